@@ -160,6 +160,11 @@ pub enum Expression {
 }
 
 impl Expression {
+    /// Whether it contains the simulation time, so that its value changes without a message.
+    pub fn reads_time(&self) -> bool {
+        matches!(self, Expression::Time) || self.parts().into_iter().any(Expression::reads_time)
+    }
+
     /// The expressions that it is directly computed from, in order.
     pub fn parts(&self) -> Vec<&Expression> {
         match self {
@@ -328,6 +333,19 @@ pub enum Condition {
     Any(Vec<Condition>),
     /// It does not hold.
     Not(Box<Condition>),
+}
+
+impl Condition {
+    /// Whether it contains the simulation time, so that it changes without a message.
+    pub fn reads_time(&self) -> bool {
+        match self {
+            Condition::Constant(_) | Condition::Input(_) => false,
+            Condition::Compare { left, right, .. } => left.reads_time() || right.reads_time(),
+            Condition::Same { left, right } => left.reads_time() || right.reads_time(),
+            Condition::All(parts) | Condition::Any(parts) => parts.iter().any(Condition::reads_time),
+            Condition::Not(of) => of.reads_time(),
+        }
+    }
 }
 
 /// How two numbers are compared.

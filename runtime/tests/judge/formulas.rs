@@ -122,8 +122,9 @@ fn key(plan: &CampaignPlan, per: &FieldRef, message: &Message) -> Option<String>
 /// A time at which a formula has a value, with its inputs then.
 type Moment = (i64, Vec<f64>);
 
-/// The values of inputs whenever a formula over them is computed: of one topic at each message, of several once per
-/// instant, when all its messages are known; as soon as every input had a message. Only messages that `counts` lets
+/// The values of inputs whenever a formula over them is computed: of one topic, or of each member of one group, at each
+/// message; of several topics, or of all members, once per instant, when all its messages are known; as soon as every
+/// input had a message. Only messages that `counts` lets
 /// through are heard; nothing is computed before the first message that `begins` it.
 fn moments(
     plan: &CampaignPlan,
@@ -137,7 +138,9 @@ fn moments(
     let mut topics: Vec<TopicId> = inputs.iter().map(|input| input.field.topic).collect();
     topics.sort_unstable();
     topics.dedup();
-    let by_instant = always_by_instant || topics.len() > 1;
+    let of_all_members =
+        |input: &Input| input.members != Members::Each && plan.topic(input.field.topic).paths.len() > 1;
+    let by_instant = always_by_instant || topics.len() > 1 || inputs.iter().any(of_all_members);
     let heard: Vec<&Message> = messages
         .iter()
         .filter(|message| topics.iter().any(|&topic| member(plan, topic, &message.path).is_some()) && counts(message))
@@ -201,7 +204,13 @@ fn moments(
 }
 
 fn of_formula(plan: &CampaignPlan, formula: &Formula, messages: &[Message], end: i64) -> Option<f64> {
+    let each = formula.inputs.iter().find(|input| input.members == Members::Each).map(|input| input.field.topic);
     let streams: Vec<Vec<Moment>> = match &formula.per {
+        // What holds of one member says nothing about another.
+        None if each.is_some() && matches!(formula.aggregate, Aggregate::Duration { .. }) => {
+            let of = |member| moments(plan, &formula.inputs, messages, |_| true, |_| true, Some(member), true);
+            (0..plan.topic(each.expect("it has such an input")).paths.len()).map(of).collect()
+        }
         None => vec![moments(plan, &formula.inputs, messages, |_| true, |_| true, None, false)],
         Some(per) => {
             let mut keys: Vec<String> = messages.iter().filter_map(|message| key(plan, per, message)).collect();

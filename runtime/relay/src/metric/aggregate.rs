@@ -1,15 +1,18 @@
 //! Declarative metrics during a run: they hold the last value of each input, and aggregate the values of the formula
 //! over time.
 //!
-//! A formula over one topic is evaluated at each of its messages. A formula over several topics is evaluated once per
-//! instant of simulation time at which one of them had a message, when all messages of that instant are known: so it
-//! never combines the new value of one topic with the old value of another that changes in the same instant. The same
-//! holds for pairs of a group's members. While the last value of an input is not finite, the formula is not evaluated.
+//! A formula over one topic, or over each member of one group, is evaluated at each message. A formula that combines
+//! several topics, or several members of a group, is evaluated once per instant of simulation time at which one of them
+//! had a message, when all messages of that instant are known: so it never combines the new value of one with the old
+//! value of another that changes in the same instant. A minimum, maximum or duration that contains the time is
+//! evaluated at every instant. While the last value of an input is not finite, the formula is not evaluated.
+//!
+//! A duration over each member has a tally for each of them, since what holds of one says nothing about another.
 
 use std::collections::BTreeMap;
 
 use sesame_base::time::SimTime;
-use sesame_plan::{Aggregate, CampaignPlan, Formula, Input, Members, TopicId};
+use sesame_plan::{Aggregate, CampaignPlan, Condition, Formula, Input, Members, TopicId};
 
 use crate::metric::Context;
 use crate::metric::expression::{Held, Moment, greatest, holds, least, number};
@@ -22,12 +25,15 @@ const KEY_LIMIT: usize = 1_000;
 /// A formula in one run.
 pub(super) struct FormulaState<'p> {
     formula: &'p Formula,
-    /// Whether its inputs are on several topics or of several members at a time.
+    /// Whether it combines several topics or several members, so that it is evaluated once per instant.
     several: bool,
+    /// Whether it is evaluated at every instant, with a message or without.
+    timed: bool,
     /// The whole state without keys; with keys, the initial state of a new one. Of pairs it holds the values.
     common: Stream,
     keys: BTreeMap<Key, Stream>,
-    /// One for each pair of a group's members, if the formula is of pairs.
+    /// One for each pair of a group's members, if the formula is of pairs; one for each member, paired with itself, if
+    /// members have tallies of their own.
     pairs: Vec<Pair>,
     /// Per member of that group: whether it had a message in the instant that is over. Kept to be used again.
     spoke: Vec<bool>,
@@ -57,11 +63,24 @@ impl<'p> FormulaState<'p> {
             paired,
             latest: None,
         };
-        let pairs: Vec<Pair> =
-            pairs_of(&formula.inputs, plan).map(|members| Pair { members, tally: Tally::default() }).collect();
+        let timed = evaluated_at_every_instant(formula);
+        let mut pairs: Vec<(usize, usize)> = pairs_of(&formula.inputs, plan).collect();
+        if formula.per.is_none() && (timed || matches!(formula.aggregate, Aggregate::Duration { .. })) {
+            let members = each().map(|input| plan.topic(input.field.topic).paths.len()).next().unwrap_or(0);
+            pairs.extend((0..members).map(|member| (member, member)));
+        }
+        let pairs: Vec<Pair> = pairs.into_iter().map(|members| Pair { members, tally: Tally::default() }).collect();
         let topics = || formula.inputs.iter().map(|input| input.field.topic);
-        let several = !pairs.is_empty() || topics().any(|topic| Some(topic) != topics().next());
-        FormulaState { formula, several, common, keys: BTreeMap::new(), pairs, spoke: Vec::new(), heard: Vec::new() }
+        let combined = |input: &Input| {
+            matches!(input.members, Members::Min | Members::Max | Members::Sum)
+                && plan.topic(input.field.topic).paths.len() > 1
+        };
+        let several = timed
+            || !pairs.is_empty()
+            || topics().any(|topic| Some(topic) != topics().next())
+            || formula.inputs.iter().any(combined);
+        let (keys, spoke, heard) = (BTreeMap::new(), Vec::new(), Vec::new());
+        FormulaState { formula, several, timed, common, keys, pairs, spoke, heard }
     }
 
     /// A message on the `member`th path of a topic, at the context's time. Returns whether the formula waits for the
@@ -119,8 +138,19 @@ impl<'p> FormulaState<'p> {
         self.several
     }
 
+    /// Whether it is evaluated at every instant; then [`FormulaState::settle`] is called for all of them.
+    pub(super) fn is_timed(&self) -> bool {
+        self.timed
+    }
+
     /// All messages of the instant at the context's time are known.
     pub(super) fn settle(&mut self, context: &mut Context) {
+        if self.timed {
+            // Time concerns all members, with a message or without.
+            for stream in std::iter::once(&mut self.common).chain(self.keys.values_mut()) {
+                (stream.heard, stream.others) = (true, true);
+            }
+        }
         if !self.pairs.is_empty() {
             self.common.settle_pairs(self.formula, &mut self.pairs, &mut self.spoke, context);
         } else if self.formula.per.is_none() {
@@ -179,6 +209,17 @@ impl<'p> FormulaState<'p> {
     }
 }
 
+/// Whether a formula changes while time passes, and its aggregate sees that: a message more or less counts in all
+/// others.
+fn evaluated_at_every_instant(formula: &Formula) -> bool {
+    let reads_time = match &formula.aggregate {
+        Aggregate::Min { of } | Aggregate::Max { of } => of.reads_time(),
+        Aggregate::Duration { of } => of.reads_time(),
+        Aggregate::Last { .. } | Aggregate::Mean { .. } | Aggregate::Count { .. } => return false,
+    };
+    reads_time || formula.when.as_ref().is_some_and(Condition::reads_time)
+}
+
 /// The pairs of different members of the group whose pairs a formula is of, each once.
 pub(super) fn pairs_of(inputs: &[Input], plan: &CampaignPlan) -> impl Iterator<Item = (usize, usize)> {
     let group = inputs.iter().find(|input| input.members == Members::First).map(|input| input.field.topic);
@@ -186,7 +227,7 @@ pub(super) fn pairs_of(inputs: &[Input], plan: &CampaignPlan) -> impl Iterator<I
     (0..count).flat_map(move |first| (first + 1..count).map(move |second| (first, second)))
 }
 
-/// The aggregated values of a pair of members.
+/// The aggregated values of a pair of members, or of one member, paired with itself.
 struct Pair {
     members: (usize, usize),
     tally: Tally,

@@ -1,5 +1,6 @@
 //! All metrics of one run: which messages they read, and their results.
 
+use sesame_base::activation::TICK;
 use sesame_base::observation::{MetricObservation, Reach};
 use sesame_base::time::SimTime;
 use sesame_base::verdict::ends;
@@ -9,6 +10,7 @@ use sesame_plan::{CampaignPlan, Formula, Members, MetricId, MetricSource, Side, 
 use crate::metric::aggregate::FormulaState;
 use crate::metric::robustness::RobustnessState;
 use crate::metric::{Context, Hook, HookEntry};
+
 use crate::stl::FormulaError;
 use crate::value::{Text, Value};
 use crate::wire::{Wire, WireTable};
@@ -108,7 +110,7 @@ impl<'p> MetricTable<'p> {
 
     /// Fresh metrics for one run.
     pub fn start(&self) -> Metrics<'_> {
-        let states = self
+        let states: Vec<State<'_>> = self
             .hooks
             .iter()
             .zip(&self.plan.metrics)
@@ -130,7 +132,8 @@ impl<'p> MetricTable<'p> {
                 ended: false,
             })
             .collect();
-        Metrics { table: self, states, now: SimTime::ZERO, waiting: Vec::new() }
+        let timed = states.iter().enumerate().filter(|(_, state)| state.is_timed()).map(|(at, _)| at).collect();
+        Metrics { table: self, states, now: SimTime::ZERO, waiting: Vec::new(), timed, timed_until: None }
     }
 }
 
@@ -142,6 +145,10 @@ pub struct Metrics<'p> {
     now: SimTime,
     /// The metrics whose formulas wait for the end of the current instant.
     waiting: Vec<usize>,
+    /// The metrics whose formulas are evaluated at the end of every instant.
+    timed: Vec<usize>,
+    /// The last instant of which they were.
+    timed_until: Option<SimTime>,
 }
 
 struct State<'p> {
@@ -153,6 +160,13 @@ struct State<'p> {
     waits: bool,
     /// Whether it knows the end of the run.
     ended: bool,
+}
+
+impl State<'_> {
+    fn is_timed(&self) -> bool {
+        self.formula.as_ref().is_some_and(FormulaState::is_timed)
+            || self.robustness.as_ref().is_some_and(RobustnessState::is_timed)
+    }
 }
 
 impl Metrics<'_> {
@@ -183,6 +197,11 @@ impl Metrics<'_> {
     /// The current instant is over: all its messages are known. Returns whether a formula waited for that.
     pub fn settle(&mut self) -> bool {
         let waited = !self.waiting.is_empty();
+        // The time right after an instant, at which its values switch operations, still belongs to it.
+        if self.timed_until.is_none_or(|last| self.now > last + TICK) {
+            self.timed_until = Some(self.now);
+            self.wake_timed();
+        }
         for at in self.waiting.drain(..) {
             let State { formula, context, waits, .. } = &mut self.states[at];
             *waits = false;
@@ -192,6 +211,19 @@ impl Metrics<'_> {
             }
         }
         waited
+    }
+
+    /// Lets those metrics wait that change while time passes.
+    fn wake_timed(&mut self) {
+        for &at in &self.timed {
+            let State { robustness, context, waits, .. } = &mut self.states[at];
+            if let Some(robustness) = robustness {
+                context.now = self.now;
+                robustness.tick(context);
+            } else if !std::mem::replace(waits, true) {
+                self.waiting.push(at);
+            }
+        }
     }
 
     /// Tells hooks and formulas that the run has ended. This is not called after a failure.

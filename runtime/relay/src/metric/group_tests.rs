@@ -137,16 +137,82 @@ fn a_text_is_compared_at_all_members_at_any_or_at_the_one_of_the_message() {
     assert_eq!(of(Members::Max, ahead()), Some(10.0), "any is");
     assert_eq!(of(Members::Min, TextTest::IsNot("ahead".into())), Some(0.0), "none is");
     assert_eq!(of(Members::Max, TextTest::IsNot("ahead".into())), Some(2.0 + 4.0), "any is not");
-    assert_eq!(of(Members::Each, TextTest::IsNot("elsewhere".into())), Some(10.0));
+    let of_each = of(Members::Each, TextTest::IsNot("elsewhere".into()));
+    assert_eq!(of_each, Some(10.0 + 9.0), "of each member since its first message");
 }
 
 #[test]
-fn time_is_that_of_the_message() {
+fn a_duration_over_each_member_does_not_depend_on_the_order_of_messages_in_an_instant() {
+    let out =
+        || Condition::Compare { left: Expression::Input(0), by: Comparison::Above, right: Expression::Constant(5.0) };
+    let x = || vec![input(POSES, &["at", "x"], Members::Each)];
+    let of = |sent: &[Sent]| value(formula(x(), Aggregate::Duration { of: out() }), sent);
+    let outside = |paths: [&'static str; 2]| -> Vec<Sent> {
+        (0..10)
+            .flat_map(|second| paths.map(|path| (second * 1000, path, if path == "poses/a" { 9.0 } else { 0.0 })))
+            .collect()
+    };
+    assert_eq!(of(&outside(["poses/a", "poses/b"])), Some(10.0));
+    assert_eq!(of(&outside(["poses/b", "poses/a"])), Some(10.0));
+}
+
+#[test]
+fn members_that_change_in_the_same_instant_are_seen_together() {
+    let x = |members| input(POSES, &["at", "x"], members);
+    let spread = Expression::Sum(vec![Expression::Input(0), Expression::Negate(Box::new(Expression::Input(1)))]);
+    let sent: Vec<Sent> = (0..10)
+        .flat_map(|second| ["poses/a", "poses/b", "poses/c"].map(|path| (second * 1000, path, second as f64)))
+        .collect();
+    let both = || vec![x(Members::Max), x(Members::Min)];
+    assert_eq!(value(formula(both(), Aggregate::Max { of: spread.clone() }), &sent), Some(0.0));
+    let apart = Condition::Compare { left: spread, by: Comparison::Above, right: Expression::Constant(0.5) };
+    assert_eq!(value(formula(both(), Aggregate::Count { of: apart }), &sent), Some(0.0));
+    let total = Aggregate::Max { of: Expression::Input(0) };
+    assert_eq!(value(formula(vec![x(Members::Sum)], total), &sent), Some(27.0));
+}
+
+/// A topic that falls silent at 2 s and returns at 8 s; other messages show that time passes.
+fn silent_for_six_seconds() -> Vec<Sent> {
+    let mut sent: Vec<Sent> = (0..100).map(|tenth| (tenth * 100, "goals/a", 0.0)).collect();
+    let stamps = (0..100).filter(|tenth| !(21..80).contains(tenth));
+    sent.extend(stamps.map(|tenth| (tenth * 100, "tower", tenth as f64 / 10.0)));
+    sent.sort_by_key(|message| message.0);
+    sent
+}
+
+#[test]
+fn the_age_of_a_silent_topic_grows_until_its_next_message() {
+    let age = || Expression::Sum(vec![Expression::Time, Expression::Negate(Box::new(Expression::Input(0)))]);
+    let x = || vec![input(TOWER, &["at", "x"], Members::Min)];
+    let sent = silent_for_six_seconds();
+    let near = |found: Option<f64>, expected: f64| assert!((found.unwrap() - expected).abs() < 1e-9, "{found:?}");
+    near(value(formula(x(), Aggregate::Max { of: age() }), &sent), 5.9);
+    let late = || Condition::Compare { left: age(), by: Comparison::Above, right: Expression::Constant(0.95) };
+    near(value(formula(x(), Aggregate::Duration { of: late() }), &sent), 5.0);
+    near(value(formula(x(), Aggregate::Count { of: late() }), &sent), 0.0);
+    let MetricSource::Robustness { mut robustness } = always_above(x(), 0.0) else { unreachable!("it is one") };
+    robustness.signals = vec![Expression::Sum(vec![Expression::Constant(1.0), Expression::Negate(Box::new(age()))])];
+    near(value(MetricSource::Robustness { robustness }, &sent), -4.9);
+}
+
+#[test]
+fn each_member_has_an_age_of_its_own() {
+    let age = || Expression::Sum(vec![Expression::Time, Expression::Negate(Box::new(Expression::Input(0)))]);
+    let x = || vec![input(POSES, &["at", "x"], Members::Each)];
+    // One is heard once, the other again and again.
+    let mut sent: Vec<Sent> = vec![(0, "poses/a", 0.0)];
+    sent.extend((0..80).map(|tenth| (tenth * 100, "poses/b", tenth as f64 / 10.0)));
+    assert_eq!(value(formula(x(), Aggregate::Max { of: age() }), &sent), Some(10.0));
+    assert_eq!(value(formula(x(), Aggregate::Min { of: age() }), &sent), Some(0.0));
+}
+
+#[test]
+fn time_is_that_of_the_message_and_passes_without_one() {
     let late = Condition::Compare { left: Expression::Time, by: Comparison::Above, right: Expression::Constant(2.0) };
     let sent = [(1000, "tower", 1.0), (2000, "tower", 1.0), (2001, "tower", 1.0), (9000, "tower", 1.0)];
     let x = || vec![input(TOWER, &["at", "x"], Members::Min)];
     assert_eq!(value(formula(x(), Aggregate::Count { of: late }), &sent), Some(2.0));
-    assert_eq!(value(formula(x(), Aggregate::Max { of: Expression::Time }), &sent), Some(9.0));
+    assert_eq!(value(formula(x(), Aggregate::Max { of: Expression::Time }), &sent), Some(10.0));
 }
 
 #[test]

@@ -5,7 +5,7 @@ use sesame_base::observation::Reach;
 use sesame_base::robustness::quantifier;
 use sesame_base::time::SimTime;
 use sesame_plan::stl::{Formula, Interval, Robustness};
-use sesame_plan::{CampaignPlan, Members, TopicId};
+use sesame_plan::{CampaignPlan, Expression, Members, TopicId};
 
 use crate::metric::Context;
 use crate::metric::aggregate::pairs_of;
@@ -47,6 +47,24 @@ struct Said {
 }
 
 impl Instance {
+    /// Gives the monitor the values of the signals at the context's time, once there are values.
+    fn push(&mut self, signals: &[Expression], context: &mut Context) {
+        let (Some(values), Some(monitor)) = (self.held.values(), &mut self.monitor) else { return };
+        for (at, signal) in signals.iter().enumerate() {
+            let moment = Moment::new(values, context.now());
+            let value = number(signal, &moment);
+            // As with other formulas: if arithmetic gives no number, the last value stays.
+            if value.is_finite() {
+                monitor.push(context.now, at, value);
+            }
+            if let Some(undefined) = moment.undefined() {
+                context.note(format!("{undefined} at {}", context.now));
+            } else if !value.is_finite() {
+                context.note(format!("refused the value {value} at {}", context.now));
+            }
+        }
+    }
+
     /// Nothing is known from `now` on: the trace is evaluated up to the `last` message before.
     fn break_off(&mut self, now: SimTime, last: SimTime) {
         if let Some(monitor) = self.monitor.take() {
@@ -91,7 +109,7 @@ impl<'p> RobustnessState<'p> {
         }
         let before = std::mem::replace(&mut self.last, context.now);
         for instance in &mut self.instances {
-            let Instance { of, held, monitor, .. } = instance;
+            let Instance { of, held, .. } = instance;
             // If each member or pair has a formula, values of all members go to all formulas, and those of one member
             // to its own.
             let mut finite = true;
@@ -116,20 +134,20 @@ impl<'p> RobustnessState<'p> {
                 instance.break_off(context.now, before);
                 continue;
             }
-            let (Some(values), Some(monitor)) = (held.values(), monitor) else { continue };
-            for (at, signal) in signals.iter().enumerate() {
-                let moment = Moment::new(values, context.now());
-                let value = number(signal, &moment);
-                // As with other formulas: if arithmetic gives no number, the last value stays.
-                if value.is_finite() {
-                    monitor.push(context.now, at, value);
-                }
-                if let Some(undefined) = moment.undefined() {
-                    context.note(format!("{undefined} at {}", context.now));
-                } else if !value.is_finite() {
-                    context.note(format!("refused the value {value} at {}", context.now));
-                }
-            }
+            instance.push(signals, context);
+        }
+    }
+
+    /// Whether its signals change while time passes; then [`RobustnessState::tick`] is called for every instant.
+    pub(super) fn is_timed(&self) -> bool {
+        self.robustness.signals.iter().any(Expression::reads_time)
+    }
+
+    /// The instant at the context's time is over, with a message or without.
+    pub(super) fn tick(&mut self, context: &mut Context) {
+        self.last = self.last.max(context.now);
+        for instance in &mut self.instances {
+            instance.push(&self.robustness.signals, context);
         }
     }
 
@@ -213,7 +231,7 @@ mod tests {
 
     use sesame_base::observation::MetricObservation;
     use sesame_plan::testing::plan;
-    use sesame_plan::{Comparison, Expression, FieldRef, Input, MetricSource, Side};
+    use sesame_plan::{Comparison, FieldRef, Input, MetricSource, Side};
 
     use super::*;
     use crate::metric::MetricTable;
