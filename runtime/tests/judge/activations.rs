@@ -8,7 +8,7 @@ use sesame_plan::condition::{Condition, Operand};
 use sesame_plan::{Activation, Copies, MetricId, MetricSource};
 
 use crate::case::{Case, topics_of, variables};
-use crate::formulas::{Judged, first_blank, hears_deliveries, judged};
+use crate::formulas::{Judged, first_blank, hears_deliveries, is_by_instant, judged};
 use crate::ledger::Ledger;
 
 /// Something that changes what a condition says: the values of all its variables from then on.
@@ -18,8 +18,8 @@ struct Change {
     end: bool,
 }
 
-/// Intervals that are not where the documentation has them. Conditions over several topics at once, over active time,
-/// and copies that wait for each other are left to other tests.
+/// Intervals that are not where the documentation has them. Conditions over what is computed once per instant, over
+/// active time, and copies that wait for each other are left to other tests.
 pub(crate) fn contradictions(case: &Case, observed: &Observation, ledger: &Ledger) -> Vec<String> {
     let mut wrong = Vec::new();
     for (used, effect) in case.test.operations.iter().zip(&observed.operations) {
@@ -28,10 +28,16 @@ pub(crate) fn contradictions(case: &Case, observed: &Observation, ledger: &Ledge
             let mut topics = topics_of(metric);
             topics.sort_unstable();
             topics.dedup();
+            let by_instant = match &metric.source {
+                MetricSource::Formula { formula } => {
+                    is_by_instant(&case.plan, &formula.inputs, Some(&formula.aggregate))
+                }
+                _ => topics.len() != 1,
+            };
             // What one key has held is known only with its next message.
             let held = matches!(&metric.source, MetricSource::Formula { formula } if formula.per.is_some());
             let open = held || first_blank(&case.plan, metric, ledger).is_some();
-            topics.len() == 1 && !open && !matches!(metric.source, MetricSource::Robustness { .. })
+            !by_instant && !open && !matches!(metric.source, MetricSource::Robustness { .. })
         };
         let copies = case.test.operations.iter().filter(|other| other.operation == used.operation).count();
         let apart = copies == 1 || case.plan.campaign.copies == Copies::MayOverlap;

@@ -119,6 +119,20 @@ fn key(plan: &CampaignPlan, per: &FieldRef, message: &Message) -> Option<String>
     })
 }
 
+/// Whether a formula is computed once per instant: of several topics, of all members of a group, or with a duration for
+/// each member.
+pub(crate) fn is_by_instant(plan: &CampaignPlan, inputs: &[Input], aggregate: Option<&Aggregate>) -> bool {
+    let mut topics: Vec<TopicId> = inputs.iter().map(|input| input.field.topic).collect();
+    topics.sort_unstable();
+    topics.dedup();
+    let members = |input: &Input| plan.topic(input.field.topic).paths.len();
+    let of_all_members = |input: &Input| input.members != Members::Each && members(input) > 1;
+    let each = inputs.iter().any(|input| input.members == Members::Each);
+    topics.len() > 1
+        || inputs.iter().any(of_all_members)
+        || each && matches!(aggregate, Some(Aggregate::Duration { .. }))
+}
+
 /// A time at which a formula has a value, with its inputs then.
 type Moment = (i64, Vec<f64>);
 

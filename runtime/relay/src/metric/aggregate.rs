@@ -240,7 +240,7 @@ struct Stream {
     tally: Tally,
     /// Whether a message of the current instant has not been aggregated yet.
     heard: bool,
-    /// Whether it was on a topic that is not of the groups below.
+    /// Whether it changed a value that concerns all members of the groups below.
     others: bool,
     /// The members of groups from which it came, if each member or pair has a formula: each once, the latest last.
     members: Vec<usize>,
@@ -262,9 +262,10 @@ impl Stream {
         if formula.inputs.iter().any(|input| of_members(input) && input.field.topic == topic) {
             self.members.retain(|&heard| heard != member);
             self.members.push(member);
-        } else {
-            self.others = true;
         }
+        // What is computed of all members concerns each of them.
+        let of_all = |input: &Input| matches!(input.members, Members::Min | Members::Max | Members::Sum);
+        self.others |= formula.inputs.iter().any(|input| of_all(input) && input.field.topic == topic);
     }
 
     /// The instant is over, and nothing in it is left to aggregate.
