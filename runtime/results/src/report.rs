@@ -14,9 +14,11 @@ mod tables;
 mod text;
 
 pub use crate::analysis::confirmed::{ConfirmedTest, FindingAgain};
+pub use crate::present::number::quantity;
 pub use crate::present::table::TextOptions;
 pub use export::{ExportError, Exported, export};
 pub use facts::coverage::CoverageSummary;
+pub use facts::readable::sentence as readable_sentence;
 pub use facts::recording::{FedMetric, RecordingReplay, Sameness};
 pub use facts::repetition::{Repetition, ViolationRate};
 pub use facts::replay::Replay;

@@ -7,6 +7,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use sesame_plan::{CampaignPlan, Direction, MetricSource};
 use sesame_results::record::TestRecord;
+use sesame_results::report::{quantity, readable_sentence};
 
 use crate::campaign::{CampaignEvent, Progress};
 use crate::cli::progress_line::{Line, awaited, cost, countdown, warning};
@@ -64,7 +65,7 @@ impl<'a> Display<'a> {
                 }
                 return;
             }
-            CampaignEvent::Warned { text } => return self.say(&warning(text)),
+            CampaignEvent::Warned { text } => return self.say(&warned(self.plan, text)),
             CampaignEvent::SearchStarted { reference, timeout } => {
                 self.began = Instant::now();
                 // How long the rest of a campaign takes that was stopped, its tests will show.
@@ -150,12 +151,15 @@ impl<'a> Display<'a> {
             }
             let Some(worst) = worst else { continue };
             let word = if objective.direction == Direction::Maximise { "most" } else { "least" };
-            parts.push(
-                format!("{word} {} {worst:.4}", metric.name).trim_end_matches('0').trim_end_matches('.').to_owned(),
-            );
+            parts.push(format!("{word} {} {}", metric.name, quantity(*worst, metric.unit.as_deref())));
         }
         parts
     }
+}
+
+/// A warning with short numbers and units; it is recorded with all digits.
+fn warned(plan: &CampaignPlan, text: &str) -> String {
+    warning(&readable_sentence(plan, text))
 }
 
 /// How long the remaining tests will take if each takes as long as those of this session.
@@ -204,6 +208,27 @@ mod tests {
 
     fn progress(done: u32, earlier: u32, front: &Front) -> Progress<'_> {
         Progress { done, total: 200, earlier, confirmation_runs: 0, front, coverage: None }
+    }
+
+    #[test]
+    fn values_have_their_unit_and_no_more_digits_than_matter() {
+        let plan = sesame_results::record::sample::plan();
+        let mut display = Display::new(&plan, 7, 1);
+        display.worst.fill(Some(-7.392_612_3));
+        let front = Front::default();
+        let details = display.details(progress(1, 0, &front));
+        let units: Vec<String> = plan
+            .objectives()
+            .map(|objective| plan.metric(objective.metric))
+            .filter(|metric| !matches!(metric.source, MetricSource::FuzzingTime))
+            .map(|metric| metric.unit.as_ref().map_or(String::new(), |unit| format!(" {unit}")))
+            .collect();
+        assert!(!units.is_empty());
+        for (detail, unit) in details.iter().skip(1).zip(&units) {
+            assert!(detail.ends_with(&format!(" -7.393{unit}")), "{detail}");
+        }
+        let text = "requirement R3 is violated before anything is fuzzed: `arm_distance` is -2.244690363500318";
+        assert!(warned(&plan, text).ends_with("`arm_distance` is -2.245 mm"), "{}", warned(&plan, text));
     }
 
     #[test]

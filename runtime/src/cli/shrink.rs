@@ -8,8 +8,9 @@ use clap::Args;
 use sesame_base::observation::{Observation, Outcome};
 use sesame_base::test_number::TestNumber;
 use sesame_plan::{CampaignPlan, Failing, RequirementId, Shrinking, Task};
-use sesame_results::record::{Origin, Repository, TestRecord, Verdict, verdict};
+use sesame_results::record::{self, Origin, RecordError, Repository, TestRecord, Verdict, verdict};
 
+use crate::cli::caller::Caller;
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled};
 use crate::cli::failure::Failure;
 use crate::cli::results_folder::{open, refuse_changed};
@@ -18,7 +19,7 @@ use crate::cli::session::Session;
 /// Which test is shrunk, and how.
 #[derive(Debug, Args)]
 pub struct Options {
-    /// The test, for example `T158`
+    /// The test, for example `T158`; to shrink a regression test, run `known` and give its folder with `--results`
     test: String,
     /// Folder of the run that recorded the test, for example `results/42`; by default the latest
     #[arg(long, value_name = "DIR")]
@@ -51,8 +52,16 @@ pub(super) fn shrink(session: &Session, options: &Options) -> Result<ExitCode, F
             options.evaluations, options.runs
         )));
     }
+    let declared = session.plan.tests.iter().any(|test| test.name == options.test);
+    if declared && options.results.is_none() && record::latest_folder(results)?.is_none() {
+        return Err(not_recorded(&session.caller, &options.test));
+    }
     let repository = open(results, options.results.as_deref())?;
-    let record = repository.test(repository.find(&options.test)?)?;
+    let number = match repository.find(&options.test) {
+        Err(RecordError::NoSuchTest { .. }) if declared => return Err(not_recorded(&session.caller, &options.test)),
+        found => found?,
+    };
+    let record = repository.test(number)?;
     let name = TestNumber(record.number).to_string();
     let failing = failing(&repository, &record, &options.requirement)?;
     refuse_changed(session, &repository, record.number)?;
@@ -73,6 +82,16 @@ pub(super) fn shrink(session: &Session, options: &Options) -> Result<ExitCode, F
     refuse_unfilled(&session.runner, &plan, true)?;
     let (recorder, folder) = begin(session, into, &folder_name, &plan, &task, seed, &options.execution)?;
     execute(session, recorder, &folder, &options.execution, &options.output, files)
+}
+
+/// What to do for a regression test that these results do not have.
+fn not_recorded(caller: &Caller, test: &str) -> Failure {
+    let known = caller.command("known", &[test]);
+    let shrink = caller.command("shrink", &[test, "--results", "known"]);
+    Failure(format!(
+        "the regression test `{test}` did not run in these results. The first command runs it and prints the folder of its \
+         results, which the second one names (`known`, or `known-2` if there is a `known` already):\n    {known}\n    {shrink}"
+    ))
 }
 
 /// How a test failed, and with which requirements.
@@ -137,6 +156,17 @@ mod tests {
     use sesame_results::record::sample;
 
     use super::*;
+
+    #[test]
+    fn a_regression_test_that_did_not_run_is_to_be_run_first() {
+        let caller = Caller { program: "sesamec".to_owned(), arguments: vec!["cell.sesame".to_owned()] };
+        let Failure(words) = not_recorded(&caller, "cut_both");
+        let commands: Vec<&str> = words.lines().skip(1).map(str::trim).collect();
+        assert_eq!(
+            commands,
+            ["sesamec known cell.sesame cut_both", "sesamec shrink cell.sesame cut_both --results known"]
+        );
+    }
 
     fn found(name: &str, wanted: &[&str]) -> Result<Failing, String> {
         let folder = tempfile::tempdir().unwrap();

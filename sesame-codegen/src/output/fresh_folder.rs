@@ -17,7 +17,8 @@ pub struct FreshFolder {
 }
 
 impl FreshFolder {
-    /// Begins to fill a folder that must be empty or not there yet. No link in the place of what is written is followed.
+    /// Begins to fill a folder that must be empty or not there yet. A link in the place of what is
+    /// written is removed, never followed.
     pub fn begin(target: &Path) -> Result<FreshFolder, Error> {
         const BEGUN: &str = ".sesamec-import";
         let was_there = is_empty_but_for(target, BEGUN)?;
@@ -148,12 +149,27 @@ mod tests {
     #[test]
     fn no_link_is_followed() {
         let folder = tempfile::tempdir().unwrap();
-        let (out, elsewhere) = (folder.path().join("out"), folder.path().join("elsewhere"));
-        fs::create_dir(&out).unwrap();
+        let elsewhere = folder.path().join("elsewhere");
         fs::create_dir(&elsewhere).unwrap();
         fs::write(elsewhere.join("mine"), "").unwrap();
-        std::os::unix::fs::symlink(&elsewhere, out.join(".sesamec-import")).unwrap();
-        FreshFolder::begin(&out).unwrap_err();
-        assert_eq!(names(&elsewhere), ["mine"]);
+        fs::create_dir(folder.path().join("out")).unwrap();
+        for (target, link) in [("out", "out/.sesamec-import"), ("new", ".new.sesamec-import")] {
+            let (target, link) = (folder.path().join(target), folder.path().join(link));
+            for behind in [&elsewhere, &elsewhere.join("mine"), &folder.path().join("missing")] {
+                std::os::unix::fs::symlink(behind, &link).unwrap();
+                let begun = FreshFolder::begin(&target).unwrap();
+                assert_eq!(begun.path(), link);
+                assert!(fs::symlink_metadata(&link).unwrap().is_dir(), "the link gives way to a folder");
+                fill(&begun);
+                assert_eq!(names(&elsewhere), ["mine"], "written through {}", link.display());
+            }
+            std::os::unix::fs::symlink(&elsewhere, &link).unwrap();
+            let begun = FreshFolder::begin(&target).unwrap();
+            fill(&begun);
+            begun.settle().unwrap();
+            assert_eq!(names(&target), ["a.sesame", "results"]);
+            assert_eq!(names(&elsewhere), ["mine"]);
+        }
+        assert_eq!(names(folder.path()), ["elsewhere", "new", "out"]);
     }
 }

@@ -35,8 +35,8 @@ pub(crate) fn number(x: f64) -> String {
     fixed(x, decimals([x]))
 }
 
-/// A number and its unit.
-pub(crate) fn quantity(x: f64, unit: Option<&str>) -> String {
+/// A number as people read it, with its unit: at most four significant digits or three decimals, `-7.393 m`.
+pub fn quantity(x: f64, unit: Option<&str>) -> String {
     with_unit(number(x), unit)
 }
 

@@ -10,7 +10,7 @@ use sesame_base::test_number::TestNumber;
 use sesame_notation as notation;
 use sesame_plan::{Bound, CampaignPlan, Expectation, MetricId};
 
-use crate::record::{RecordError, Repository, TestRecord};
+use crate::record::{RecordError, Repository, TestRecord, Verdict, verdict};
 
 /// A test in the words of the language.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -37,9 +37,10 @@ pub enum ExportError {
 
 /// The test that a user calls `T158`, `158`, or by the name of a regression test, as a block of the language.
 ///
-/// The block has a `name` of its own, by default one that the space does not use yet. It expects of each objective the
-/// value that was measured; in a campaign without objectives, of each metric that a requirement bounds. It names the
-/// simulator's seed of the run, so it has these values in any campaign that ends at the same time.
+/// The block has a `name` of its own, by default one that the space does not use yet. It expects the measured values of
+/// each objective and of each metric with which the test violates a requirement; without objectives, of each metric that
+/// a requirement bounds. It names the simulator's seed of the run, so it has these values in any campaign that ends at
+/// the same time.
 pub fn export(repository: &Repository, test: &str, name: Option<&str>) -> Result<Exported, ExportError> {
     let record = repository.test(repository.find(test)?)?;
     if record.test.operations.is_empty() {
@@ -81,10 +82,16 @@ fn expectations(plan: &CampaignPlan, record: &TestRecord) -> Vec<String> {
         return vec![format!("// Its run ended as a {}, so there is no value to expect.", outcome.word())];
     }
     let mut metrics = plan.campaign.objectives.clone();
-    if metrics.is_empty() {
-        metrics.extend(plan.requirements.iter().map(|requirement| requirement.metric));
+    let searched = !metrics.is_empty();
+    for requirement in &plan.requirements {
+        let value = record.observation.value(requirement.metric);
+        let expected = !searched || verdict(requirement.bound, outcome, value) == Verdict::Violated;
+        if expected && !metrics.contains(&requirement.metric) {
+            metrics.push(requirement.metric);
+        }
+    }
+    if !searched {
         metrics.sort();
-        metrics.dedup();
     }
     let expected = metrics.into_iter().map(|metric| match value(record, metric) {
         Some(value) => notation::expectation(&Expectation { metric, bound: Bound::Equal { value } }, &plan.metrics),
@@ -115,6 +122,7 @@ fn free_name(plan: &CampaignPlan, name: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use sesame_base::observation::Reach;
     use sesame_plan::condition::ConditionEnd;
     use sesame_plan::{Activation, Choice, Moment, OperationId, OperationKind, Test, TestOperation};
 
@@ -165,6 +173,29 @@ mod tests {
         plan.operations[4].kind = OperationKind::Custom { moment: Moment::AfterEnd };
         let after = block(&plan, "T5 of `coverage_experiment`, seed 42.", &record, "spoilt");
         assert!(after.contains("\n  spoil way \"hot\" after end seed 11\n"), "{after}");
+    }
+
+    #[test]
+    fn a_block_expects_the_objectives_and_the_metrics_of_violated_requirements() {
+        let mut plan = sample::plan();
+        let mut record = sample::record(&plan, 5, crate::record::Origin::Search, sample::conditional_test());
+        plan.campaign.objectives.truncate(1);
+        let objective = plan.campaign.objectives[0];
+        plan.requirements.retain(|requirement| requirement.metric != objective);
+        plan.requirements.truncate(1);
+        plan.requirements[0].bound = Bound::AtMost { value: 5.0 };
+        let bounded = plan.requirements[0].metric;
+        let name = plan.metric(bounded).name.clone();
+        for (value, expected) in [(5.0, 1), (6.0, 2)] {
+            let measured = &mut record.observation.metrics[bounded.index()];
+            (measured.value, measured.reach) = (Some(value), Reach { low: Some(value), high: Some(value) });
+            let lines = expectations(&plan, &record);
+            assert_eq!(lines.len(), expected, "{value}: {lines:?}");
+            assert_eq!(lines.iter().any(|line| line.contains(&name)), expected == 2, "{lines:?}");
+        }
+        plan.campaign.objectives.clear();
+        record.observation.metrics[bounded.index()].value = Some(5.0);
+        assert!(expectations(&plan, &record)[0].contains(&name), "without objectives, of all requirements");
     }
 
     #[test]

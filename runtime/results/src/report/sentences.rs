@@ -154,7 +154,7 @@ pub(crate) fn outcome_sentence(test: &TestReport) -> String {
     };
     let _ =
         write!(sentence, ", {}", plural(usize::try_from(test.messages).unwrap_or(usize::MAX), "message", "messages"));
-    if let Some(generation) = test.generation {
+    if let Some(generation) = test.generation.filter(|_| test.repeats.is_none()) {
         let _ = write!(sentence, ", generation {generation}");
     }
     if let Some(original) = &test.duplicate_of {
@@ -189,9 +189,22 @@ pub(crate) fn spans_text(spans: &[Span]) -> String {
     format!("{} s{more}", words.join(", "))
 }
 
-/// When a requirement was violated in a run; a dash for never.
-pub(crate) fn outside_text(requirement: &VerdictReport) -> String {
-    if requirement.unrecorded { "not recorded".to_owned() } else { spans_text(&requirement.outside) }
+/// When a requirement that a run violates was violated in it; a dash if the run does not violate it.
+pub(crate) fn beyond_text(requirement: &VerdictReport) -> String {
+    match requirement.first {
+        _ if requirement.unrecorded => "not recorded".to_owned(),
+        Verdict::Violated => spans_text(&requirement.outside),
+        Verdict::Satisfied | Verdict::Inconclusive => spans_text(&[]),
+    }
+}
+
+/// What a column of [`beyond_text`] means, if it says anything.
+pub(crate) fn beyond_sentence(requirements: &[VerdictReport]) -> Option<&'static str> {
+    let said = requirements.iter().any(|shown| shown.first == Verdict::Violated && !shown.outside.is_empty());
+    said.then_some(
+        "Beyond bound: when the metric's value up to then violated the requirement (a maximum that has crossed an upper \
+         bound stays beyond it); for a robustness, when its signal did.",
+    )
 }
 
 /// A metric's value in a run, of a robustness with the time that decided it: `-2.25 m at 41.20 s`.

@@ -5,6 +5,7 @@ use crate::analysis::regions::Rule;
 use crate::present::number::{self, plural};
 use crate::present::table::{Cell, Column, Datum, Table};
 use crate::record::{Difference, MetricValue, Verdict};
+use crate::report::facts::readable::short_numbers;
 use crate::report::facts::recording::{FedMetric, Sameness};
 use crate::report::facts::repetition::ViolationRate;
 use crate::report::facts::show::{MetricReport, OperationReport, TestList, VerdictReport};
@@ -15,7 +16,7 @@ use crate::report::facts::summary::{
 };
 use crate::report::facts::wording::value_text;
 use crate::report::sentences::{
-    as_expected, choices_text, effect_text, outcome_words, outside_text, planned_text, rate_text, spans_text,
+    as_expected, beyond_text, choices_text, effect_text, outcome_words, planned_text, rate_text, spans_text,
     verdict_value_text,
 };
 
@@ -111,13 +112,19 @@ pub(super) fn expectations(expectations: &[ExpectationSummary]) -> Table {
         Column::words("as expected"),
     ]);
     for ExpectationSummary { test, known_test, metric, bound, value, verdict } in expectations {
+        let mut value_text = value.map_or("unmeasured".to_owned(), number::number);
+        let mut bound_text = short_numbers(bound);
+        // All digits where the short ones do not show why the value is not as expected.
+        if let Some(value) = value.filter(|_| *verdict == Verdict::Violated && bound_text.contains(&value_text)) {
+            value_text = number::exact(value);
+            bound_text.clone_from(bound);
+        }
         table.row([
             Datum::text(known_test).into(),
             Datum::Test(*test).into(),
             Datum::text(metric).into(),
-            // All digits, since the comparison is exact.
-            Cell::from(Datum::Text(value.map_or("unmeasured".to_owned(), number::exact))),
-            Datum::text(bound).into(),
+            Cell::from(Datum::Text(value_text)),
+            Datum::Text(bound_text).into(),
             Datum::text(as_expected(*verdict)).bad_if(*verdict != Verdict::Satisfied),
         ]);
     }
@@ -179,10 +186,11 @@ pub(super) fn list(list: &TestList) -> Table {
             Some(original) => format!("as {original}"),
             None => outcome_words(&test.outcome),
         };
+        let generation = test.generation.filter(|_| test.repeats.is_none());
         let mut cells = vec![
             Datum::Text(format!("{}{}", test.test, if test.front { "*" } else { "" })),
-            Datum::text(&test.origin),
-            Datum::Text(test.generation.map_or(String::new(), |generation| generation.to_string())),
+            Datum::text(test.repeats.unwrap_or(&test.origin)),
+            Datum::Text(generation.map_or(String::new(), |generation| generation.to_string())),
             Datum::Text(outcome),
         ];
         let value = |at: usize| Datum::real(test.values.get(at).and_then(|shown| shown.value));
@@ -236,7 +244,7 @@ pub(super) fn verdicts(requirements: &[VerdictReport]) -> Table {
     if again {
         columns.extend(["violated in fresh runs", "in the first run"].map(Column::words));
     }
-    columns.extend([Column::words("value"), Column::words("outside"), Column::sentence("sentence")]);
+    columns.extend([Column::words("value"), Column::words("beyond bound"), Column::sentence("sentence")]);
     let mut table = Table::with(columns);
     for requirement in requirements {
         let mut cells = vec![
@@ -249,7 +257,7 @@ pub(super) fn verdicts(requirements: &[VerdictReport]) -> Table {
         }
         cells.extend([
             Datum::Text(verdict_value_text(requirement)),
-            Datum::Text(outside_text(requirement)),
+            Datum::Text(beyond_text(requirement)),
             Datum::text(&requirement.text),
         ]);
         table.row(cells);

@@ -3,7 +3,7 @@
 use sesame_plan::Task;
 
 use super::*;
-use crate::record::{Origin, Repository, Standing, sample};
+use crate::record::{Origin, Repository, Standing, Verdict, sample};
 
 mod browser;
 mod page;
@@ -202,6 +202,47 @@ fn a_repetition_says_how_often_each_requirement_was_violated() {
     });
     insta::assert_snapshot!("repeated", summary_text(&summary(&repository).unwrap(), WIDE));
     assert!(page(&repository).unwrap().contains("95 % Wilson interval"));
+    let shown = test_text(&show(&repository, "T3").unwrap(), WIDE);
+    assert!(shown.starts_with("T3 (repetition)\n") && !shown.contains("generation"), "{shown}");
+    assert!(!list_text(&list(&repository).unwrap(), WIDE).contains("search"));
+    assert_eq!(serde_json::to_value(show(&repository, "T3").unwrap()).unwrap()["origin"], "search", "as in results");
+}
+
+#[test]
+fn runs_of_a_passive_campaign_are_observations() {
+    let folder = tempfile::tempdir().unwrap();
+    let task = Task::Repeat { name: "undisturbed".to_owned(), test: sesame_plan::Test::default(), times: 2 };
+    let plan = task.plan(&sample::plan());
+    let mut recorder = crate::record::Recorder::create_for(folder.path(), &plan, &task, 1, 1).unwrap();
+    for number in 1..=2 {
+        let test = sesame_plan::Test::default();
+        recorder.commit(&sample::record(&plan, number, crate::record::Origin::Search, test)).unwrap();
+    }
+    let repository = recorder.finish("all tests were evaluated").unwrap();
+    let text = summary_text(&summary(&repository).unwrap(), WIDE);
+    assert!(text.contains("Observed without disturbance") && !text.contains("undisturbed repeated"), "{text}");
+    assert!(test_text(&show(&repository, "T2").unwrap(), WIDE).starts_with("T2 (observation)\n"));
+    assert_eq!(list_text(&list(&repository).unwrap(), WIDE).matches("observation").count(), 2);
+    let page = page(&repository).unwrap();
+    assert!(page.contains("2 observations") && !page.contains("undisturbed repeated"));
+}
+
+#[test]
+fn only_a_violated_requirement_says_when_its_metric_was_beyond_the_bound() {
+    let (_folder, repository) = repository();
+    let mut report = show(&repository, "T1").unwrap();
+    let beyond = sesame_plan::Span { start: 0.1, end: 8.0 };
+    let violated = report.requirements.iter_mut().find(|shown| shown.first == Verdict::Violated).unwrap();
+    violated.outside = vec![beyond];
+    let note = "Beyond bound: when";
+    let text = test_text(&report, WIDE);
+    assert!(text.contains("beyond bound") && text.contains("0.10–8.00 s") && text.contains(note), "{text}");
+    for shown in &mut report.requirements {
+        shown.first = Verdict::Satisfied;
+        shown.outside = vec![beyond];
+    }
+    let text = test_text(&report, WIDE);
+    assert!(!text.contains("0.10–8.00 s") && !text.contains(note), "{text}");
 }
 
 #[test]

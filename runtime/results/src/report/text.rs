@@ -9,8 +9,8 @@ use crate::report::facts::show::{TestList, TestReport};
 use crate::report::facts::shrinking::Shrinking;
 use crate::report::facts::summary::Summary;
 use crate::report::sentences::{
-    confirmation_sentence, counts_sentence, coverage_sentence, headline, once_sentence, outcome_sentence,
-    shrinking_sentence, values_sentence,
+    beyond_sentence, confirmation_sentence, counts_sentence, coverage_sentence, headline, once_sentence,
+    outcome_sentence, shrinking_sentence, values_sentence,
 };
 use crate::report::tables;
 
@@ -33,8 +33,7 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
     section(&mut text, "Requirements", &tables::requirements(summary), options);
     section(&mut text, "Regression tests", &tables::expectations(&summary.expectations), options);
     if let Some(repetition) = &summary.repetition {
-        let title = format!("{} repeated", repetition.test);
-        section(&mut text, &title, &tables::violation_rates(&repetition.requirements), options);
+        section(&mut text, &repetition.title, &tables::violation_rates(&repetition.requirements), options);
     }
     section(&mut text, "Crashes and timeouts", &tables::failures(&summary.failures), options);
     section(&mut text, "Numbers that are not finite", &tables::not_finite(&summary.not_finite), options);
@@ -83,7 +82,11 @@ pub fn list_text(list: &TestList, options: TextOptions) -> String {
 /// Everything on one test.
 pub fn test_text(test: &TestReport, options: TextOptions) -> String {
     let mut text = String::new();
-    paragraph(&mut text, &options.heading(&format!("{} ({})", test.test, test.origin)), options);
+    paragraph(
+        &mut text,
+        &options.heading(&format!("{} ({})", test.test, test.repeats.unwrap_or(&test.origin))),
+        options,
+    );
     paragraph(&mut text, &outcome_sentence(test), options);
     if !test.parents.is_empty() {
         let parents: Vec<String> = test.parents.iter().map(ToString::to_string).collect();
@@ -96,6 +99,9 @@ pub fn test_text(test: &TestReport, options: TextOptions) -> String {
     }
     section(&mut text, "Metrics", &tables::metrics(&test.metrics), options);
     section(&mut text, "Requirements", &tables::verdicts(&test.requirements), options);
+    if let Some(sentence) = beyond_sentence(&test.requirements) {
+        paragraph(&mut text, sentence, options);
+    }
     if let Some(confirmed) = &test.confirmed {
         section(&mut text, "Run again", &tables::findings(confirmed), options);
     }

@@ -10,7 +10,7 @@ use crate::present::number;
 const DIGITS: usize = 6;
 
 /// A recorded sentence with short numbers, and with units where it says what a metric is.
-pub(crate) fn sentence(plan: &CampaignPlan, text: &str) -> String {
+pub fn sentence(plan: &CampaignPlan, text: &str) -> String {
     short_numbers(&with_units(plan, text))
 }
 

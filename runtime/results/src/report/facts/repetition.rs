@@ -5,6 +5,7 @@ use serde::Serialize;
 use sesame_plan::{CampaignPlan, Task};
 
 use crate::analysis::statistics::wilson;
+use crate::present::number::plural;
 use crate::record::{Origin, Tally, TestRow};
 
 /// The results of repeating one test.
@@ -14,6 +15,9 @@ pub struct Repetition {
     pub test: String,
     /// How often each requirement was violated, in the space's order.
     pub requirements: Vec<ViolationRate>,
+    /// The heading of these results.
+    #[serde(skip)]
+    pub(crate) title: String,
 }
 
 /// How often a requirement was violated.
@@ -31,6 +35,22 @@ pub struct ViolationRate {
     pub interval: Option<[f64; 2]>,
 }
 
+/// What a run that is not a reference run is called where a test is repeated instead of searched for: an observation
+/// if the test has no operations, else a repetition.
+pub(crate) fn run_word(plan: &CampaignPlan, task: &Task) -> Option<&'static str> {
+    task.repeated(plan).map(|repeated| if repeated.test.operations.is_empty() { "observation" } else { "repetition" })
+}
+
+/// How often which test is repeated, in words; `None` if none is.
+pub(crate) fn repeated_words(plan: &CampaignPlan, task: &Task) -> Option<String> {
+    let repeated = task.repeated(plan)?;
+    Some(if repeated.test.operations.is_empty() {
+        plural(repeated.times as usize, "observation", "observations")
+    } else {
+        format!("{} repeated {} times", repeated.name, repeated.times)
+    })
+}
+
 /// The results of a run that repeats a test; `None` for any other.
 pub(crate) fn repetition(plan: &CampaignPlan, task: &Task, rows: &[TestRow]) -> Option<Repetition> {
     let repeated = task.repeated(plan)?;
@@ -45,5 +65,9 @@ pub(crate) fn repetition(plan: &CampaignPlan, task: &Task, rows: &[TestRow]) -> 
             interval: wilson(tally.violated, tally.conclusive()),
         }
     });
-    Some(Repetition { test: repeated.name.to_owned(), requirements: requirements.collect() })
+    let title = match repeated.test.operations[..] {
+        [] => "Observed without disturbance".to_owned(),
+        _ => format!("{} repeated", repeated.name),
+    };
+    Some(Repetition { test: repeated.name.to_owned(), requirements: requirements.collect(), title })
 }

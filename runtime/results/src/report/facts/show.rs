@@ -10,7 +10,7 @@ use sesame_base::robustness;
 use sesame_base::test_number::TestNumber;
 use sesame_notation as notation;
 use sesame_plan::stl::Formula;
-use sesame_plan::{Activation, Bound, CampaignPlan, Choice, Metric, MetricSource, Span};
+use sesame_plan::{Activation, Bound, CampaignPlan, Choice, Metric, MetricSource, Span, Task};
 
 use crate::analysis::confirmed::{ConfirmedTest, confirmed_test};
 use crate::analysis::statistics::wilson;
@@ -20,6 +20,7 @@ use crate::record::{
     verdict, violation_spans,
 };
 use crate::report::facts::readable;
+use crate::report::facts::repetition::run_word;
 use crate::report::facts::stacked::{Stacked, stacked_in};
 use crate::report::facts::wording;
 
@@ -32,6 +33,9 @@ pub struct ListedTest {
     pub origin: String,
     /// The generation it belongs to.
     pub generation: Option<u32>,
+    /// What a run is called in a campaign that repeats a test or observes, instead of searching; `None` for others.
+    #[serde(skip)]
+    pub(crate) repeats: Option<&'static str>,
     /// `completed`, `no_effect`, `unknown`, `crash` or `timeout`.
     pub outcome: String,
     /// The equal test whose result stands for this one.
@@ -70,6 +74,9 @@ pub struct TestReport {
     pub origin: String,
     /// The generation it belongs to.
     pub generation: Option<u32>,
+    /// What a run is called in a campaign that repeats a test or observes, instead of searching; `None` for others.
+    #[serde(skip)]
+    pub(crate) repeats: Option<&'static str>,
     /// The tests it was made of.
     pub parents: Vec<TestNumber>,
     /// The simulator's seed in its run.
@@ -217,15 +224,20 @@ pub fn list(repository: &Repository) -> Result<TestList, RecordError> {
     Ok(TestList {
         metrics: plan.metrics.iter().map(|metric| metric.name.clone()).collect(),
         units: plan.metrics.iter().map(|metric| metric.unit.clone()).collect(),
-        tests: repository.tests()?.iter().map(|row| listed(plan, &judge, row, front.contains(&row.number))).collect(),
+        tests: repository
+            .tests()?
+            .iter()
+            .map(|row| listed(plan, repository.task(), &judge, row, front.contains(&row.number)))
+            .collect(),
     })
 }
 
-fn listed(plan: &CampaignPlan, judge: &Judge<'_>, row: &TestRow, front: bool) -> ListedTest {
+fn listed(plan: &CampaignPlan, task: &Task, judge: &Judge<'_>, row: &TestRow, front: bool) -> ListedTest {
     ListedTest {
         test: TestNumber(row.number),
         origin: origin(plan, row.origin),
         generation: row.generation,
+        repeats: run_word(plan, task).filter(|_| row.origin == Origin::Search),
         outcome: row.outcome.word().to_owned(),
         duplicate_of: row.duplicate_of.map(TestNumber),
         front,
@@ -253,7 +265,7 @@ pub fn show(repository: &Repository, name: &str) -> Result<TestReport, RecordErr
     let record = repository.test(repository.find(name)?)?;
     let front = repository.latest_result_set()?.is_some_and(|set| set.members.contains(&record.number));
     let ran = record.duplicate_of.unwrap_or(record.number);
-    let mut report = report_on(repository.plan(), &record, repository.judge()?.runs(ran), front);
+    let mut report = report_on(repository.plan(), repository.task(), &record, repository.judge()?.runs(ran), front);
     let notes = repository.events()?.into_iter();
     let notes = notes.filter(|event| event.kind == EventKind::Session && event.test == Some(ran));
     report.notes = notes.map(|event| event.text).collect();
@@ -263,13 +275,20 @@ pub fn show(repository: &Repository, name: &str) -> Result<TestReport, RecordErr
 }
 
 /// Everything on a test, from its record and its fresh runs, without the findings of fresh runs, notes and trace.
-pub(crate) fn report_on(plan: &CampaignPlan, record: &TestRecord, fresh: &[Repetition], front: bool) -> TestReport {
+pub(crate) fn report_on(
+    plan: &CampaignPlan,
+    task: &Task,
+    record: &TestRecord,
+    fresh: &[Repetition],
+    front: bool,
+) -> TestReport {
     let observation = &record.observation;
     TestReport {
         test: TestNumber(record.number),
         number: record.number,
         origin: origin(plan, record.origin),
         generation: record.generation,
+        repeats: run_word(plan, task).filter(|_| record.origin == Origin::Search),
         parents: record.parents.iter().copied().map(TestNumber).collect(),
         simulator_seed: record.simulator_seed,
         duplicate_of: record.duplicate_of.map(TestNumber),

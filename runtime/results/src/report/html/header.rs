@@ -5,6 +5,7 @@ use sesame_plan::{Search, Task};
 use crate::present::markup::Markup;
 use crate::present::number::{self, plural};
 use crate::record::{RecordError, Repository};
+use crate::report::facts::repetition::repeated_words;
 use crate::report::facts::summary::Summary;
 use crate::report::sentences::{counts_sentence, headline};
 
@@ -33,8 +34,7 @@ pub(super) fn header(
         (Task::Known { tests }, _) => plural(tests.len(), "regression test", "regression tests"),
         (Task::Shrink(shrinking), _) => format!("{} at most", budget(&format!("{} shrunk", shrinking.name))),
         (Task::Campaign, Search::Repeat { .. }) | (Task::Repeat { .. }, _) => {
-            let repeated = facts.task.repeated(plan);
-            repeated.map_or_else(String::new, |repeated| format!("{} repeated {} times", repeated.name, repeated.times))
+            repeated_words(plan, &facts.task).unwrap_or_default()
         }
     };
     let search = match plan.campaign.coverage.as_ref().and_then(|goal| goal.stop_at) {

@@ -84,7 +84,8 @@ fn page_in(repository: &Repository, folder: &Path, digest: &str) -> Result<Strin
 }
 
 /// What the marks of a timeline mean.
-const MARKS: &str = "Outlined: planned; filled: active. Red: outside the bound of a requirement.";
+const MARKS: &str =
+    "Outlined: planned; filled: active. Red: the value up to then is outside the bound of a requirement.";
 
 /// Tests that get a timeline, under a heading.
 struct Group {
@@ -156,7 +157,7 @@ fn sections(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
     if let Some(repetition) = &summary.repetition {
         let caption = "How often each requirement was violated, with the 95 % Wilson interval.";
         let table = tables::violation_rates(&repetition.requirements);
-        section(body, &format!("{} repeated", repetition.test), Some(caption), table, drawn);
+        section(body, &repetition.title, Some(caption), table, drawn);
     }
     section(body, "Regression tests", None, tables::expectations(&summary.expectations), drawn);
     section(body, "Crashes and timeouts", None, tables::failures(&summary.failures), drawn);

@@ -9,7 +9,7 @@ use crate::report::facts::summary::Summary;
 use crate::report::facts::wording::value_text;
 use crate::report::html::command;
 use crate::report::html::timeline::timeline;
-use crate::report::sentences::outcome_sentence;
+use crate::report::sentences::{beyond_sentence, outcome_sentence};
 use crate::report::tables;
 
 /// Draws a test of these results; `folder` is the path of the run's folder relative to the page.
@@ -23,7 +23,7 @@ pub(super) fn test(
     let record = repository.test(number)?;
     let ran = record.duplicate_of.unwrap_or(number);
     let on_front = summary.front.iter().any(|test| test.number == number);
-    let report = report_on(repository.plan(), &record, repository.judge()?.runs(ran), on_front);
+    let report = report_on(repository.plan(), repository.task(), &record, repository.judge()?.runs(ran), on_front);
     body.open("article", &[("class", "test"), ("id", &report.test.to_string())]);
     heading(body, summary, &report);
     timeline(body, repository.plan(), &record, &report);
@@ -39,8 +39,8 @@ pub(super) fn test(
 fn heading(body: &mut Markup, summary: &Summary, report: &TestReport) {
     body.open("h3", &[]);
     body.text(&report.test.to_string());
-    if report.origin != "search" {
-        body.element("span", &[("class", "quiet")], &format!(" {}", report.origin));
+    if report.origin != "search" || report.repeats.is_some() {
+        body.element("span", &[("class", "quiet")], &format!(" {}", report.repeats.unwrap_or(&report.origin)));
     }
     for requirement in report.requirements.iter().filter(|requirement| requirement.verdict == Verdict::Violated) {
         body.element("span", &[("class", "chip"), ("title", &requirement.text)], &requirement.requirement);
@@ -76,6 +76,9 @@ fn figures(body: &mut Markup, report: &TestReport, command: &str) {
     tables::metrics(&report.metrics).html(body, &[]);
     if !report.requirements.is_empty() {
         tables::verdicts(&report.requirements).html(body, &[]);
+        if let Some(sentence) = beyond_sentence(&report.requirements) {
+            body.element("p", &[("class", "quiet")], sentence);
+        }
     }
     for warning in &report.warnings {
         body.open("p", &[("class", "warning")]);

@@ -350,6 +350,7 @@ mod tests {
     use proptest::prelude::*;
 
     use sesame_base::observation::Counters;
+    use sesame_plan::Task;
 
     use super::*;
     use crate::record::{Origin, sample};
@@ -372,7 +373,7 @@ mod tests {
         record.observation.end = 60.0;
         record.observation.metrics.iter_mut().for_each(|metric| metric.series.truncate(3));
         let mut markup = Markup::default();
-        timeline(&mut markup, &plan, &record, &report_on(&plan, &record, &[], true));
+        timeline(&mut markup, &plan, &record, &report_on(&plan, &Task::Campaign, &record, &[], true));
         insta::assert_snapshot!("timeline", markup.finish().replace("><", ">\n<"));
     }
 
@@ -381,7 +382,7 @@ mod tests {
         let plan = sample::plan();
         let record = sample::record(&plan, 1, Origin::Search, sample::conditional_test());
         let mut markup = Markup::default();
-        let report = report_on(&plan, &record, &[], true);
+        let report = report_on(&plan, &Task::Campaign, &record, &[], true);
         timeline(&mut markup, &plan, &record, &report);
         let drawn = markup.finish();
         assert_eq!(drawn.matches(r#"class="planned""#).count(), 3, "{drawn}");
@@ -399,7 +400,7 @@ mod tests {
         record.observation.metrics[3] = MetricObservation::whole(Some(999.0), false, vec![]);
         let drawn = |record: &TestRecord| {
             let mut markup = Markup::default();
-            timeline(&mut markup, &plan, record, &report_on(&plan, record, &[], true));
+            timeline(&mut markup, &plan, record, &report_on(&plan, &Task::Campaign, record, &[], true));
             let drawn = markup.finish();
             drawn.split("<b>cycle_time</b>").nth(1).map(str::to_owned)
         };
@@ -416,7 +417,7 @@ mod tests {
         let mut record = sample::record(&plan, 1, Origin::Search, sample::conditional_test());
         let drawn = |record: &TestRecord| {
             let mut markup = Markup::default();
-            timeline(&mut markup, &plan, record, &report_on(&plan, record, &[], true));
+            timeline(&mut markup, &plan, record, &report_on(&plan, &Task::Campaign, record, &[], true));
             markup.finish()
         };
         assert!(!drawn(&record).contains("<details"));
