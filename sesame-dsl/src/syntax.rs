@@ -5,6 +5,7 @@
 
 pub(crate) mod ast;
 mod blocks;
+mod foreign;
 mod limits;
 mod parse;
 mod syntax_error;

@@ -9,6 +9,7 @@ use pest::iterators::Pairs;
 use sesame_grammar::Rule;
 
 use super::blocks::{self, Block};
+use super::foreign::{self, Expected, Rewrite};
 use super::limits::parse_bounded;
 use super::token::{Token, TokenKind, is_keyword, token_at};
 use crate::diagnostic::{Applicability, Code, Diagnostic, Suggestion};
@@ -139,6 +140,11 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
             .label(format!("expected {expected}"))
             .fix(format!("write `{range}`"), join, count);
     }
+    if let Some((operator, rewrites)) = foreign::operator(text, failure.at).filter(|_| !counts(Rule::equals)) {
+        let title = format!("unexpected `{}`", &text[operator.clone()]);
+        let diagnostic = Diagnostic::new(Code::SYNTAX, placed(file, operator), title);
+        return rewritten(diagnostic.label("not an operator of the language"), rewrites);
+    }
     let joins = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || c == '_');
     if found.text == "-" && joins(before) && joins(after) {
         let diagnostic = Diagnostic::new(Code::NOT_A_NAME, span, "a name cannot contain `-`")
@@ -218,10 +224,46 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
             diagnostic = diagnostic.note(format!("`{}` is declared inside `system {{ … }}`", found.text));
         }
     }
+    let from = previous.map_or(region.lo, |previous| previous.lo) as usize;
+    let part = if counts(Rule::times) { Expected::Operator } else { Expected::Operand };
+    diagnostic = rewritten(diagnostic, foreign::notation(text, from, found.lo, part));
+    if counts(Rule::range) || counts(Rule::bracket_open) {
+        diagnostic = rewritten(diagnostic, one_value(text, found));
+    }
     if found.kind == TokenKind::Sign && found.text == "=" && failure.expected.contains(&Rule::equal_to) {
         diagnostic = diagnostic.fix("use `==` to compare", span, "==");
     }
     diagnostic
+}
+
+fn placed(file: FileId, range: std::ops::Range<usize>) -> Span {
+    let [lo, hi] = [range.start, range.end].map(|at| u32::try_from(at).expect("files are small"));
+    Span { file, lo, hi }
+}
+
+fn rewritten(mut diagnostic: Diagnostic, rewrites: impl IntoIterator<Item = Rewrite>) -> Diagnostic {
+    let file = diagnostic.span.file;
+    for Rewrite { message, edits, same } in rewrites {
+        let edits = edits.into_iter().map(|(range, written)| (placed(file, range), written)).collect();
+        let mut suggestion = Suggestion::possible(message, edits);
+        if same {
+            suggestion.applicability = Applicability::MachineApplicable;
+        }
+        diagnostic.suggestions.push(suggestion);
+    }
+    diagnostic
+}
+
+/// One value where a range is expected: `packet loss 50%`.
+fn one_value(text: &str, found: Token<'_>) -> Option<Rewrite> {
+    let number = if found.text == "-" { token_at(text, found.hi()) } else { found };
+    let place = found.lo..number.hi();
+    let range = format!("[{0}, {0}]", &text[place.clone()]);
+    (number.kind == TokenKind::Number).then(|| Rewrite {
+        message: format!("use the range `{range}`, which has one value"),
+        edits: vec![(place, range)],
+        same: false,
+    })
 }
 
 /// What foreign words at a token mean, of what can stand there, and where they end: two words that belong together,
@@ -469,11 +511,10 @@ fn phrases_of(rule: Rule) -> Vec<String> {
         Rule::formula_outbound => &["`outbound`"],
         Rule::formula_whole => &["`whole windows`"],
         Rule::fuzzing_time => &["`fuzzing_time()`"],
-        Rule::minus
-        | Rule::k_not
+        Rule::minus => &["`-`"],
+        Rule::k_not
         | Rule::k_always
         | Rule::k_eventually
-        | Rule::k_implies
         | Rule::k_node
         | Rule::k_parameter
         | Rule::k_pair
