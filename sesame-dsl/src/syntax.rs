@@ -5,6 +5,7 @@
 
 pub(crate) mod ast;
 mod blocks;
+mod bounds;
 mod foreign;
 mod limits;
 mod parse;

@@ -178,7 +178,7 @@ fn chained(text: &str, from: usize, second: Token<'_>) -> Option<Rewrite> {
     let first = &text[left.start..middle.end];
     let written = format!("{first} and {} {} {}", &text[middle], second.text, &text[right.clone()]);
     Some(Rewrite {
-        message: "compare twice, joined with `and`".to_owned(),
+        message: format!("use `{written}`"),
         edits: vec![(left.start..right.end, in_parentheses(text, left.start..right.end, &written))],
         same: false,
     })
@@ -240,7 +240,7 @@ fn operand(text: &str, from: usize, end: usize, rule: Rule) -> Option<Range<usiz
 }
 
 /// What a rule reads at a place.
-fn following(text: &str, at: usize, rule: Rule) -> Option<Range<usize>> {
+pub(super) fn following(text: &str, at: usize, rule: Rule) -> Option<Range<usize>> {
     let lo = token_at(text, at).lo;
     let read = parse_bounded(rule, &text[lo..]).ok()?;
     Some(lo..lo + read.as_str().trim_end().len())
