@@ -136,6 +136,13 @@ const SYNONYMS: &[Synonym] = &[
     like("decreasing", "falling"),
     like("nonincreasing", "falling"),
     like("init", "initial"),
+    // Temporal operators.
+    same("globally", "always"),
+    like("g", "always"),
+    same("finally", "eventually"),
+    like("future", "eventually"),
+    like("f", "eventually"),
+    like("u", "until"),
     // Types of messages.
     same("float", "real"),
     same("float32", "real"),

@@ -5,6 +5,8 @@
 
 pub(crate) mod ast;
 mod blocks;
+mod bounds;
+mod foreign;
 mod limits;
 mod parse;
 mod syntax_error;

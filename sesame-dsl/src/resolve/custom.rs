@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::Resolver;
-use crate::diagnostic::{Code, Diagnostic};
+use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::model::{self, Domain, Moment, OperationKind, Parameter, Shape, Target};
 use crate::span::Span;
 use crate::syntax::ast;
@@ -114,6 +114,16 @@ impl<'a> Resolver<'a> {
         what: &str,
     ) -> Option<([f64; 3], [f64; 3])> {
         let [low, high] = corners;
+        if let (None, None, Some(unit)) = (&low.coordinates[0].unit, &high.coordinates[0].unit, unit) {
+            let title = format!("`{}` and `{}` have no unit", self.text(low.span), self.text(high.span));
+            let mut diagnostic = Diagnostic::new(Code::WRONG_UNIT, low.span.to(high.span), title)
+                .label(format!("{what} is in `{}`", unit.text()));
+            let edits = corners.iter().map(|point| (point.span.end(), unit.text().to_owned())).collect();
+            let message = format!("add the unit `{}`", unit.text());
+            diagnostic.suggestions.push(Suggestion::possible(message, edits));
+            self.report(diagnostic);
+            return None;
+        }
         let from = self.coordinates(low, unit, what);
         let to = self.coordinates(high, unit, what);
         let [from, to] = [from?, to?];

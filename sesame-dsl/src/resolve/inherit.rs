@@ -79,7 +79,8 @@ fn hand_down(base: &Campaign, child: &mut Campaign) {
         child.repeats.clone_from(&base.repeats);
         child.passives.clone_from(&base.passives);
     }
-    let searches = !child.searches.is_empty();
+    // One that also repeats or observes is wrong as it is; what it would inherit for a search is not its mistake.
+    let searches = !child.searches.is_empty() && child.repeats.is_empty() && child.passives.is_empty();
     // What is missing in the base was reported there.
     child.has_errors |= base.has_errors || !own || searches != base.searches.is_empty();
     child.inherited_errors |= base.inherited_errors;

@@ -141,14 +141,24 @@ impl<'a> Resolver<'a> {
         let Some(lengths) = self.operations[index].as_ref().and_then(|operation| operation.lengths) else { return };
         let title =
             format!("`{}` cannot keep its permitted lengths in campaign `{}`", name.text, campaign.head.name.text);
-        let diagnostic = Diagnostic::new(Code::CANNOT_CONTAIN, name.span, title);
+        let activation = campaign.activates.first().and_then(|(span, mode)| match mode {
+            ast::ActivationMode::Condition(by) => Some(by.lengths.first().map_or(*span, |(_, range)| range.span)),
+            ast::ActivationMode::Time => None,
+        });
+        // What a campaign inherits is not its mistake: that is what it writes itself.
+        let (place, other) = match activation.filter(|_| campaign.inherited.operations) {
+            Some(activation) => (activation, (name.span, "its operations are listed here")),
+            None => (name.span, (activation.unwrap_or(name.span), "activated here")),
+        };
+        let diagnostic = Diagnostic::new(Code::CANNOT_CONTAIN, place, title);
         let diagnostic = match space.lengths {
             Some(of) if permitted(of).shared(permitted(lengths)).is_some() => return,
-            Some(of) => diagnostic.label(format!("its activations last {}s to {}s here", of.low, of.high)),
+            Some(of) => diagnostic.label(format!("activations last {}s to {}s here", of.low, of.high)),
             None => diagnostic
-                .label("its activations end by a condition here, at any time")
+                .label("activations end by a condition here, at any time")
                 .note("add `for` with a range of times to the `activate` of this campaign, such as `for [0.1s, 2s]`"),
         };
+        let diagnostic = diagnostic.secondary(other.0, other.1);
         let declared = self.written_lengths(index);
         self.report(match declared {
             Some(declared) => diagnostic.secondary(declared, "its permitted lengths"),

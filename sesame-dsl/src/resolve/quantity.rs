@@ -108,7 +108,7 @@ impl Resolver<'_> {
         self.report(diagnostic);
     }
 
-    /// A diagnostic with what numbers without a unit may mean. Between 0 and 1, a share is probably written as a
+    /// A diagnostic with what numbers without a unit may mean. From -1 to 1, a share is probably written as a
     /// fraction.
     fn with_unit(&self, mut diagnostic: Diagnostic, numbers: &[&Quantity], unit: &Unit) -> Diagnostic {
         // A sign right behind a number would continue its unit: `0/h`.
@@ -119,7 +119,10 @@ impl Resolver<'_> {
         if numbers.iter().any(glued) {
             return diagnostic;
         }
-        if unit.text() == "%" && numbers.iter().all(|number| (0.0..=1.0).contains(&number.value)) {
+        // Zero is the same in both.
+        let share = |number: &&Quantity| (-1.0..=1.0).contains(&number.value);
+        let zero = numbers.iter().all(|number| number.value == 0.0);
+        if unit.text() == "%" && numbers.iter().all(share) && !zero {
             let percentage = |number: f64| sesame_notation::Unit::Share.number(number);
             let percentages = numbers.iter().map(|number| (number.span, percentage(number.value)));
             let message = "write the fraction as a percentage";

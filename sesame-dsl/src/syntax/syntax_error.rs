@@ -9,6 +9,8 @@ use pest::iterators::Pairs;
 use sesame_grammar::Rule;
 
 use super::blocks::{self, Block};
+use super::bounds;
+use super::foreign::{self, Expected, Rewrite};
 use super::limits::parse_bounded;
 use super::token::{Token, TokenKind, is_keyword, token_at};
 use crate::diagnostic::{Applicability, Code, Diagnostic, Suggestion};
@@ -43,6 +45,8 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, block: &Block, pre
     let member = block.begins_with(after.text) || (block.begins_with_a_name() && after.kind == TokenKind::Word);
     let ends = member || matches!(after.kind, TokenKind::End | TokenKind::Doc) || after.text == "}";
     let starts = || std::iter::once(region.lo).chain(previous.map(|previous| previous.lo));
+    let last = with_signs(text, region.hi);
+    let mut readable = Vec::new();
     diagnostic.suggestions.retain_mut(|suggestion| {
         let inside = |lo: u32| suggestion.edits.iter().all(|(span, _)| lo <= span.lo && span.hi <= region.hi);
         let readings: Vec<Reading> =
@@ -50,9 +54,31 @@ pub(super) fn explain(file: FileId, text: &str, region: Span, block: &Block, pre
         if !ends || !readings.contains(&Reading::Whole) {
             suggestion.applicability = Applicability::MaybeIncorrect;
         }
-        readings.is_empty() || readings.iter().any(|reading| *reading != Reading::NotEvenTheSuggestion)
+        let keeps = readings.is_empty() || readings.iter().any(|reading| *reading != Reading::NotEvenTheSuggestion);
+        if keeps {
+            let whole = |lo| reading(text, lo, last, suggestion, block) == Reading::Whole;
+            readable.push(readings.is_empty() || starts().filter(|&lo| inside(lo)).any(whole));
+        }
+        keeps
     });
+    // What leads to no other mistake is likelier.
+    if readable.contains(&true) {
+        let mut readable = readable.into_iter();
+        diagnostic.suggestions.retain(|_| readable.next().unwrap_or(true));
+    }
     diagnostic
+}
+
+/// Where the signs end that follow a stretch: it ends at its last word or number.
+fn with_signs(text: &str, hi: u32) -> u32 {
+    let mut end = hi as usize;
+    loop {
+        let after = token_at(text, end);
+        if after.kind != TokenKind::Sign || matches!(after.text, "{" | "}") {
+            return u32::try_from(end).expect("files are small");
+        }
+        end = after.hi();
+    }
 }
 
 /// How far a stretch can be read with a suggestion applied.
@@ -139,6 +165,11 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
             .label(format!("expected {expected}"))
             .fix(format!("write `{range}`"), join, count);
     }
+    if let Some((operator, rewrites)) = foreign::operator(text, failure.at).filter(|_| !counts(Rule::equals)) {
+        let title = format!("unexpected `{}`", &text[operator.clone()]);
+        let diagnostic = Diagnostic::new(Code::SYNTAX, placed(file, operator), title);
+        return rewritten(diagnostic.label("not an operator of the language"), rewrites);
+    }
     let joins = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || c == '_');
     if found.text == "-" && joins(before) && joins(after) {
         let diagnostic = Diagnostic::new(Code::NOT_A_NAME, span, "a name cannot contain `-`")
@@ -166,6 +197,22 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
     // A keyword that begins the next declaration is in its place: what lacks is the name before it.
     let [in_file, in_system] = [Rule::file, Rule::system].map(|rule| blocks::block(rule).begins_with(found.text));
     let declares = (in_file || in_system) && (next.kind == TokenKind::Word || next.text == "{");
+    if first.text == "requirement"
+        && let Some(formula) = bounds::formula(text, first.lo, found.lo)
+    {
+        let title = "a requirement is a bound on a metric, not a formula";
+        return Diagnostic::new(Code::SYNTAX, span, title)
+            .label(if wants_name { "expected the name of a metric" } else { "expected a bound such as `<= 0`" })
+            .note(format!("declare a metric with the formula, {formula}"));
+    }
+    if matches!(found.text, "maximise" | "minimise") && wants_name && next.kind == TokenKind::Word && !declares {
+        let title = format!("`{}` belongs to the declaration of the metric", found.text);
+        let gap = placed(file, found.lo..next.lo);
+        return Diagnostic::new(Code::KEYWORD_AS_NAME, span, title)
+            .label("expected the name of a metric")
+            .suggest("remove the direction", gap, "")
+            .note(format!("the direction is declared as in `metric {} {} = …`", next.text, found.text));
+    }
     if wants_name && found.kind == TokenKind::Word && is_keyword(found.text) && !declares {
         return Diagnostic::new(
             Code::KEYWORD_AS_NAME,
@@ -218,10 +265,51 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
             diagnostic = diagnostic.note(format!("`{}` is declared inside `system {{ … }}`", found.text));
         }
     }
+    let from = previous.map_or(region.lo, |previous| previous.lo) as usize;
+    let part = if counts(Rule::times) { Expected::Operator } else { Expected::Operand };
+    diagnostic = rewritten(diagnostic, foreign::notation(text, from, found.lo, part));
+    if found.text == "and"
+        && let Some(previous) = previous
+    {
+        diagnostic = rewritten(diagnostic, bounds::both(text, previous.lo as usize, found));
+    }
+    if counts(Rule::range) || counts(Rule::bracket_open) {
+        diagnostic = rewritten(diagnostic, one_value(text, found));
+    }
     if found.kind == TokenKind::Sign && found.text == "=" && failure.expected.contains(&Rule::equal_to) {
         diagnostic = diagnostic.fix("use `==` to compare", span, "==");
     }
     diagnostic
+}
+
+fn placed(file: FileId, range: std::ops::Range<usize>) -> Span {
+    let [lo, hi] = [range.start, range.end].map(|at| u32::try_from(at).expect("files are small"));
+    Span { file, lo, hi }
+}
+
+fn rewritten(mut diagnostic: Diagnostic, rewrites: impl IntoIterator<Item = Rewrite>) -> Diagnostic {
+    let file = diagnostic.span.file;
+    for Rewrite { message, edits, same } in rewrites {
+        let edits = edits.into_iter().map(|(range, written)| (placed(file, range), written)).collect();
+        let mut suggestion = Suggestion::possible(message, edits);
+        if same {
+            suggestion.applicability = Applicability::MachineApplicable;
+        }
+        diagnostic.suggestions.push(suggestion);
+    }
+    diagnostic
+}
+
+/// One value where a range is expected: `packet loss 50%`.
+fn one_value(text: &str, found: Token<'_>) -> Option<Rewrite> {
+    let number = if found.text == "-" { token_at(text, found.hi()) } else { found };
+    let place = found.lo..number.hi();
+    let range = format!("[{0}, {0}]", &text[place.clone()]);
+    (number.kind == TokenKind::Number).then(|| Rewrite {
+        message: format!("use the range `{range}`, which has one value"),
+        edits: vec![(place, range)],
+        same: false,
+    })
 }
 
 /// What foreign words at a token mean, of what can stand there, and where they end: two words that belong together,
@@ -469,11 +557,10 @@ fn phrases_of(rule: Rule) -> Vec<String> {
         Rule::formula_outbound => &["`outbound`"],
         Rule::formula_whole => &["`whole windows`"],
         Rule::fuzzing_time => &["`fuzzing_time()`"],
-        Rule::minus
-        | Rule::k_not
+        Rule::minus => &["`-`"],
+        Rule::k_not
         | Rule::k_always
         | Rule::k_eventually
-        | Rule::k_implies
         | Rule::k_node
         | Rule::k_parameter
         | Rule::k_pair

@@ -3,10 +3,11 @@
 use sesame_grammar::Rule;
 
 use super::reader::{Pair, Reader, child, children, expect_child, first_of};
+use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::span::Span;
 use crate::syntax::ast::{
     Amounts, Contained, Custom, CustomParameter, Distribution, Domain, Drain, Moment, NotFinite, Operation,
-    OperationBody, OperationKind, Place, Range, Step, Stuck, Target, Text,
+    OperationBody, OperationKind, Place, Point, Range, Step, Stuck, Target, Text, UnitName,
 };
 
 impl Reader<'_> {
@@ -144,7 +145,30 @@ impl Reader<'_> {
         let corners = child(pair, Rule::corners)?;
         let mut points = children(&corners, Rule::point).map(|point| self.point(&point));
         let mut next = || points.next().expect("a box has two corners");
-        Some(Amounts::Corners(Box::new([next(), next()]), self.span(&corners)))
+        let mut ends = [next(), next()];
+        drop(points);
+        if let Some(unit) = child(&expect_child(&corners, Rule::corners_end), Rule::unit).map(|unit| self.unit(&unit)) {
+            self.unit_of_corners(&mut ends, unit);
+        }
+        Some(Amounts::Corners(Box::new(ends), self.span(&corners)))
+    }
+
+    /// Reports a unit after the `]` of a box, and reads it as that of its corners without one.
+    fn unit_of_corners(&mut self, corners: &mut [Point; 2], unit: UnitName) {
+        let title = "the unit of a box is given for each point, after its `)`";
+        let mut diagnostic = Diagnostic::new(Code::WRONG_UNIT, unit.span, title).label("unexpected unit");
+        let mut edits = vec![(unit.span, String::new())];
+        let without = corners.iter_mut().filter(|corner| corner.coordinates[0].unit.is_none());
+        for corner in without {
+            edits.push((corner.span.end(), unit.text.clone()));
+            for coordinate in &mut corner.coordinates {
+                coordinate.unit = Some(unit.clone());
+            }
+        }
+        let message = if edits.len() == 1 { "remove this unit" } else { "write the unit after each point" };
+        edits.sort_by_key(|(span, _)| span.lo);
+        diagnostic.suggestions.push(Suggestion::possible(message, edits));
+        self.report(diagnostic);
     }
 
     fn listed(&mut self, pair: &Pair<'_>) -> Vec<Text> {
