@@ -154,7 +154,15 @@ impl<'a> Resolver<'a> {
     pub(super) fn unknown_function(&mut self, name: &Name, known: &[&'static str]) {
         let title = format!("no function named `{}`", name.text);
         let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title).label("unknown function");
-        let synonym = meanings(&name.text, |word| known.contains(&word)).first().map(|synonym| synonym.meant);
+        if matches!(name.text.as_str(), "norm" | "magnitude" | "length") {
+            let note = "the length of a vector is its distance from the origin, such as \
+                        `distance(velocity, (0, 0, 0)m/s)`; that of a number is `abs`";
+            self.report(diagnostic.note(note));
+            return;
+        }
+        // Operators over time are written before what they apply to.
+        let expected = |word: &str| known.contains(&word) || word == "always" || word == "eventually";
+        let synonym = meanings(&name.text, expected).first().map(|synonym| synonym.meant);
         diagnostic = match synonym.or_else(|| most_similar(&name.text, known.iter().copied())) {
             Some(similar) => diagnostic.did_you_mean(name.span, similar),
             None => diagnostic.note(format!("the functions allowed here are {}", super::list(known))),

@@ -148,13 +148,13 @@ impl Reader<'_> {
         let mut ends = [next(), next()];
         drop(points);
         if let Some(unit) = child(&expect_child(&corners, Rule::corners_end), Rule::unit).map(|unit| self.unit(&unit)) {
-            self.unit_of_corners(&mut ends, unit);
+            self.unit_of_corners(&mut ends, &unit);
         }
         Some(Amounts::Corners(Box::new(ends), self.span(&corners)))
     }
 
     /// Reports a unit after the `]` of a box, and reads it as that of its corners without one.
-    fn unit_of_corners(&mut self, corners: &mut [Point; 2], unit: UnitName) {
+    fn unit_of_corners(&mut self, corners: &mut [Point; 2], unit: &UnitName) {
         let title = "the unit of a box is given for each point, after its `)`";
         let mut diagnostic = Diagnostic::new(Code::WRONG_UNIT, unit.span, title).label("unexpected unit");
         let mut edits = vec![(unit.span, String::new())];
