@@ -155,7 +155,7 @@ fn an_exported_test_reproduces_its_values_in_the_space_it_is_written_into() {
     let changed = project.build("coverage_experiment").run(&["replay", "T4", "--results", "r/5"]).expect(1);
     assert!(changed.err.contains("the model has changed"), "{}", changed.err);
     assert!(changed.err.contains("(requirement `"), "{}", changed.err);
-    assert!(changed.err.contains("`export T4`"), "{}", changed.err);
+    assert!(changed.err.contains(" export T4 --results r/5"), "{}", changed.err);
 }
 
 #[test]

@@ -93,7 +93,7 @@ fn formulas_of_points_texts_time_and_groups_give_the_values_that_one_computes_by
         ("from_gate", "min(distance(each of poses.position, (4000, 0, 250)cm))", 10.0),
         ("held", "duration(tower == \"hold\")", 2.0),
         ("all_fast", "count(poses.mode == \"fast\" and tower != \"free\")", 1.0),
-        ("any_slow", "count(max of poses.mode != \"fast\")", 3.0),
+        ("any_slow", "count(max of poses.mode != \"fast\")", 1.0),
         ("last_slow", "when each of poses.mode == \"slow\" then time", 1.0),
         ("obeyed", "robustness(always (tower == \"hold\" implies poses.position.z < 2m))", -0.5),
         ("heading", "last(cos(each of poses.heading) * 2)", 1.0),

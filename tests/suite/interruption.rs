@@ -121,7 +121,7 @@ fn ctrl_c_stops_in_good_order_and_resume_gives_what_an_unbroken_run_gives() {
         killpg(running.pid(), Signal::SIGINT).unwrap();
         let (_, said) = running.ended();
         let said = said.expect(130);
-        let advice = format!("`resume {}` continues to the same results", Path::new(&results).join("3").display());
+        let advice = format!(" resume {}\n", Path::new(&results).join("3").display());
         assert!(said.err.contains(&advice), "{}", said.err);
         assert_eq!(said.out, "");
         no_worker_is_left(&runner);

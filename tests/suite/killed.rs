@@ -285,7 +285,7 @@ fn a_reference_run_that_is_killed_is_run_again_by_resume() {
     let whole = runner.run(&["--results", "whole"]).expect(0).digest();
     let process = start(&runner, &["--results", "results"], "killed without disturbance");
     let said = Done::of(&process.wait_with_output().unwrap()).expect(1);
-    for part in ["killed twice", "T0 is not recorded", "`resume` runs it again", "--workers"] {
+    for part in ["killed twice", "T0 is not recorded", "resume results/3", "--workers"] {
         assert!(said.err.contains(part), "{part}: {}", said.err);
     }
     assert!(recorded(&runner.folder.join("results/3")).is_empty());
