@@ -101,8 +101,8 @@ impl HeldInputs {
         self.turn(inputs, |input| (input.members == Members::Each).then_some(member))
     }
 
-    /// Makes inputs that are of a pair, or of each member, those of this one. Returns whether both had a message for all
-    /// of them.
+    /// Makes inputs that are of a pair, or of each member, those of this one. Returns whether both had a message for
+    /// all of them.
     pub(super) fn turn_to_pair(&mut self, inputs: &[Input], (first, second): (usize, usize)) -> bool {
         self.turn(inputs, |input| match input.members {
             Members::First | Members::Each => Some(first),

@@ -258,7 +258,7 @@ mod tests {
             prop_assume!(count > 1);
             let budget = share * groups.iter().map(|(it, n)| it.cost(it.reach) * *n as f64).sum::<f64>();
             let mean = groups.iter().map(|(it, n)| it.centre * *n as f64).sum::<f64>() / count as f64;
-            // Means that can be reached, somewhere around the mean of the centres; not so few that a climber finds none.
+            // Means that can be reached, somewhere around the mean of the centres; enough for a climber to find some.
             let costless = groups.iter().map(|(it, n)| it.free * *n as f64).sum::<f64>();
             let half = (budget + costless) / count as f64;
             let (low, high) = (mean - half * ends.0, mean + half * ends.1);
