@@ -39,8 +39,8 @@ pub enum ExportError {
 ///
 /// The block has a `name` of its own, by default one that the space does not use yet. It expects the measured values of
 /// each objective and of each metric with which the test violates a requirement; without objectives, of each metric
-/// that a requirement bounds. It names the simulator's seed of the run, so it has these values in any campaign that ends at
-/// the same time.
+/// that a requirement bounds. It names the simulator's seed of the run, so it has these values in any campaign that
+/// ends at the same time.
 pub fn export(repository: &Repository, test: &str, name: Option<&str>) -> Result<Exported, ExportError> {
     let record = repository.test(repository.find(test)?)?;
     if record.test.operations.is_empty() {
