@@ -155,7 +155,7 @@ fn runners() -> clap::Command {
 fn command_line() -> clap::Command {
     let runners = runners();
     let names = runners.get_subcommands().map(|command| command.get_name().to_owned());
-    names.fold(Arguments::command(), |command, name| command.mut_subcommand(name, runner::RunnerOf::arguments))
+    names.fold(Arguments::command(), |command, name| command.mut_subcommand(name, runner::of_a_campaign))
 }
 
 /// The command line of this process.

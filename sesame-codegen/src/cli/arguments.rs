@@ -2,8 +2,10 @@
 
 use std::path::PathBuf;
 
+use anyhow::bail;
+
 use super::shell::Format;
-use crate::environment::{Options, RuntimeChoice};
+use crate::environment::{self, Options, RuntimeChoice};
 
 /// Which diagnostics fail the command besides errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -68,6 +70,20 @@ pub(super) enum Purpose {
 }
 
 impl Generation {
+    /// The folder of the runners.
+    pub(super) fn runners(&self) -> PathBuf {
+        self.out.clone().unwrap_or_else(|| self.file.with_file_name(environment::RUNNERS))
+    }
+
+    /// The folder of the runners, to be written in: unless the user names it, it must not lead elsewhere.
+    pub(super) fn own_runners(&self) -> anyhow::Result<PathBuf> {
+        let runners = self.runners();
+        if self.out.is_none() && runners.is_symlink() {
+            bail!("{} is a link; choose the folder for the runners with `-o`", runners.display());
+        }
+        Ok(runners)
+    }
+
     /// With the defaults of everything but the campaign and the place of its runner.
     pub(super) fn of(file: PathBuf, campaign: Option<String>, out: Option<PathBuf>) -> Self {
         let diagnostics = Diagnostics { format: Format::Human };

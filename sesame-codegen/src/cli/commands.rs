@@ -259,11 +259,7 @@ pub(super) fn write(
     chosen: &[usize],
     mode: Mode,
 ) -> anyhow::Result<(PathBuf, Report)> {
-    let out = generation.out.clone().unwrap_or_else(|| generation.file.with_file_name(environment::RUNNERS));
-    // Nobody named the folder that it leads to.
-    if generation.out.is_none() && out.is_symlink() {
-        bail!("{} is a link; choose the folder for the runners with `-o`", out.display());
-    }
+    let out = generation.own_runners()?;
     let environment = environment(&generation.file, &out, &checked.plans, options).map_err(|errors| all(&errors))?;
     let trees = emit::emit(&checked.plans, &environment).map_err(|problems| all(&problems))?;
     let (shared, runners) = trees.split_first().expect("there is a tree for what runners share");

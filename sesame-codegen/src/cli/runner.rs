@@ -4,111 +4,108 @@
 //! and its plan says everything. The runner of any other campaign is a crate, which is generated and built first.
 
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, ExitCode};
 
-use anyhow::{Context as _, bail};
-use clap::{Arg, ArgAction, ArgMatches, Subcommand as _};
+use anyhow::Context as _;
+use clap::{Arg, ArgAction, ArgMatches};
 use sesame_runtime::Interpreted;
 use sesame_runtime::cli::{CALLER, Caller, Running, Showing};
 
 use super::arguments::Generation;
 use super::build;
 use super::commands::{all, check, choose, write};
-use super::shell::{self, Format, Shell};
+use super::shell::{self, Shell};
 use crate::emit;
-use crate::environment::{self, Options};
+use crate::environment;
 use crate::frontend::{Checked, Language};
 use crate::names;
 use crate::output::Mode;
 use crate::plan::RunnerPlan;
 use crate::unfilled::unfilled_objectives;
 
-/// The campaign whose runner a command is for.
-#[derive(Debug)]
-pub(super) struct RunnerOf {
-    file: PathBuf,
-    campaign: Option<String>,
-    out: Option<PathBuf>,
-}
-
 /// Names of the arguments that say which campaign it is.
 const FILE: &str = "space_file";
 const CAMPAIGN: &str = "space_campaign";
 const OUT: &str = "runners_folder";
 
-impl RunnerOf {
-    /// A command of runners, with the arguments that say whose.
-    pub(super) fn arguments(mut command: clap::Command) -> clap::Command {
-        let others: Vec<clap::Id> =
-            command.get_arguments().filter(|arg| arg.is_positional()).map(|arg| arg.get_id().clone()).collect();
-        for (position, id) in (2..).zip(others) {
-            command = command.mut_arg(id, |arg| arg.index(position));
-        }
-        command.args([
-            Arg::new(FILE)
-                .index(1)
-                .required(true)
-                .value_name("FILE")
-                .value_parser(clap::value_parser!(PathBuf))
-                .help("The `.sesame` file"),
-            Arg::new(CAMPAIGN)
-                .long("campaign")
-                .short('c')
-                .value_name("CAMPAIGN")
-                .help("The campaign; if omitted, the only one"),
-            Arg::new(OUT)
-                .long("out")
-                .short('o')
-                .value_name("FOLDER")
-                .value_parser(clap::value_parser!(PathBuf))
-                .help("The folder with the runners; if omitted, `runners` beside the file"),
-        ])
+/// A command of runners, with the arguments that say whose.
+pub(super) fn of_a_campaign(mut command: clap::Command) -> clap::Command {
+    let others: Vec<clap::Id> =
+        command.get_arguments().filter(|arg| arg.is_positional()).map(|arg| arg.get_id().clone()).collect();
+    for (position, id) in (2..).zip(others) {
+        command = command.mut_arg(id, |arg| arg.index(position));
     }
+    command.args([
+        Arg::new(FILE)
+            .index(1)
+            .required(true)
+            .value_name("FILE")
+            .value_parser(clap::value_parser!(PathBuf))
+            .help("The `.sesame` file"),
+        Arg::new(CAMPAIGN)
+            .long("campaign")
+            .short('c')
+            .value_name("CAMPAIGN")
+            .help("The campaign; if omitted, the only one"),
+        Arg::new(OUT)
+            .long("out")
+            .short('o')
+            .value_name("FOLDER")
+            .value_parser(clap::value_parser!(PathBuf))
+            .help("The folder with the runners; if omitted, `runners` beside the file"),
+    ])
+}
 
-    /// What the command line says.
-    pub(super) fn named(matches: &ArgMatches) -> Self {
-        RunnerOf {
-            file: matches.get_one::<PathBuf>(FILE).expect("it is required").clone(),
-            campaign: matches.get_one::<String>(CAMPAIGN).cloned(),
-            out: matches.get_one::<PathBuf>(OUT).cloned(),
-        }
-    }
+/// What those arguments say.
+fn named(matches: &ArgMatches) -> Generation {
+    Generation::of(
+        matches.get_one::<PathBuf>(FILE).expect("it is required").clone(),
+        matches.get_one::<String>(CAMPAIGN).cloned(),
+        matches.get_one::<PathBuf>(OUT).cloned(),
+    )
+}
 
-    /// How its commands are called, for hints that can be copied.
-    fn caller(&self, several: bool, name: &str) -> Caller {
-        let mut arguments = vec![self.file.display().to_string()];
-        if several {
-            arguments.extend(["--campaign".to_owned(), name.to_owned()]);
+/// The runner of a campaign that was found in its space.
+struct Found<'a> {
+    generation: &'a Generation,
+    checked: Checked,
+    /// The campaign among the plans.
+    chosen: usize,
+    /// How commands of this runner are called, for hints that can be copied.
+    caller: Caller,
+}
+
+impl<'a> Found<'a> {
+    /// Checks the space.
+    fn find(shell: Shell, language: &Language, generation: &'a Generation) -> anyhow::Result<Self> {
+        let checked = check(shell, language, &generation.file, generation.diagnostics.format)?;
+        let chosen = choose(&checked, &generation.file, generation.campaign.as_deref())?;
+        let mut arguments = vec![generation.file.display().to_string()];
+        if checked.plans.len() > 1 {
+            arguments.extend(["--campaign".to_owned(), checked.plans[chosen].plan.campaign.name.clone()]);
         }
-        if let Some(out) = &self.out {
+        if let Some(out) = &generation.out {
             arguments.extend(["--out".to_owned(), out.display().to_string()]);
         }
-        Caller { program: shell::command().to_owned(), arguments }
+        let caller = Caller { program: shell::command().to_owned(), arguments };
+        Ok(Found { generation, checked, chosen, caller })
     }
 
-    /// The folder of its runner.
-    fn folder(&self, name: &str) -> PathBuf {
-        let out = self.out.clone().unwrap_or_else(|| self.file.with_file_name(environment::RUNNERS));
-        out.join(names::campaign_folder(name))
-    }
-
-    fn generation(&self) -> Generation {
-        Generation::of(self.file.clone(), self.campaign.clone(), self.out.clone())
+    fn plan(&self) -> &RunnerPlan {
+        &self.checked.plans[self.chosen]
     }
 
     /// The runner as data, if the campaign needs no Rust.
-    fn interpreted(&self, runner: &RunnerPlan, options: &Options) -> anyhow::Result<Option<Interpreted>> {
-        if runner.needs_rust() || environment::runtime_is_chosen(&self.file, options)? {
+    fn interpreted(&self) -> anyhow::Result<Option<Interpreted>> {
+        let file = &self.generation.file;
+        if self.plan().needs_rust() || environment::runtime_is_chosen(file, &self.generation.options())? {
             return Ok(None);
         }
-        let (space, simulator) = environment::program_folders(&self.file, runner)?;
-        let folder = self.folder(&runner.plan.campaign.name);
-        if self.out.is_none() && folder.parent().is_some_and(Path::is_symlink) {
-            bail!("{} is a link; choose the folder for the runners with `-o`", folder.with_file_name("").display());
-        }
+        let (space, simulator) = environment::program_folders(file, self.plan())?;
+        let folder = self.generation.own_runners()?.join(names::campaign_folder(&self.plan().plan.campaign.name));
         let directory = std::path::absolute(&folder).with_context(|| format!("cannot find {}", folder.display()))?;
-        Ok(Some(Interpreted { plan: emit::plan_json(runner), directory, space, simulator }))
+        Ok(Some(Interpreted { plan: emit::plan_json(self.plan()), directory, space, simulator }))
     }
 }
 
@@ -120,17 +117,12 @@ pub(super) fn run(
     build: bool,
     arguments: &[OsString],
 ) -> anyhow::Result<ExitCode> {
-    let checked = check(shell, language, &generation.file, generation.diagnostics.format)?;
-    let chosen = choose(&checked, &generation.file, generation.campaign.as_deref())?;
-    let runner = &checked.plans[chosen];
-    let named =
-        RunnerOf { file: generation.file.clone(), campaign: generation.campaign.clone(), out: generation.out.clone() };
-    let caller = named.caller(checked.plans.len() > 1, &runner.plan.campaign.name);
-    if !build && let Some(interpreted) = named.interpreted(runner, &generation.options())? {
-        return Ok(sesame_runtime::cli::interpret(&interpreted, caller, arguments));
+    let found = Found::find(shell, language, generation)?;
+    if !build && let Some(interpreted) = found.interpreted()? {
+        return Ok(sesame_runtime::cli::interpret(&interpreted, found.caller, arguments));
     }
     let allowed = arguments.iter().any(|argument| argument == "--allow-unimplemented");
-    compiled(shell, generation, &checked, chosen, &caller, arguments, allowed)
+    compiled(shell, &found, arguments, allowed)
 }
 
 /// A command that runs tests.
@@ -140,17 +132,14 @@ pub(super) fn running(
     command: &Running,
     (name, matches): (&str, &ArgMatches),
 ) -> anyhow::Result<ExitCode> {
-    let named = RunnerOf::named(matches);
-    let checked = check(shell, language, &named.file, Format::Human)?;
-    let chosen = choose(&checked, &named.file, named.campaign.as_deref())?;
-    let runner = &checked.plans[chosen];
-    let caller = named.caller(checked.plans.len() > 1, &runner.plan.campaign.name);
-    if let Some(interpreted) = named.interpreted(runner, &Options::default())? {
-        return Ok(sesame_runtime::cli::carry_out(command, &interpreted, caller));
+    let generation = named(matches);
+    let found = Found::find(shell, language, &generation)?;
+    if let Some(interpreted) = found.interpreted()? {
+        return Ok(sesame_runtime::cli::carry_out(command, &interpreted, found.caller));
     }
     let mut arguments = vec![OsString::from(name)];
-    arguments.extend(passed_on(&Running::augment_subcommands(clap::Command::new("runner")), name, matches));
-    compiled(shell, &named.generation(), &checked, chosen, &caller, &arguments, true)
+    arguments.extend(passed_on(&super::runners(), name, matches));
+    compiled(shell, &found, &arguments, true)
 }
 
 /// A command that shows results. The space is read only if the campaign is not named.
@@ -160,16 +149,13 @@ pub(super) fn showing(
     command: &Showing,
     matches: &ArgMatches,
 ) -> anyhow::Result<ExitCode> {
-    let named = RunnerOf::named(matches);
-    let name = match &named.campaign {
-        Some(name) if named.folder(name).join("results").is_dir() => name.clone(),
-        name => {
-            let checked = check(shell, language, &named.file, Format::Human)?;
-            let chosen = choose(&checked, &named.file, name.as_deref())?;
-            checked.plans[chosen].plan.campaign.name.clone()
-        }
-    };
-    Ok(sesame_runtime::cli::show(command, &named.folder(&name).join("results")))
+    let generation = named(matches);
+    let results = |name: &str| generation.runners().join(names::campaign_folder(name)).join("results");
+    if let Some(results) = generation.campaign.as_deref().map(results).filter(|results| results.is_dir()) {
+        return Ok(sesame_runtime::cli::show(command, &results));
+    }
+    let found = Found::find(shell, language, &generation)?;
+    Ok(sesame_runtime::cli::show(command, &results(&found.plan().plan.campaign.name)))
 }
 
 /// The arguments of a runner's command, as a runner's own command line takes them.
@@ -198,18 +184,11 @@ pub(super) fn passed_on(runners: &clap::Command, name: &str, matches: &ArgMatche
 }
 
 /// Generates and builds a runner, and becomes it.
-fn compiled(
-    shell: Shell,
-    generation: &Generation,
-    checked: &Checked,
-    chosen: usize,
-    caller: &Caller,
-    arguments: &[OsString],
-    allow_unfilled: bool,
-) -> anyhow::Result<ExitCode> {
+fn compiled(shell: Shell, found: &Found<'_>, arguments: &[OsString], allow_unfilled: bool) -> anyhow::Result<ExitCode> {
+    let Found { generation, checked, chosen, caller } = found;
     let mode = if generation.force { Mode::Force } else { Mode::Write };
-    let (out, _) = write(shell, generation, &generation.options(), checked, &[chosen], mode)?;
-    let runner = &checked.plans[chosen];
+    let (out, _) = write(shell, generation, &generation.options(), checked, &[*chosen], mode)?;
+    let runner = found.plan();
     let campaign = &runner.plan.campaign.name;
     if !allow_unfilled {
         let unfilled = unfilled_objectives(runner, &out.join("hooks"));
