@@ -8,6 +8,7 @@ pub mod activation;
 pub mod condition;
 pub mod observation;
 pub mod robustness;
+pub mod shell;
 pub mod test_number;
 pub mod time;
 pub mod verdict;

@@ -1,6 +1,7 @@
 //! How the user calls a runner's commands, so that what messages propose can be pasted.
 
 use serde::{Deserialize, Serialize};
+use sesame_base::shell::quoted;
 
 /// The environment variable in which `sesamec` tells a compiled runner how it was called, as JSON.
 pub const CALLER: &str = "SESAME_CALLER";
@@ -35,15 +36,6 @@ impl Caller {
         arguments
             .fold(format!("{} {name}", self.program), |command, argument| format!("{command} {}", quoted(argument)))
     }
-}
-
-/// A word of a command line, in quotes if a shell would read something else in it.
-fn quoted(word: &str) -> String {
-    let plain = |sign: char| sign.is_ascii_alphanumeric() || "_-./:=@%+,".contains(sign);
-    if !word.is_empty() && word.chars().all(plain) {
-        return word.to_owned();
-    }
-    format!("'{}'", word.replace('\'', "'\\''"))
 }
 
 #[cfg(test)]

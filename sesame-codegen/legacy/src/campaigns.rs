@@ -309,7 +309,7 @@ fn strategy(writer: &mut Writer<'_>, campaign: &Campaign, shown: &str, clauses: 
         }
         approach => {
             let total = performed.max(100);
-            if *approach == Approach::Unsaid {
+            if *approach == Approach::Missing {
                 writer.notes.say(Kind::Changed, format!("campaign `{shown}` does not say how it searches: at random"));
             }
             clauses.push(notation::search_clause(Strategy::Random, total, None, None));
@@ -365,7 +365,7 @@ fn conditions(operation: &Operation) -> impl Iterator<Item = &Condition> {
     let (start, end) = match &operation.activation {
         Activation::Condition(start, end) => (start.as_ref(), end.as_ref()),
         Activation::ConditionFor(start, _) => (start.as_ref(), None),
-        Activation::Time(..) | Activation::Unsaid => (None, None),
+        Activation::Time(..) | Activation::Missing => (None, None),
     };
     start.into_iter().chain(end)
 }

@@ -294,12 +294,12 @@ fn window(writer: &Writer<'_>, operation: &Operation, at: usize, over: f64) -> R
         Activation::Condition(start, end) => {
             let start = match start.as_ref().map(|it| settled(writer, it)).transpose()? {
                 Some(Truth::Sometimes(start)) => start,
-                Some(Truth::Always) => return Err("it begins at once, which is no condition".to_owned()),
+                Some(Truth::Always) => return Err("its start condition always holds".to_owned()),
                 Some(Truth::Never) | None => return never(),
             };
             match end.as_ref().map(|it| settled(writer, it)).transpose()? {
                 Some(Truth::Sometimes(end)) => exact(plan::Activation::Condition { start, end, times }),
-                Some(Truth::Always) => Err("it ends at once, which is no condition".to_owned()),
+                Some(Truth::Always) => Err("its end condition always holds".to_owned()),
                 Some(Truth::Never) | None => exact(plan::Activation::ConditionFor { start, length: forever, times }),
             }
         }
@@ -307,10 +307,10 @@ fn window(writer: &Writer<'_>, operation: &Operation, at: usize, over: f64) -> R
             Some(Truth::Sometimes(start)) if *length > 0.0 => {
                 exact(plan::Activation::ConditionFor { start, length: *length, times })
             }
-            Some(Truth::Always) => Err("it begins at once, which is no condition".to_owned()),
+            Some(Truth::Always) => Err("its start condition always holds".to_owned()),
             _ => never(),
         },
-        Activation::Unsaid => Err("it does not say when it is active".to_owned()),
+        Activation::Missing => Err("it does not say when it is active".to_owned()),
     }
 }
 

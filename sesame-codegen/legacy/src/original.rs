@@ -282,7 +282,7 @@ pub enum Activation {
     /// From when a condition holds, for a time.
     ConditionFor(Option<Condition>, f64),
     /// It does not say.
-    Unsaid,
+    Missing,
 }
 
 /// A condition.
@@ -375,7 +375,7 @@ pub enum ActivationMode {
 pub enum Approach {
     /// It does not say.
     #[default]
-    Unsaid,
+    Missing,
     /// At random.
     Random,
     /// NSGA-II.

@@ -210,7 +210,7 @@ fn approach(original: &mut Original, element: &Element) -> Result<Approach, Stri
             let (population, evaluations) = (count(element, "populationSize")?, count(element, "iterations")?);
             Approach::Nsga { population, evaluations, coverage }
         }
-        _ => Approach::Unsaid,
+        _ => Approach::Missing,
     })
 }
 
@@ -277,7 +277,7 @@ fn operation(original: &mut Original, element: &Element) -> Result<Operation, St
         other => OperationKind::Other(other.into()),
     };
     let activation = match element.children.iter().find(|child| child.tag == "activation") {
-        None => Activation::Unsaid,
+        None => Activation::Missing,
         Some(found) => match found.kind.as_deref() {
             Some("FixedTimeActivation") => {
                 Activation::Time(number(found, "startTime", 0.0)?, number(found, "endTime", 0.0)?)
@@ -288,7 +288,7 @@ fn operation(original: &mut Original, element: &Element) -> Result<Operation, St
             Some("ConditionBasedTimeLimited") => {
                 Activation::ConditionFor(condition(original, found, "starting")?, number(found, "length", 0.0)?)
             }
-            _ => Activation::Unsaid,
+            _ => Activation::Missing,
         },
     };
     let recorded = element.children.iter().find(|child| child.tag == "recordedTimings");

@@ -137,7 +137,7 @@ impl Importer<'_> {
             };
             let name = &self.plan.metric(id).name;
             if !value.value.is_finite() {
-                notes.lose(Counted::Value, format!("values of `{name}` that are no finite numbers"), 1);
+                notes.lose(Counted::Value, format!("values of `{name}` that are not finite numbers"), 1);
                 continue;
             }
             if std::mem::replace(&mut measured[id.index()], true) {
@@ -251,7 +251,7 @@ impl Importer<'_> {
                 }
                 None => Err("nothing starts it".to_owned()),
             },
-            Activation::Unsaid => Err("it does not say when it is active".to_owned()),
+            Activation::Missing => Err("it does not say when it is active".to_owned()),
         }
     }
 

@@ -239,7 +239,7 @@ fn field_of(step: &str) -> Result<(&str, bool), String> {
         None => (step, None),
     };
     if !is_field(name) {
-        return Err(format!("`{}` is no name of a field", printable(step)));
+        return Err(format!("`{}` is not the name of a field", printable(step)));
     }
     let is_position = |text: &str| (1..=6).contains(&text.len()) && text.bytes().all(|byte| byte.is_ascii_digit());
     match position {

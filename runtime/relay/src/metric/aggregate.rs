@@ -312,6 +312,9 @@ impl Stream {
             let concerned = spoke[members.0] || spoke[members.1];
             if concerned && self.held.turn_to_pair(&formula.inputs, *members) {
                 step(formula, &self.held, tally, context);
+            } else if tally.holds_since.is_some() {
+                // Of a silent member it holds on, and conditions over the duration need to see that.
+                tally.hold(context.now, true);
             }
         }
     }

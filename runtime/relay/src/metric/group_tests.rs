@@ -89,6 +89,11 @@ fn always_above(inputs: Vec<Input>, limit: f64) -> MetricSource {
 
 /// Value and warnings of a metric after a run of ten seconds.
 fn measured(source: MetricSource, sent: &[Sent]) -> (Option<f64>, Vec<String>) {
+    until(Some(10.0), source, sent)
+}
+
+/// Value and warnings of a metric after a run, which breaks off if it has no end.
+fn until(end: Option<f64>, source: MetricSource, sent: &[Sent]) -> (Option<f64>, Vec<String>) {
     let mut plan = system();
     plan.metrics.truncate(1);
     plan.metrics[0].source = source;
@@ -99,7 +104,9 @@ fn measured(source: MetricSource, sent: &[Sent]) -> (Option<f64>, Vec<String>) {
     for &(time, path, x) in sent {
         metrics.message(SimTime::from_nanos(time * 1_000_000), wires.find(path).unwrap(), &payload(x));
     }
-    metrics.end(SimTime::from_seconds(10.0));
+    if let Some(end) = end {
+        metrics.end(SimTime::from_seconds(end));
+    }
     let (mut observed, warnings) = metrics.finish(&[]);
     (observed.remove(0).value, warnings)
 }
@@ -154,6 +161,16 @@ fn a_duration_over_each_member_does_not_depend_on_the_order_of_messages_in_an_in
     };
     assert_eq!(of(&outside(["poses/a", "poses/b"])), Some(10.0));
     assert_eq!(of(&outside(["poses/b", "poses/a"])), Some(10.0));
+}
+
+#[test]
+fn a_duration_over_each_member_grows_while_those_that_it_holds_of_are_silent() {
+    let out =
+        Condition::Compare { left: Expression::Input(0), by: Comparison::Above, right: Expression::Constant(5.0) };
+    let x = || vec![input(POSES, &["at", "x"], Members::Each)];
+    let source = formula(x(), Aggregate::Duration { of: out });
+    let sent = [(0, "poses/a", 9.0), (1_000, "poses/b", 8.0), (3_000, "poses/c", 0.0), (4_000, "poses/c", 0.0)];
+    assert_eq!(until(None, source, &sent).0, Some(3.0 + 2.0), "the instant of the last message is not over");
 }
 
 #[test]

@@ -80,7 +80,7 @@ mod tests {
         let warning = "requirement R3 is violated before anything is fuzzed: `arm_distance` is -2.244690363500318";
         assert_eq!(said(warning), "requirement R3 is violated before anything is fuzzed: `arm_distance` is -2.245 mm");
         assert_eq!(said("`collision_occurrence` is 3"), "`collision_occurrence` is 3", "a plain number");
-        assert_eq!(said("`arm_distance` is no value"), "`arm_distance` is no value");
+        assert_eq!(said("`arm_distance` has no value"), "`arm_distance` has no value");
         assert_eq!(said("`arm_distance` is 5 of a kind"), "`arm_distance` is 5 of a kind");
     }
 

@@ -5,6 +5,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use sesame_base::shell::{quoted, quoted_file};
 use sesame_plan::CampaignPlan;
 
 /// What shows one test in full, in the folder of the space: what stands before its name, and what after.
@@ -13,13 +14,13 @@ pub(super) fn show(plan: &CampaignPlan, run: &Path) -> (String, String) {
     if let Some(run) = below_project(run) {
         let _ = write!(after, " --results {}", quoted(&run));
     }
-    (format!("sesamec show {} ", quoted(&plan.source)), after)
+    (format!("sesamec show {} ", quoted_file(&plan.source)), after)
 }
 
 /// What lists all tests.
 pub(super) fn list(plan: &CampaignPlan, run: &Path) -> String {
     let (_, after) = show(plan, run);
-    format!("sesamec list {}{after}", quoted(&plan.source))
+    format!("sesamec list {}{after}", quoted_file(&plan.source))
 }
 
 /// The folder of a run as seen from the folder of its space, if it lies where runners put it:
@@ -31,17 +32,6 @@ fn below_project(run: &Path) -> Option<String> {
         [.., runners, name, results @ "results", run] => Some([*runners, *name, *results, *run].join("/")),
         _ => None,
     }
-}
-
-/// An argument as shells of POSIX read it.
-fn quoted(argument: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.' | '/');
-    if !argument.is_empty() && argument.chars().all(plain) && !argument.starts_with('-') {
-        return argument.to_owned();
-    }
-    let printable: String = argument.chars().filter(|c| !c.is_control()).collect();
-    let quoted = format!("'{}'", printable.replace('\'', r"'\''"));
-    if printable.starts_with('-') { format!("./{quoted}") } else { quoted }
 }
 
 #[cfg(test)]
@@ -68,7 +58,5 @@ mod tests {
         "a'; rm -rf ~; '.sesame\n".clone_into(&mut plan.source);
         let (before, _) = show(&plan, Path::new("run"));
         assert_eq!(before, r"sesamec show 'a'\''; rm -rf ~; '\''.sesame' ");
-        assert_eq!(quoted("$(reboot)"), "'$(reboot)'");
-        assert_eq!(quoted("-rf"), "./'-rf'");
     }
 }

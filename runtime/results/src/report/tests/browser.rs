@@ -113,22 +113,24 @@ fn a_narrow_screen_shows_the_page_without_scrolling_sideways() {
     assert!(found["tallest"].as_f64().unwrap() < 110.0, "rows of the front are not tall: {found}");
 }
 
+/// Runs a script that uses the page and says of each of its checks whether it holds.
+fn assert_checks(browser: &str, script: &str, more_than: usize) {
+    let found = findings(browser, &full_page(), script, 1280, Scheme::Light);
+    let checks = found["checks"].as_object().unwrap();
+    for (what, seen) in checks {
+        assert_eq!(seen, &Value::Bool(true), "{what}: {found:#}");
+    }
+    assert!(checks.len() > more_than, "{found:#}");
+}
+
 #[test]
 fn the_table_of_tests_sorts_filters_and_selects_everywhere() {
     let Some(browser) = browser() else { return };
-    let found = findings(browser, &full_page(), include_str!("browser/tests.js"), 1280, Scheme::Light);
-    for (what, seen) in found["checks"].as_object().unwrap() {
-        assert_eq!(seen, &Value::Bool(true), "{what}: {found:#}");
-    }
-    assert!(found["checks"].as_object().unwrap().len() > 15);
+    assert_checks(browser, include_str!("browser/tests.js"), 15);
 }
 
 #[test]
 fn timelines_have_a_cursor_a_zoom_and_a_second_test() {
     let Some(browser) = browser() else { return };
-    let found = findings(browser, &full_page(), include_str!("browser/timelines.js"), 1280, Scheme::Light);
-    for (what, seen) in found["checks"].as_object().unwrap() {
-        assert_eq!(seen, &Value::Bool(true), "{what}: {found:#}");
-    }
-    assert!(found["checks"].as_object().unwrap().len() > 10);
+    assert_checks(browser, include_str!("browser/timelines.js"), 10);
 }
