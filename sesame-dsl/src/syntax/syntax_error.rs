@@ -95,7 +95,8 @@ fn reading(text: &str, lo: u32, hi: u32, suggestion: &Suggestion, block: &Block)
     for (span, replacement) in suggestion.edits.iter().rev() {
         let from = (span.lo - lo) as usize;
         mended.replace_range(from..(span.hi - lo) as usize, replacement);
-        written = written.max(from + replacement.len());
+        // Where something is removed, what follows has to fit.
+        written = written.max(from + replacement.len().max(1));
     }
     if mended.trim().is_empty() {
         return Reading::Whole;
@@ -125,7 +126,7 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
         let doc = token_at(text, lo);
         return Diagnostic::new(Code::SYNTAX, span_of(doc), "this doc comment documents nothing")
             .label("expected a declaration after it")
-            .fix("use a plain comment", Span { hi: region.lo + 3, ..region }, "//");
+            .suggest("use a plain comment", Span { hi: region.lo + 3, ..region }, "//");
     }
     if first.text == "}" {
         let title = "unmatched `}`";
@@ -239,9 +240,14 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
         let known = Rule::all_rules().iter().any(|&rule| keyword_of(rule) == Some(found.text));
         let (phrase, meanings) = foreign_words(text, found, &candidates);
         let phrase = Span { hi: u32::try_from(phrase).expect("files are small"), ..span };
+        let from = previous.map_or(region.lo, |previous| previous.lo) as usize;
+        // What may stand only once would stand there twice.
+        let direction = |word: &str| matches!(word, "maximise" | "minimise");
+        let said_already =
+            |word: &str| words(text, from, hi).any(|other| other == word || direction(word) && direction(other));
         for synonym in &meanings {
             let message = format!("did you mean `{}`?", synonym.meant);
-            diagnostic = if synonym.same {
+            diagnostic = if synonym.same && !said_already(synonym.meant) {
                 diagnostic.fix(message, phrase, synonym.meant)
             } else {
                 diagnostic.suggest(message, phrase, synonym.meant)
@@ -259,7 +265,7 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
         if number_before && Unit::parse(found.text).is_ok() {
             let gap = text[..found.lo].trim_end().len();
             let gap = Span { lo: u32::try_from(gap).expect("files are small"), hi: span.lo, ..span };
-            diagnostic = diagnostic.fix("remove the space before the unit", gap, "");
+            diagnostic = diagnostic.suggest("remove the space before the unit", gap, "");
         }
         if block.rule == Rule::file && in_system {
             diagnostic = diagnostic.note(format!("`{}` is declared inside `system {{ … }}`", found.text));
@@ -277,7 +283,10 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
         diagnostic = rewritten(diagnostic, one_value(text, found));
     }
     if found.kind == TokenKind::Sign && found.text == "=" && failure.expected.contains(&Rule::equal_to) {
-        diagnostic = diagnostic.fix("use `==` to compare", span, "==");
+        // A number may be what is needed, not a condition.
+        if foreign::following(text, found.hi(), Rule::sum).is_some() {
+            diagnostic = diagnostic.suggest("use `==` to compare", span, "==");
+        }
     }
     diagnostic
 }
@@ -325,6 +334,16 @@ fn foreign_words(text: &str, found: Token<'_>, candidates: &[&str]) -> (usize, V
         }
     }
     (found.hi(), synonyms::meanings(found.text, expected))
+}
+
+/// The words of a stretch.
+fn words(text: &str, lo: usize, hi: usize) -> impl Iterator<Item = &str> {
+    let mut at = lo;
+    std::iter::from_fn(move || {
+        let token = token_at(text, at);
+        at = token.hi();
+        (token.kind != TokenKind::End && token.lo < hi).then_some(token.text)
+    })
 }
 
 /// Two numbers of a count, where they stand, and what to write there.
