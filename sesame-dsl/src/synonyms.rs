@@ -302,6 +302,20 @@ pub(crate) fn meanings(foreign: &str, expected: impl Fn(&str) -> bool) -> Vec<Sy
     SYNONYMS.iter().filter(|row| row.foreign == normal && expected(first(row.meant))).copied().collect()
 }
 
+/// What to write for a region that other tools have.
+pub(crate) fn region_otherwise(name: &str) -> Option<&'static str> {
+    match name {
+        "circle" | "disc" | "disk" | "cylinder" => Some(
+            "the signed distance from a circle, at any height, is a formula such as \
+             `hypot(position.x - 20m, position.y - 20m) - 3m`",
+        ),
+        "sphere" | "ball" => {
+            Some("the signed distance from a sphere is a formula such as `distance(position, (20, 20, 0)m) - 3m`")
+        }
+        _ => None,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,5 +1,5 @@
 //! Files of the corpus against their blessed outcome, one test for each file: `good/` gives models, `bad/` gives
-//! diagnostics.
+//! diagnostics. `systems/` are ten systems as their engineers would describe them, without a line of Rust.
 
 mod files;
 
@@ -7,12 +7,14 @@ use std::process::ExitCode;
 
 use libtest_mimic::{Arguments, Trial};
 use sesame_dsl::diagnostic::render;
+use sesame_dsl::model::MetricSource;
 
 use files::{analyse_text, corpus};
 
 fn main() -> ExitCode {
     let mut tests = of_each("good", gives_its_model);
     tests.extend(of_each("bad", gives_its_diagnostics));
+    tests.extend(of_each("systems", needs_no_rust));
     libtest_mimic::run(&Arguments::from_args(), tests).exit_code()
 }
 
@@ -40,6 +42,15 @@ fn gives_its_diagnostics(name: &str, text: &str) {
     assert!(!analysis.diagnostics.is_empty(), "{name} is not bad");
     assert_eq!(analysis.model.is_some(), !analysis.has_errors(), "{name}");
     insta::assert_snapshot!(format!("bad_{name}"), render::human(&analysis.diagnostics, &sources, false));
+}
+
+fn needs_no_rust(name: &str, text: &str) {
+    let (sources, analysis) = analyse_text(name, text);
+    assert!(analysis.diagnostics.is_empty(), "{}", render::human(&analysis.diagnostics, &sources, false));
+    let model = analysis.model.unwrap_or_else(|| panic!("{name} has no errors and no model"));
+    let hooks = model.metrics.iter().filter(|(_, metric)| matches!(metric.source, MetricSource::Hook { .. }));
+    assert_eq!(hooks.count(), 0, "{name}");
+    assert!(model.metrics.len() > 10 && model.requirements.len() > 4 && model.operations.len() > 5, "{name}");
 }
 
 /// A model's debug text without spans and scales, whose numbers nobody can check by eye.

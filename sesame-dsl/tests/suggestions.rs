@@ -4,7 +4,7 @@ use sesame_dsl::source::SourceMap;
 use sesame_dsl::{analyse, diagnostic::Diagnostic};
 
 /// What a suggestion that says what to do begins with.
-const IMPERATIVES: [&str; 7] = ["add", "apply", "remove", "split", "swap", "use", "write"];
+const IMPERATIVES: [&str; 8] = ["add", "apply", "move", "remove", "split", "swap", "use", "write"];
 
 #[expect(clippy::disallowed_methods, reason = "the crate is pure; its tests read their corpus")]
 fn diagnostics_of_the_corpus() -> Vec<Diagnostic> {

@@ -137,6 +137,10 @@ impl<'a> Resolver<'a> {
         let (of, text) = match (&left.kind, &right.kind) {
             (_, ExpressionKind::Text(text)) => (left, text),
             (ExpressionKind::Text(text), _) => (right, text),
+            _ if !matches!(by, Comparison::Equal | Comparison::NotEqual) => {
+                self.texts_have_no_order(left.span.to(right.span));
+                return None;
+            }
             _ => {
                 let (text, other) = if self.is_text(left) { (left, right) } else { (right, left) };
                 let title = format!("the text `{}` is not compared with a written text", self.text(text.span));
@@ -173,9 +177,7 @@ impl<'a> Resolver<'a> {
             Comparison::Equal => TextTest::Is(text.text.clone()),
             Comparison::NotEqual => TextTest::IsNot(text.text.clone()),
             _ => {
-                let title = "texts have no order";
-                let span = left.span.to(right.span);
-                self.report(Diagnostic::new(Code::WRONG_TYPE, span, title).label("compare them by `==` or `!=`"));
+                self.texts_have_no_order(left.span.to(right.span));
                 return None;
             }
         };
@@ -185,6 +187,11 @@ impl<'a> Resolver<'a> {
             return None;
         }
         self.input(inputs, path, field, members, Some(test))
+    }
+
+    fn texts_have_no_order(&mut self, span: Span) {
+        let diagnostic = Diagnostic::new(Code::WRONG_TYPE, span, "texts have no order");
+        self.report(diagnostic.label("compare them by `==` or `!=`"));
     }
 
     fn conditions(&mut self, inputs: &mut Vec<Input>, parts: &'a [ast::Expression]) -> Option<Vec<Condition>> {

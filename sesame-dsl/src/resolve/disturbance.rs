@@ -3,6 +3,7 @@
 use sesame_grammar::Rule;
 
 use super::Resolver;
+use super::quantity::is_of_times;
 use super::system::type_in_words;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{
@@ -128,6 +129,15 @@ impl<'a> Resolver<'a> {
             (Rule::clock_skew, Some(ast::Amounts::Range(range))) => self.clock_skew(target, range),
             (Rule::packet_loss, Some(ast::Amounts::Range(range))) => {
                 let target = self.whole_messages(target, "packet loss drops");
+                if is_of_times(range) {
+                    let written = self.text(range.span);
+                    let title = format!("`{written}` is a range of times, but the loss is a percentage in `%`");
+                    let diagnostic = Diagnostic::new(Code::WRONG_UNIT, range.span, title)
+                        .label("expected percentages such as `[0%, 100%]`")
+                        .note(format!("to lose every message for a time, use `blackhole for {written}`"));
+                    self.report(diagnostic);
+                    return None;
+                }
                 let loss = self.probabilities(range, "the loss")?;
                 Some((target?, OperationKind::PacketLoss, vec![number("loss", None, loss)]))
             }

@@ -173,7 +173,7 @@ impl<'a> Resolver<'a> {
             return;
         }
         if let Some((call, name)) = aggregate_in(expression) {
-            self.over_time(call, name);
+            self.over_time(call, name, moved_inside(expression));
             return;
         }
         if !reads_a_topic(expression) {
@@ -449,6 +449,22 @@ fn aggregate_in(expression: &ast::Expression) -> Option<(Span, &Name)> {
         }
         _ => None,
     })
+}
+
+/// A sum that begins with an aggregate that a constant can be moved into: `max(x) - 3m` is `max(x - 3m)`.
+fn moved_inside(expression: &ast::Expression) -> Option<Suggestion> {
+    let ExpressionKind::Sum(terms) = &expression.kind else { return None };
+    let ([(false, first)], rest) = terms.split_at_checked(1)? else { return None };
+    let ExpressionKind::Call(name, arguments) = &first.kind else { return None };
+    let [argument] = arguments.as_slice() else { return None };
+    let shifts = matches!(name.text.as_str(), "min" | "max" | "mean" | "last");
+    let constant = rest.iter().all(|(_, term)| matches!(term.kind, ExpressionKind::Number(_)));
+    if !shifts || !constant || first.parenthesised || expression.parenthesised {
+        return None;
+    }
+    let closing = Span { lo: argument.span.hi, hi: first.span.hi, ..first.span };
+    let edits = vec![(closing, String::new()), (expression.span.end(), ")".to_owned())];
+    Some(Suggestion::possible(format!("move the constant into `{}(…)`", name.text), edits))
 }
 
 /// Whether an expression has a temporal operator.

@@ -2,7 +2,7 @@
 
 use super::Resolver;
 use super::formula::{AGGREGATES, Number, scaled};
-use crate::diagnostic::{Code, Diagnostic};
+use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::model::{BinaryFunction, Expression, Input, UnaryFunction};
 use crate::similar::most_similar;
 use crate::span::Span;
@@ -113,7 +113,7 @@ impl<'a> Resolver<'a> {
                 return self.binary(inputs, &name.text, function, takes, gives, [left, right]);
             }
             (Some(Computes::Least | Computes::Greatest), [_]) => {
-                self.over_time(call.span, name);
+                self.over_time(call.span, name, None);
                 return None;
             }
             (Some(Computes::Absolute | Computes::Unary(..)), _) => "one value",
@@ -121,7 +121,7 @@ impl<'a> Resolver<'a> {
             (Some(Computes::SignedDistance), _) => "two arguments",
             (Some(Computes::Least | Computes::Greatest), _) => "two values or more",
             (None, _) if AGGREGATES.contains(&name.text.as_str()) => {
-                self.over_time(call.span, name);
+                self.over_time(call.span, name, None);
                 return None;
             }
             (None, _) => {
@@ -139,8 +139,8 @@ impl<'a> Resolver<'a> {
         self.report(Diagnostic::new(Code::NOT_A_FORMULA, call, title).label(format!("expected {takes}")));
     }
 
-    /// Reports an aggregate over time inside of a formula.
-    pub(super) fn over_time(&mut self, call: Span, name: &Name) {
+    /// Reports an aggregate over time inside of a formula, and how to write it if that is known.
+    pub(super) fn over_time(&mut self, call: Span, name: &Name, better: Option<Suggestion>) {
         let title = format!("`{}(…)` over time cannot be nested in a formula", name.text);
         let mut diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, call, title)
             .label("only allowed as the outermost function of a formula")
@@ -148,6 +148,7 @@ impl<'a> Resolver<'a> {
         if name.text == "min" || name.text == "max" {
             diagnostic = diagnostic.note(format!("to compare several values, use `{}(a, b)`", name.text));
         }
+        diagnostic.suggestions.extend(better);
         self.report(diagnostic);
     }
 

@@ -6,6 +6,7 @@ use super::region::scaled;
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::model::{Distance, Expression, FieldPath, Input, Point, SignedDistance, Type};
 use crate::span::Span;
+use crate::synonyms::region_otherwise;
 use crate::syntax::ast::{self, ExpressionKind, Members, Path};
 use crate::units::{Unit, convert, dimension};
 
@@ -207,12 +208,15 @@ impl<'a> Resolver<'a> {
             _ => {
                 self.operand(inputs, from);
                 let title = format!("`{}` is not a region", self.text(to.span));
-                let diagnostic = Diagnostic::new(Code::WRONG_TYPE, to.span, title);
-                self.report(
-                    diagnostic
-                        .label("expected a `box` or a `polygon`")
-                        .note("its corners are written as numbers, for example `polygon((0, 0), (50, 0), (50, 50))m`"),
-                );
+                let diagnostic =
+                    Diagnostic::new(Code::WRONG_TYPE, to.span, title).label("expected a `box` or a `polygon`");
+                let otherwise = match &to.kind {
+                    ExpressionKind::Call(name, _) => region_otherwise(&name.text),
+                    _ => None,
+                };
+                self.report(diagnostic.note(otherwise.unwrap_or(
+                    "its corners are written as numbers, for example `polygon((0, 0), (50, 0), (50, 50))m`",
+                )));
                 return None;
             }
         };

@@ -212,6 +212,15 @@ impl Resolver<'_> {
     }
 }
 
+/// Whether both ends of a range are times.
+pub(super) fn is_of_times(range: &ast::Range) -> bool {
+    let is_time = |end: &Quantity| {
+        let unit = end.unit.as_ref().and_then(|unit| Unit::parse(&unit.text).ok());
+        unit.is_some_and(|unit| unit.dimension() == Unit::seconds().dimension())
+    };
+    is_time(&range.low) && is_time(&range.high)
+}
+
 /// A hundredth of an unsigned number as written; `None` for anything else.
 fn hundredth(written: &str) -> Option<f64> {
     let (digits, exponent) = written.split_once(['e', 'E']).unwrap_or((written, "0"));

@@ -101,11 +101,36 @@ impl<'a> Resolver<'a> {
         let mut ty = topic.ty.clone();
         let mut holder = format!("topic `{}`", path.topic.text);
         for name in &path.fields {
-            ty = self.field_in(&ty, &holder, name)?;
+            let Some(found) = self.field_in(&ty, &holder, name) else {
+                self.note_on_members(index, name);
+                return None;
+            };
+            ty = found;
             holder = format!("field `{}`", name.text);
         }
         let fields = path.fields.iter().map(|name| name.text.clone()).collect();
         Some((model::FieldPath { topic: TopicId::from_index(index), fields }, ty))
+    }
+
+    /// Adds to the last report, of a field that does not exist, what to write if the member of a group was meant.
+    fn note_on_members(&mut self, topic: usize, name: &Name) {
+        let Some(topic) = self.system.topics[topic].as_ref() else { return };
+        let is_member = |path: &String| path.split('/').any(|part| part == name.text);
+        let (Some(last), Some(member)) = (self.diagnostics.last_mut(), topic.paths.iter().find(|path| is_member(path)))
+        else {
+            return;
+        };
+        if topic.paths.len() > 1 && last.span == name.span {
+            let group = &topic.declaration.name;
+            last.notes.push(format!(
+                "`{group}` is a group of {} topics: `each of {group}` stands for each of them, `min of {group}` and \
+                 `max of {group}` for the least and the greatest value",
+                topic.paths.len()
+            ));
+            last.notes.push(format!(
+                "to name one of them, declare `{member}` as a topic of its own, instead of a member of the group"
+            ));
+        }
     }
 
     /// A path to a value that a formula reads: a field, or a coordinate of a point.
@@ -184,8 +209,11 @@ impl<'a> Resolver<'a> {
                 let numbers = fields.filter(|field| matches!(field.ty, Type::Int(_) | Type::Real(_)));
                 numbers.take(3).map(|field| field.declaration.name.clone()).collect()
             }
-            Type::Point(_) => {
-                diagnostic = diagnostic.note("`distance(p, q)` is the distance of two points");
+            Type::Point(ref unit) => {
+                let unit = unit.as_ref().map_or("", Unit::text);
+                diagnostic = diagnostic
+                    .note("`distance(p, q)` is the distance of two points")
+                    .note(format!("`distance({written}, (0, 0, 0){unit})` is its length"));
                 ["x", "y", "z"].map(str::to_owned).into()
             }
             Type::Text => {

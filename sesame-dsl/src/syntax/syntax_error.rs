@@ -274,6 +274,15 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
     let from = previous.map_or(region.lo, |previous| previous.lo) as usize;
     let part = if counts(Rule::times) { Expected::Operator } else { Expected::Operand };
     diagnostic = rewritten(diagnostic, foreign::notation(text, from, found.lo, part));
+    if part == Expected::Operator && found.text == "[" {
+        diagnostic = diagnostic.note(
+            "members of a group have no index: `each of` stands for each of them, `min of` and `max of` for the least \
+             and the greatest value",
+        );
+    }
+    let mut region = words(text, from, found.lo).skip_while(|&word| word != "signed_distance");
+    let otherwise = region.find_map(synonyms::region_otherwise);
+    diagnostic.notes.extend(otherwise.map(str::to_owned));
     if found.text == "and"
         && let Some(previous) = previous
     {

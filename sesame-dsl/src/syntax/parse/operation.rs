@@ -172,7 +172,7 @@ impl Reader<'_> {
     }
 
     fn listed(&mut self, pair: &Pair<'_>) -> Vec<Text> {
-        children(&expect_child(pair, Rule::texts), Rule::text).map(|text| self.text_of(&text)).collect()
+        children(&expect_child(pair, Rule::texts), Rule::text).map(|text| self.any_text(&text)).collect()
     }
 
     fn drains(&mut self, pair: &Pair<'_>) -> Vec<(Span, Drain)> {
@@ -227,8 +227,12 @@ impl Reader<'_> {
             }
             rule => {
                 let texts = expect_child(pair, Rule::texts);
-                let texts = children(&texts, Rule::text).map(|text| self.text_of(&text)).collect();
-                if rule == Rule::file_domain { Domain::Files(texts) } else { Domain::Texts(texts) }
+                let texts = children(&texts, Rule::text);
+                if rule == Rule::file_domain {
+                    Domain::Files(texts.map(|text| self.text_of(&text)).collect())
+                } else {
+                    Domain::Texts(texts.map(|text| self.any_text(&text)).collect())
+                }
             }
         }
     }

@@ -38,7 +38,7 @@ impl Reader<'_> {
                     Rule::range => Choice::Range(self.range(&value)),
                     Rule::signed => Choice::Value(self.signed(&value)),
                     Rule::point => Choice::Point(self.point(&value)),
-                    _ => Choice::Text(self.text_of(&value)),
+                    _ => Choice::Text(self.any_text(&value)),
                 };
                 (name, value)
             })
