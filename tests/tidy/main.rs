@@ -66,6 +66,7 @@ fn the_tree_is_tidy() {
         rules::mod_files(&files),
         rules::without_purpose(&files),
         rules::not_in_the_index(&files),
+        rules::pictures_not_shown(&files),
         rules::digests(&files),
         rules::exit_codes(&files),
     ]

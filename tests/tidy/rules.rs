@@ -122,6 +122,15 @@ pub(crate) fn not_in_the_index(files: &[File]) -> Vec<String> {
     unlisted.chain(missing.map(|link| format!("{INDEX}: there is no page docs/{link}; remove its row"))).collect()
 }
 
+/// Pictures of the documentation that no page shows.
+pub(crate) fn pictures_not_shown(files: &[File]) -> Vec<String> {
+    let pages: Vec<&File> = files.iter().filter(|file| file.ending() == Some("md")).collect();
+    let shown = |picture: &File| pages.iter().any(|page| page.text.contains(&format!("{})", picture.name())));
+    let pictures = files.iter().filter(|file| matches!(file.ending(), Some("png" | "svg")));
+    let hidden = pictures.filter(|picture| !shown(picture));
+    hidden.map(|file| format!("{0}: no page shows it; remove it with `git rm {0}`", file.path)).collect()
+}
+
 /// Digests of results in documentation: nobody notices when they are out of date.
 pub(crate) fn digests(files: &[File]) -> Vec<String> {
     let mut complaints = Vec::new();
@@ -244,6 +253,16 @@ mod tests {
                 "docs/README.md: add a row for docs/b.md",
                 "docs/README.md: there is no page docs/gone.md; remove its row"
             ]
+        );
+    }
+
+    #[test]
+    fn each_picture_is_shown_by_a_page() {
+        let page = file("docs/a.md", "![A front](front.png)");
+        let files = [page, file("docs/front.png", ""), file("docs/old.png", "")];
+        assert_eq!(
+            pictures_not_shown(&files),
+            ["docs/old.png: no page shows it; remove it with `git rm docs/old.png`"]
         );
     }
 

@@ -68,6 +68,8 @@ struct Operation {
     name: String,
     kind: Kind,
     within: Option<(f64, f64)>,
+    /// Its lengths are bounded, so a test says how long it is active.
+    bounded: bool,
 }
 
 /// A space that grows.
@@ -242,6 +244,48 @@ impl Space {
         if found.is_empty() { None } else { Some(self.draw.one(&found).clone()) }
     }
 
+    /// A topic or a field of one that is a point, with its unit, and whether its topic is a group.
+    fn point_place(&mut self) -> Option<(String, &'static str, bool)> {
+        let mut found = Vec::new();
+        for topic in &self.topics {
+            match &topic.ty {
+                Type::Point(unit) => found.push((topic.name.clone(), *unit, topic.group)),
+                Type::Message(at) => {
+                    for (name, ty) in &self.messages[*at].fields {
+                        if let Type::Point(unit) = ty {
+                            found.push((format!("{}.{name}", topic.name), *unit, topic.group));
+                        }
+                    }
+                }
+                _ => {}
+            }
+        }
+        if found.is_empty() { None } else { Some(self.draw.one(&found).clone()) }
+    }
+
+    /// A formula over points, texts and the time, with its unit; over a number where there is no other.
+    fn geometry(&mut self) -> (String, &'static str) {
+        let bound = self.draw.number();
+        let corner = self.draw.number();
+        if let Some((point, unit, group)) = self.point_place().filter(|_| self.draw.chance(0.8)) {
+            let each = if group { "each of " } else { "" };
+            let corners = format!("({corner}, {corner}, -1), ({}, {}, 20)", corner + 1.0, corner + 2.5);
+            return match self.draw.below(if group { 5 } else { 4 }) {
+                0 => (format!("= max({each}{point}.x)"), unit),
+                1 => (format!("= min(distance({each}{point}, ({bound}, {corner}, 0){unit}))"), unit),
+                2 => (format!("= max(signed_distance({each}{point}, box({corners}){unit}))"), unit),
+                3 => (format!("= duration({each}{point}.z > {bound}{unit} and sqrt(4) > 1)"), "s"),
+                _ => (format!("= min(distance(each pair of {point}))"), unit),
+            };
+        }
+        if let Some(place) = self.text_place().filter(|_| self.draw.chance(0.5)) {
+            let sign = *self.draw.one(&["==", "!="]);
+            return (format!("= count({place} {sign} {})", quoted(&text(&mut self.draw))), "");
+        }
+        let Field { written, unit, .. } = self.field();
+        (format!("= count(sin({corner}rad) < 0.5 or {written} > {bound}{unit})"), "")
+    }
+
     // ----- metrics and requirements
 
     pub(super) fn metrics(&mut self) -> Vec<String> {
@@ -253,7 +297,11 @@ impl Space {
             let name = self.name("hook");
             let field = self.field();
             let bound = format!("{}{}", self.draw.number(), field.unit);
-            let (clause, source, unit, boundless) = match self.draw.below(9) {
+            let (clause, source, unit, boundless) = match self.draw.below(12) {
+                9.. => {
+                    let (formula, unit) = self.geometry();
+                    (String::new(), formula, unit, false)
+                }
                 0..=2 => {
                     let topics = self.draw.some(self.topics.len(), 3);
                     let unit = self.unit();
@@ -360,9 +408,14 @@ impl Space {
             if during && self.draw.chance(0.2) {
                 clauses += " untimed";
             }
+            let bounded = during && self.draw.chance(0.3);
+            if bounded {
+                // Long enough for all windows of the tests.
+                clauses += " for [0s, 5s]";
+            }
             let on = if during { format!(" on {target}") } else { String::new() };
             items.push(format!("{}operation {name}{on} = {source}{clauses}\n", docs(&mut self.draw)));
-            self.operations.push(Operation { name, kind, within });
+            self.operations.push(Operation { name, kind, within, bounded });
         }
         items
     }
@@ -417,8 +470,8 @@ impl Space {
             let name = self.name("test");
             let mut lines = String::new();
             for at in self.draw.some(self.operations.len(), 3) {
-                let Operation { name, kind, within } = &self.operations[at];
-                let (name, within) = (name.clone(), *within);
+                let Operation { name, kind, within, bounded } = &self.operations[at];
+                let (name, within, bounded) = (name.clone(), *within, *bounded);
                 let (choices, moment) = match kind {
                     Kind::Range { word, range, unit } => {
                         (format!("{word} {}", written(self.draw.part(*range), unit)), None)
@@ -441,7 +494,9 @@ impl Space {
                 let condition = if self.draw.chance(0.3) { self.comparison().zip(self.comparison()) } else { None };
                 let activation = match (moment, condition) {
                     (Some(moment), _) => moment.to_owned(),
-                    (None, Some((start, end))) if self.draw.chance(0.5) => format!("when {start} until {end}"),
+                    (None, Some((start, end))) if !bounded && self.draw.chance(0.5) => {
+                        format!("when {start} until {end}")
+                    }
                     (None, Some((one, _))) => format!("when {one} for 200ms at most 2 times"),
                     (None, None) => format!("from {from}s to {to}s"),
                 };
@@ -563,6 +618,7 @@ impl Space {
         let possible: Vec<usize> = (0..self.metrics.len()).filter(|&at| self.metrics[at].objective).collect();
         let objectives: Vec<usize> = self.draw.some(possible.len(), 3).into_iter().map(|at| possible[at]).collect();
         let operations = self.draw.some(self.operations.len(), 4);
+        let bounded = operations.iter().any(|&at| self.operations[at].bounded);
         let operations: Vec<&str> = operations.iter().map(|&at| self.operations[at].name.as_str()).collect();
         let operations = operations.join(", ");
         // There may be operations beside the run only, which a test holds once unless copies may overlap.
@@ -584,7 +640,8 @@ impl Space {
         let variables: Vec<usize> = (0..self.metrics.len()).filter(|&at| self.metrics[at].boundless).collect();
         if !variables.is_empty() && self.draw.chance(0.4) {
             let chosen: Vec<usize> = self.draw.some(variables.len(), 3).into_iter().map(|at| variables[at]).collect();
-            let length = *self.draw.one(&["", " for [10ms, 0.3s]", " { depth 3  integers [-5, 9] } at most 3 times"]);
+            let lengths: &[&str] = &[" for [10ms, 0.3s]", "", " { depth 3  integers [-5, 9] } at most 3 times"];
+            let length = *self.draw.one(if bounded { &lengths[..1] } else { lengths });
             members.push(format!("activate by condition over {}{length}", self.list_metrics(&chosen)));
         } else if self.draw.chance(0.5) {
             members.push("activate by time".to_owned());
