@@ -82,7 +82,7 @@ codes! {
     NOT_A_CONDITION = "E0306": "A condition contains something other than comparisons of metrics.",
     CONSTANT_COMPARISON = "E0307": "A comparison has the same outcome in every test.",
     TEMPORAL_REACH = "E0308": "The scope of a temporal operator is ambiguous.",
-    BAD_REGION = "E0309": "The corners of a region do not enclose anything, or not one thing.",
+    BAD_REGION = "E0309": "The corners of a region do not enclose exactly one region.",
     UNPAIRED = "E0310": "Members of groups are read together that do not belong together.",
     REVERSED_RANGE = "E0401": "A range begins above its end.",
     OUT_OF_RANGE = "E0402": "A value is outside the permitted range.",

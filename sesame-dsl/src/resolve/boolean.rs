@@ -143,7 +143,7 @@ impl<'a> Resolver<'a> {
             }
             _ => {
                 let (text, other) = if self.is_text(left) { (left, right) } else { (right, left) };
-                let title = format!("the text `{}` is not compared with a written text", self.text(text.span));
+                let title = format!("`{}` can only be compared with a text in double quotes", self.text(text.span));
                 let diagnostic = Diagnostic::new(Code::WRONG_TYPE, other.span, title)
                     .label("expected a text in double quotes, such as `\"ready\"`");
                 self.report(diagnostic);
@@ -191,7 +191,7 @@ impl<'a> Resolver<'a> {
 
     fn texts_have_no_order(&mut self, span: Span) {
         let diagnostic = Diagnostic::new(Code::WRONG_TYPE, span, "texts have no order");
-        self.report(diagnostic.label("compare them by `==` or `!=`"));
+        self.report(diagnostic.label("compare them with `==` or `!=`"));
     }
 
     fn conditions(&mut self, inputs: &mut Vec<Input>, parts: &'a [ast::Expression]) -> Option<Vec<Condition>> {

@@ -163,6 +163,12 @@ impl<'a> Resolver<'a> {
         }
         // Operators over time are written before what they apply to.
         let expected = |word: &str| known.contains(&word) || word == "always" || word == "eventually";
+        let aggregate = meanings(&name.text, |word| AGGREGATES.contains(&word)).first().map(|synonym| synonym.meant);
+        if let Some(meant) = aggregate.filter(|meant| !known.contains(meant)) {
+            let note = format!("`{}` is `{meant}`, which is only allowed as the outermost function", name.text);
+            self.report(diagnostic.note(note));
+            return;
+        }
         let synonym = meanings(&name.text, expected).first().map(|synonym| synonym.meant);
         diagnostic = match synonym.or_else(|| most_similar(&name.text, known.iter().copied())) {
             Some(similar) => diagnostic.did_you_mean(name.span, similar),

@@ -15,6 +15,11 @@ pub(super) fn permitted(range: Range) -> Lengths {
     Lengths { low: range.low, high: range.high }
 }
 
+/// A time in a message: differences of times are rounded to the resolution of simulation time.
+fn seconds(time: f64) -> String {
+    format!("{}s", (time * 1e9).round() / 1e9)
+}
+
 impl<'a> Resolver<'a> {
     /// The lengths that the clause of an operation permits, which fit into its window.
     pub(super) fn window_lengths(&mut self, written: &ast::Range, within: Option<Range>) -> Option<Range> {
@@ -27,9 +32,9 @@ impl<'a> Resolver<'a> {
         }
         let room = within.map_or(f64::INFINITY, |within| within.high - within.low);
         if found.low > room && !permitted(found).contain(room) {
-            let title = format!("no window of {}s or more fits into `within`", found.low);
+            let title = format!("no window of {} or more fits into `within`", seconds(found.low));
             let diagnostic = Diagnostic::new(Code::BAD_WINDOW, written.span, title)
-                .label(format!("the permitted window is only {room}s long"));
+                .label(format!("the permitted window is only {} long", seconds(room)));
             self.report(diagnostic);
             return None;
         }
@@ -69,10 +74,9 @@ impl<'a> Resolver<'a> {
                     Activation::Condition { .. } | Activation::Offline => 0.0,
                 };
                 let how = if length < lengths.low { "shorter" } else { "longer" };
-                let length = (length * 1e9).round() / 1e9;
                 (
-                    format!("`{name}` is active for {length}s, {how} than permitted"),
-                    format!("expected a length of {}s to {}s", lengths.low, lengths.high),
+                    format!("`{name}` is active for {}, {how} than permitted", seconds(length)),
+                    format!("expected a length of {} to {}", seconds(lengths.low), seconds(lengths.high)),
                 )
             }
         };
@@ -94,16 +98,18 @@ impl<'a> Resolver<'a> {
         if campaign.inherited.operations && campaign.inherited.end {
             return;
         }
-        let Some((lengths, begin)) = self.operations[index]
-            .as_ref()
-            .and_then(|operation| Some((operation.lengths?, operation.within.map_or(0.0, |within| within.low))))
+        let Some((lengths, within)) =
+            self.operations[index].as_ref().and_then(|operation| Some((operation.lengths?, operation.within)))
         else {
             return;
         };
+        let begin = within.map_or(0.0, |within| within.low);
         let (Some(written), Some((_, end_written))) = (self.written_lengths(index), campaign.ends.first()) else {
             return;
         };
         let room = end - begin;
+        // That was reported of its window.
+        let leaves_the_end = within.is_some_and(|within| within.high > end);
         let (end_text, of) = (self.text(end_written.span), &campaign.head.name.text);
         // An operation that begins too late was reported as that.
         let diagnostic = if room <= 0.0 {
@@ -114,14 +120,14 @@ impl<'a> Resolver<'a> {
                 name.span,
                 format!("`{}` can never be active in campaign `{of}`", name.text),
             )
-            .label(format!("it needs {}s, but tests end at {end_text}", lengths.low))
-        } else if lengths.high > room && !permitted(lengths).contain(room) {
+            .label(format!("it needs {}, but tests end at {end_text}", seconds(lengths.low)))
+        } else if lengths.high > room + 1e-9 && !leaves_the_end {
             Diagnostic::new(
                 Code::OUTLASTS_THE_END,
                 name.span,
                 format!("`{}` may be active beyond the end of campaign `{of}`", name.text),
             )
-            .label(format!("no window of {}s fits, because tests end at {end_text}", lengths.high))
+            .label(format!("no window of {} fits, because tests end at {end_text}", seconds(lengths.high)))
         } else {
             return;
         };
@@ -153,7 +159,7 @@ impl<'a> Resolver<'a> {
         let diagnostic = Diagnostic::new(Code::CANNOT_CONTAIN, place, title);
         let diagnostic = match space.lengths {
             Some(of) if permitted(of).shared(permitted(lengths)).is_some() => return,
-            Some(of) => diagnostic.label(format!("activations last {}s to {}s here", of.low, of.high)),
+            Some(of) => diagnostic.label(format!("activations last {} to {} here", seconds(of.low), seconds(of.high))),
             None => diagnostic
                 .label("activations end by a condition here, at any time")
                 .note("add `for` with a range of times to the `activate` of this campaign, such as `for [0.1s, 2s]`"),

@@ -123,8 +123,8 @@ impl<'a> Resolver<'a> {
         if topic.paths.len() > 1 && last.span == name.span {
             let group = &topic.declaration.name;
             last.notes.push(format!(
-                "`{group}` is a group of {} topics: `each of {group}` stands for each of them, `min of {group}` and \
-                 `max of {group}` for the least and the greatest value",
+                "`{group}` is a group of {} topics: `each of {group}` stands for each of them, `max of {group}` for \
+                 the greatest value, and `{group}` alone for the least",
                 topic.paths.len()
             ));
             last.notes.push(format!(

@@ -102,7 +102,7 @@ pub(super) fn notation(text: &str, from: usize, at: usize, expected: Expected) -
     }
     match found.text {
         "^" => rewrites.extend(power(text, from, found)),
-        "<" | "<=" | ">" | ">=" | "==" => rewrites.extend(chained(text, from, found)),
+        "<" | "<=" | ">" | ">=" => rewrites.extend(chained(text, from, found)),
         "in" | "between" => rewrites.extend(between(text, from, found)),
         _ => {}
     }
@@ -158,7 +158,8 @@ fn power(text: &str, from: usize, found: Token<'_>) -> Vec<Rewrite> {
     let (whole, base, exponent) = (base.start..exponent.hi(), &text[base], &text[sign.lo..exponent.hi()]);
     let mut written = vec![format!("pow({base}, {exponent})")];
     if exponent == "2" {
-        written.push(format!("({base} * {base})"));
+        // `pow` takes plain numbers only.
+        written.insert(0, format!("({base} * {base})"));
     }
     let rewrite = |written: String| Rewrite {
         message: format!("use `{written}`"),
@@ -172,9 +173,12 @@ fn power(text: &str, from: usize, found: Token<'_>) -> Vec<Rewrite> {
 fn chained(text: &str, from: usize, second: Token<'_>) -> Option<Rewrite> {
     let middle = operand(text, from, second.lo, Rule::sum)?;
     let before = text[..middle.start].trim_end();
-    let sign = ["<=", ">=", "==", "<", ">"].into_iter().find(|sign| before.ends_with(sign))?;
+    let sign = ["<=", ">=", "<", ">"].into_iter().find(|sign| before.ends_with(sign))?;
     let left = operand(text, from, before.len() - sign.len(), Rule::sum)?;
     let right = following(text, second.hi(), Rule::sum)?;
+    if matches!(token_at(text, right.end).text, "<" | "<=" | ">" | ">=" | "==" | "!=") {
+        return None;
+    }
     let first = &text[left.start..middle.end];
     let written = format!("{first} and {} {} {}", &text[middle], second.text, &text[right.clone()]);
     Some(Rewrite {
@@ -229,7 +233,8 @@ fn operand(text: &str, from: usize, end: usize, rule: Rule) -> Option<Range<usiz
     }
     let mut at = token_at(text, start);
     while at.lo < end && at.kind != TokenKind::End {
-        let fits = at.text != "-"
+        // `-x^2` is minus the power of `x`, but `-x < y` compares `-x`.
+        let fits = (rule == Rule::sum || at.text != "-")
             && parse_bounded(rule, &text[at.lo..end]).is_ok_and(|read| read.as_str().len() == end - at.lo);
         if fits {
             return Some(at.lo..end);

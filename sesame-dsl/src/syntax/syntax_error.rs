@@ -112,11 +112,7 @@ fn reading(text: &str, lo: u32, hi: u32, suggestion: &Suggestion, block: &Block)
 }
 
 fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Option<Span>) -> Diagnostic {
-    let span_of = |token: Token<'_>| Span {
-        file,
-        lo: u32::try_from(token.lo).expect("files are small"),
-        hi: u32::try_from(token.hi()).expect("files are small"),
-    };
+    let span_of = |token: Token<'_>| placed(file, token.lo..token.hi());
     let [lo, hi] = [region.lo as usize, region.hi as usize];
     let mut first = token_at(text, lo);
     while first.kind == TokenKind::Doc && first.hi() < hi {
@@ -160,11 +156,9 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
         _ => None,
     };
     if let Some((range, join, count)) = counted {
-        let place = |at: usize| u32::try_from(at).expect("files are small");
-        let join = Span { lo: place(join.start), hi: place(join.end), ..span };
         return Diagnostic::new(Code::SYNTAX, span, format!("unexpected `{}`", found.text))
             .label(format!("expected {expected}"))
-            .fix(format!("write `{range}`"), join, count);
+            .fix(format!("write `{range}`"), placed(file, join), count);
     }
     if let Some((operator, rewrites)) = foreign::operator(text, failure.at).filter(|_| !counts(Rule::equals)) {
         let title = format!("unexpected `{}`", &text[operator.clone()]);
@@ -177,13 +171,14 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
             .label("names consist of letters, digits and `_`");
         let from = text[..found.lo].rfind(|c| !joins(Some(c))).map_or(0, |at| at + 1);
         let to = token_at(text, found.hi()).hi();
-        let meanings = synonyms::meanings(&text[from..to], |_| true);
-        let place = |at: usize| u32::try_from(at).expect("files are small");
-        let whole = Span { lo: place(from), hi: place(to), ..span };
-        return match meanings.first() {
-            Some(synonym) => diagnostic.did_you_mean(whole, synonym.meant),
-            None => diagnostic.suggest("use `_`", span, "_"),
+        let declared = text[..from].trim_end().rsplit(|c| !joins(Some(c))).next().unwrap_or_default();
+        let declares = [Rule::file, Rule::system].iter().any(|&rule| blocks::block(rule).begins_with(declared));
+        let meanings = synonyms::meanings(&text[from..to], |_| !declares);
+        let diagnostic = match meanings.first() {
+            Some(synonym) => diagnostic.did_you_mean(placed(file, from..to), synonym.meant),
+            None => diagnostic,
         };
+        return diagnostic.suggest("use `_`", span, "_");
     }
     if found.kind == TokenKind::OpenText {
         let title = "this text does not end on its line";
@@ -195,7 +190,7 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
             .note("`///` documents the declaration after it; use `//` for any other comment");
     }
     let next = token_at(text, found.hi());
-    // A keyword that begins the next declaration is in its place: what lacks is the name before it.
+    // A keyword that begins the next declaration is in its place: what is missing is the name before it.
     let [in_file, in_system] = [Rule::file, Rule::system].map(|rule| blocks::block(rule).begins_with(found.text));
     let declares = (in_file || in_system) && (next.kind == TokenKind::Word || next.text == "{");
     if first.text == "requirement"
@@ -204,7 +199,7 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
         let title = "a requirement is a bound on a metric, not a formula";
         return Diagnostic::new(Code::SYNTAX, span, title)
             .label(if wants_name { "expected the name of a metric" } else { "expected a bound such as `<= 0`" })
-            .note(format!("declare a metric with the formula, {formula}"));
+            .note(formula);
     }
     if matches!(found.text, "maximise" | "minimise") && wants_name && next.kind == TokenKind::Word && !declares {
         let title = format!("`{}` belongs to the declaration of the metric", found.text);
@@ -239,7 +234,7 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
         // A word of the language is not a misspelling of another.
         let known = Rule::all_rules().iter().any(|&rule| keyword_of(rule) == Some(found.text));
         let (phrase, meanings) = foreign_words(text, found, &candidates);
-        let phrase = Span { hi: u32::try_from(phrase).expect("files are small"), ..span };
+        let phrase = placed(file, found.lo..phrase);
         let from = previous.map_or(region.lo, |previous| previous.lo) as usize;
         // What may stand only once would stand there twice.
         let direction = |word: &str| matches!(word, "maximise" | "minimise");
@@ -264,7 +259,7 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
             && text[..found.lo].trim_end().ends_with(|c: char| c.is_ascii_digit());
         if number_before && Unit::parse(found.text).is_ok() {
             let gap = text[..found.lo].trim_end().len();
-            let gap = Span { lo: u32::try_from(gap).expect("files are small"), hi: span.lo, ..span };
+            let gap = placed(file, gap..found.lo);
             diagnostic = diagnostic.suggest("remove the space before the unit", gap, "");
         }
         if block.rule == Rule::file && in_system {
@@ -274,10 +269,10 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
     let from = previous.map_or(region.lo, |previous| previous.lo) as usize;
     let part = if counts(Rule::times) { Expected::Operator } else { Expected::Operand };
     diagnostic = rewritten(diagnostic, foreign::notation(text, from, found.lo, part));
-    if part == Expected::Operator && found.text == "[" {
+    if part == Expected::Operator && found.text == "[" && is_index(text, found) {
         diagnostic = diagnostic.note(
-            "members of a group have no index: `each of` stands for each of them, `min of` and `max of` for the least \
-             and the greatest value",
+            "members of a group have no index: `each of` stands for each of them, `max of` for the greatest value, and \
+             the name alone for the least",
         );
     }
     let mut region = words(text, from, found.lo).skip_while(|&word| word != "signed_distance");
@@ -343,6 +338,12 @@ fn foreign_words(text: &str, found: Token<'_>, candidates: &[&str]) -> (usize, V
         }
     }
     (found.hi(), synonyms::meanings(found.text, expected))
+}
+
+/// Whether brackets contain what chooses one of several: a count or a text.
+fn is_index(text: &str, open: Token<'_>) -> bool {
+    let inside = token_at(text, open.hi());
+    (is_count(inside) || inside.kind == TokenKind::Text) && token_at(text, inside.hi()).text == "]"
 }
 
 /// The words of a stretch.

@@ -1,5 +1,5 @@
--- Robustness over time: what the outermost always or eventually of a metric's formula quantifies over, thinned. Pieces
--- are as in series_pieces; the last point ends the signal and repeats the value before. It explains the metric's value
+-- Robustness over time: that of the formula inside the outermost always or eventually of a metric's formula, thinned.
+-- Pieces are as in series_pieces; the last point ends the signal and repeats the value before. It explains the metric's value
 -- and is not part of the digest. The view robustness has a row per point.
 CREATE TABLE robustness_pieces (
     test            INTEGER NOT NULL REFERENCES tests,
