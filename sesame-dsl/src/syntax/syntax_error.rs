@@ -169,7 +169,7 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
     if found.text == "-" && joins(before) && joins(after) {
         let diagnostic = Diagnostic::new(Code::NOT_A_NAME, span, "a name cannot contain `-`")
             .label("names consist of letters, digits and `_`");
-        let from = text[..found.lo].rfind(|c| !joins(Some(c))).map_or(0, |at| at + 1);
+        let from = text[..found.lo].trim_end_matches(|c| joins(Some(c))).len();
         let to = token_at(text, found.hi()).hi();
         let declared = text[..from].trim_end().rsplit(|c| !joins(Some(c))).next().unwrap_or_default();
         let declares = [Rule::file, Rule::system].iter().any(|&rule| blocks::block(rule).begins_with(declared));
@@ -371,7 +371,7 @@ fn counted_otherwise(text: &str, found: Token<'_>) -> Option<Counted> {
     }
     let joined = matches!(found.text, "-" | "–" | "—" | "…" | "~" | ":" | "." | "to" | "until");
     let gap = text[..found.lo].trim_end().len();
-    let first = text[..gap].rfind(|c: char| !c.is_ascii_digit()).map_or(0, |at| at + 1);
+    let first = text[..gap].trim_end_matches(|c: char| c.is_ascii_digit()).len();
     let whole = !text[..first].ends_with(|c: char| c == '.' || c.is_alphanumeric());
     let both = joined && is_count(last) && first < gap && whole;
     both.then(|| (format!("{}..{}", &text[first..gap], last.text), gap..last.lo, "..".to_owned()))
