@@ -32,6 +32,7 @@ use std::process::ExitCode;
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 use sesame_base::visible::visible_lines;
+use sesame_results::record::{self, Repository};
 
 use crate::campaign::WorkerProgram;
 use crate::cli::failure::Failure;
@@ -45,7 +46,7 @@ pub use self::caller::{CALLER, Caller};
 pub use self::commands::{Internal, Running, Showing};
 
 /// What the exit codes of a runner mean.
-const EXIT_CODES: &str = "Exit codes: 0 done; 1 failed; 2 wrong usage; 3 done, but not as required (`known`: an \
+pub const EXIT_CODES: &str = "Exit codes: 0 done; 1 failed; 2 wrong usage; 3 done, but not as required (`known`: an \
                           expectation is not kept; `replay`: the test came out different; `replay-recording`: a metric \
                           did; `--fail-on`: what it names was found; a campaign says too little: most of its tests broke \
                           off, none was disturbed, or no requirement was judged); 130 stopped by the user.";
@@ -92,6 +93,12 @@ pub fn interpret(runner: &Interpreted, caller: Caller, arguments: &[OsString]) -
 #[cfg(feature = "process")]
 pub fn carry_out(command: &Running, runner: &Interpreted, caller: Caller) -> ExitCode {
     concluded(interpreted(runner, caller).and_then(|session| command.carry_out(&session)))
+}
+
+/// The file name of the space whose run is the latest in a folder of results; `None` if there is none that can be read.
+pub fn recorded_source(results: &Path) -> Option<String> {
+    let latest = record::latest_folder(results).ok().flatten()?;
+    Some(Repository::open(&latest).ok()?.plan().source.clone())
 }
 
 /// Carries out a command on the runs in a folder of results.

@@ -25,7 +25,8 @@ use crate::project;
 pub use shell::Shell;
 
 const EXIT_CODES: &str = "Exit codes: 0 success, 1 errors in the input or generated files out of date, 2 wrong usage; \
-                          `run` passes on the exit code of the runner.";
+                          `run` and the other commands of a campaign have the exit codes of its runner; see their \
+                          `--help`.";
 
 /// Checks `.sesame` spaces, runs test campaigns of robots, and generates their runners.
 #[derive(Debug, Parser)]

@@ -125,3 +125,38 @@ fn an_objective_whose_hook_is_a_stub_is_told_of_before_the_build() {
     assert!(said.contains("is not filled in yet") && said.contains("hooks/"), "{said}");
     assert!(!said.contains("Building") && !said.contains("Built"), "{said}");
 }
+
+#[test]
+fn two_spaces_in_one_folder_do_not_share_results_and_none_are_written_through_a_link() {
+    let project = two_robots("interpreted_beside");
+    let run = |space: &str| without_cargo(&project, &["run", space, "-c", "crossing"]);
+    run("two_robots.sesame").expect(0);
+    fs::copy(&project.space, project.folder.join("other.sesame")).unwrap();
+    for told in [
+        run("other.sesame").expect(1),
+        without_cargo(&project, &["list", "other.sesame", "-c", "crossing"]).expect(1),
+        without_cargo(&project, &["replay", "other.sesame", "-c", "crossing", "T3"]).expect(1),
+    ] {
+        assert!(told.err.contains("contains results of `two_robots.sesame`, not of `other.sesame`"), "{}", told.err);
+    }
+    // Whoever renames a space keeps its results.
+    fs::remove_file(&project.space).unwrap();
+    without_cargo(&project, &["replay", "other.sesame", "-c", "crossing", "T3"]).expect(0);
+    without_cargo(&project, &["list", "other.sesame", "-c", "crossing"]).expect(0);
+
+    let elsewhere = project.folder.join("elsewhere");
+    fs::rename(project.runners.join("crossing"), &elsewhere).unwrap();
+    std::os::unix::fs::symlink(&elsewhere, project.runners.join("crossing")).unwrap();
+    let told = run("other.sesame").expect(1);
+    assert!(told.err.contains("crossing is a link"), "{}", told.err);
+    assert!(!elsewhere.join("results/42-2").exists());
+}
+
+#[test]
+fn results_are_shown_while_their_space_has_errors_if_they_are_named() {
+    let project = two_robots("interpreted_broken");
+    without_cargo(&project, &["run", "two_robots.sesame", "-c", "crossing"]).expect(0);
+    fs::write(&project.space, "space two_robots\nmetric").unwrap();
+    let list = ["list", "two_robots.sesame", "--results", "runners/crossing/results/42"];
+    assert!(without_cargo(&project, &list).expect(0).out.contains("T20"));
+}

@@ -43,8 +43,8 @@ pub enum CampaignError {
     /// No part of the system receives what operations disturb, so tests with them would show nothing.
     #[error(
         "{}\nnothing was fuzzed: such tests would pass without having disturbed anything. Disturb what the simulator \
-         subscribes to, let it subscribe to this topic, or read the topic by a metric with `outbound`. To run the campaign \
-         as it is, pass `--allow-unheard`",
+         subscribes to, let it subscribe to this topic, or read the topic by a metric with `outbound`. With \
+         `--allow-unheard`, such tests run all the same",
         .0.iter().map(Unheard::to_string).collect::<Vec<_>>().join("\n")
     )]
     Unheard(Vec<Unheard>),

@@ -1,6 +1,8 @@
 //! The program that a supervisor starts as its worker: its own, which is called again.
 
-use std::io;
+use std::io::{self, Write as _};
+#[cfg(target_os = "linux")]
+use std::os::unix::process::CommandExt as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -27,14 +29,31 @@ impl WorkerProgram {
 
     /// The command that starts a worker with this folder of its own.
     pub(super) fn command(&self, directory: &Path) -> io::Result<Command> {
-        let mut command = Command::new(&self.executable);
+        let mut command = self.this_program();
         command.arg("worker");
         if let Some(text) = &self.interpreted {
             let file = directory.join("runner.json");
-            std::fs::write(&file, text)?;
+            // A file of an earlier worker goes, and nothing is written through a link.
+            match std::fs::remove_file(&file) {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+                _ => std::fs::File::create_new(&file)?.write_all(text.as_bytes())?,
+            }
             command.arg("--runner").arg(file.canonicalize()?);
         }
         Ok(command)
+    }
+
+    /// The running program, even if another version has been installed in its place since.
+    #[cfg(target_os = "linux")]
+    fn this_program(&self) -> Command {
+        let mut command = Command::new("/proc/self/exe");
+        command.arg0(&self.executable);
+        command
+    }
+
+    #[cfg(not(target_os = "linux"))]
+    fn this_program(&self) -> Command {
+        Command::new(&self.executable)
     }
 
     /// The program, as messages name it.

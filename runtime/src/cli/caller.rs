@@ -31,7 +31,7 @@ impl Caller {
     }
 
     /// A command as it can be pasted into a shell.
-    pub(super) fn command(&self, name: &str, arguments: &[&str]) -> String {
+    pub fn command(&self, name: &str, arguments: &[&str]) -> String {
         let arguments = self.arguments.iter().map(String::as_str).chain(arguments.iter().copied());
         arguments
             .fold(format!("{} {name}", self.program), |command, argument| format!("{command} {}", quoted(argument)))

@@ -60,8 +60,9 @@ pub(super) fn confirm(session: &Session, options: &Options) -> Result<ExitCode, 
     }
     if tests.is_empty() {
         return Err(Failure(format!(
-            "there is no front in {}: name the tests that are to be run again, for example `confirm T1`",
-            shown(repository.path())
+            "there is no front in {}: name the tests that are to be run again, for example\n    {}",
+            shown(repository.path()),
+            session.caller.command("confirm", &["T1"])
         )));
     }
     for test in &mut tests {

@@ -17,7 +17,7 @@ use sesame_relay::metric::unimplemented_hooks;
 use sesame_results::record::{self, Recorder, Repository};
 use sesame_results::report::{self, Summary};
 
-use crate::campaign::{CampaignEnd, Settings, run_campaign};
+use crate::campaign::{CampaignEnd, CampaignError, Settings, run_campaign};
 use crate::changed_files::ChangedFiles;
 use crate::cli::failure::{Failure, STOPPED};
 use crate::cli::gate::Gate;
@@ -79,10 +79,14 @@ fn workers(text: &str) -> Result<NonZeroUsize, String> {
 /// A length of wall time from the command line.
 pub(super) fn seconds(text: &str) -> Result<Duration, String> {
     let seconds: f64 = text.parse().map_err(|_| "not a number of seconds".to_owned())?;
-    Duration::try_from_secs_f64(seconds)
-        .ok()
-        .filter(|limit| !limit.is_zero())
-        .ok_or_else(|| "must be above 0".to_owned())
+    if seconds.is_nan() || seconds <= 0.0 {
+        return Err("must be above 0".to_owned());
+    }
+    match Duration::try_from_secs_f64(seconds) {
+        Ok(limit) if limit.is_zero() => Err("must be a nanosecond or more".to_owned()),
+        Ok(limit) => Ok(limit),
+        Err(_) => Err("too long; leave the option out for the default".to_owned()),
+    }
 }
 
 impl ExecutionArgs {
@@ -221,6 +225,7 @@ pub(super) fn execute(
     let settings = execution.settings(session, seed, &files);
     let interrupted = interruptible()?;
     let started = Instant::now();
+    let before = runs(recorder.repository())?;
     let mut display = Display::new(&plan, seed, execution.workers());
     let end =
         run_campaign(&plan, recorder, &settings, &folder.join("workers"), &interrupted, &mut |event, progress| {
@@ -230,21 +235,24 @@ pub(super) fn execute(
     files.finish()?;
     let resume = || session.caller.command("resume", &[&shown(folder)]);
     let end = end.map_err(|error| {
-        let continued = if error.leaves_the_run_resumable() {
-            format!("\nThis continues the run:\n    {}", resume())
-        } else {
-            String::new()
+        let continued = match &error {
+            error if error.leaves_the_run_resumable() => format!("\nThis continues the run:\n    {}", resume()),
+            CampaignError::Unheard(_) => {
+                let anyway = session.caller.command("resume", &["--allow-unheard", &shown(folder)]);
+                format!("\nThis runs the campaign as it is:\n    {anyway}")
+            }
+            _ => String::new(),
         };
         Failure(format!("{error}{continued}"))
     });
     match end? {
         CampaignEnd::Finished(repository) => {
             let code = report_outcome(&repository, folder, &folder.join("report.html"), output)?;
-            let repetitions: usize = repository.repetitions()?.values().map(Vec::len).sum();
-            let (took, tests) = (started.elapsed(), repository.numbers()?.len() + repetitions);
+            let (took, runs) = (started.elapsed(), runs(&repository)?);
             let took =
                 if took.as_secs() < 90 { format!("{:.1} s", took.as_secs_f64()) } else { wait(took.as_secs_f64()) };
-            say(format_args!("      Took {took} for {tests} runs"));
+            let of_all = if before == 0 { String::new() } else { format!(" of {runs}") };
+            say(format_args!("      Took {took} for {} runs{of_all}", runs - before));
             Ok(code)
         }
         CampaignEnd::Interrupted => {
@@ -255,6 +263,12 @@ pub(super) fn execute(
             Ok(ExitCode::from(STOPPED))
         }
     }
+}
+
+/// How many runs are recorded, repetitions among them.
+fn runs(repository: &Repository) -> Result<usize, Failure> {
+    let repetitions: usize = repository.repetitions()?.values().map(Vec::len).sum();
+    Ok(repository.numbers()?.len() + repetitions)
 }
 
 /// A flag that Ctrl-C sets: the first one stops in good order, a second one exits at once.

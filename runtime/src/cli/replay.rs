@@ -1,8 +1,11 @@
 //! `replay`: a recorded test once more, just as it was.
 
+use std::fs::DirBuilder;
+#[cfg(unix)]
+use std::os::unix::fs::DirBuilderExt as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 use clap::Args;
 
@@ -88,8 +91,14 @@ struct Scratch(PathBuf);
 
 impl Scratch {
     fn new() -> Result<Self, Failure> {
-        let folder = std::env::temp_dir().join(format!("sesame-replay-{}", std::process::id()));
-        std::fs::create_dir_all(&folder)
+        let moment = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default().as_nanos();
+        let folder = std::env::temp_dir().join(format!("sesame-replay-{}-{moment:x}", std::process::id()));
+        let mut builder = DirBuilder::new();
+        // Others must not write in it: it names the program that the worker starts.
+        #[cfg(unix)]
+        builder.mode(0o700);
+        builder
+            .create(&folder)
             .map_err(|error| Failure(format!("cannot make a folder for the worker: {error}: {}", folder.display())))?;
         Ok(Scratch(folder))
     }

@@ -72,8 +72,9 @@ pub(super) fn resume(session: &Session, options: &ResumeOptions) -> Result<ExitC
     let recorder = Recorder::resume(&folder, options.execution.workers())?;
     if let Some(difference) = recorder.repository().campaign().plan.model_difference(plan) {
         return Err(Failure(format!(
-            "the model has changed since {} was begun ({difference}): start anew with `run`",
-            shown(&folder)
+            "the model has changed since {} was begun ({difference}). This starts anew:\n    {}",
+            shown(&folder),
+            session.caller.command("run", &[])
         )));
     }
     let files = claim_files(&session.runner, plan)?;

@@ -118,7 +118,7 @@ pub(super) fn failing(repository: &Repository, record: &TestRecord, wanted: &[St
     if violated.is_empty() {
         return Err(Failure(format!(
             "{test} violates no requirement and its run came to its end, so there is nothing that a smaller test could \
-             keep; `list` shows which tests violate what"
+             keep; the command `list` shows which tests violate what"
         )));
     }
     let chosen: Vec<RequirementId> = violated

@@ -32,24 +32,25 @@ pub(super) fn new(
     output::create(folder, &project::files(folder, simulator, runtime, &templates)?)?;
     let name = folder.file_name().unwrap_or_default().display();
     let space = folder.join(format!("{name}.sesame"));
-    let (space, hook) = (space.display(), folder.join(project::HOOK_FILE));
-    let (sesamec, hook, line) = (shell::command(), hook.display(), project::HOOK_LINE);
+    let hook = folder.join(project::HOOK_FILE);
+    let (hook, line) = (hook.display(), project::HOOK_LINE);
+    let [generate, run] = ["generate", "run"].map(|command| shell::command_for(command, &space));
     match simulator {
         project::Simulator::Rust => {
             shell.did("Created", format!("{}: a space, a simulator of its own, and a README", folder.display()));
             shell.text(&format!(
                 "\nNext steps to a first front:\n\
                  \n  1. generate the runner and a stub for its metric\n\
-                 \n         {sesamec} generate {space}\n\
+                 \n         {generate}\n\
                  \n  2. fill in the stub: in {hook}, replace the body of `on_clearance` with\n\
                  \n         {line}\n\
                  \n  3. run the campaign\n\
-                 \n         {sesamec} run {space}\n"
+                 \n         {run}\n"
             ));
         }
         project::Simulator::Python => {
             shell.did("Created", format!("{}: a space, a simulator in Python, and a README", folder.display()));
-            shell.text(&format!("\nTo a first front:\n\n    {sesamec} run {space}\n"));
+            shell.text(&format!("\nTo a first front:\n\n    {run}\n"));
         }
     }
     Ok(ExitCode::SUCCESS)
@@ -138,7 +139,7 @@ pub(super) fn generate(
             };
             shell.text(&visible(&format!("{} {what}", out.join(&file.path).display())));
         }
-        bail!("out of date: run `{} generate {}`", shell::command(), generation.file.display());
+        bail!("out of date: run `{}`", shell::command_for("generate", &generation.file));
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -214,10 +215,11 @@ pub(super) fn explain_name(
         return Ok(ExitCode::SUCCESS);
     }
     if found.errors > 0 {
-        let (file, sesamec) = (file.display(), shell::command());
         let has = if found.errors == 1 { "an error".to_owned() } else { format!("{} errors", found.errors) };
         shell.warning(format!(
-            "{file} has {has}: uses that could not be read are missing; see `{sesamec} check {file}`"
+            "{} has {has}: uses that could not be read are missing; see `{}`",
+            file.display(),
+            shell::command_for("check", file)
         ));
     }
     match format {

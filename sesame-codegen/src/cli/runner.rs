@@ -4,13 +4,13 @@
 //! and its plan says everything. The runner of any other campaign is a crate, which is generated and built first.
 
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
-use anyhow::Context as _;
+use anyhow::{Context as _, bail};
 use clap::{Arg, ArgAction, ArgMatches};
 use sesame_runtime::Interpreted;
-use sesame_runtime::cli::{CALLER, Caller, Running, Showing};
+use sesame_runtime::cli::{CALLER, Caller, EXIT_CODES, Running, Showing};
 
 use super::arguments::Generation;
 use super::build;
@@ -36,7 +36,7 @@ pub(super) fn of_a_campaign(mut command: clap::Command) -> clap::Command {
     for (position, id) in (2..).zip(others) {
         command = command.mut_arg(id, |arg| arg.index(position));
     }
-    command.args([
+    command.after_help(EXIT_CODES).args([
         Arg::new(FILE)
             .index(1)
             .required(true)
@@ -104,9 +104,29 @@ impl<'a> Found<'a> {
         }
         let (space, simulator) = environment::program_folders(file, self.plan())?;
         let folder = self.generation.own_runners()?.join(names::campaign_folder(&self.plan().plan.campaign.name));
+        let results = folder.join("results");
+        if let Some(link) = [&folder, &results].into_iter().find(|path| path.is_symlink()) {
+            bail!("{} is a link, and results are never written through links", link.display());
+        }
+        refuse_others(self.generation, &results)?;
         let directory = std::path::absolute(&folder).with_context(|| format!("cannot find {}", folder.display()))?;
         Ok(Some(Interpreted { plan: emit::plan_json(self.plan()), directory, space, simulator }))
     }
+}
+
+/// Fails if results are of another space in the same folder, which has a campaign of the same name.
+fn refuse_others(generation: &Generation, results: &Path) -> anyhow::Result<()> {
+    let Some(source) = sesame_runtime::cli::recorded_source(results) else { return Ok(()) };
+    let (file, other) = (&generation.file, generation.file.with_file_name(&source));
+    // A space that was renamed still owns its results.
+    if file.file_name().is_some_and(|name| name == source.as_str()) || !other.is_file() {
+        return Ok(());
+    }
+    bail!(
+        "{} contains results of `{source}`, not of `{}`: choose another folder for the runners of one of them with `-o`",
+        results.display(),
+        file.display()
+    )
 }
 
 /// `sesamec run`
@@ -118,6 +138,8 @@ pub(super) fn run(
     arguments: &[OsString],
 ) -> anyhow::Result<ExitCode> {
     let found = Found::find(shell, language, generation)?;
+    // These concern the crate.
+    let build = build || generation.force || generation.templates.is_some();
     if !build && let Some(interpreted) = found.interpreted()? {
         return Ok(sesame_runtime::cli::interpret(&interpreted, found.caller, arguments));
     }
@@ -150,12 +172,18 @@ pub(super) fn showing(
     matches: &ArgMatches,
 ) -> anyhow::Result<ExitCode> {
     let generation = named(matches);
-    let results = |name: &str| generation.runners().join(names::campaign_folder(name)).join("results");
-    if let Some(results) = generation.campaign.as_deref().map(results).filter(|results| results.is_dir()) {
-        return Ok(sesame_runtime::cli::show(command, &results));
+    if let Some(run) = matches.try_get_one::<PathBuf>("results").ok().flatten().filter(|run| run.is_dir()) {
+        // It says which campaign it is of.
+        return Ok(sesame_runtime::cli::show(command, run));
     }
-    let found = Found::find(shell, language, &generation)?;
-    Ok(sesame_runtime::cli::show(command, &results(&found.plan().plan.campaign.name)))
+    let results = |name: &str| generation.runners().join(names::campaign_folder(name)).join("results");
+    let named = generation.campaign.as_deref().map(results).filter(|results| results.is_dir());
+    let results = match named {
+        Some(results) => results,
+        None => results(&Found::find(shell, language, &generation)?.plan().plan.campaign.name),
+    };
+    refuse_others(&generation, &results)?;
+    Ok(sesame_runtime::cli::show(command, &results))
 }
 
 /// The arguments of a runner's command, as a runner's own command line takes them.

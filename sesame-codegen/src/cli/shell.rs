@@ -2,8 +2,10 @@
 
 use std::fmt::Display;
 use std::io::{self, IsTerminal as _, Write as _};
+use std::path::Path;
 
 use sesame_dsl::diagnostic::{shortened, visible};
+use sesame_runtime::cli::Caller;
 
 use crate::frontend::Look;
 
@@ -144,6 +146,11 @@ pub(super) fn asked_for(text: &str) -> anyhow::Result<()> {
         }
         _ => Ok(()),
     }
+}
+
+/// A command on a file, for hints that can be copied.
+pub(super) fn command_for(name: &str, file: &Path) -> String {
+    Caller { program: command().to_owned(), arguments: vec![file.display().to_string()] }.command(name, &[])
 }
 
 /// How the user called this command, for hints that can be copied.
