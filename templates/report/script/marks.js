@@ -65,19 +65,32 @@ document.querySelectorAll("svg title").forEach(title => {
   if (test && mark.matches(".dot")) { mark.dataset.test = test[1]; }
 });
 
-// Enough digits for people: four of the largest value.
+// Enough digits for people, as in the rest of the page: four of the largest value, and the smallest is not shown as
+// zero; no more than make a difference.
 function decimalsOf(values) {
-  let largest = 0, whole = true;
-  values.forEach(value => {
-    if (value === null) { return; }
-    largest = Math.max(largest, Math.abs(value));
-    whole = whole && Number.isInteger(value);
+  const known = values.filter(value => value !== null).map(Math.abs);
+  let largest = 0, smallest = Infinity;
+  known.forEach(value => {
+    largest = Math.max(largest, value);
+    if (value > 0) { smallest = Math.min(smallest, value); }
   });
-  return whole || largest === 0 ? 0 : Math.min(3, Math.max(0, 3 - Math.floor(Math.log10(largest))));
+  const magnitude = value => Math.floor(Math.log10(value));
+  const wanted = Math.max(3 - magnitude(largest), -magnitude(smallest));
+  const told = scale => known.every(value => Math.abs(Math.round(value * scale) - value * scale) < 1e-6);
+  const decimals = [0, 1, 2].find(decimals => wanted <= decimals || told(Math.pow(10, decimals)));
+  return decimals === undefined ? 3 : decimals;
+}
+
+// What is too large or small to be read with so many decimals gets an exponent; a zero has no sign.
+function fixed(value, decimals) {
+  const size = Math.abs(value);
+  if (value !== 0 && !(size >= 5e-4 && size < 1e9)) { return value.toExponential(2).replace("e+", "e"); }
+  const text = value.toFixed(decimals);
+  return /^-[0.]*$/.test(text) ? text.slice(1) : text;
 }
 
 function withUnit(value, decimals, unit) {
-  return value.toFixed(decimals) + (unit ? " " + unit : "");
+  return fixed(value, decimals) + (unit ? " " + unit : "");
 }
 
 // Round numbers between two ends, about so many.

@@ -26,11 +26,12 @@ if (tests) {
       end.type = "number"; end.step = "any";
       end.addEventListener("change", () => {
         const axis = axes[which.value], [low, high] = ends.map(end => end.value === "" ? null : Number(end.value));
-        permit(axis, low === null && high === null ? null : [low === null ? axis.low : low, high === null ? axis.high : high]);
+        const range = [low === null ? axis.low : low, high === null ? axis.high : high].sort((a, b) => a - b);
+        permit(axis, low === null && high === null ? null : range);
       });
       return control(controls, words, end);
     });
-    controls.append(button("All ranges", "remove all ranges", () => {
+    controls.append(button("Remove all ranges", "", () => {
       axes.forEach(axis => { axis.range = null; });
       axes.forEach(axis => tests.filter("range " + axis.name, null));
       showRange();
@@ -55,7 +56,7 @@ if (tests) {
       const decimals = decimalsOf([axis.low, axis.high]);
       // The name may take two lines, and breaks between its words.
       axis.labels = [element("div", "axis-name", (axis.name + (axis.unit ? " [" + axis.unit + "]" : "")).replace(/_/g, "_\u200b"))].concat(
-        [axis.high, axis.low].map(value => element("div", "axis-end", value.toFixed(decimals))));
+        [axis.high, axis.low].map(value => element("div", "axis-end", fixed(value, decimals))));
       axis.labels[0].title = axis.name;
       field.append(...axis.labels);
     });
@@ -112,9 +113,10 @@ if (tests) {
     }
     const plan = () => { if (!planned) { planned = true; requestAnimationFrame(draw); } };
     canvas.addEventListener("pointerdown", event => {
+      if (event.button !== 0) { return; }
       const n = Math.round((event.offsetX - 44) / (width - 88) * (axes.length - 1));
       const axis = axes[Math.min(axes.length - 1, Math.max(0, n))];
-      drag = { axis, from: event.offsetY };
+      drag = { axis, from: event.offsetY, before: axis.range };
       canvas.setPointerCapture(event.pointerId);
     });
     canvas.addEventListener("pointermove", event => {
@@ -137,7 +139,11 @@ if (tests) {
       });
       if (nearest) { tests.select(nearest[1]); }
     });
-    canvas.addEventListener("pointercancel", () => { drag = null; plan(); });
+    canvas.addEventListener("pointercancel", () => {
+      if (drag) { drag.axis.range = drag.before; }
+      drag = null;
+      plan();
+    });
     tests.listen(plan);
     window.addEventListener("resize", plan);
     window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", plan);

@@ -6,7 +6,7 @@ if (tests) {
     const decimals = decimalsOf(values);
     return {
       title: title + (unit ? " [" + unit + "]" : ""), number: true, value: row => values[row],
-      text: row => values[row] === null ? "–" : values[row].toFixed(decimals),
+      text: row => values[row] === null ? "–" : fixed(values[row], decimals),
     };
   };
   const words = (title, text) => ({ title, value: text, text });
@@ -29,7 +29,7 @@ if (tests) {
     return field;
   };
   const fields = [
-    data.requirements.length && anyOf("violates", ["any or none", "a requirement", "none"].concat(data.requirements.map(it => it.name)),
+    data.requirements.length && anyOf("violates", ["all tests", "any requirement", "no requirement"].concat(data.requirements.map(it => it.name)),
       at => row => at === 0 ? data.violates[row].length > 0 : at === 1 ? !data.violates[row].length : data.violates[row].includes(at - 2)),
     data.operations.length && anyOf("operation", ["any"].concat(data.operations), at => row => data.uses[row].includes(at)),
     data.outcomes.length > 1 && anyOf("outcome", ["any"].concat(data.outcomes), at => row => data.outcome[row] === at),
@@ -48,7 +48,6 @@ if (tests) {
   view.tabIndex = 0;
   view.setAttribute("role", "region");
   view.setAttribute("aria-label", "all tests; arrow keys move the selection");
-  table.setAttribute("aria-rowcount", count + 1);
   columns.forEach((column, at) => {
     const title = element("th", column.number ? "number" : "words");
     title.scope = "col";
@@ -81,6 +80,7 @@ if (tests) {
       title.setAttribute("aria-sort", at !== sorted ? "none" : descending ? "descending" : "ascending");
     });
     said.textContent = order.length === count ? count + " tests" : order.length + " of " + count + " tests";
+    table.setAttribute("aria-rowcount", order.length + 1);
     show();
   }
   const space = height => {

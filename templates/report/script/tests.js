@@ -48,8 +48,11 @@ if (tests) {
     document.querySelectorAll(".test").forEach(test => test.classList.toggle("selected", test.id === "T" + selected));
   });
   dots.forEach(dot => dot.addEventListener("click", () => tests.select(Number(dot.dataset.test))));
-  window.addEventListener("hashchange", () => {
+  const named = () => {
     const test = /^#T(\d+)$/.exec(location.hash);
     if (test) { tests.select(Number(test[1])); }
-  });
+  };
+  window.addEventListener("hashchange", named);
+  // Once all parts of the script are there.
+  window.addEventListener("load", named);
 }

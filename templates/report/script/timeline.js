@@ -163,7 +163,7 @@
       row.bounds.forEach(({ line, y }) => ["y1", "y2"].forEach(key => line.setAttribute(key, moved(row, y))));
       row.dots.forEach(({ dot, y }) => dot.setAttribute("cy", moved(row, y)));
       const decimals = decimalsOf([scale.low, scale.high]);
-      row.ticks.forEach((tick, n) => { tick.textContent = (n ? scale.low : scale.high).toFixed(decimals); });
+      row.ticks.forEach((tick, n) => { tick.textContent = fixed(n ? scale.low : scale.high, decimals); });
       if (second) {
         second.paths.filter(path => !path.matches(".bad")).forEach(path => {
           row.frame.prepend(part("path", { "class": "line other", d: path.getAttribute("d"), transform: move(second) }));

@@ -34,7 +34,7 @@ pub(crate) fn short_numbers(text: &str) -> String {
     let mut said = String::with_capacity(text.len());
     let mut rest = text;
     while let Some(next) = rest.chars().next() {
-        // A number within a name, such as `zone1.5`, is none.
+        // Digits within a name, such as `zone1.5`, are not a number.
         let in_name = said.chars().next_back().is_some_and(|before| before.is_alphanumeric() || before == '_');
         let length = if in_name { 0 } else { number_length(rest) };
         let (word, after) = rest.split_at(if length == 0 { next.len_utf8() } else { length });
@@ -48,7 +48,7 @@ pub(crate) fn short_numbers(text: &str) -> String {
     said
 }
 
-/// How long the number is with which a text begins; 0 where there is none.
+/// The length of the number at the start of a text; 0 if there is none.
 fn number_length(text: &str) -> usize {
     let unsigned = text.strip_prefix('-').unwrap_or(text);
     let digits = |text: &str| text.bytes().take_while(u8::is_ascii_digit).count();

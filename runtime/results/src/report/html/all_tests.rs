@@ -21,7 +21,7 @@ use crate::report::html::command;
 use crate::report::html::legend::legend;
 use crate::report::sentences::outcome_words;
 
-/// Tests that the page has data of at most.
+/// The most tests that the page holds data of.
 const MOST: usize = 20_000;
 
 /// The section with the table of all tests.
@@ -43,13 +43,14 @@ pub(super) fn all_tests(
             .map(|(at, _)| at)
             .collect()
     };
-    let shown = chosen(summary, &judge, repository.plan(), rows, MOST);
+    let shown = chosen(summary, &judge, repository.plan(), rows, drawn, MOST);
     let data = data(repository, summary, &shown, drawn, violated)?;
     body.open("section", &[("id", "tests")]);
     body.element("h2", &[], "All tests");
     if shown.len() < rows.len() {
         let words = format!(
-            "{} of {} tests: the front, tests that violate a requirement or broke off, and evenly chosen others.",
+            "{} of {} tests: the front, the tests with a timeline, and evenly chosen others, half of which violate a \
+             requirement or broke off if there are so many.",
             shown.len(),
             rows.len()
         );
@@ -74,28 +75,32 @@ pub(super) fn all_tests(
     Ok(())
 }
 
-/// The tests that the page has data of: all, or at most so many: those that matter, up to half, and evenly chosen
-/// others.
+/// The tests that the page has data of: all, or at most so many: the front, those that are drawn, and evenly chosen
+/// others, half of them such that matter if there are so many.
 fn chosen<'r>(
     summary: &Summary,
     judge: &Judge<'_>,
     plan: &CampaignPlan,
     rows: &'r [TestRow],
+    drawn: &[u32],
     most: usize,
 ) -> Vec<&'r TestRow> {
     if rows.len() <= most {
         return rows.iter().collect();
     }
     let front: BTreeSet<u32> = summary.front.iter().map(|test| test.number).collect();
+    let always =
+        |row: &&TestRow| front.contains(&row.number) || drawn.contains(&row.number) || row.origin != Origin::Search;
     let matters = |row: &&TestRow| {
-        front.contains(&row.number)
-            || row.origin != Origin::Search
-            || matches!(row.outcome, Outcome::Crash { .. } | Outcome::Timeout { .. })
+        matches!(row.outcome, Outcome::Crash { .. } | Outcome::Timeout { .. })
             || plan.requirements.iter().any(|requirement| judge.verdict(row, requirement) == Verdict::Violated)
     };
-    let (first, others): (Vec<&TestRow>, Vec<&TestRow>) = rows.iter().partition(matters);
-    let first = evenly(&first, most / 2);
-    let mut kept = [evenly(&others, most - first.len()), first].concat();
+    let (always, rest): (Vec<&TestRow>, Vec<&TestRow>) = rows.iter().partition(always);
+    let (first, others): (Vec<&TestRow>, Vec<&TestRow>) = rest.into_iter().partition(matters);
+    let always = evenly(&always, most);
+    let room = most - always.len();
+    let first = evenly(&first, (room / 2).max(room.saturating_sub(others.len())));
+    let mut kept = [evenly(&others, room - first.len()), first, always].concat();
     kept.sort_unstable_by_key(|row| row.number);
     kept
 }
@@ -195,16 +200,16 @@ fn dimensions(data: &Value) -> Vec<Dimension> {
     names.filter_map(|column| Dimension::named(column["name"].as_str()?)).collect()
 }
 
-/// Five digits, which is more than a table shows.
+/// Nine digits, which is more than a table shows, so that its rounding is that of the rest of the page.
 fn rounded(value: Option<f64>) -> Value {
     let value = value.filter(|value| value.is_finite()).map(|value| {
-        let short: f64 = format!("{value:.4e}").parse().unwrap_or(value);
+        let short: f64 = format!("{value:.8e}").parse().unwrap_or(value);
         short + 0.0
     });
     match value {
         // Whole numbers without `.0`.
-        #[expect(clippy::cast_possible_truncation, reason = "a whole number of five digits")]
-        Some(value) if value.fract() == 0.0 && value.abs() < 1e5 => json!(value as i64),
+        #[expect(clippy::cast_possible_truncation, reason = "a whole number of nine digits")]
+        Some(value) if value.fract() == 0.0 && value.abs() < 1e9 => json!(value as i64),
         Some(value) => json!(value),
         None => Value::Null,
     }
@@ -230,7 +235,7 @@ mod tests {
         with_tests(90, |repository, summary, rows| {
             let plan = repository.plan();
             let judge = repository.judge().unwrap();
-            let of = |most| chosen(summary, &judge, plan, rows, most);
+            let of = |most| chosen(summary, &judge, plan, rows, &[1, 2], most);
             assert_eq!(of(rows.len()).len(), rows.len());
             let violating = |kept: &[&TestRow]| {
                 let violates = |row: &&&TestRow| {
@@ -241,6 +246,7 @@ mod tests {
             let kept = of(40);
             assert_eq!(kept.len(), 40);
             assert!(kept.is_sorted_by_key(|row| row.number));
+            assert!([1, 2].iter().all(|drawn| kept.iter().any(|row| row.number == *drawn)));
             assert!(violating(&kept) >= 10 && violating(&kept) < 40, "{}", violating(&kept));
         });
     }
@@ -260,11 +266,11 @@ mod tests {
     }
 
     #[test]
-    fn numbers_have_five_digits() {
+    fn numbers_have_nine_digits() {
         let short = |value| rounded(value).to_string();
         assert_eq!(
             [Some(1.0 / 3.0), Some(-0.0), Some(123_456.7), Some(70.0), Some(f64::NAN), None].map(short),
-            ["0.33333", "0", "123460.0", "70", "null", "null"]
+            ["0.333333333", "0", "123456.7", "70", "null", "null"]
         );
     }
 }

@@ -11,9 +11,7 @@ use sesame_plan::CampaignPlan;
 /// What shows one test in full, in the folder of the space: what stands before its name, and what after.
 pub(super) fn show(plan: &CampaignPlan, run: &Path) -> (String, String) {
     let mut after = format!(" --campaign {}", quoted(&plan.campaign.name));
-    if let Some(run) = below_project(run) {
-        let _ = write!(after, " --results {}", quoted(&run));
-    }
+    let _ = write!(after, " --results {}", quoted_file(&results(run)));
     (format!("sesamec show {} ", quoted_file(&plan.source)), after)
 }
 
@@ -23,14 +21,14 @@ pub(super) fn list(plan: &CampaignPlan, run: &Path) -> String {
     format!("sesamec list {}{after}", quoted_file(&plan.source))
 }
 
-/// The folder of a run as seen from the folder of its space, if it lies where runners put it:
-/// `runners/NAME/results/1`.
-fn below_project(run: &Path) -> Option<String> {
-    let run = std::path::absolute(run).ok()?;
-    let parts: Vec<&str> = run.iter().map(|part| part.to_str()).collect::<Option<_>>()?;
+/// The folder of a run, as seen from the folder of its space if it lies where runners put it: `runners/NAME/results/1`.
+/// A folder elsewhere is named in full.
+fn results(run: &Path) -> String {
+    let run = std::path::absolute(run).unwrap_or_else(|_| run.to_owned());
+    let parts: Vec<&str> = run.iter().filter_map(|part| part.to_str()).collect();
     match parts.as_slice() {
-        [.., runners, name, results @ "results", run] => Some([*runners, *name, *results, *run].join("/")),
-        _ => None,
+        [.., runners @ "runners", name, results @ "results", run] => [*runners, *name, *results, *run].join("/"),
+        _ => run.display().to_string(),
     }
 }
 
@@ -49,7 +47,9 @@ mod tests {
              --results runners/coverage_experiment/results/3"
         );
         let elsewhere = show(&sample::plan(), Path::new("/tmp/sent_by_ada")).1;
-        assert_eq!(elsewhere, " --campaign coverage_experiment");
+        assert_eq!(elsewhere, " --campaign coverage_experiment --results /tmp/sent_by_ada");
+        let named = show(&sample::plan(), Path::new("/home/ada/out/coverage_experiment/results/3")).1;
+        assert_eq!(named, " --campaign coverage_experiment --results /home/ada/out/coverage_experiment/results/3");
     }
 
     #[test]

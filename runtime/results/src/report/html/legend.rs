@@ -12,7 +12,7 @@ pub(super) fn legend(body: &mut Markup, dimensions: &[Dimension]) {
         _ => names.join(", "),
     };
     body.open("details", &[("class", "legend")]);
-    body.element("summary", &[], &format!("What {names} mean"));
+    body.element("summary", &[], &format!("What {names} {}", if dimensions.len() == 1 { "means" } else { "mean" }));
     body.open("dl", &[]);
     for &dimension in dimensions {
         body.open("div", &[]);

@@ -177,7 +177,7 @@ fn section(body: &mut Markup, title: &str, caption: Option<&str>, mut table: Tab
     let more = table.truncate(FAILURES);
     table.html(body, drawn);
     if more > 0 {
-        body.element("p", &[("class", "quiet")], &format!("And {more} more; `report --format json` has all."));
+        body.element("p", &[("class", "quiet")], &format!("And {more} more; the report in JSON has all."));
     }
     body.close();
 }

@@ -10,6 +10,7 @@ use std::process::Command;
 use serde_json::Value;
 
 use super::page::full_page;
+use crate::present::number;
 
 /// Whether the browser prefers light or dark pages.
 #[derive(Debug, Clone, Copy)]
@@ -133,4 +134,34 @@ fn the_table_of_tests_sorts_filters_and_selects_everywhere() {
 fn timelines_have_a_cursor_a_zoom_and_a_second_test() {
     let Some(browser) = browser() else { return };
     assert_checks(browser, include_str!("browser/timelines.js"), 10);
+}
+
+#[test]
+fn the_script_writes_numbers_as_the_rest_of_the_page_does() {
+    let Some(browser) = browser() else { return };
+    let columns: [&[f64]; 9] = [
+        &[1.4e-4, 1.69e-4],
+        &[20_000.0, 0.537, 0.36],
+        &[49.238, 12.0],
+        &[18.0, 0.0, -3.0],
+        &[0.27, 0.3],
+        &[-0.001, 49.2],
+        &[123_456.7],
+        &[1.5e12, -2.0],
+        &[0.0],
+    ];
+    let marks = include_str!("../../../../../templates/report/script/marks.js");
+    let functions = marks.split_once("function decimalsOf").unwrap().1.split_once("function withUnit").unwrap().0;
+    let script = format!(
+        "leave(() => {{ function decimalsOf{functions}\n return {}.map(column => column.map(value => \
+         fixed(value, decimalsOf(column)))); }});",
+        serde_json::to_string(&columns).unwrap()
+    );
+    let written = |column: &[f64]| -> Vec<String> {
+        let decimals = number::decimals(column.iter().copied());
+        column.iter().map(|&value| number::fixed(value, decimals)).collect()
+    };
+    let expected: Vec<Vec<String>> = columns.iter().map(|column| written(column)).collect();
+    let found = findings(browser, &full_page(), &script, 1280, Scheme::Light);
+    assert_eq!(found, serde_json::to_value(expected).unwrap());
 }

@@ -33,7 +33,8 @@ leave(() => {
   choose(room, "operation", data.operations[0]);
   const both = data.violates.filter((violated, row) => violated.includes(requirement) && data.uses[row].includes(0)).length;
   checks["filters add up"] = said() === both + " of " + number + " tests";
-  choose(room, "violates", "any or none");
+  checks["the number of rows follows"] = one("table.tests").getAttribute("aria-rowcount") === String(both + 1);
+  choose(room, "violates", "all tests");
   choose(room, "operation", "any");
   choose(room, "outcome", "crash");
   const crashes = data.outcome.filter(outcome => data.outcomes[outcome] === "crash").length;
@@ -64,6 +65,14 @@ leave(() => {
   low.dispatchEvent(new Event("change"));
   const above = values.filter(value => value >= middle).length;
   checks["a range of an axis filters"] = said() === above + " of " + number + " tests";
+  const most = Math.max(...values);
+  high.value = middle; low.value = most;
+  low.dispatchEvent(new Event("change"));
+  checks["whichever end is written first"] = said() === above + " of " + number + " tests";
+  const canvas = one("#parallel-coordinates canvas");
+  canvas.dispatchEvent(new PointerEvent("pointerdown", { button: 2 }));
+  canvas.dispatchEvent(new PointerEvent("pointerup", { button: 2 }));
+  checks["other buttons of the mouse leave it"] = said() === above + " of " + number + " tests";
   controls.querySelector("button").click();
   checks["until it is removed"] = said() === number + " tests" && low.value === "" && high.value === "";
   return { checks, titles, said: said() };
