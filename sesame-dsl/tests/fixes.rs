@@ -281,7 +281,7 @@ fn assert_kept(broken: &BTreeMap<String, String>) {
     assert!(broken.is_empty(), "{}", broken.values().map(String::as_str).collect::<Vec<_>>().join("\n\n"));
 }
 
-/// The same slips every time: what other draws find is for the long suite, and not for whoever changes something else.
+/// The same slips every time: other draws belong to the long suite, so that an unrelated change does not fail here.
 #[test]
 fn every_suggestion_for_a_slip_in_an_example_does_what_it_promises() {
     assert_kept(&broken_by_slips(400, RngSeed::Fixed(1)));

@@ -139,7 +139,7 @@ fn two_spaces_in_one_folder_do_not_share_results_and_none_are_written_through_a_
     ] {
         assert!(told.err.contains("contains results of `two_robots.sesame`, not of `other.sesame`"), "{}", told.err);
     }
-    // Whoever renames a space keeps its results.
+    // A renamed space keeps its results.
     fs::remove_file(&project.space).unwrap();
     without_cargo(&project, &["replay", "other.sesame", "-c", "crossing", "T3"]).expect(0);
     without_cargo(&project, &["list", "other.sesame", "-c", "crossing"]).expect(0);

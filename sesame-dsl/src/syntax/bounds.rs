@@ -3,7 +3,7 @@
 use sesame_grammar::Rule;
 
 use super::foreign::{Rewrite, following};
-use super::token::{Token, TokenKind, token_at};
+use super::token::{Token, token_at, tokens};
 
 const COMPUTE_IT: &str = "declare a metric whose formula computes this from topics, and require a bound on that metric";
 
@@ -41,14 +41,7 @@ pub(super) fn formula(text: &str, requirement: usize, at: usize) -> Option<Strin
 
 /// The `=` of a requirement, before a place.
 fn equals_of(text: &str, requirement: usize, at: usize) -> Option<Token<'_>> {
-    let mut token = token_at(text, requirement);
-    while token.text != "=" {
-        if token.kind == TokenKind::End || token.lo >= at {
-            return None;
-        }
-        token = token_at(text, token.hi());
-    }
-    Some(token)
+    tokens(text, requirement, at).find(|token| token.text == "=")
 }
 
 /// Two bounds on one metric: `= gap >= 5m and gap <= 6m`.

@@ -12,7 +12,7 @@ use super::blocks::{self, Block};
 use super::bounds;
 use super::foreign::{self, Expected, Rewrite};
 use super::limits::parse_bounded;
-use super::token::{Token, TokenKind, is_keyword, token_at};
+use super::token::{Token, TokenKind, is_keyword, token_at, tokens};
 use crate::diagnostic::{Applicability, Code, Diagnostic, Suggestion};
 use crate::span::{FileId, Span};
 use crate::synonyms::{self, Synonym};
@@ -225,6 +225,7 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
         TokenKind::Number => format!("unexpected number `{}`", found.text),
         _ => format!("unexpected `{}`", found.text),
     };
+    let from = previous.map_or(region.lo, |previous| previous.lo) as usize;
     let mut diagnostic = Diagnostic::new(Code::SYNTAX, span, title).label(format!("expected {expected}"));
     if found.kind == TokenKind::Word {
         let mut candidates: Vec<&'static str> = failure.expected.iter().filter_map(|&rule| keyword_of(rule)).collect();
@@ -235,11 +236,10 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
         let known = Rule::all_rules().iter().any(|&rule| keyword_of(rule) == Some(found.text));
         let (phrase, meanings) = foreign_words(text, found, &candidates);
         let phrase = placed(file, found.lo..phrase);
-        let from = previous.map_or(region.lo, |previous| previous.lo) as usize;
         // What may stand only once would stand there twice.
         let direction = |word: &str| matches!(word, "maximise" | "minimise");
         let said_already =
-            |word: &str| words(text, from, hi).any(|other| other == word || direction(word) && direction(other));
+            |word: &str| tokens(text, from, hi).any(|it| it.text == word || direction(word) && direction(it.text));
         for synonym in &meanings {
             let message = format!("did you mean `{}`?", synonym.meant);
             diagnostic = if synonym.same && !said_already(synonym.meant) {
@@ -266,7 +266,6 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
             diagnostic = diagnostic.note(format!("`{}` is declared inside `system {{ … }}`", found.text));
         }
     }
-    let from = previous.map_or(region.lo, |previous| previous.lo) as usize;
     let part = if counts(Rule::times) { Expected::Operator } else { Expected::Operand };
     diagnostic = rewritten(diagnostic, foreign::notation(text, from, found.lo, part));
     if part == Expected::Operator && found.text == "[" && is_index(text, found) {
@@ -275,8 +274,8 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
              the name alone for the least",
         );
     }
-    let mut region = words(text, from, found.lo).skip_while(|&word| word != "signed_distance");
-    let otherwise = region.find_map(synonyms::region_otherwise);
+    let mut region = tokens(text, from, found.lo).skip_while(|token| token.text != "signed_distance");
+    let otherwise = region.find_map(|token| synonyms::region_otherwise(token.text));
     diagnostic.notes.extend(otherwise.map(str::to_owned));
     if found.text == "and"
         && let Some(previous) = previous
@@ -344,16 +343,6 @@ fn foreign_words(text: &str, found: Token<'_>, candidates: &[&str]) -> (usize, V
 fn is_index(text: &str, open: Token<'_>) -> bool {
     let inside = token_at(text, open.hi());
     (is_count(inside) || inside.kind == TokenKind::Text) && token_at(text, inside.hi()).text == "]"
-}
-
-/// The words of a stretch.
-fn words(text: &str, lo: usize, hi: usize) -> impl Iterator<Item = &str> {
-    let mut at = lo;
-    std::iter::from_fn(move || {
-        let token = token_at(text, at);
-        at = token.hi();
-        (token.kind != TokenKind::End && token.lo < hi).then_some(token.text)
-    })
 }
 
 /// Two numbers of a count, where they stand, and what to write there.

@@ -31,6 +31,16 @@ pub(super) enum TokenKind {
     End,
 }
 
+/// The tokens that begin in a stretch of a text.
+pub(crate) fn tokens(text: &str, lo: usize, hi: usize) -> impl Iterator<Item = Token<'_>> {
+    let mut at = lo;
+    std::iter::from_fn(move || {
+        let token = token_at(text, at);
+        at = token.hi();
+        (token.kind != TokenKind::End && token.lo < hi).then_some(token)
+    })
+}
+
 /// The token at or after an offset.
 pub(crate) fn token_at(text: &str, offset: usize) -> Token<'_> {
     let mut at = offset;
