@@ -4,7 +4,8 @@
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use sesame_relay::transport;
+use sesame_plan::CampaignPlan;
+use sesame_relay::transport::{self, Connect, Transport};
 
 use crate::runner::Runner;
 
@@ -19,6 +20,16 @@ pub struct Interpreted {
     pub space: PathBuf,
     /// Folder that the simulator runs in, as seen from there.
     pub simulator: PathBuf,
+}
+
+/// The transport to the simulator of a plan, which is a program or a system of ROS 2 nodes.
+fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
+    let connect = match &plan.simulator.transport {
+        #[cfg(feature = "ros2")]
+        sesame_plan::Transport::Ros2(_) => sesame_ros2::ros2(folder.to_owned()),
+        _ => transport::process(folder.to_owned()),
+    };
+    connect.transport(plan)
 }
 
 impl Interpreted {
@@ -36,7 +47,7 @@ impl Interpreted {
             space: space.clone(),
             hooks: &[],
             operations: &[],
-            connect: transport::process(directory.join(simulator)),
+            connect: Connect::new(connect, directory.join(simulator)),
         }
     }
 }

@@ -34,7 +34,7 @@ pub use sesame_optimise as optimise;
 pub use sesame_plan as plan;
 #[cfg(feature = "mcap")]
 pub use sesame_relay::trace;
-pub use sesame_relay::{evaluate, fuzz, message, metric, relay, simulator, stl, transport, value, wire};
+pub use sesame_relay::{evaluate, fuzz, message, metric, relay, simulator, stl, value, wire};
 #[cfg(feature = "campaign")]
 pub use sesame_results::{analysis, record, report};
 pub use sesame_rng as rng;
@@ -42,6 +42,13 @@ pub use sesame_rng as rng;
 pub use sesame_search as search;
 #[cfg(feature = "campaign")]
 pub use sesame_search::{coverage, sspr};
+
+/// How a runner reaches its simulator.
+pub mod transport {
+    pub use sesame_relay::transport::*;
+    #[cfg(feature = "ros2")]
+    pub use sesame_ros2::ros2;
+}
 
 /// The version of the interface between generated code and this crate.
 pub const GENERATOR_ABI: u32 = 3;

@@ -8,6 +8,9 @@ mod import;
 mod progress;
 mod results;
 mod runner;
+mod scan;
+#[cfg(feature = "ros2")]
+mod scan_ros2;
 mod search_space;
 mod shell;
 
@@ -123,10 +126,13 @@ enum Command {
         #[arg(long, short = 'o', value_name = "FOLDER")]
         out: PathBuf,
     },
+    /// Look at a running system, and print a space of it.
+    #[command(subcommand)]
+    Scan(scan::Scan),
     /// Explain the code of a diagnostic, for example E0203; or something that a space declares, with all its uses.
     ///
     /// A campaign is shown with every default written out, and with the space of its tests. Without a code or a name,
-    /// all codes are listed.
+    /// all codes are listed. `explain wiring FILE` shows how the nodes of a ROS 2 system are remapped.
     Explain {
         /// The code, or the name: for a field or parameter with what it belongs to, as in `SafetyZone.level`.
         #[arg(value_name = "CODE or NAME")]
@@ -197,6 +203,7 @@ pub fn run(
         Command::Internal(command) => Ok(sesame_runtime::cli::serve(&command)),
         Command::Results(asked) => results::results(shell, asked),
         Command::Import { file, out } => import::import(shell, language, &file, &out),
+        Command::Scan(asked) => scan::scan(shell, language, &asked),
         Command::Explain { what: Some(what), file: Some(file), format } => {
             commands::explain_name(shell, language, &what, &file, format)
         }

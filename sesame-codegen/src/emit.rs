@@ -102,7 +102,7 @@ pub fn emit(plans: &[RunnerPlan], environment: &Environment) -> Result<Vec<Tree>
 pub fn simulator_path(transport: &Transport) -> Option<Vec<&str>> {
     match transport {
         Transport::InProcess { path, .. } => Some(path.split("::").collect()),
-        Transport::Process { .. } => None,
+        Transport::Process { .. } | Transport::Ros2(_) => None,
     }
 }
 
@@ -142,6 +142,8 @@ struct RunnerReadme {
     hooks: Vec<ReadmeHook>,
     evaluations: u32,
     seed: u64,
+    /// How nodes of ROS 2 are remapped, line by line; empty for other systems.
+    wiring: Vec<String>,
 }
 
 /// The hooks of a space, metrics first; if `used`, only those that this campaign uses.
@@ -253,7 +255,9 @@ fn runner(runner: &RunnerPlan, environment: &Environment) -> Result<Tree, Proble
     let note = generated_by(runner, &tree.options);
     let header = format!("// {note}\n");
 
-    let dependencies = package::with_features(&environment.dependencies, &FEATURES);
+    let mut features = FEATURES.to_vec();
+    features.extend(matches!(plan.simulator.transport, Transport::Ros2(_)).then_some("ros2"));
+    let dependencies = package::with_features(&environment.dependencies, &features);
     tree.add(
         "Cargo.toml",
         Owner::Machine,
@@ -277,6 +281,10 @@ fn runner(runner: &RunnerPlan, environment: &Environment) -> Result<Tree, Proble
         hooks: readme_hooks(runner, true),
         evaluations: plan.campaign.search.evaluations(),
         seed: plan.campaign.seed,
+        wiring: match plan.simulator.transport {
+            Transport::Ros2(_) => doc_lines(&crate::wiring::text(plan)),
+            Transport::InProcess { .. } | Transport::Process { .. } => Vec::new(),
+        },
     };
     tree.add("README.md", Owner::Machine, environment.templates.render("runner/runner_readme.md.tera", &readme)?);
 
@@ -333,7 +341,8 @@ fn runner(runner: &RunnerPlan, environment: &Environment) -> Result<Tree, Proble
 }
 
 /// The features of the runtime that runners use. They are the same for all campaigns, whatever transport or traces one
-/// asks for, so that a change of the space does not compile the runtime again.
+/// asks for, so that a change of the space does not compile the runtime again. Only ROS 2 is another, because it costs
+/// more to compile than all of these, and a space hardly ever changes to it.
 const FEATURES: [&str; 4] = ["campaign", "in-process", "mcap", "process"];
 
 /// `campaign.rs`: the campaign as the runtime takes it.
@@ -363,8 +372,12 @@ fn campaign(runner: &RunnerPlan, environment: &Environment, header: &str) -> Str
             /// The folder that the simulator runs in, as seen from this crate's.
             const SIMULATOR: &str = #folder;
         };
+        let transport = match plan.simulator.transport {
+            Transport::Ros2(_) => quote! { ros2 },
+            Transport::InProcess { .. } | Transport::Process { .. } => quote! { process },
+        };
         let connect = quote! {
-            ::sesame_runtime::transport::process(::std::path::Path::new(::core::env!("CARGO_MANIFEST_DIR")).join(SIMULATOR))
+            ::sesame_runtime::transport::#transport(::std::path::Path::new(::core::env!("CARGO_MANIFEST_DIR")).join(SIMULATOR))
         };
         (simulator, connect)
     };

@@ -5,11 +5,12 @@ use std::path::Path;
 use sesame_dsl::Analysis;
 use sesame_dsl::diagnostic::{Diagnostic, MEANINGS, Severity, page, render};
 use sesame_dsl::index::Kind;
-use sesame_dsl::model::Space;
+use sesame_dsl::model::{Space, Transport};
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::span::Span;
 
 use crate::input::{self, Unreadable};
+use crate::interfaces::Files;
 use crate::lower::lower;
 use crate::plan::RunnerPlan;
 use crate::uses;
@@ -101,7 +102,7 @@ fn check(file: &str, text: &str, look: Look) -> Checked {
     let mut sources = SourceMap::new();
     let root = sources.add(file, text);
     sesame_dsl::load_imports(&mut sources, root, read);
-    let analysis = sesame_dsl::analyse(&sources, root);
+    let analysis = sesame_dsl::analyse_with(&sources, root, &Files::default());
     let Diagnosed { diagnostics, errors } = diagnosed(&analysis.diagnostics, &sources, look);
     let warnings = analysis.diagnostics.iter().filter(|found| found.severity() == Severity::Warning).count();
     // A plan names the file without its folder: the same space gives the same plan wherever it lies.
@@ -124,24 +125,23 @@ fn read(name: &str) -> Result<String, String> {
     })
 }
 
-/// What a space says and no runner uses yet, with its places.
+/// What a space says and no runner uses, or not yet, with its places.
 fn not_used(space: &Space, sources: &SourceMap) -> Vec<String> {
     let at = |span: Span| {
         let file = space.files.get(&span.file).map_or("", String::as_str);
         format!("{file}:{}", sources.position(span).line)
     };
     let mut notes = Vec::new();
-    if let Some(launch) = &space.lifecycle.launch {
-        let place = at(launch.command.span);
-        notes.push(format!("`launch` ({place}) is not used by runners yet: they start the simulator themselves"));
-    }
-    if let Some(terminate) = &space.lifecycle.terminate {
-        let place = at(terminate.span);
-        notes.push(format!("`terminate` ({place}) is not used by runners yet: they end the simulator themselves"));
-    }
-    if let Some(budget) = &space.lifecycle.relay_budget {
-        let place = at(budget.span);
-        notes.push(format!("`relay budget` ({place}) is not used by runners yet: in lock-step a relay adds no delay"));
+    let unmeasured = match &space.simulator.transport {
+        Transport::InProcess { .. } => Some("an in-process simulator is stepped without delay"),
+        Transport::Process { step_ns: Some(_), .. } | Transport::Ros2 { step: Some(_), .. } => {
+            Some("in lock-step time stands still while messages pass through the relay")
+        }
+        Transport::Process { step_ns: None, .. } => Some("it is measured between nodes of ROS 2 only"),
+        Transport::Ros2 { step: None, .. } => None,
+    };
+    if let (Some(budget), Some(why)) = (&space.lifecycle.relay_budget, unmeasured) {
+        notes.push(format!("`relay budget` ({}) has no effect: {why}", at(budget.span)));
     }
     let monitors = space.eddis.values().map(|eddi| ("monitor", &eddi.declaration));
     let labs = space.physicals.values().map(|lab| ("lab", &lab.declaration));
@@ -266,16 +266,15 @@ mod tests {
     }
 
     #[test]
-    fn what_no_runner_uses_yet_is_said_with_its_place() {
+    fn what_no_runner_uses_is_said_with_its_place() {
         let text = include_str!("../../sesame-dsl/tests/good/blocks.sesame");
         let checked = check("spaces/blocks.sesame", text, PLAIN);
         assert_eq!(checked.diagnostics, "");
         assert_eq!(
             checked.notes,
             [
-                "`launch` (blocks.sesame:6) is not used by runners yet: they start the simulator themselves",
-                "`terminate` (blocks.sesame:6) is not used by runners yet: they end the simulator themselves",
-                "`relay budget` (blocks.sesame:7) is not used by runners yet: in lock-step a relay adds no delay",
+                "`relay budget` (blocks.sesame:7) has no effect: in lock-step time stands still while messages pass \
+                 through the relay",
                 "monitor `transport` (blocks.sesame:32) is checked, but not used by runners yet",
                 "monitor `conveyor` (blocks.sesame:41) is checked, but not used by runners yet",
                 "lab `lab` (blocks.sesame:47) is checked, but not used by runners yet",

@@ -15,11 +15,15 @@ pub mod files;
 #[cfg(feature = "cli")]
 pub mod frontend;
 pub mod input;
+pub mod interfaces;
 pub mod lower;
 pub mod names;
 pub mod output;
 pub mod plan;
 pub mod project;
+#[cfg(all(feature = "cli", any(feature = "ros2", test)))]
+mod scan;
 pub mod unfilled;
 #[cfg(feature = "cli")]
 pub mod uses;
+pub mod wiring;

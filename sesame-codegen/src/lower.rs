@@ -14,6 +14,7 @@ mod formula;
 mod id;
 mod operation;
 mod robustness;
+mod ros2;
 mod selection;
 mod system;
 
@@ -22,8 +23,9 @@ use sesame_plan as plan;
 
 use self::id::topic_id;
 use self::operation::custom_operations;
+use self::ros2::ros2;
 use self::selection::{Selection, without_operations};
-use self::system::{message, node, topic, unit};
+use self::system::{lifecycle, message, node, topic, unit};
 use crate::plan::{HookPlan, RunnerPlan};
 
 /// The plan of a campaign's runner. `source` is the `.sesame` file's name without its folder, `generator` the name and
@@ -39,6 +41,7 @@ pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str)
             let (program, arguments) = (program.clone(), arguments.clone());
             (plan::Transport::Process { program, arguments, step_ns: *step_ns }, None)
         }
+        model::Transport::Ros2 { .. } => (plan::Transport::Ros2(ros2(space)), None),
     };
     let system_file = space.file_of(&space.simulator.declaration).to_owned();
     let plan = plan::CampaignPlan {
@@ -47,9 +50,13 @@ pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str)
         source: source.to_owned(),
         space: space.declaration.name.clone(),
         doc: space.declaration.doc.clone(),
-        simulator: plan::Simulator { name: space.simulator.declaration.name.clone(), transport },
+        simulator: plan::Simulator {
+            name: space.simulator.declaration.name.clone(),
+            transport,
+            lifecycle: lifecycle(&space.lifecycle),
+        },
         messages: space.messages.values().map(message).collect(),
-        topics: space.topics.values().map(topic).collect(),
+        topics: space.topics.values().map(|declared| topic(space, declared)).collect(),
         nodes: space.nodes.values().map(node).collect(),
         metrics: selection.metrics.iter().map(|&id| metric(&space.metrics[id])).collect(),
         requirements: space.requirements.values().map(|requirement| selection.requirement(requirement)).collect(),
@@ -170,11 +177,59 @@ mod tests {
     "#;
 
     fn lowered(campaign: &str) -> RunnerPlan {
+        lowered_from(CELL, campaign)
+    }
+
+    fn lowered_from(text: &str, campaign: &str) -> RunnerPlan {
         let mut sources = SourceMap::new();
-        let file = sources.add("cell.sesame", CELL);
+        let file = sources.add("cell.sesame", text);
         let analysis = analyse(&sources, file);
         let space = analysis.model.unwrap_or_else(|| panic!("{:#?}", analysis.diagnostics));
         lower(&space, space.campaign(campaign).unwrap(), "cell.sesame", "sesamec 0.0.0")
+    }
+
+    #[test]
+    fn an_operation_on_a_node_has_the_node_and_no_topic_and_cuts_none() {
+        let text = r#"
+            space cell
+            system {
+              simulator sim = ros2
+              message Level = "std_msgs/msg/Float64" { data: real[mm] }
+              topic level = "level" : Level
+              node arm { publishes level  launch "./arm" "{ros-args}" }
+              node plan "/planner" { subscribes level }
+            }
+            metric highest maximise default 0mm = max(level.data)
+            operation weak on parameter "limits.payload" of plan = set [-1, 3] priority 2
+            operation lag on node arm = slow [10%, 50%] for [1s, 2s]
+            operation halt on node arm = pause untimed
+            operation fail on node arm = kill within [2s, 3s]
+            test bad { weak value 2.5 from 1s to 3s  lag share 25% from 1s to 2.5s }
+            campaign look { objectives highest  operations weak, lag, halt, fail 1 per test
+                            search random { evaluations 8 }  end after 10s }
+        "#;
+        let plan = lowered_from(text, "look").plan;
+        plan.validate().unwrap();
+        let kinds: Vec<_> = plan.operations.iter().map(|operation| operation.kind.clone()).collect();
+        let [arm, planner] = [0, 1].map(plan::NodeId);
+        let set = plan::OperationKind::Set { node: planner, parameter: "limits.payload".to_owned() };
+        let on_arm = [
+            plan::OperationKind::Slow { node: arm },
+            plan::OperationKind::Pause { node: arm },
+            plan::OperationKind::Kill { node: arm },
+        ];
+        assert_eq!(kinds, [&[set][..], &on_arm].concat());
+        assert!(plan.operations.iter().all(|it| it.topic.is_none() && it.places.is_empty()));
+        let domain = |low, high| plan::Domain::Number { low, high, shape: plan::Shape::Value, integer: false };
+        let parameters: Vec<_> = plan
+            .operations
+            .iter()
+            .flat_map(|it| &it.parameters)
+            .map(|it| (it.name.as_str(), it.domain.clone()))
+            .collect();
+        assert_eq!(parameters, [("value", domain(-1.0, 3.0)), ("share", domain(0.1, 0.5))]);
+        let chosen: Vec<_> = plan.tests[0].test.operations.iter().flat_map(|used| &used.parameters).collect();
+        assert_eq!(chosen, [&plan::Choice::Value { value: 2.5 }, &plan::Choice::Value { value: 0.25 }]);
     }
 
     #[test]

@@ -94,10 +94,15 @@ impl RunnerPlan {
         Path::new(&self.system_file).parent().unwrap_or(Path::new(""))
     }
 
-    /// Whether a runner of this campaign contains Rust of the user's: its simulator or hooks. Without, the plan says
-    /// everything.
+    /// Whether a runner of this campaign contains Rust that this command does not: the user's simulator or hooks, or
+    /// the transport of ROS 2 unless the command was built with it. Without, the plan says everything.
     pub fn needs_rust(&self) -> bool {
-        matches!(self.plan.simulator.transport, Transport::InProcess { .. })
+        let transport = match self.plan.simulator.transport {
+            Transport::InProcess { .. } => true,
+            Transport::Process { .. } => false,
+            Transport::Ros2(_) => !cfg!(feature = "ros2"),
+        };
+        transport
             || self.hooks.iter().any(|hook| self.uses(hook))
             || self.operations.iter().any(|operation| self.applies(operation))
     }

@@ -64,6 +64,8 @@ pub enum Kind {
     Field,
     /// A topic, or a group of topics.
     Topic,
+    /// A service.
+    Service,
     /// A node.
     Node,
     /// A metric.
@@ -101,6 +103,7 @@ impl Kind {
             Kind::Message => "message",
             Kind::Field => "field",
             Kind::Topic => "topic",
+            Kind::Service => "service",
             Kind::Node => "node",
             Kind::Metric => "metric",
             Kind::Requirement => "requirement",

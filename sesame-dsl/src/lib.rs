@@ -8,6 +8,7 @@ pub mod diagnostic;
 pub mod format;
 mod import;
 pub mod index;
+pub mod interfaces;
 pub mod model;
 pub mod place;
 mod resolve;
@@ -20,6 +21,7 @@ pub mod units;
 
 use diagnostic::{Diagnostic, Severity};
 use index::Index;
+use interfaces::{Interfaces, NoInterfaces};
 use model::Space;
 use source::SourceMap;
 use span::FileId;
@@ -48,12 +50,17 @@ impl Analysis {
 /// Analyses the file `root` of `sources` with all it imports, which [`load_imports`] has added: syntax, names, types
 /// and units, ranges, campaigns, and what deserves a warning.
 ///
-/// All mistakes of all these kinds come out of one call.
+/// All mistakes of all these kinds come out of one call. Of the types of ROS only those are known that need no files.
 pub fn analyse(sources: &SourceMap, root: FileId) -> Analysis {
+    analyse_with(sources, root, &NoInterfaces)
+}
+
+/// [`analyse`] with layouts of ROS interfaces from elsewhere.
+pub fn analyse_with(sources: &SourceMap, root: FileId, interfaces: &dyn Interfaces) -> Analysis {
     let mut diagnostics = Vec::new();
     let merged = import::merge(sources, root, &mut diagnostics);
     let index = index::build::index(&merged);
-    let model = resolve::resolve(sources, root, merged, &mut diagnostics);
+    let model = resolve::resolve(sources, root, merged, interfaces, &mut diagnostics);
     if let Some(space) = &model {
         diagnostics.extend(check::check(space, root));
     }

@@ -30,10 +30,11 @@ use std::collections::BTreeMap;
 // What holds no names and no units is the same here and in a plan.
 pub use sesame_plan::stl::Interval;
 pub use sesame_plan::{
-    Aggregate, Averaging, BinaryFunction, BoostedChildren, Bound, Choice, Comparison, Condition, Confirmation, Copies,
-    Dimension, Direction, Distance, Distribution, Drain, Exploration, Expression, Members, Moment, NotFinite,
-    OperationKind, OwnSetting, Point, Recorded, Region, Setting, Shape, SignedDistance, Statistic, Step, StopRule,
-    Strategy, StrategyKind, StrategyProperties, TextTest, Trend, UnaryFunction, ValueMode,
+    Aggregate, Averaging, BinaryFunction, BoostedChildren, Bound, Channel, Choice, Clock, Comparison, Condition,
+    Confirmation, Copies, Dimension, Direction, Distance, Distribution, Drain, Exploration, Expression, Interface,
+    Members, Moment, NotFinite, OperationKind, OwnSetting, Point, Recorded, Region, Setting, Shape, SignedDistance,
+    Statistic, Step, StepBy, Stepping, StopRule, Strategy, StrategyKind, StrategyProperties, TextTest, Trend,
+    UnaryFunction, ValueMode,
 };
 
 use crate::span::FileId;
@@ -49,7 +50,9 @@ pub struct Space {
     pub lifecycle: Lifecycle,
     /// Message types, each after the types it contains, otherwise in declaration order.
     pub messages: Arena<MessageId, Message>,
-    /// Topics, in declaration order.
+    /// Layouts of ROS types: those of messages with one and what they contain, each after those it contains.
+    pub interfaces: Vec<Interface>,
+    /// Topics, in declaration order; those of services come last.
     pub topics: Arena<TopicId, Topic>,
     /// Nodes, in declaration order.
     pub nodes: Arena<NodeId, Node>,

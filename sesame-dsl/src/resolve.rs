@@ -1,7 +1,8 @@
 //! From syntax to model, in passes:
 //!
 //! 1. [`collect`] collects names, and reports duplicates and missing declarations
-//! 2. [`system`] resolves message types (ordered so that each follows those it contains), topics, nodes, the simulator
+//! 2. [`system`] resolves message types (ordered so that each follows those it contains), topics, nodes, the simulator;
+//!    [`ros2`], [`ros_types`] and [`services`] those of ROS
 //! 3. [`metrics`] resolves metrics and requirements; [`formula`] resolves formulas, with [`function`], [`geometry`],
 //!    [`region`] and [`members`]
 //! 4. [`fuzz`] resolves operations ([`disturbance`] their targets and parameters, [`custom`] those in the user's code)
@@ -37,29 +38,40 @@ mod metrics;
 mod nodes;
 mod parts;
 mod physical;
+mod placeholders;
 mod quantity;
 mod region;
+mod resource;
 mod robustness;
+mod ros2;
+mod ros_types;
+mod services;
 mod simulator;
 mod stop;
 mod system;
+mod words;
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::diagnostic::{Code, Diagnostic, Severity, Suggestion};
 use crate::import::Merged;
 use crate::index::Kind;
+use crate::interfaces::Interfaces;
 use crate::model::{self, Arena, Declaration, Id, Space};
 use crate::similar::most_similar;
 use crate::source::SourceMap;
 use crate::span::{FileId, Span};
 use crate::syntax::ast::{self, Name};
 
+use ros_types::RosTypes;
+use words::list;
+
 /// Resolves the files of a space. `None` exactly when there is an error, be it in `diagnostics` before or after.
 pub(crate) fn resolve(
     sources: &SourceMap,
     root: FileId,
     merged: Merged,
+    interfaces: &dyn Interfaces,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Option<Space> {
     let Merged { mut file, names, ranks } = merged;
@@ -69,6 +81,7 @@ pub(crate) fn resolve(
         root,
         ranks: &ranks,
         file: &file,
+        interfaces,
         diagnostics,
         names: BTreeMap::new(),
         silent: BTreeSet::new(),
@@ -99,6 +112,7 @@ pub(crate) fn resolve(
         simulator: simulator?,
         lifecycle: lifecycle?,
         messages: arena(system.messages)?,
+        interfaces: system.ros.interfaces,
         topics: arena(system.topics)?,
         nodes: arena(system.nodes)?,
         metrics: arena(metrics)?,
@@ -139,8 +153,11 @@ struct Definition {
 
 #[derive(Default)]
 struct SystemPart {
-    /// In the order of ids, which is not that of the file.
+    /// In the order of ids, which is not that of the file; with those that types of ROS contain.
     messages: Vec<Option<model::Message>>,
+    /// The number of values of each message, by its id.
+    values: Vec<u64>,
+    ros: RosTypes,
     /// Per message in the order of the file: its id.
     message_ids: Vec<model::MessageId>,
     topics: Vec<Option<model::Topic>>,
@@ -153,6 +170,7 @@ struct Resolver<'a> {
     /// The places of files in the order of declarations.
     ranks: &'a BTreeMap<FileId, usize>,
     file: &'a ast::File,
+    interfaces: &'a dyn Interfaces,
     diagnostics: &'a mut Vec<Diagnostic>,
     names: BTreeMap<&'a str, Definition>,
     /// Names that are not reported again: broken where they are declared, or already reported as unknown.
@@ -317,16 +335,6 @@ impl<'a> Resolver<'a> {
             .label(format!("add {what}"))
             .note(format!("for example `{example}`"));
         self.report(diagnostic);
-    }
-}
-
-/// Names in backquotes, joined for a sentence.
-fn list(names: &[&str]) -> String {
-    let quoted: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
-    match quoted.split_last() {
-        Some((last, [])) => last.clone(),
-        Some((last, others)) => format!("{} and {last}", others.join(", ")),
-        None => String::new(),
     }
 }
 

@@ -68,6 +68,18 @@ const SYNONYMS: &[Synonym] = &[
     like("clock_drift", "clock skew"),
     same("inf", "infinity"),
     same("infinite", "infinity"),
+    // Operations on nodes and parameters.
+    like("suspend", "pause"),
+    like("halt", "pause"),
+    like("hang", "pause"),
+    like("stall", "pause"),
+    like("crash", "kill"),
+    like("restart", "kill"),
+    like("shutdown", "kill"),
+    like("throttle", "slow"),
+    like("starve", "slow"),
+    like("assign", "set"),
+    like("param", "parameter"),
     // Operations on messages.
     like("delay", "latency"),
     like("lag", "latency"),

@@ -56,6 +56,18 @@ fn a_file_with_errors_has_its_definitions_and_their_uses() {
 }
 
 #[test]
+fn an_operation_on_a_node_or_its_parameter_mentions_the_node() {
+    let text = "space cell
+        system { simulator sim = ros2  node arm { launch \"./arm\" }  node plan { } }
+        operation halt on node arm = pause
+        operation weak on parameter \"payload\" of plan = set [0, 3]
+        operation wrong on node plan = blackhole";
+    let (sources, index, _) = index(text);
+    assert_eq!(uses(&sources, &index, "arm"), [("halt".to_owned(), 3)]);
+    assert_eq!(uses(&sources, &index, "plan"), [("weak".to_owned(), 4), ("wrong".to_owned(), 5)]);
+}
+
+#[test]
 fn names_that_do_not_resolve_are_references_too() {
     let (sources, index, _) = index(BROKEN);
     let unresolved = index.references.iter().filter(|reference| reference.target.is_none());

@@ -3,6 +3,7 @@
 //! Everything lies below the workspace's target folder: projects in folders of fixed names, since a path is part of
 //! what cargo knows a crate by, and all runners in one target folder, so that the runtime is compiled once.
 
+pub mod dds;
 pub mod models;
 pub mod optimisers;
 mod python;
@@ -31,7 +32,7 @@ pub fn target() -> PathBuf {
     scratch().join("target")
 }
 
-/// The program `sesamec` of this workspace, built if it is not up to date.
+/// The program `sesamec` of this workspace, with ROS 2 as in the rest of these tests, built if it is not up to date.
 pub fn sesamec() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     PROGRAM.get_or_init(|| built(&[]))
@@ -45,7 +46,8 @@ pub fn optimised_sesamec() -> &'static Path {
 
 fn built(arguments: &[&str]) -> PathBuf {
     let output = Command::new(env!("CARGO"))
-        .args(["build", "--quiet", "--package", "sesame-codegen", "--message-format=json-render-diagnostics"])
+        .args(["build", "--quiet", "--package", "sesame-codegen", "--features", "ros2"])
+        .arg("--message-format=json-render-diagnostics")
         .args(arguments)
         .current_dir(workspace())
         .output()
@@ -188,7 +190,7 @@ impl Project {
 
     /// Generates and builds the runner of a campaign, without running it.
     pub fn build(&self, campaign: &str) -> Runner {
-        // A copy of the program is this project's own: in the target folder, another project of the same name
+        // The name of the program is this project's own: in the target folder, another project of the same name
         // overwrites it.
         static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
         self.sesamec("generate", &["--campaign", campaign]).expect(0);
@@ -199,7 +201,10 @@ impl Project {
         let name = package.lines().find_map(|line| line.strip_prefix("name = \"")).expect("a package has a name");
         let name = name.trim_end_matches('"');
         let program = self.folder.join(name);
-        fs::copy(target().join("debug").join(name), &program).expect("what was built can be copied");
+        // A second name for the same file, for copies would fill the disk. Neither cargo nor a linker writes into a
+        // file that exists: each puts a new one in its place.
+        let _ = fs::remove_file(&program);
+        fs::hard_link(target().join("debug").join(name), &program).expect("what was built can be linked");
         Runner { program, folder: self.folder.clone() }
     }
 

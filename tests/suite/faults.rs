@@ -156,6 +156,8 @@ fn every_row_of_the_table_of_faults_names_a_test_that_exists() {
         let file = file.split(')').next().unwrap();
         let text = fs::read_to_string(workspace().join(file)).unwrap_or_else(|error| panic!("{error}: {row}"));
         let test = text.split(&format!("fn {name}(")).next().unwrap();
-        assert!(test.len() < text.len() && test.trim_end().ends_with(']'), "{file} has no test `{name}`: {row}");
+        let is_function = test.len() < text.len() && test.trim_end().ends_with(']');
+        // A program that is its own harness lists its tests.
+        assert!(is_function || text.contains(&format!("\"{name}")), "{file} has no test `{name}`: {row}");
     }
 }

@@ -52,6 +52,37 @@ fn an_interpreted_campaign_and_its_crate_have_the_same_digest() {
 }
 
 #[test]
+fn tests_end_as_soon_as_their_condition_holds() {
+    let project = two_robots("interpreted_ends");
+    let text = fs::read_to_string(&project.space).unwrap();
+    let mut changed = text;
+    for (from, to) in [
+        ("end        after 70s", "end        after 70s or when heard > 200"),
+        ("  activate   by time", "  observes   heard\n  activate   by time"),
+        // No trip is completed by then.
+        ("requirement R2 \"All trips are made in a minute\"       = completion <= 60s", ""),
+        ("metric fuzzing_time", "metric heard = count(east.position.x > -1km)\nmetric fuzzing_time"),
+    ] {
+        assert!(changed.contains(from), "{from}");
+        changed = changed.replacen(from, to, 1);
+    }
+    fs::write(&project.space, changed).unwrap();
+    let digests = ["1", "2"].map(|workers| {
+        let run = ["run", "two_robots.sesame", "-c", "crossing", "--", "--workers", workers];
+        without_cargo(&project, &run).expect(0).digest()
+    });
+    assert_eq!(digests[0], digests[1]);
+    let show = ["show", "two_robots.sesame", "T0", "-c", "crossing", "--format", "json"];
+    let shown: serde_json::Value = serde_json::from_str(&without_cargo(&project, &show).expect(0).out).unwrap();
+    assert_eq!(shown["outcome"], "completed");
+    // Two hundred messages, one every 50 ms, and the one that makes it true.
+    let end = shown["end"].as_f64().unwrap();
+    assert!((10.0..10.2).contains(&end), "{end}");
+    let heard = shown["metrics"].as_array().unwrap().iter().find(|metric| metric["metric"] == "heard").unwrap();
+    assert_eq!(heard["value"], 201.0);
+}
+
+#[test]
 fn an_interpreted_campaign_that_is_stopped_is_resumed_by_the_command_that_it_proposes() {
     use std::io::{BufRead as _, BufReader};
     use std::process::Stdio;

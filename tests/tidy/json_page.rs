@@ -14,7 +14,7 @@ const PAGE: &str = "docs/json.md";
 const MARK: &str = "<!-- From here on a test writes this page; CONTRIBUTING.md says how. -->\n";
 
 /// What is printed: the heading, how the values come, and the type with its file.
-const PRINTED: [(&str, &str, &str, &str); 10] = [
+const PRINTED: [(&str, &str, &str, &str); 11] = [
     (
         "`run`, `resume`, `known`, `repeat`, `shrink`, `report`",
         "One object.",
@@ -40,15 +40,17 @@ const PRINTED: [(&str, &str, &str, &str); 10] = [
         "sesame-dsl/src/diagnostic/render/json.rs",
     ),
     ("`sesamec explain NAME FILE`", "One object.", "Explained", "sesame-codegen/src/uses.rs"),
+    ("`sesamec scan ros2`", "One object.", "Facts", "runtime/ros2/src/scan/facts.rs"),
 ];
 
 /// Crates whose types may be printed, by the folder of their sources.
-const CRATES: [(&str, &str); 7] = [
+const CRATES: [(&str, &str); 8] = [
     ("sesame_runtime", "runtime/src"),
     ("sesame_results", "runtime/results/src"),
     ("sesame_search", "runtime/search/src"),
     ("sesame_base", "runtime/base/src"),
     ("sesame_plan", "runtime/plan/src"),
+    ("sesame_ros2", "runtime/ros2/src"),
     ("sesame_dsl", "sesame-dsl/src"),
     ("sesame_codegen", "sesame-codegen/src"),
 ];

@@ -27,6 +27,22 @@ pub enum Outcome {
         /// The limit, in seconds of wall time.
         limit: f64,
     },
+    /// A program that the space launches could not be started, or was not ready in time. It says nothing about the
+    /// system, and neither do the next two.
+    LaunchFailed {
+        /// What is known of the cause.
+        message: String,
+    },
+    /// The connection to the simulator was lost, although nothing says that the simulator has ended.
+    Disconnect {
+        /// What is known of the cause.
+        message: String,
+    },
+    /// The clock of the simulator went back.
+    WrongClock {
+        /// From when to when.
+        message: String,
+    },
 }
 
 /// How much of what is known of a crash is kept, in bytes.
@@ -35,14 +51,36 @@ const CAUSE_BYTES: usize = 4096;
 impl Outcome {
     /// A crash for this cause. A very long one, which simulators and panics can produce, is
     /// shortened, and says by how much.
-    pub fn crash(mut cause: String) -> Self {
+    pub fn crash(cause: String) -> Self {
+        Outcome::Crash { message: Outcome::message_of(cause) }
+    }
+
+    /// A cause as an outcome keeps it: a very long one is shortened.
+    pub fn message_of(mut cause: String) -> String {
         if cause.len() > CAUSE_BYTES {
             let whole = cause.len();
             let kept = (0..=CAUSE_BYTES).rev().find(|&at| cause.is_char_boundary(at)).unwrap_or(0);
             cause.truncate(kept);
             write!(cause, "… ({} bytes more)", whole - kept).expect("text grows as needed");
         }
-        Outcome::Crash { message: cause }
+        cause
+    }
+
+    /// Whether it is the environment's fault that the run broke off: the run says nothing about the system, and is
+    /// worth another try.
+    pub fn is_of_environment(&self) -> bool {
+        matches!(self, Outcome::LaunchFailed { .. } | Outcome::Disconnect { .. } | Outcome::WrongClock { .. })
+    }
+
+    /// What is known of the cause, as it is recorded.
+    pub fn message(&self) -> Option<&str> {
+        match self {
+            Outcome::Completed | Outcome::NoEffect | Outcome::Unknown | Outcome::Timeout { .. } => None,
+            Outcome::Crash { message }
+            | Outcome::LaunchFailed { message }
+            | Outcome::Disconnect { message }
+            | Outcome::WrongClock { message } => Some(message),
+        }
     }
 
     /// Whether the run came to its planned end.
@@ -58,15 +96,17 @@ impl Outcome {
             Outcome::Unknown => "unknown",
             Outcome::Crash { .. } => "crash",
             Outcome::Timeout { .. } => "timeout",
+            Outcome::LaunchFailed { .. } => "launch_failed",
+            Outcome::Disconnect { .. } => "disconnect",
+            Outcome::WrongClock { .. } => "wrong_clock",
         }
     }
 
     /// What the word leaves out.
     pub fn detail(&self) -> Option<String> {
         match self {
-            Outcome::Completed | Outcome::NoEffect | Outcome::Unknown => None,
-            Outcome::Crash { message } => Some(message.clone()),
             Outcome::Timeout { limit } => Some(format!("stopped after {limit} s of wall time")),
+            _ => self.message().map(str::to_owned),
         }
     }
 }

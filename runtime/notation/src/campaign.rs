@@ -6,6 +6,7 @@ use sesame_plan::{
     Search, Statistic, StopRule, Strategy,
 };
 
+use crate::condition;
 use crate::text::block;
 use crate::unit::Unit;
 
@@ -68,7 +69,8 @@ fn clauses(plan: &CampaignPlan) -> Vec<Clause> {
         };
         ("record", format!("mcap {which}"))
     }));
-    clauses.push(end_clause(campaign.end_after));
+    let when = campaign.end_when.as_ref().map(|condition| condition::write(condition, &plan.metrics));
+    clauses.push(end_clause(campaign.end_after, when.as_deref()));
     clauses
 }
 
@@ -109,9 +111,10 @@ pub fn coverage_clause(goal: &CoverageGoal) -> Clause {
     ("coverage", format!("{{ {}hits {}{stop} }}", axes.collect::<String>(), goal.hits))
 }
 
-/// `end`: when a test ends, in seconds.
-pub fn end_clause(seconds: f64) -> Clause {
-    ("end", format!("after {}", Unit::SECONDS.number(seconds)))
+/// `end`: when a test ends, in seconds, and what ends it before.
+pub fn end_clause(seconds: f64, when: Option<&str>) -> Clause {
+    let when = when.map(|condition| format!(" or when {condition}")).unwrap_or_default();
+    ("end", format!("after {}{when}", Unit::SECONDS.number(seconds)))
 }
 
 fn exploration_clause(exploration: &Exploration) -> Clause {

@@ -6,7 +6,7 @@ use sesame_plan::{
     place_in_words,
 };
 
-use crate::text::{list, one_of};
+use crate::text::{list, one_of, quoted};
 use crate::unit::Unit;
 
 /// An operation of a plan in one line, with every clause that it can have: no default is left out.
@@ -21,6 +21,15 @@ pub fn operation(plan: &CampaignPlan, operation: &Operation) -> String {
         }
         line = format!("{line} on {}", targets.join(", "));
     }
+    if let Some(resource) = resource(plan, operation) {
+        line = format!("{line} on {resource}");
+    }
+    for (word, nodes) in [("from", &operation.from), ("to", &operation.to)] {
+        let names: Vec<&str> = nodes.iter().map(|node| plan.nodes[node.index()].name.as_str()).collect();
+        if !names.is_empty() {
+            line = format!("{line} {word} {}", names.join(", "));
+        }
+    }
     let clauses = Clauses {
         within: (!operation.kind.is_offline()).then_some(operation.within),
         lengths: operation.lengths,
@@ -30,6 +39,15 @@ pub fn operation(plan: &CampaignPlan, operation: &Operation) -> String {
         start_contains: operation.constraints.iter().map(|it| constraint(it, &plan.metrics)).collect(),
     };
     format!("{line} = {}{}", disturbance(operation), clauses.write())
+}
+
+/// The node or the parameter on which an operation acts, if it acts on one instead of messages.
+pub fn resource(plan: &CampaignPlan, operation: &Operation) -> Option<String> {
+    let node = &plan.node(operation.kind.node()?).name;
+    Some(match &operation.kind {
+        OperationKind::Set { parameter, .. } => format!("parameter {} of {node}", quoted(parameter)),
+        _ => format!("node {node}"),
+    })
 }
 
 /// The clauses behind an operation. One that is `None`, false or empty is not written.

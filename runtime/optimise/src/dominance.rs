@@ -33,7 +33,7 @@ impl Fitness {
 pub enum Unfit {
     /// None of its operations had an effect.
     Void,
-    /// It completed, but an objective has neither a value nor a default.
+    /// An objective has neither a value nor a default, although the system did not fail.
     Unmeasured,
     /// The simulator or a hook failed.
     Crash,

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::condition::ConditionSpace;
+use crate::condition::{Condition, ConditionSpace};
 use crate::{Confirmation, CoverageGoal, Exploration, Lengths, MetricId, OperationId, Search, StopRule, Times};
 
 /// A campaign.
@@ -45,6 +45,10 @@ pub struct Campaign {
     pub seed: u64,
     /// Simulation time at which a test ends, in seconds.
     pub end_after: f64,
+    /// What ends a test before that time: weighed whenever the transport has advanced, after each step of a simulator
+    /// that is stepped. `None` for a campaign that does not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub end_when: Option<Condition>,
     /// Of which tests the messages and the activity of operations are recorded; `None` for none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub record: Option<Recorded>,

@@ -27,6 +27,10 @@ id!(
     TopicId
 );
 id!(
+    /// A node: position in [`crate::CampaignPlan::nodes`].
+    NodeId
+);
+id!(
     /// A metric: position in [`crate::CampaignPlan::metrics`].
     MetricId
 );

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::NodeId;
+
 /// What an operation does to the messages of its topic, with the parameters that a test chooses for it.
 ///
 /// Of the values at an operation's places, only numbers, points, texts and truth values are changed as the kind says;
@@ -79,6 +81,28 @@ pub enum OperationKind {
     Duplicate,
     /// Drops every message. No parameters.
     Blackhole,
+    /// Sets a parameter of a node while it is active, and then to what it was before. One parameter `value`: a number.
+    Set {
+        /// The node.
+        node: NodeId,
+        /// The name of the parameter in the node.
+        parameter: String,
+    },
+    /// Stops all processes of a node while it is active. No parameters.
+    Pause {
+        /// The node, which the runner launches.
+        node: NodeId,
+    },
+    /// Leaves a node only a share of the time while it is active. One parameter `share`, between 0 and 1.
+    Slow {
+        /// The node, which the runner launches.
+        node: NodeId,
+    },
+    /// Kills all processes of a node when it becomes active, and starts the node again when it ends. No parameters.
+    Kill {
+        /// The node, which the runner launches.
+        node: NodeId,
+    },
     /// The user's Rust code, with parameters as declared.
     Custom {
         /// When it is called.
@@ -117,9 +141,25 @@ impl OperationKind {
         matches!(self, OperationKind::Custom { moment: Moment::BeforeStart | Moment::AfterEnd })
     }
 
+    /// The node on which it acts, if it acts on a node or its parameters instead of messages.
+    pub fn node(&self) -> Option<NodeId> {
+        match self {
+            OperationKind::Set { node, .. }
+            | OperationKind::Pause { node }
+            | OperationKind::Slow { node }
+            | OperationKind::Kill { node } => Some(*node),
+            _ => None,
+        }
+    }
+
+    /// Whether it acts on messages, so that it has a topic.
+    pub fn acts_on_messages(&self) -> bool {
+        !self.is_offline() && self.node().is_none()
+    }
+
     /// Whether its parameters are probabilities: fractions here, percentages in the `.sesame` file.
     pub fn has_probabilities(&self) -> bool {
-        matches!(self, OperationKind::PacketLoss | OperationKind::BurstLoss)
+        matches!(self, OperationKind::PacketLoss | OperationKind::BurstLoss | OperationKind::Slow { .. })
     }
 
     /// What it does to messages, as far as the dimensions O1 to O3 of the reduced space distinguish it.
@@ -136,12 +176,18 @@ impl OperationKind {
             | OperationKind::NotFinite { .. }
             | OperationKind::Freeze
             | OperationKind::ClockSkew
-            | OperationKind::Duplicate => Class::Value,
+            | OperationKind::Duplicate
+            | OperationKind::Set { .. } => Class::Value,
             OperationKind::PacketLoss
             | OperationKind::BurstLoss
             | OperationKind::RateLimit
-            | OperationKind::Blackhole => Class::Loss,
-            OperationKind::Latency { .. } | OperationKind::Reorder { .. } | OperationKind::Stale => Class::Delay,
+            | OperationKind::Blackhole
+            | OperationKind::Kill { .. } => Class::Loss,
+            OperationKind::Latency { .. }
+            | OperationKind::Reorder { .. }
+            | OperationKind::Stale
+            | OperationKind::Pause { .. }
+            | OperationKind::Slow { .. } => Class::Delay,
             // What the user's code does is not known.
             OperationKind::Custom { .. } => Class::Other,
         }
@@ -159,7 +205,8 @@ impl OperationKind {
     /// | rate limit | the highest rate |
     /// | duplicate | one copy |
     /// | custom | 0, since what the user's code does is not known |
-    /// | random absolute, stuck at | none: of a sub-range only a narrower one is milder |
+    /// | slow | 1: all of the time |
+    /// | set, random absolute, stuck at | none: of a sub-range only a narrower one is milder |
     pub fn neutral_value(&self, parameter: &str) -> Option<f64> {
         match self {
             OperationKind::RandomValue { mode: ValueMode::Absolute, .. }
@@ -167,8 +214,11 @@ impl OperationKind {
             | OperationKind::RandomText { .. }
             | OperationKind::NotFinite { .. }
             | OperationKind::Freeze
-            | OperationKind::Blackhole => None,
-            OperationKind::Scale | OperationKind::Duplicate => Some(1.0),
+            | OperationKind::Blackhole
+            | OperationKind::Set { .. }
+            | OperationKind::Pause { .. }
+            | OperationKind::Kill { .. } => None,
+            OperationKind::Scale | OperationKind::Duplicate | OperationKind::Slow { .. } => Some(1.0),
             OperationKind::BurstLoss if parameter == "leave" => Some(1.0),
             OperationKind::RateLimit => Some(f64::INFINITY),
             OperationKind::RandomValue { mode: ValueMode::Offset, .. }
@@ -213,6 +263,10 @@ impl OperationKind {
             OperationKind::Reorder { .. } => "reorder",
             OperationKind::Duplicate => "duplicate",
             OperationKind::Blackhole => "blackhole",
+            OperationKind::Set { .. } => "set",
+            OperationKind::Pause { .. } => "pause",
+            OperationKind::Slow { .. } => "slow",
+            OperationKind::Kill { .. } => "kill",
             OperationKind::Custom { moment: Moment::OnMessage } => "custom",
             OperationKind::Custom { moment: Moment::BeforeStart } => "custom before start",
             OperationKind::Custom { moment: Moment::AfterEnd } => "custom after end",

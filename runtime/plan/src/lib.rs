@@ -17,11 +17,13 @@ mod exploration;
 mod formula;
 mod id;
 mod kind;
+mod lifecycle;
 mod meaning;
 mod metric;
 mod model;
 mod objective;
 mod operation;
+mod ros2;
 mod search;
 pub mod stl;
 mod stop;
@@ -31,6 +33,7 @@ mod test;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
 mod validate;
+mod wiring;
 
 pub use campaign::*;
 pub use confirmation::*;
@@ -39,16 +42,19 @@ pub use exploration::*;
 pub use formula::*;
 pub use id::*;
 pub use kind::*;
+pub use lifecycle::*;
 pub use metric::*;
 pub use model::*;
 pub use objective::Objective;
 pub use operation::*;
+pub use ros2::*;
 pub use search::*;
 pub use stop::*;
 pub use system::*;
 pub use task::*;
 pub use test::*;
 pub use validate::PlanError;
+pub use wiring::Remapping;
 
 /// The version of this schema. A runner refuses a plan of another version: both come from one release.
 pub const SCHEMA: u32 = 2;

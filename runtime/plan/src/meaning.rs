@@ -88,10 +88,10 @@ fn forget_what_is_for_people(plan: &mut CampaignPlan) {
             doc.clear();
         }
     }
-    for Topic { name: _, doc, paths: _, ty: _ } in topics {
+    for Topic { name: _, doc, paths: _, ty: _, interface: _, channel: _ } in topics {
         doc.clear();
     }
-    for Node { name: _, doc, publishes: _, subscribes: _ } in nodes {
+    for Node { name: _, doc, publishes: _, subscribes: _, named: _, launch: _, answers: _, every_step: _ } in nodes {
         doc.clear();
     }
     for metric in metrics {
@@ -118,6 +118,8 @@ fn forget_what_is_for_people(plan: &mut CampaignPlan) {
             name: _,
             doc,
             topic: _,
+            from: _,
+            to: _,
             places: _,
             kind: _,
             parameters: _,
@@ -149,6 +151,7 @@ fn forget_what_is_for_people(plan: &mut CampaignPlan) {
         stop: _,
         seed: _,
         end_after: _,
+        end_when: _,
         record: _,
     } = campaign;
     doc.clear();
@@ -173,6 +176,7 @@ fn align_what_no_test_depends_on(one: &mut CampaignPlan, other: &mut CampaignPla
         stop,
         seed,
         end_after: _,
+        end_when: _,
         record,
     } = &mut one.campaign;
     let campaign = &other.campaign;

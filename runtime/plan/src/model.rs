@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Campaign, KnownTest, KnownTestId, MessageId, MessageType, Metric, MetricId, Node, Operation, OperationId,
+    Campaign, KnownTest, KnownTestId, MessageId, MessageType, Metric, MetricId, Node, NodeId, Operation, OperationId,
     Requirement, RequirementId, Simulator, Topic, TopicId,
 };
 
@@ -51,6 +51,10 @@ impl CampaignPlan {
     /// The topic of an id.
     pub fn topic(&self, id: TopicId) -> &Topic {
         &self.topics[id.index()]
+    }
+    /// The node of an id.
+    pub fn node(&self, id: NodeId) -> &Node {
+        &self.nodes[id.index()]
     }
     /// The metric of an id.
     pub fn metric(&self, id: MetricId) -> &Metric {

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::condition::Constraint;
-use crate::{OperationKind, TopicId};
+use crate::{NodeId, OperationKind, TopicId};
 
 /// A fuzzing operation with its permitted ranges. A test holds instances of it, see [`crate::TestOperation`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -12,8 +12,16 @@ pub struct Operation {
     pub name: String,
     /// Its doc comment.
     pub doc: String,
-    /// The topic whose messages it disturbs; `None` exactly for a custom operation before the start or after the end.
+    /// The topic whose messages it disturbs; `None` exactly for one that acts on no messages: a custom operation before
+    /// the start or after the end, or one on a node.
     pub topic: Option<TopicId>,
+    /// Only messages that these nodes publish; none for all messages.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub from: Vec<NodeId>,
+    /// Only messages on their way to these nodes, for each of them apart; none for all messages, each before it is
+    /// fanned out.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub to: Vec<NodeId>,
     /// The values in each message that it changes, in written order; none exactly where it acts on whole messages.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub places: Vec<Place>,

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{MessageId, TopicId};
+use crate::{Launch, Lifecycle, MessageId, Ros2, TopicId};
 
 /// The simulator, and how the runner reaches it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -11,6 +11,9 @@ pub struct Simulator {
     pub name: String,
     /// The transport and its settings.
     pub transport: Transport,
+    /// What starts and ends the system around it.
+    #[serde(default, skip_serializing_if = "Lifecycle::is_default")]
+    pub lifecycle: Lifecycle,
 }
 
 /// How a runner exchanges messages with a simulator.
@@ -36,6 +39,8 @@ pub enum Transport {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         step_ns: Option<u64>,
     },
+    /// Nodes of ROS 2.
+    Ros2(Ros2),
 }
 
 /// A named message type.
@@ -108,6 +113,33 @@ pub struct Topic {
     /// What it carries.
     #[serde(rename = "type")]
     pub ty: Type,
+    /// The layout of its messages on the wire, by the name of an [`Interface`](crate::Interface), where the transport
+    /// needs it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interface: Option<String>,
+    /// Whether it is a topic of the middleware, or one direction of a service.
+    #[serde(default, skip_serializing_if = "Channel::is_default")]
+    pub channel: Channel,
+}
+
+/// What carries the messages of a topic.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Channel {
+    /// A topic.
+    #[default]
+    Topic,
+    /// The requests of a service, whose name is the path.
+    Request,
+    /// The replies of a service, whose name is the path.
+    Reply,
+}
+
+impl Channel {
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference")]
+    fn is_default(&self) -> bool {
+        *self == Channel::default()
+    }
 }
 
 /// A node: a program that publishes and subscribes.
@@ -121,6 +153,27 @@ pub struct Node {
     pub publishes: Vec<TopicId>,
     /// Topics it subscribes to.
     pub subscribes: Vec<TopicId>,
+    /// Its name in the middleware where that differs from its name in the space.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub named: Option<String>,
+    /// What starts it; `None` for a node that others start.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub launch: Option<Launch>,
+    /// What it publishes in answer to what it receives, so that a lock-stepped run knows what to wait for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub answers: Vec<Answer>,
+    /// On which topics it publishes one message in every step, on each of their paths, for the same reason.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub every_step: Vec<TopicId>,
+}
+
+/// For each message that a node receives on one topic, it publishes exactly one on another.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Answer {
+    /// What it receives.
+    pub to: TopicId,
+    /// What it publishes.
+    pub with: TopicId,
 }
 
 /// A value inside the messages of a topic.

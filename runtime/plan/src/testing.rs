@@ -5,10 +5,10 @@
 //! plan is filled in here, and in no test.
 
 use crate::{
-    Activation, ActivationMode, Bound, Campaign, CampaignPlan, Choice, Copies, Count, Distribution, Domain, Drain,
-    Field, FieldRef, KnownTest, MessageId, MessageType, Metric, MetricId, MetricSource, Node, Operation, OperationId,
-    OperationKind, Parameter, Requirement, SCHEMA, Search, Shape, Simulator, Span, Step, Strategy, Test, TestOperation,
-    Topic, TopicId, Transport, Type, ValueMode,
+    Activation, ActivationMode, Bound, Campaign, CampaignPlan, Channel, Choice, Copies, Count, Distribution, Domain,
+    Drain, Field, FieldRef, KnownTest, Lifecycle, MessageId, MessageType, Metric, MetricId, MetricSource, Node,
+    Operation, OperationId, OperationKind, Parameter, Requirement, SCHEMA, Search, Shape, Simulator, Span, Step,
+    Strategy, Test, TestOperation, Topic, TopicId, Transport, Type, ValueMode,
 };
 
 /// The smallest valid plan: a simulator, and [a campaign](campaign) that may not use anything.
@@ -50,13 +50,18 @@ pub fn campaign(name: &str, operations: usize) -> Campaign {
         stop: Vec::new(),
         seed: 1,
         end_after: 10.0,
+        end_when: None,
         record: None,
     }
 }
 
 /// A simulator that is a Rust type, with steps of so many nanoseconds.
 pub fn in_process(name: &str, path: &str, step_ns: u64) -> Simulator {
-    Simulator { name: name.to_owned(), transport: Transport::InProcess { path: path.to_owned(), step_ns } }
+    Simulator {
+        name: name.to_owned(),
+        transport: Transport::InProcess { path: path.to_owned(), step_ns },
+        lifecycle: Lifecycle::default(),
+    }
 }
 
 /// A message type.
@@ -71,12 +76,28 @@ pub fn field(name: &str, ty: Type) -> Field {
 
 /// A topic, or a group of topics.
 pub fn topic(name: &str, paths: &[&str], ty: Type) -> Topic {
-    Topic { name: name.to_owned(), doc: String::new(), paths: paths.iter().map(|&path| path.to_owned()).collect(), ty }
+    Topic {
+        name: name.to_owned(),
+        doc: String::new(),
+        paths: paths.iter().map(|&path| path.to_owned()).collect(),
+        ty,
+        interface: None,
+        channel: Channel::default(),
+    }
 }
 
 /// A node that neither publishes nor subscribes.
 pub fn node(name: &str) -> Node {
-    Node { name: name.to_owned(), doc: String::new(), publishes: Vec::new(), subscribes: Vec::new() }
+    Node {
+        name: name.to_owned(),
+        doc: String::new(),
+        publishes: Vec::new(),
+        subscribes: Vec::new(),
+        named: None,
+        launch: None,
+        answers: Vec::new(),
+        every_step: Vec::new(),
+    }
 }
 
 /// A metric without a unit, a direction or a trend.
@@ -111,7 +132,9 @@ pub fn operation_with(name: &str, topic: u32, kind: OperationKind, parameters: V
     Operation {
         name: name.to_owned(),
         doc: String::new(),
-        topic: (!kind.is_offline()).then_some(TopicId(topic)),
+        topic: kind.acts_on_messages().then_some(TopicId(topic)),
+        from: Vec::new(),
+        to: Vec::new(),
         places: Vec::new(),
         kind,
         parameters,
@@ -175,7 +198,7 @@ pub fn operation(topic: u32, kind: OperationKind) -> Operation {
         OperationKind::Latency { .. } => vec![range("delay", 0.0, 5.0)],
         OperationKind::Bias => vec![value("bias", -9.0, 9.0)],
         OperationKind::ClockSkew => vec![value("skew", -9.0, 9.0)],
-        OperationKind::StuckAt { truth: None } => vec![value("value", -9.0, 9.0)],
+        OperationKind::StuckAt { truth: None } | OperationKind::Set { .. } => vec![value("value", -9.0, 9.0)],
         OperationKind::Drift => vec![value("rate", -9.0, 9.0)],
         OperationKind::Noise | OperationKind::RandomWalk => vec![value("sigma", 0.0, 9.0)],
         OperationKind::Scale => vec![value("factor", -9.0, 9.0)],
@@ -184,11 +207,14 @@ pub fn operation(topic: u32, kind: OperationKind) -> Operation {
         OperationKind::RateLimit => vec![value("rate", 0.1, 100.0)],
         OperationKind::Reorder { .. } => vec![value("window", 0.0, 5.0)],
         OperationKind::Duplicate => vec![whole("copies", 1.0, 100.0)],
+        OperationKind::Slow { .. } => vec![value("share", 0.1, 0.9)],
         OperationKind::RandomText { .. }
         | OperationKind::StuckAt { truth: Some(_) }
         | OperationKind::NotFinite { .. }
         | OperationKind::Freeze
         | OperationKind::Blackhole
+        | OperationKind::Pause { .. }
+        | OperationKind::Kill { .. }
         | OperationKind::Custom { .. } => Vec::new(),
     };
     operation_with(&kind.words().replace(' ', "_"), topic, kind, parameters)

@@ -10,6 +10,7 @@
 mod campaign;
 mod check;
 mod formula;
+mod system;
 
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -18,7 +19,7 @@ use crate::condition::{Condition, Constraint, Operand};
 use crate::{
     Activation, Bound, CampaignPlan, Choice, Domain, Failing, FieldRef, KnownTest, KnownTestId, MessageId, Metric,
     MetricId, MetricSource, Operation, OperationId, OperationKind, RequirementId, SCHEMA, Shrinking, Span, Task, Test,
-    TopicId, Transport, Type,
+    TopicId, Type,
 };
 
 use check::{
@@ -64,11 +65,7 @@ impl CampaignPlan {
         at("schema", known_schema(self.schema))?;
         at("space", name(&self.space))?;
         at("simulator.name", name(&self.simulator.name))?;
-        let step_ns = match self.simulator.transport {
-            Transport::InProcess { step_ns, .. } => Some(step_ns),
-            Transport::Process { step_ns, .. } => step_ns,
-        };
-        at("simulator.transport.step_ns", require(step_ns != Some(0), || "must be positive".to_owned()))?;
+        at("simulator", self.sound_simulator())?;
         self.messages.iter().enumerate().try_for_each(|(index, message)| {
             let field = |field: &crate::Field| {
                 at("name", name(&field.name))?;
@@ -80,13 +77,10 @@ impl CampaignPlan {
         each("topics", &self.topics, |topic| {
             at("name", name(&topic.name))?;
             at("paths", filled(&topic.paths))?;
-            at("type", self.ty(&topic.ty))
+            at("type", self.ty(&topic.ty))?;
+            at("interface", self.has_interface(topic.interface.as_deref()))
         })?;
-        each("nodes", &self.nodes, |node| {
-            at("name", name(&node.name))?;
-            each("publishes", &node.publishes, |&id| self.has_topic(id))?;
-            each("subscribes", &node.subscribes, |&id| self.has_topic(id))
-        })?;
+        each("nodes", &self.nodes, |node| self.sound_node(node))?;
         at("metrics", distinct(self.metrics.iter().map(|metric| &metric.name)))?;
         each("metrics", &self.metrics, |metric| self.sound_metric(metric))?;
         at("requirements", distinct(self.requirements.iter().map(|requirement| &requirement.name)))?;
@@ -163,7 +157,8 @@ impl CampaignPlan {
 
     fn sound_operation(&self, operation: &Operation) -> Checked {
         at("name", name(&operation.name))?;
-        let beside = operation.kind.is_offline();
+        let beside = !operation.kind.acts_on_messages();
+        at("kind.node", operation.kind.node().map_or(Ok(()), |id| self.has_node(id)))?;
         at("topic", operation.topic.map_or(Ok(()), |id| self.has_topic(id)))?;
         at(
             "topic",
@@ -171,6 +166,8 @@ impl CampaignPlan {
                 if beside { "it acts on none".to_owned() } else { "it acts on one".to_owned() }
             }),
         )?;
+        each("from", &operation.from, |&id| self.has_node(id))?;
+        each("to", &operation.to, |&id| self.has_node(id))?;
         if let OperationKind::RandomText { texts } = &operation.kind {
             at("kind.texts", filled(texts))?;
         }

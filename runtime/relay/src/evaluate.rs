@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use sesame_base::observation::{Observation, Outcome, WallTime};
 use sesame_base::time::SimTime;
+use sesame_plan::condition::Condition;
 use sesame_plan::{CampaignPlan, Moment, Test};
 
 use crate::files::{NoFiles, SpaceFiles};
@@ -13,7 +14,7 @@ use crate::metric::MetricTable;
 use crate::panic_capture;
 use crate::relay::{Listener, Relay};
 use crate::simulator::Progress;
-use crate::transport::{Transport, TransportError};
+use crate::transport::{Fault, Transport, TransportError};
 use crate::wire::WireTable;
 
 /// Runs a test and returns what was observed. If the simulator fails, or the simulator or a hook panics, this is an
@@ -58,23 +59,23 @@ pub fn evaluate_tapped(
     if let Some(tap) = tap {
         relay = relay.tapped(tap);
     }
-    let until = SimTime::from_seconds(plan.campaign.end_after);
+    let until = (SimTime::from_seconds(plan.campaign.end_after), plan.campaign.end_when.as_ref());
     let files = custom.files.as_mut();
     let driven = AssertUnwindSafe(|| drive(transport, &mut relay, simulator_seed, until, files));
     let mut failure = match panic::catch_unwind(driven) {
         Ok(driven) => driven.err(),
-        Err(_) => Some(panic_capture::take()),
+        Err(_) => Some(Failure::crash(panic_capture::take())),
     };
     if plan.operations.iter().any(|operation| operation.kind.is_offline())
         && let Err(error) = custom.files.restore()
     {
-        failure.get_or_insert_with(|| error.to_string());
+        failure.get_or_insert_with(|| Failure::crash(error.to_string()));
     }
     let end = transport.now();
     let finished = relay.finish(end);
     let effect = finished.operations.iter().any(|operation| operation.counters.any_effect());
     let outcome = match failure {
-        Some(message) => Outcome::crash(message),
+        Some(Failure { fault, message }) => outcome(fault, message),
         None if test.operations.is_empty() || effect => Outcome::Completed,
         None => Outcome::NoEffect,
     };
@@ -108,27 +109,58 @@ impl Custom<'static> {
     }
 }
 
+/// Why a run broke off.
+struct Failure {
+    fault: Fault,
+    message: String,
+}
+
+impl Failure {
+    fn crash(message: String) -> Self {
+        Failure { fault: Fault::Crash, message }
+    }
+}
+
+impl From<TransportError> for Failure {
+    fn from(error: TransportError) -> Self {
+        Failure { fault: error.fault(), message: error.to_string() }
+    }
+}
+
+fn outcome(fault: Fault, message: String) -> Outcome {
+    let message = Outcome::message_of(message);
+    match fault {
+        Fault::Crash => Outcome::Crash { message },
+        Fault::Timeout { limit } => Outcome::Timeout { limit },
+        Fault::LaunchFailed => Outcome::LaunchFailed { message },
+        Fault::Disconnect => Outcome::Disconnect { message },
+        Fault::WrongClock => Outcome::WrongClock { message },
+    }
+}
+
 /// The error gives the reason.
 fn drive(
     transport: &mut dyn Transport,
     relay: &mut Relay<'_>,
     seed: u64,
-    end: SimTime,
+    (end, when): (SimTime, Option<&Condition>),
     files: &mut dyn SpaceFiles,
-) -> Result<(), String> {
-    let words = |error: TransportError| error.to_string();
-    relay.before_or_after_run(Moment::BeforeStart, files)?;
+) -> Result<(), Failure> {
+    relay.before_or_after_run(Moment::BeforeStart, files).map_err(Failure::crash)?;
     relay.begin();
-    transport.reset(seed, relay).map_err(words)?;
-    while transport.advance(end, relay).map_err(words)? == Progress::Running {}
+    transport.reset(seed, relay)?;
+    // What comes at the end of an instant is known when the next one begins, so the condition is weighed between steps.
+    let is_over = |relay: &Relay<'_>| when.is_some_and(|condition| relay.holds(condition));
+    while transport.advance(end, relay)? == Progress::Running && !is_over(relay) {}
     relay.end(transport.now());
-    relay.before_or_after_run(Moment::AfterEnd, files)
+    relay.before_or_after_run(Moment::AfterEnd, files).map_err(Failure::crash)
 }
 
 #[cfg(test)]
 mod tests {
+    use sesame_plan::condition::{Comparison, Operand};
     use sesame_plan::testing::{operation, plan, test_of, use_of};
-    use sesame_plan::{MetricSource, OperationKind, TopicId};
+    use sesame_plan::{MetricId, MetricSource, OperationKind, Span, TopicId};
 
     use super::*;
     use crate::metric::{Context, Hook, HookEntry};
@@ -140,6 +172,7 @@ mod tests {
     struct Ticker {
         now: SimTime,
         fails_at: Option<f64>,
+        error: TransportError,
     }
 
     impl Transport for Ticker {
@@ -157,7 +190,7 @@ mod tests {
             }
             self.now = self.now + SimTime::from_seconds(0.1);
             if self.fails_at.is_some_and(|time| self.now.seconds() >= time) {
-                return Err(TransportError::Simulator("out of breath".to_owned()));
+                return Err(self.error.clone());
             }
             let wire = relay.wires().find("arm/command").unwrap();
             relay.advance(self.now, &mut Vec::new());
@@ -168,6 +201,10 @@ mod tests {
             self.now
         }
         fn close(&mut self) {}
+    }
+
+    fn ticker(fails_at: Option<f64>) -> Ticker {
+        Ticker { now: SimTime::ZERO, fails_at, error: TransportError::Simulator("out of breath".to_owned()) }
     }
 
     /// Counts messages, panics at five seconds, and has an opinion on the end.
@@ -208,8 +245,8 @@ mod tests {
         let wires = WireTable::new(&plan);
         let metrics = MetricTable::new(&plan, &wires, &[HookEntry { metric: "counted", build }]).unwrap();
         let test = test_of(vec![use_of(0, 1.0, 2.0, vec![], 1)]);
-        evaluate(&plan, &wires, &metrics, &mut Ticker { now: SimTime::ZERO, fails_at }, &test, 1, &mut Custom::none())
-            .unwrap()
+        let mut ticker = ticker(fails_at);
+        evaluate(&plan, &wires, &metrics, &mut ticker, &test, 1, &mut Custom::none()).unwrap()
     }
 
     #[test]
@@ -221,11 +258,29 @@ mod tests {
     }
 
     #[test]
+    fn a_run_ends_after_the_step_in_which_its_condition_begins_to_hold() {
+        let mut plan = plan(vec![operation(0, OperationKind::Blackhole)]);
+        let (fuzzing_time, by) = (Operand::Variable(MetricId(0)), Comparison::Above);
+        plan.campaign.end_when = Some(Condition::Compare { left: fuzzing_time, by, right: Operand::Number(0.5) });
+        let wires = WireTable::new(&plan);
+        let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
+        let ended = |test: &Test| {
+            let mut ticker = ticker(None);
+            evaluate(&plan, &wires, &metrics, &mut ticker, test, 1, &mut Custom::none()).unwrap()
+        };
+        let disturbed = ended(&test_of(vec![use_of(0, 1.0, 2.0, vec![], 1)]));
+        assert_eq!((disturbed.outcome, disturbed.end, disturbed.messages), (Outcome::Completed, 1.6, 16));
+        assert_eq!(disturbed.operations[0].intervals, [Span { start: 1.0, end: 1.6 }]);
+        let reference = ended(&test_of(vec![]));
+        assert_eq!((reference.outcome, reference.end), (Outcome::Completed, 10.0));
+    }
+
+    #[test]
     fn a_run_of_a_passive_campaign_is_complete_and_not_void() {
         let plan = plan(vec![operation(0, OperationKind::Blackhole)]);
         let wires = WireTable::new(&plan);
         let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
-        let mut ticker = Ticker { now: SimTime::ZERO, fails_at: None };
+        let mut ticker = ticker(None);
         let run = evaluate(&plan, &wires, &metrics, &mut ticker, &test_of(vec![]), 1, &mut Custom::none()).unwrap();
         assert_eq!((run.outcome, run.messages), (Outcome::Completed, 100));
         assert_eq!((run.operations.len(), run.metrics[0].value), (0, Some(0.0)));
@@ -246,6 +301,33 @@ mod tests {
         let run = observed(|| Box::new(Counter { panics: false }), Some(3.0));
         assert_eq!(run.outcome, Outcome::Crash { message: "the simulator failed: out of breath".to_owned() });
         assert_eq!((run.end, run.metrics[2].value), (3.0, Some(29.0)));
+    }
+
+    #[test]
+    fn how_a_run_broke_off_is_told_apart() {
+        let plan = plan(vec![operation(0, OperationKind::Blackhole)]);
+        let wires = WireTable::new(&plan);
+        let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
+        let second = SimTime::from_seconds;
+        let ended = |error: TransportError| {
+            let mut ticker = Ticker { error, ..ticker(Some(3.0)) };
+            let run = evaluate(&plan, &wires, &metrics, &mut ticker, &test_of(vec![]), 1, &mut Custom::none()).unwrap();
+            (run.outcome, run.end)
+        };
+        let text = str::to_owned;
+        let launch = TransportError::LaunchFailed { what: text("`x`"), problem: text("hangs"), last_lines: text("a") };
+        let message = text("the launch failed: `x` hangs; the last lines that it wrote:\na");
+        assert_eq!(ended(launch), (Outcome::LaunchFailed { message }, 3.0));
+        let lost = TransportError::ConnectionLost { to: text("the bridge"), how: text("it closed") };
+        let message = text("the connection to the bridge was lost: it closed");
+        assert_eq!(ended(lost), (Outcome::Disconnect { message }, 3.0));
+        let back = TransportError::ClockBack { from: second(2.0), to: second(1.5) };
+        let message = text("the clock of the simulator went back, from 2.000 s to 1.500 s");
+        assert_eq!(ended(back), (Outcome::WrongClock { message }, 3.0));
+        let silent = TransportError::Silent { awaited: text("the clock"), limit: 20.0 };
+        assert_eq!(ended(silent), (Outcome::Timeout { limit: 20.0 }, 3.0));
+        let gone = TransportError::Ended { what: text("`x`"), how: text("ended"), last_lines: String::new() };
+        assert_eq!(ended(gone), (Outcome::Crash { message: text("`x` ended") }, 3.0));
     }
 
     #[test]

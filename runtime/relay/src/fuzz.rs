@@ -20,6 +20,7 @@ mod random_value;
 mod random_walk;
 mod rate_limit;
 mod reorder;
+mod resource;
 mod scale;
 mod stale;
 mod stuck_at;
@@ -49,6 +50,7 @@ pub use random_value::{RandomText, RandomValue};
 pub use random_walk::RandomWalk;
 pub use rate_limit::RateLimit;
 pub use reorder::Reorder;
+pub use resource::{Order, Resource};
 pub use scale::Scale;
 pub use stale::Stale;
 pub use stuck_at::{Stuck, StuckAt};
@@ -92,6 +94,8 @@ pub enum Disturbance {
     Duplicate(u32),
     /// Drops all messages.
     Blackhole,
+    /// It acts on a node instead of messages.
+    Resource(Resource),
     /// Calls the user's code.
     Custom(Custom),
 }
@@ -257,6 +261,16 @@ impl Disturbance {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` clamps")]
             OperationKind::Duplicate => Disturbance::Duplicate(number("copies")? as u32),
             OperationKind::Blackhole => Disturbance::Blackhole,
+            OperationKind::Set { node, parameter } => Disturbance::Resource(Resource::Set {
+                node: *node,
+                parameter: parameter.clone(),
+                value: number("value")?,
+            }),
+            OperationKind::Pause { node } => Disturbance::Resource(Resource::Pause { node: *node }),
+            OperationKind::Slow { node } => {
+                Disturbance::Resource(Resource::Slow { node: *node, share: number("share")? })
+            }
+            OperationKind::Kill { node } => Disturbance::Resource(Resource::Kill { node: *node }),
             OperationKind::Custom { moment } => match Custom::new(operation, *moment, &test.parameters, hooks) {
                 Some(custom) => Disturbance::Custom(custom),
                 None => return refuse("has no hook in this runner: run `sesamec generate` again".to_owned()),
@@ -324,7 +338,7 @@ impl Disturbance {
             Disturbance::Reorder(operation) => operation.apply(at.draws),
             Disturbance::Duplicate(copies) => Action::Duplicated(*copies),
             Disturbance::Blackhole => Action::Dropped,
-            Disturbance::Custom(_) => Action::Unchanged,
+            Disturbance::Resource(_) | Disturbance::Custom(_) => Action::Unchanged,
         }
     }
 }

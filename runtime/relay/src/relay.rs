@@ -21,17 +21,20 @@ mod pass;
 mod release;
 mod stage;
 
+use std::collections::BTreeSet;
+
 use release::{Held, ReleaseQueue, Why};
 use stage::Stage;
 
 use sesame_base::activation::{Activity, Edge, TICK};
+use sesame_base::condition::holds;
 use sesame_base::observation::{Counters, OperationEffect};
 use sesame_base::time::SimTime;
-use sesame_plan::condition::Operand;
-use sesame_plan::{CampaignPlan, Copies, Drain, Moment, Side, Span, Test, TopicId};
+use sesame_plan::condition::{Condition, Operand};
+use sesame_plan::{CampaignPlan, Copies, Drain, Moment, NodeId, Side, Span, Test};
 
 use crate::files::SpaceFiles;
-use crate::fuzz::{ChoiceError, Disturbance, KeyedRng, OperationEntry, RunContext};
+use crate::fuzz::{ChoiceError, Disturbance, KeyedRng, OperationEntry, Order, RunContext};
 use crate::metric::Metrics;
 use crate::value::Value;
 use crate::wire::{Wire, WireTable};
@@ -59,8 +62,8 @@ pub struct Relay<'a> {
     metrics: Metrics<'a>,
     /// Per wire: whether it has a receiver.
     heard: Vec<bool>,
-    /// The topics that operations of the plan act on, whether or not this test contains them.
-    acted_on: Vec<TopicId>,
+    /// The wires that operations of the plan act on, whether or not this test contains them.
+    acted_on: BTreeSet<Wire>,
     conditions: Conditions,
     /// The instant at hand.
     now: SimTime,
@@ -70,6 +73,8 @@ pub struct Relay<'a> {
     /// Copies made in the event at hand.
     copies: u32,
     flooded: bool,
+    /// What the transport has to do.
+    orders: Vec<Order>,
     /// The listeners besides the metrics.
     taps: Vec<&'a mut dyn Listener>,
 }
@@ -121,6 +126,7 @@ impl<'a> Relay<'a> {
             operations.push(Stage {
                 operation: choice.operation,
                 name: operation.name.clone(),
+                from: operation.from.clone(),
                 observes_inactive: disturbance.observes_inactive(),
                 holds_order: disturbance.holds_order(),
                 disturbance,
@@ -135,23 +141,20 @@ impl<'a> Relay<'a> {
                 last_touch: None,
             });
         }
-        let mut pipelines = vec![Vec::new(); wires.len()];
-        let mut members = vec![0u64; plan.topics.len()];
-        for wire in wires.iter() {
-            let topic = wires.topic(wire);
-            let member = members[topic.index()];
-            members[topic.index()] += 1;
-            let touched =
-                order.iter().filter(|&&at| plan.operation(test.operations[at].operation).topic == Some(topic));
-            pipelines[wire.index()].extend(touched.map(|&at| (at, member)));
+        let mut pipelines = vec![Vec::new(); wires.len_with_links()];
+        for &at in &order {
+            let acted_on = wires.acted_on(plan.operation(test.operations[at].operation));
+            for (member, wire) in (0u64..).zip(acted_on) {
+                pipelines[wire.index()].push((at, member));
+            }
         }
         let conditional = (0..operations.len()).filter(|&at| operations[at].activity.is_conditional()).collect();
         let (variables, compared) = fuzzing_time::read_by(plan, test);
         let reads = |wire, side| variables.iter().any(|&metric| metrics.hears(metric, wire, side));
         Ok(Relay {
             wires,
-            heard: wires.iter().map(|wire| metrics.delivers(wire)).collect(),
-            acted_on: plan.operations.iter().filter_map(|operation| operation.topic).collect(),
+            heard: wires.iter().map(|wire| metrics.delivers(wire)).chain(wires.links().iter().map(|_| false)).collect(),
+            acted_on: plan.operations.iter().flat_map(|operation| wires.acted_on(operation)).collect(),
             conditions: Conditions {
                 ended: Vec::with_capacity(operations.len()),
                 operations: conditional,
@@ -165,15 +168,22 @@ impl<'a> Relay<'a> {
             order,
             pipelines,
             published: vec![0; wires.len()],
-            queue: ReleaseQueue::new(test.operations.len(), wires.len()),
+            queue: ReleaseQueue::new(test.operations.len(), wires.len_with_links()),
             metrics,
             now: SimTime::ZERO,
             messages: 0,
             overflowed: false,
             copies: 0,
             flooded: false,
+            orders: Vec::new(),
             taps: Vec::new(),
         })
+    }
+
+    /// Whether a condition holds now.
+    pub fn holds(&self, condition: &Condition) -> bool {
+        let fuzzing_time = self.fuzzing_time().seconds();
+        holds(condition, &|metric| self.metrics.value(metric, fuzzing_time))
     }
 
     /// Adds a listener, which is told everything that happens from now on.
@@ -267,12 +277,8 @@ impl<'a> Relay<'a> {
         if self.flooded {
             warnings.push(format!("copies of copies: more than {COPIES_LIMIT} in one event are not made"));
         }
-        let unheard = self
-            .wires
-            .iter()
-            .filter(|&wire| !self.heard[wire.index()] && self.acted_on.contains(&self.wires.topic(wire)))
-            .map(|wire| self.wires.path(wire).to_owned())
-            .collect();
+        let unheard = self.acted_on.iter().filter(|wire| !self.heard[wire.index()]);
+        let unheard = unheard.map(|&wire| self.wires.path(wire).to_owned()).collect();
         Finished { operations, unheard, metrics, warnings, messages: self.messages }
     }
 
@@ -403,12 +409,21 @@ impl<'a> Relay<'a> {
         stage.since = now;
         stage.end_tail(now);
         stage.disturbance.begin();
+        self.order(at, true);
         self.tell(now, at, OperationEvent::Started);
+    }
+
+    /// Tells the transport what an operation on a node does, or that it has ended.
+    fn order(&mut self, at: usize, begins: bool) {
+        if let Disturbance::Resource(resource) = &self.operations[at].disturbance {
+            self.orders.push(Order { operation: at, resource: resource.clone(), begins });
+        }
     }
 
     /// An operation becomes inactive: listeners are told, and the messages that it holds are handled by its `drain`.
     fn end_activity(&mut self, at: usize, now: SimTime) {
         self.tell(now, at, OperationEvent::Ended);
+        self.order(at, false);
         match self.operations[at].disturbance.drain() {
             None | Some(Drain::Finish) => {}
             Some(Drain::Flush) => return self.queue.release_all(at, now),
@@ -452,7 +467,14 @@ impl Exchange for Relay<'_> {
         self.advance_to(now, deliveries);
     }
 
-    fn message(&mut self, now: SimTime, wire: Wire, value: Value, deliveries: &mut Vec<Delivery>) {
+    fn message_from(
+        &mut self,
+        now: SimTime,
+        wire: Wire,
+        publisher: Option<NodeId>,
+        value: Value,
+        deliveries: &mut Vec<Delivery>,
+    ) {
         if now > self.now || self.phase == Phase::New {
             self.advance_to(now, deliveries);
         }
@@ -468,11 +490,19 @@ impl Exchange for Relay<'_> {
             self.evaluate_conditions();
             self.release_due(deliveries);
         }
-        self.pass(self.now, Held { wire, published: index, index, value, next_stage: 0 }, deliveries);
+        self.pass(self.now, Held { wire, publisher, published: index, index, value, next_stage: 0 }, deliveries);
         if self.conditions.reads_delivered {
             self.evaluate_conditions();
             self.release_due(deliveries);
         }
+    }
+
+    fn take_orders(&mut self) -> Vec<Order> {
+        std::mem::take(&mut self.orders)
+    }
+
+    fn carried_out(&mut self, now: SimTime, operation: usize) {
+        self.operations[operation].count(true, now, 1, |counters| &mut counters.side_effects);
     }
 
     fn next_due(&self) -> Option<SimTime> {
@@ -506,6 +536,8 @@ pub struct Finished {
 mod activations;
 #[cfg(test)]
 mod behaviour;
+#[cfg(test)]
+mod links;
 #[cfg(test)]
 mod matrix;
 #[cfg(test)]

@@ -72,7 +72,7 @@ pub struct Capabilities {
 }
 
 /// What went wrong between runner and simulator, in words for the user.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TransportError {
     /// The simulator reported a failure.
     #[error("the simulator failed: {0}")]
@@ -117,6 +117,53 @@ pub enum TransportError {
         /// The last lines of its standard error.
         last_lines: String,
     },
+    /// A program that the plan launches could not be started, or was not ready in time.
+    #[error("the launch failed: {what} {problem}{}", words(last_lines))]
+    LaunchFailed {
+        /// The program, and whose it is.
+        what: String,
+        /// The problem, as a phrase.
+        problem: String,
+        /// The last lines that it wrote.
+        last_lines: String,
+    },
+    /// A program that the plan launches ended in the middle of a run.
+    #[error("{what} {how}{}", words(last_lines))]
+    Ended {
+        /// The program, and whose it is.
+        what: String,
+        /// How it ended, as a phrase.
+        how: String,
+        /// The last lines that it wrote.
+        last_lines: String,
+    },
+    /// The connection to the simulator was lost, although nothing says that the simulator has ended.
+    #[error("the connection to {to} was lost: {how}")]
+    ConnectionLost {
+        /// What was connected.
+        to: String,
+        /// How it was lost, as a phrase.
+        how: String,
+    },
+    /// The clock of the simulator went back.
+    #[error("the clock of the simulator went back, from {from} to {to}")]
+    ClockBack {
+        /// The latest time before.
+        from: SimTime,
+        /// The time after it.
+        to: SimTime,
+    },
+    /// The clock of the simulator stands still, or the simulator says nothing.
+    #[error("{awaited} was awaited for {limit} s of wall time")]
+    Silent {
+        /// What was awaited, as a phrase.
+        awaited: String,
+        /// For how long, in seconds of wall time.
+        limit: f64,
+    },
+    /// Messages would not pass through the relay, or would not arrive, in words with the remedy.
+    #[error("{0}")]
+    Wiring(String),
     /// The simulator's program sent something that is not part of the protocol.
     #[error("line {line} since the simulator's reset {problem}; {remedy}")]
     Protocol {
@@ -127,6 +174,49 @@ pub enum TransportError {
         /// The remedy, as an instruction.
         remedy: String,
     },
+}
+
+/// Whose fault it is that a run broke off.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Fault {
+    /// The system's: a program of it ended or said that it failed.
+    Crash,
+    /// The system's: it says nothing any more.
+    Timeout {
+        /// For how long, in seconds of wall time.
+        limit: f64,
+    },
+    /// The environment's: a program was not started, or not ready in time.
+    LaunchFailed,
+    /// The environment's: the connection to the simulator was lost.
+    Disconnect,
+    /// The environment's: the simulator's clock went back.
+    WrongClock,
+}
+
+impl TransportError {
+    /// Whose fault it is.
+    pub fn fault(&self) -> Fault {
+        match self {
+            TransportError::LaunchFailed { .. } => Fault::LaunchFailed,
+            TransportError::ConnectionLost { .. } => Fault::Disconnect,
+            TransportError::ClockBack { .. } => Fault::WrongClock,
+            TransportError::Silent { limit, .. } => Fault::Timeout { limit: *limit },
+            // A simulator that cannot be started is the space's mistake; running the test again does not help.
+            TransportError::Simulator(_)
+            | TransportError::UnknownTopic { .. }
+            | TransportError::WrongType { .. }
+            | TransportError::NotStarted { .. }
+            | TransportError::Disconnected { .. }
+            | TransportError::Ended { .. }
+            | TransportError::Wiring(_)
+            | TransportError::Protocol { .. } => Fault::Crash,
+        }
+    }
+}
+
+fn words(last_lines: &str) -> String {
+    if last_lines.is_empty() { String::new() } else { format!("; the last lines that it wrote:\n{last_lines}") }
 }
 
 fn quoted(last_lines: &str) -> String {
@@ -161,6 +251,11 @@ pub struct Connect {
 }
 
 impl Connect {
+    /// What makes transports of one kind. `folder` is the one that programs run in.
+    pub fn new(make: fn(&CampaignPlan, &Path) -> Box<dyn Transport>, folder: PathBuf) -> Self {
+        Connect { make, folder }
+    }
+
     /// A transport as the plan describes it.
     pub fn transport(&self, plan: &CampaignPlan) -> Box<dyn Transport> {
         (self.make)(plan, &self.folder)

@@ -86,17 +86,50 @@ impl Fields {
 }
 
 /// A structured message: named values.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Record {
     fields: Arc<Fields>,
     values: Vec<Value>,
+    origin: Option<Arc<Origin>>,
+}
+
+/// Where a record was decoded from. The record may have only some of the fields that are there.
+#[derive(Debug)]
+pub struct Origin {
+    /// The message as it came.
+    pub bytes: Arc<[u8]>,
+    /// The values of the record's fields as they were decoded.
+    pub values: Vec<Value>,
+}
+
+/// Records with equal fields and values are equal, wherever they come from.
+impl PartialEq for Record {
+    fn eq(&self, other: &Self) -> bool {
+        self.fields == other.fields && self.values == other.values
+    }
 }
 
 impl Record {
     /// A record of these fields. There must be a value for each field.
     pub fn new(fields: &Arc<Fields>, values: Vec<Value>) -> Self {
         assert_eq!(fields.names().len(), values.len(), "a record has a value for each of its fields");
-        Record { fields: Arc::clone(fields), values }
+        Record { fields: Arc::clone(fields), values, origin: None }
+    }
+
+    /// A record that was decoded from a message. There must be a value for each field.
+    pub fn decoded(fields: &Arc<Fields>, values: Vec<Value>, bytes: Arc<[u8]>) -> Self {
+        let origin = Origin { bytes, values: values.clone() };
+        Record { origin: Some(Arc::new(origin)), ..Record::new(fields, values) }
+    }
+
+    /// What it was decoded from, if it was.
+    pub fn origin(&self) -> Option<&Origin> {
+        self.origin.as_deref()
+    }
+
+    /// Its values, in the order of its fields.
+    pub fn values(&self) -> &[Value] {
+        &self.values
     }
 
     /// The names of the fields.
@@ -207,7 +240,7 @@ impl Value {
     }
 
     /// Whether it is equal in every bit; so NaNs in the same places are equal.
-    pub(crate) fn is_same(&self, other: &Value) -> bool {
+    pub fn is_same(&self, other: &Value) -> bool {
         let all = |left: &[Value], right: &[Value]| {
             left.len() == right.len() && left.iter().zip(right).all(|(left, right)| left.is_same(right))
         };
@@ -216,7 +249,9 @@ impl Value {
             (Value::Point(left), Value::Point(right)) => left.map(f64::to_bits) == right.map(f64::to_bits),
             (Value::List(left), Value::List(right)) => all(left, right),
             (Value::Record(left), Value::Record(right)) => {
-                left.fields == right.fields && all(&left.values, &right.values)
+                let origins = [left, right].map(|record| record.origin().map(|origin| &origin.bytes));
+                let other_message = matches!(origins, [Some(left), Some(right)] if left != right);
+                left.fields == right.fields && all(&left.values, &right.values) && !other_message
             }
             _ => self == other,
         }

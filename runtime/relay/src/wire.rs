@@ -1,8 +1,9 @@
-//! Topics as they are on the wire: every member of a topic group is a wire of its own.
+//! Topics as they are on the wire: every member of a topic group is a wire of its own, and so is the way of its
+//! messages to a subscriber that operations distinguish.
 
 use std::collections::BTreeMap;
 
-use sesame_plan::{CampaignPlan, TopicId};
+use sesame_plan::{CampaignPlan, NodeId, Operation, TopicId, Transport};
 
 /// A single topic on the wire: position in [`WireTable`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -15,11 +16,26 @@ impl Wire {
     }
 }
 
-/// All wires of a plan: topics in declaration order, the members of a group one after another.
+/// All wires of a plan: topics in declaration order, the members of a group one after another. Behind them come the
+/// [`Link`]s.
 #[derive(Debug, Clone)]
 pub struct WireTable {
     paths: Vec<(String, TopicId)>,
     by_path: BTreeMap<String, Wire>,
+    links: Vec<Link>,
+}
+
+/// The way of a wire's messages to one subscriber, where operations tell it apart from the others (`to NODE`). Its
+/// messages have passed all operations that act on every subscriber.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Link {
+    /// Its own wire.
+    pub wire: Wire,
+    /// The wire from which its messages branch off.
+    pub of: Wire,
+    /// The subscriber.
+    pub to: NodeId,
+    path: String,
 }
 
 impl WireTable {
@@ -30,7 +46,35 @@ impl WireTable {
             .flat_map(|(id, topic)| topic.paths.iter().map(move |path| (path.clone(), TopicId(id))))
             .collect();
         let by_path = (0u32..).zip(&paths).map(|(at, (path, _))| (path.clone(), Wire(at))).collect();
-        WireTable { paths, by_path }
+        let mut table = WireTable { paths, by_path, links: Vec::new() };
+        if let Transport::Ros2(ros2) = &plan.simulator.transport {
+            let mut links = Vec::new();
+            for of in table.iter() {
+                let distinguished = ros2.wiring.get(table.topic(of).index()).into_iter().flat_map(|it| &it.subscribers);
+                for &to in distinguished {
+                    let wire = Wire(u32::try_from(table.len() + links.len()).unwrap_or(u32::MAX));
+                    let path = format!("{}/to/{}", table.path(of), plan.node(to).name);
+                    links.push(Link { wire, of, to, path });
+                }
+            }
+            table.links = links;
+        }
+        table
+    }
+
+    /// The ways to subscribers that operations tell apart from the others.
+    pub fn links(&self) -> &[Link] {
+        &self.links
+    }
+
+    /// The number of wires with all links.
+    pub fn len_with_links(&self) -> usize {
+        self.paths.len() + self.links.len()
+    }
+
+    /// The link that has this wire, if it is none of a topic's own.
+    pub fn link(&self, wire: Wire) -> Option<&Link> {
+        self.links.get(wire.index().checked_sub(self.paths.len())?)
     }
 
     /// The wire of a name, matched exactly.
@@ -40,20 +84,28 @@ impl WireTable {
 
     /// The name of a wire.
     pub fn path(&self, wire: Wire) -> &str {
-        &self.paths[wire.index()].0
+        self.link(wire).map_or_else(|| self.paths[wire.index()].0.as_str(), |link| &link.path)
     }
 
     /// The topic a wire belongs to.
     pub fn topic(&self, wire: Wire) -> TopicId {
-        self.paths[wire.index()].1
+        self.paths[self.link(wire).map_or(wire, |link| link.of).index()].1
     }
 
-    /// All wires, in order.
+    /// The wires on whose messages an operation acts: the links to the subscribers that it names, or else the wires of
+    /// its topic.
+    pub fn acted_on(&self, operation: &Operation) -> impl Iterator<Item = Wire> {
+        let links = self.links.iter().filter(|link| operation.to.contains(&link.to)).map(|link| link.wire);
+        let own = self.iter().filter(|_| operation.to.is_empty());
+        own.chain(links).filter(|&wire| operation.topic == Some(self.topic(wire)))
+    }
+
+    /// All wires of topics, in order, without links.
     pub fn iter(&self) -> impl Iterator<Item = Wire> + use<> {
         (0u32..).take(self.paths.len()).map(Wire)
     }
 
-    /// The number of wires.
+    /// The number of wires without links.
     pub fn len(&self) -> usize {
         self.paths.len()
     }

@@ -29,8 +29,8 @@ pub use facts::show::{
 pub use facts::shrinking::{ShrinkStep, Shrinking, TestSize};
 pub use facts::stacked::{Stacked, StackedSum};
 pub use facts::summary::{
-    Counts, ExpectationSummary, Failure, FrontTest, NotFinite, Objective, RequirementSummary, Spread, Summary, Worst,
-    summary,
+    Counts, ExpectationSummary, Failure, FrontTest, NotFinite, Objective, Quarantined, RequirementSummary, Spread,
+    Summary, Worst, summary,
 };
 pub use html::{page, write_page, write_page_with};
 pub use junit::{junit, write_junit};

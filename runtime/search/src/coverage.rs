@@ -18,9 +18,10 @@ pub use curve::{CurvePoint, curve};
 pub use feasible::Feasible;
 pub use grid::{Grid, GridError, MOST_CELLS, edge};
 
-/// Whether a run counts: one without effect, and one that stands for a run that was counted already, covers no cell.
+/// Whether a run counts: one without effect, one that the environment broke off, and one that stands for a run that was
+/// counted already, covers no cell.
 pub fn counts(outcome: &Outcome, duplicate: bool) -> bool {
-    !duplicate && !matches!(outcome, Outcome::NoEffect)
+    !duplicate && !matches!(outcome, Outcome::NoEffect) && !outcome.is_of_environment()
 }
 
 /// How often each cell of a grid was hit.
@@ -142,6 +143,7 @@ mod tests {
         assert!(counts(&Outcome::Completed, false));
         assert!(counts(&Outcome::Crash { message: "gone".to_owned() }, false));
         assert!(!counts(&Outcome::NoEffect, false));
+        assert!(!counts(&Outcome::Disconnect { message: "gone".to_owned() }, false));
         assert!(!counts(&Outcome::Completed, true));
     }
 

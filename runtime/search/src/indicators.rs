@@ -68,7 +68,11 @@ impl Indicators {
         self.evaluations += 1;
         self.duplicates += u32::from(duplicate);
         match outcome {
-            Outcome::Completed | Outcome::Unknown => {}
+            Outcome::Completed
+            | Outcome::Unknown
+            | Outcome::LaunchFailed { .. }
+            | Outcome::Disconnect { .. }
+            | Outcome::WrongClock { .. } => {}
             Outcome::NoEffect => self.no_effect += 1,
             Outcome::Crash { .. } => self.crashes += 1,
             Outcome::Timeout { .. } => self.timeouts += 1,

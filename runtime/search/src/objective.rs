@@ -18,6 +18,9 @@ pub fn fitness_of(plan: &CampaignPlan, outcome: &Outcome, value: impl Fn(MetricI
         Outcome::NoEffect => return Fitness::Unfit(Unfit::Void),
         Outcome::Crash { .. } => return Fitness::Unfit(Unfit::Crash),
         Outcome::Timeout { .. } => return Fitness::Unfit(Unfit::Timeout),
+        Outcome::LaunchFailed { .. } | Outcome::Disconnect { .. } | Outcome::WrongClock { .. } => {
+            return Fitness::Unfit(Unfit::Unmeasured);
+        }
     }
     let oriented = plan.objectives().map(|objective| {
         let value = value(objective.metric).filter(|value| !value.is_nan())?;

@@ -1,13 +1,14 @@
 //! Running tests again to confirm what was found: the same disturbance, a fresh seed of the simulator.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::ops::RangeInclusive;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+use sesame_optimise::dominance::{Fitness, Unfit};
 use sesame_optimise::front::Front;
 use sesame_plan::{CampaignPlan, Confirmation, Test};
-use sesame_results::record::{self, Event, EventKind, Recorder, Repetition, TestRecord};
+use sesame_results::record::{self, Event, EventKind, QUARANTINE, Recorder, Repetition, TestRecord};
 use sesame_rng::derive_seed;
 use sesame_search::{ConfirmedFront, Evaluated, GenerationTest};
 
@@ -87,10 +88,11 @@ impl ConfirmedSearch {
             }
             let before = self.front.front();
             let runs: Vec<_> = unconfirmed.iter().map(|&number| (number, 1..=self.confirmation.times)).collect();
-            evaluator.repeat(&mut self.repeated, &runs, self.seed, &mut |runs| each(runs, &before))?;
+            evaluator.repeat(plan, &mut self.repeated, &runs, self.seed, &mut |runs| each(runs, &before))?;
             for number in unconfirmed {
                 let fitness = record::confirmed_fitness(plan, evaluator.repetitions_of(number));
-                self.front.confirm(number, fitness.expect("all repetitions of the test have just been run"));
+                // Only runs of a quarantined test are missing.
+                self.front.confirm(number, fitness.unwrap_or(Fitness::Unfit(Unfit::Crash)));
             }
         }
         for (test, fitness) in tests.iter_mut().zip(self.front.fitness()) {
@@ -140,8 +142,9 @@ pub fn confirm_recorded(
     let total = confirmations.times.saturating_mul(u32::try_from(confirmations.tests.len()).unwrap_or(u32::MAX));
     let timeout = settings.timeout.unwrap_or_else(|| default_timeout(longest));
     let mut pool = Pool::start(&settings.pool(total, directory, timeout))?;
+    let plan = repository.plan().clone();
     let mut evaluator = Evaluator::for_repetitions(recorder, &mut pool, interrupted)?;
-    match evaluator.repeat(&mut repeated, &runs, settings.seed, &mut |runs| each(runs, total)) {
+    match evaluator.repeat(&plan, &mut repeated, &runs, settings.seed, &mut |runs| each(runs, total)) {
         Ok(()) => Ok(true),
         Err(Halt::Stopped) => Ok(false),
         Err(Halt::Failed(error)) => Err(error),
@@ -190,20 +193,24 @@ impl Evaluator<'_> {
         self.repetitions.get(&test).map_or(&[], Vec::as_slice)
     }
 
-    /// Runs these repetitions of each of these tests and records each as it ends; those that are recorded are not run.
+    /// Runs these repetitions of each of these tests and records each as it ends; those that are recorded are not run,
+    /// and none of a quarantined test. The first ones of a test that crashed decide that, so the others wait for them.
     /// `each` is told how many there are by now.
     fn repeat(
         &mut self,
+        plan: &CampaignPlan,
         repeated: &mut RepeatedTests,
         tests: &[(u32, RangeInclusive<u32>)],
         seed: u64,
         each: &mut dyn FnMut(u32),
     ) -> Result<(), Halt> {
-        let mut waiting = BTreeMap::new();
+        let (mut waiting, mut jobs) = (BTreeMap::new(), 0..);
+        let mut later: BTreeMap<u32, VecDeque<Job>> = BTreeMap::new();
         for (number, positions) in tests {
             let number = *number;
-            let Some((test, _)) = repeated.first.get(&number) else { unreachable!("tests are remembered before") };
-            let test = test.clone();
+            let Some((test, first)) = repeated.first.get(&number) else { unreachable!("tests are remembered before") };
+            let (test, first) = (test.clone(), first.outcome.clone());
+            let mut queue = VecDeque::new();
             for position in positions.clone() {
                 let simulator_seed = confirmation_seed(seed, number, position);
                 if let Some(recorded) = self.repetitions_of(number).iter().find(|run| run.position == position) {
@@ -213,10 +220,21 @@ impl Evaluator<'_> {
                     repeated.count(recorded);
                     continue;
                 }
-                let job = u32::try_from(waiting.len()).unwrap_or(u32::MAX);
-                self.executor.submit(Job { number: job, test: test.clone(), simulator_seed, trace: None });
+                let job = jobs.next().unwrap_or(u32::MAX);
+                queue.push_back(Job { number: job, test: test.clone(), simulator_seed, trace: None });
                 waiting.insert(job, (number, position, simulator_seed));
             }
+            let known = self.repetitions_of(number).len();
+            let now = match () {
+                () if record::is_quarantined(plan, &first, self.repetitions_of(number)) => 0,
+                () if record::may_be_quarantined(plan, &first) && known < QUARANTINE - 1 => QUARANTINE - 1 - known,
+                () => queue.len(),
+            };
+            for job in queue.drain(..now.min(queue.len())) {
+                self.executor.submit(job);
+            }
+            later.insert(number, queue);
+            self.go_on(plan, repeated, number, &mut later, &mut waiting);
         }
         each(repeated.runs);
         while !waiting.is_empty() {
@@ -233,8 +251,33 @@ impl Evaluator<'_> {
             let recorded = self.repetitions.entry(test).or_default();
             let place = recorded.partition_point(|run| run.position < position);
             recorded.insert(place, repetition);
+            self.go_on(plan, repeated, test, &mut later, &mut waiting);
             each(repeated.runs);
         }
         Ok(())
+    }
+
+    /// Submits the runs of a test that waited for its first ones, or leaves them out, once these have ended.
+    fn go_on(
+        &mut self,
+        plan: &CampaignPlan,
+        repeated: &RepeatedTests,
+        test: u32,
+        later: &mut BTreeMap<u32, VecDeque<Job>>,
+        waiting: &mut BTreeMap<u32, (u32, u32, u64)>,
+    ) {
+        if self.repetitions_of(test).len() < QUARANTINE - 1 {
+            return;
+        }
+        let Some(jobs) = later.remove(&test) else { return };
+        let first = repeated.first.get(&test).map(|(_, first)| &first.outcome);
+        let quarantined = first.is_some_and(|first| record::is_quarantined(plan, first, self.repetitions_of(test)));
+        for job in jobs {
+            if quarantined {
+                waiting.remove(&job.number);
+            } else {
+                self.executor.submit(job);
+            }
+        }
     }
 }

@@ -70,12 +70,12 @@ mod system {
 
     /// Takes the standard input of this process, which is a worker, as the connection to its supervisor. Programs that
     /// the worker starts do not inherit it, and hooks that read standard input find it empty.
-    pub(in crate::campaign) fn connect(_: &Address, lock_stepped: bool) -> io::Result<Stream> {
+    pub(in crate::campaign) fn connect(_: &Address, lock_stepped: bool, end_limit: Duration) -> io::Result<Stream> {
         let not_started = |_| io::Error::other("`worker` is started by `run`, not by hand");
         let mut stream = UnixStream::from(io::stdin().as_fd().try_clone_to_owned()?);
         stream.peer_addr().map_err(not_started)?;
         rustix::stdio::dup2_stdin(File::open("/dev/null")?)?;
-        protocol::send(&mut stream, &Hello { lock_stepped, token: None })?;
+        protocol::send(&mut stream, &Hello { lock_stepped, end_limit, token: None })?;
         Ok(stream)
     }
 }
@@ -126,9 +126,13 @@ mod system {
     }
 
     /// Connects this process, which is a worker, to its supervisor.
-    pub(in crate::campaign) fn connect(address: &Address, lock_stepped: bool) -> io::Result<Stream> {
+    pub(in crate::campaign) fn connect(
+        address: &Address,
+        lock_stepped: bool,
+        end_limit: Duration,
+    ) -> io::Result<Stream> {
         let token = std::env::var(TOKEN).map_err(|_| io::Error::other("`worker` is started by `run`, not by hand"))?;
-        port::connect(address.supervisor, &Hello { lock_stepped, token: Some(token) })
+        port::connect(address.supervisor, &Hello { lock_stepped, end_limit, token: Some(token) })
     }
 }
 

@@ -29,6 +29,10 @@ const START_LIMIT: Duration = Duration::from_secs(30);
 /// How long a worker that broke off the conversation may take to end.
 const DEATH_LIMIT: Duration = Duration::from_secs(2);
 
+/// How often a test is run again that the environment broke off: a failed launch, a lost connection, a clock that went
+/// back say nothing about the system.
+const RETRIES: usize = 2;
+
 /// How a pool runs its workers.
 #[derive(Debug, Clone)]
 pub struct PoolSettings {
@@ -142,17 +146,36 @@ impl WorkerSlot {
         .map_err(|NotStarted { reason, .. }| ExecutorError { worker: self.number, reason })
     }
 
+    /// Runs a test. If the environment breaks it off, the test is run again, [`RETRIES`] times at most; what happened
+    /// then is its outcome.
+    fn run(&mut self, job: &Job) -> Result<JobResult, ExecutorError> {
+        let mut notes = Vec::new();
+        for _ in 0..RETRIES {
+            let mut ended = self.run_unless_killed(job)?;
+            notes.append(&mut ended.notes);
+            let outcome = &ended.observation.outcome;
+            if !outcome.is_of_environment() || self.stop.load(Ordering::Relaxed) {
+                return Ok(JobResult { notes, ..ended });
+            }
+            let cause = outcome.message().unwrap_or_default();
+            notes.push(format!("the environment broke off this test, so the test was run again: {cause}"));
+        }
+        let mut ended = self.run_unless_killed(job)?;
+        notes.append(&mut ended.notes);
+        Ok(JobResult { notes, ..ended })
+    }
+
     /// Runs a test. If its worker or its simulator is killed, the test is run once more: a process killed by hand, or
     /// because memory is short, must leave no trace in results. If it is killed again, the test is a crash that says
     /// so.
-    fn run(&mut self, job: &Job) -> Result<JobResult, ExecutorError> {
+    fn run_unless_killed(&mut self, job: &Job) -> Result<JobResult, ExecutorError> {
         let (ended, victim) = self.attempt(job)?;
         let Some(victim) = victim.filter(|_| !self.stop.load(Ordering::Relaxed)) else { return Ok(ended) };
         let (mut ended, again) = self.attempt(job)?;
         ended.notes.insert(0, format!("the {victim} was killed while it ran this test, so the test was run again"));
         if again.is_some() {
             ended.killed = true;
-            if let Outcome::Crash { message } = &mut ended.observation.outcome {
+            if let Outcome::Crash { message } | Outcome::LaunchFailed { message } = &mut ended.observation.outcome {
                 *message = format!("killed twice, by a user or by the system because memory was short: {message}");
             }
         }
@@ -247,7 +270,10 @@ impl Worker {
             if process.ended().is_some() { Err(io::ErrorKind::UnexpectedEof.into()) } else { Ok(()) }
         });
         match taken {
-            Ok((stream, Hello { lock_stepped, .. })) => Ok(Worker { stream, process, lock_stepped }),
+            Ok((stream, Hello { lock_stepped, end_limit, .. })) => {
+                process.extend_end_limit(end_limit);
+                Ok(Worker { stream, process, lock_stepped })
+            }
             Err(error) if error.kind() == io::ErrorKind::TimedOut => Err(error.into()),
             // It closed the connection, so it is about to end: how says more.
             Err(error) => Err(process.wait(DEATH_LIMIT).map_or_else(

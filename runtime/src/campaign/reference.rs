@@ -5,6 +5,7 @@ use std::fmt;
 
 use sesame_base::observation::Observation;
 use sesame_plan::{CampaignPlan, OperationId, Task, Test};
+use sesame_relay::wire::WireTable;
 use sesame_results::record::{Difference, Verdict, differences, verdict};
 
 /// An operation on a topic that nothing in the system receives, or of whose members nothing receives some.
@@ -58,9 +59,12 @@ pub(super) fn unheard(plan: &CampaignPlan, task: &Task, reference: &Observation)
     let found = operations.into_iter().filter_map(|id| {
         let operation = plan.operation(id);
         let topic = plan.topic(operation.topic?);
-        let paths: Vec<String> = topic.paths.iter().filter(|path| reference.unheard.contains(path)).cloned().collect();
-        let unheard =
-            Unheard { operation: operation.name.clone(), topic: topic.name.clone(), paths, of: topic.paths.len() };
+        let wires = WireTable::new(plan);
+        let acted_on: Vec<&str> = wires.acted_on(operation).map(|wire| wires.path(wire)).collect();
+        let of = acted_on.len();
+        let paths = acted_on.into_iter().filter(|path| reference.unheard.iter().any(|unheard| unheard == path));
+        let paths = paths.map(str::to_owned).collect();
+        let unheard = Unheard { operation: operation.name.clone(), topic: topic.name.clone(), paths, of };
         (!unheard.paths.is_empty()).then_some(unheard)
     });
     found.collect()

@@ -136,7 +136,10 @@ impl<'a, 'l> Campaign<'a, 'l> {
                     "if the simulator is slow and not stuck, give it more time with `--reference-timeout SECONDS`";
                 return Err(CampaignError::Reference(format!("{stopped}; {remedy}")).into());
             }
-            outcome @ Outcome::Crash { .. } => {
+            outcome @ (Outcome::Crash { .. }
+            | Outcome::LaunchFailed { .. }
+            | Outcome::Disconnect { .. }
+            | Outcome::WrongClock { .. }) => {
                 return Err(CampaignError::Reference(outcome.detail().unwrap_or_default()).into());
             }
             Outcome::Completed | Outcome::NoEffect | Outcome::Unknown => {}

@@ -86,7 +86,7 @@ const NOT_BUILT_IN: &str = "this runner was built without traces: run `sesamec g
 fn is_kept(plan: &CampaignPlan, keep: Recorded, observation: &Observation) -> bool {
     use sesame_results::record::{Verdict, verdict};
 
-    let failed = matches!(observation.outcome, Outcome::Crash { .. } | Outcome::Timeout { .. });
+    let failed = !observation.outcome.is_whole();
     let violated = || {
         plan.requirements.iter().any(|requirement| {
             verdict(requirement.bound, &observation.outcome, observation.value(requirement.metric)) == Verdict::Violated

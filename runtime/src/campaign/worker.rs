@@ -4,7 +4,6 @@ use std::sync::{Mutex, mpsc};
 use std::time::Duration;
 use std::{io, thread};
 
-use sesame_base::observation::Outcome;
 use sesame_plan::CampaignPlan;
 use sesame_relay::evaluate::Custom;
 use sesame_relay::lifecycle::descendants;
@@ -27,7 +26,7 @@ use crate::runner::Runner;
 pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: &Address) -> io::Result<()> {
     // Nothing is started before the first test.
     let transport = runner.connect.transport(plan);
-    let mut stream = link::connect(supervisor, transport.capabilities().lock_stepped)?;
+    let mut stream = link::connect(supervisor, transport.capabilities().lock_stepped, end_limit(plan))?;
     panic_capture::install();
     // So that what leaves its parents can be found when it is to end. Where the system cannot do that, groups have to
     // do.
@@ -47,7 +46,7 @@ pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: &Address) -> io::
         let (observation, trace_failure) =
             traces::run(plan, &wires, &metrics, simulator.as_mut(), &job, &directory, &mut custom);
         let incidents = simulator.incidents();
-        if matches!(observation.outcome, Outcome::Crash { .. }) {
+        if !observation.outcome.is_whole() {
             transport = None;
         }
         let sent = protocol::send(&mut stream, &Reply { number: job.number, observation, trace_failure, incidents });
@@ -57,6 +56,17 @@ pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: &Address) -> io::
         }
     }
     unreachable!("jobs come until the process is ended")
+}
+
+/// How long it may take to end what the plan launches, beside its simulator.
+fn end_limit(plan: &CampaignPlan) -> Duration {
+    #[cfg(feature = "process")]
+    return sesame_relay::lifecycle::launch::end_limit(plan);
+    #[cfg(not(feature = "process"))]
+    {
+        let _ = plan;
+        Duration::ZERO
+    }
 }
 
 /// Reads jobs in a thread of its own. When the supervisor is gone, this thread ends what the worker started, and then

@@ -22,6 +22,9 @@ pub(super) const WORKER: &str = "SESAME_WORKER";
 /// it may take after that.
 const END_LIMIT: Duration = Duration::from_secs(2);
 
+/// How much more time a worker may ask for.
+const MOST_MORE: Duration = Duration::from_secs(60);
+
 /// The children of this process that are not to be taken for orphans. A process adopts orphans as a whole, so there is
 /// one list for all pools in it.
 static CHILDREN: Mutex<Children> = Mutex::new(Children { workers: BTreeSet::new(), earlier: None });
@@ -53,6 +56,8 @@ impl Children {
 pub(super) struct WorkerProcess {
     child: Child,
     status: Option<ExitStatus>,
+    /// How long it may take to end once its connection is closed.
+    end_limit: Duration,
 }
 
 impl WorkerProcess {
@@ -68,7 +73,12 @@ impl WorkerProcess {
         }
         let child = command.spawn()?;
         children.workers.insert(child.id());
-        Ok(WorkerProcess { child, status: None })
+        Ok(WorkerProcess { child, status: None, end_limit: END_LIMIT })
+    }
+
+    /// Gives it this much more time to end once its connection is closed.
+    pub(super) fn extend_end_limit(&mut self, more: Duration) {
+        self.end_limit = END_LIMIT + more.min(MOST_MORE);
     }
 
     /// Its status once it has ended; then everything that it started is ended too.
@@ -106,7 +116,7 @@ impl WorkerProcess {
 
 impl Drop for WorkerProcess {
     fn drop(&mut self) {
-        if self.status.is_none() && self.wait(END_LIMIT).is_none() {
+        if self.status.is_none() && self.wait(self.end_limit).is_none() {
             self.end();
         }
     }

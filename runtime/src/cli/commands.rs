@@ -64,7 +64,7 @@ pub enum Internal {
         #[command(flatten)]
         supervisor: campaign::Address,
     },
-    /// Keep the simulator of a worker; started by `worker`
+    /// Keep a program of a worker; started by `worker`
     #[cfg(all(feature = "process", target_os = "linux"))]
     #[command(hide = true)]
     Simulator {
@@ -72,6 +72,9 @@ pub enum Internal {
         worker: u32,
         /// The file that is told how the simulator ended
         report: std::path::PathBuf,
+        /// It has no input of its own
+        #[arg(long)]
+        background: bool,
         /// The simulator's program with its arguments
         #[arg(required = true, last = true)]
         program: Vec<std::ffi::OsString>,
@@ -82,6 +85,9 @@ pub enum Internal {
     Simulated {
         /// Process id of the keeper
         keeper: u32,
+        /// It has no input of its own
+        #[arg(long)]
+        background: bool,
         /// The simulator's program with its arguments
         #[arg(required = true, last = true)]
         program: Vec<std::ffi::OsString>,
@@ -136,14 +142,14 @@ impl Internal {
                 Ok(ExitCode::SUCCESS)
             }
             #[cfg(all(feature = "process", target_os = "linux"))]
-            Internal::Simulator { worker, report, program } => {
+            Internal::Simulator { worker, report, background, program } => {
                 let (program, arguments) = program.split_first().expect("the program is required");
-                Ok(sesame_relay::transport::keep_simulator(*worker, report, program, arguments))
+                Ok(sesame_relay::transport::keep_simulator(*worker, report, program, arguments, *background))
             }
             #[cfg(all(feature = "process", target_os = "linux"))]
-            Internal::Simulated { keeper, program } => {
+            Internal::Simulated { keeper, background, program } => {
                 let (program, arguments) = program.split_first().expect("the program is required");
-                Ok(sesame_relay::transport::become_simulator(*keeper, program, arguments))
+                Ok(sesame_relay::transport::become_simulator(*keeper, program, arguments, *background))
             }
         }
     }

@@ -1,10 +1,12 @@
 //! Plans in which one thing is wrong that later code relies on: each is refused with the place of it.
 
 use sesame_plan::condition::{ConditionEnd, ConditionSpace};
-use sesame_plan::testing::{field, message};
+use sesame_plan::testing::{field, message, minimal, node, topic};
 use sesame_plan::{
-    Activation, ActivationMode, Bound, CampaignPlan, Dimension, Domain, KnownTestId, MessageId, MessageType, MetricId,
-    MetricSource, OperationId, Search, Strategy, TopicId, Type,
+    Activation, ActivationMode, Answer, Bound, CampaignPlan, Clock, Command, Dimension, Domain, Interface,
+    InterfaceField, KnownTestId, Launch, Lifecycle, MessageId, MessageType, MetricId, MetricSource, Node, NodeId,
+    OperationId, Ready, ReadyWhen, RelayBudget, Ros2, Search, Simulator, StepBy, Stepping, Strategy, Topic, TopicId,
+    Transport, Type, WireType, Wiring,
 };
 use sesame_results::record::sample;
 
@@ -103,8 +105,43 @@ fn each_thing_that_later_code_relies_on_is_asked_for() {
         ),
         (|plan| plan.operations[4].topic = Some(TopicId(0)), "operations[4].topic: it acts on none"),
     ];
+    let of_ros: &[Altered] = &[
+        (|plan| ros(plan).domain = 233, "simulator.transport.domain: is 233, more than 232"),
+        (|plan| ros(plan).step.as_mut().unwrap().step_ns = 0, "simulator.transport.step_ns: must be positive"),
+        (|plan| ros(plan).interfaces.reverse(), "interfaces[0].fields[0].type: `test_msgs/msg/Inner` is not before it"),
+        (
+            |plan| ros(plan).interfaces[0].name = "test_msgs/msg/Outer".to_owned(),
+            "interfaces[1].fields[0].type: `test_msgs/msg/Inner` is not before it",
+        ),
+        (
+            |plan| {
+                let first = ros(plan).interfaces[0].clone();
+                ros(plan).interfaces.push(first);
+            },
+            "interfaces[2].name: `test_msgs/msg/Inner` is there twice",
+        ),
+        (|plan| ros(plan).wiring.clear(), "simulator.transport.wiring: there are 0 for 1 topics"),
+        (|plan| ros(plan).wiring[0].publishers[0] = NodeId(1), "wiring[0].publishers[0]: there is no node 1"),
+        (|plan| ros(plan).wiring[0].subscribers.push(NodeId(7)), "wiring[0].subscribers[0]: there is no node 7"),
+        (|plan| ros(plan).wiring[0].cut = false, "wiring[0]: distinguishes nodes of a topic that is not cut"),
+        (|plan| plan.topics[0].interface = None, "topics[0].interface: there is none"),
+        (
+            |plan| plan.topics[0].interface = Some("test_msgs/msg/Other".to_owned()),
+            "topics[0].interface: there is no interface `test_msgs/msg/Other`",
+        ),
+        (|plan| plan.nodes[0].answers[0].to = TopicId(1), "nodes[0].answers[0].to: there is no topic 1"),
+        (|plan| plan.nodes[0].answers[0].with = TopicId(2), "nodes[0].answers[0].with: there is no topic 2"),
+        (|plan| ready(plan).within = 0.0, "nodes[0].launch.ready.within: 0 is not above 0"),
+        (|plan| ready(plan).within = f64::INFINITY, "nodes[0].launch.ready.within: inf is not above 0"),
+        (|plan| ready(plan).when = ReadyWhen::Topic { topic: TopicId(9) }, "launch.ready.when: there is no topic 9"),
+        (|plan| ros(plan).clock = Clock::Wall, "simulator.lifecycle.launch.ready.when: the simulator has no clock"),
+        (
+            |plan| plan.simulator.lifecycle.relay_budget.as_mut().unwrap().jitter = Some(-1.0),
+            "simulator.lifecycle.relay_budget.jitter: -1 is not above 0",
+        ),
+    ];
     let conditional = sample::offline_plan(ConditionEnd::Condition);
-    for (whole, altered) in [(rich(), by_time), (conditional, by_condition)] {
+    for (whole, altered) in [(rich(), by_time), (conditional, by_condition), (arm(), of_ros)] {
         whole.validate().unwrap();
         for (alter, words) in altered {
             let mut plan = whole.clone();
@@ -117,6 +154,57 @@ fn each_thing_that_later_code_relies_on_is_asked_for() {
             assert!(read.contains(words) || read.contains("null"), "{read:?} does not say {words:?}");
         }
     }
+}
+
+/// A plan of a ROS 2 system.
+fn arm() -> CampaignPlan {
+    let interface = |name: &str, ty: WireType| Interface {
+        name: format!("test_msgs/msg/{name}"),
+        fields: vec![InterfaceField { name: "value".to_owned(), ty }],
+    };
+    let inner = WireType::Interface { name: "test_msgs/msg/Inner".to_owned() };
+    let launch = |when| Launch {
+        command: Command { program: "./arm".to_owned(), arguments: Vec::new() },
+        ready: Some(Ready { when, within: 5.0 }),
+    };
+    let answers = vec![Answer { to: TopicId(0), with: TopicId(0) }];
+    let path = "/clock".to_owned();
+    let transport = Transport::Ros2(Ros2 {
+        domain: 232,
+        clock: Clock::Topic { path: path.clone() },
+        step: Some(Stepping { step_ns: 1, by: StepBy::Topic { path } }),
+        reset: None,
+        interfaces: vec![
+            interface("Inner", WireType::String),
+            interface("Outer", WireType::Sequence { of: Box::new(inner), bound: None }),
+        ],
+        wiring: vec![Wiring { cut: true, publishers: vec![NodeId(0)], subscribers: Vec::new() }],
+    });
+    let lifecycle = Lifecycle {
+        launch: Some(launch(ReadyWhen::Clock)),
+        terminate: None,
+        relay_budget: Some(RelayBudget { latency: None, jitter: Some(1.0) }),
+    };
+    let topic =
+        Topic { interface: Some("test_msgs/msg/Outer".to_owned()), ..topic("joints", &["/joints"], Type::Bool) };
+    let ready_at = ReadyWhen::Topic { topic: TopicId(0) };
+    CampaignPlan {
+        simulator: Simulator { name: "cell".to_owned(), transport, lifecycle },
+        topics: vec![topic],
+        nodes: vec![Node { launch: Some(launch(ready_at)), answers, ..node("arm") }],
+        ..minimal()
+    }
+}
+
+fn ros(plan: &mut CampaignPlan) -> &mut Ros2 {
+    match &mut plan.simulator.transport {
+        Transport::Ros2(ros2) => ros2,
+        Transport::InProcess { .. } | Transport::Process { .. } => panic!("it is a system of ROS"),
+    }
+}
+
+fn ready(plan: &mut CampaignPlan) -> &mut Ready {
+    plan.nodes[0].launch.as_mut().and_then(|launch| launch.ready.as_mut()).expect("the node is launched")
 }
 
 fn containing_itself() -> MessageType {

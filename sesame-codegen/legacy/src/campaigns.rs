@@ -148,7 +148,7 @@ fn campaign_text(
     if !observed.is_empty() {
         clauses.push(("observes", observed.join(", ")));
     }
-    clauses.push(notation::end_clause(end));
+    clauses.push(notation::end_clause(end, None));
     let name = writer.name("campaign", &campaign.name);
     let doc = if name == campaign.name { String::new() } else { called_before(&campaign.name) };
     text.push('\n');

@@ -27,6 +27,7 @@ use sesame_plan::CampaignPlan;
 use sesame_results::record::RecordError;
 
 pub use dialect::Dialect;
+pub use naming::Names;
 pub use notes::{Counted, Kind, Notes};
 pub use original::Original;
 pub use results::Recorded;

@@ -8,14 +8,14 @@ const LONGEST: usize = 60;
 
 /// Gives out names that are each other's, and no reserved words.
 #[derive(Debug, Default)]
-pub(crate) struct Names {
+pub struct Names {
     taken: BTreeSet<String>,
 }
 
 impl Names {
     /// A name like `wanted`, or like `fallback` where nothing of it is left. Names differ in more than case and
     /// underscores, so that they do in generated code too.
-    pub(crate) fn take(&mut self, wanted: &str, fallback: &str) -> String {
+    pub fn take(&mut self, wanted: &str, fallback: &str) -> String {
         let mut plain = plain(wanted);
         if plain.is_empty() {
             fallback.clone_into(&mut plain);

@@ -186,6 +186,7 @@ pub(super) fn explainable(language: &Language) -> anyhow::Result<ExitCode> {
         (language.codes)().iter().map(|(code, meaning)| format!("  {code}  {meaning}\n")).collect();
     shell::asked_for(&format!(
         "`{sesamec} explain NAME FILE` explains what a space declares: a topic, metric, operation, campaign, …\n\
+         `{sesamec} explain wiring FILE` shows how the nodes of a ROS 2 system are remapped\n\
          `{sesamec} explain CODE` explains a diagnostic:\n{}",
         codes.concat()
     ))?;
@@ -201,7 +202,12 @@ pub(super) fn explain_name(
     format: ExplainFormat,
 ) -> anyhow::Result<ExitCode> {
     let text = input::text(file).with_context(|| format!("cannot read {}", file.display()))?;
-    let found = (language.find)(&file.display().to_string(), &text, name).map_err(|why| anyhow!(why))?;
+    let found = match (language.find)(&file.display().to_string(), &text, name) {
+        Ok(found) => found,
+        // A name of the space comes first.
+        Err(_) if name == "wiring" => return explain_wiring(shell, language, file, &text),
+        Err(why) => bail!(why),
+    };
     if format == ExplainFormat::Human && found.campaign {
         let checked = check_text(shell, language, file, &text, Format::Human)?;
         let plan = &checked.plans[choose(&checked, file, Some(name))?].plan;
@@ -226,6 +232,15 @@ pub(super) fn explain_name(
         ExplainFormat::Human => shell::asked_for(&visible(&found.text))?,
         ExplainFormat::Json => shell::asked_for(&found.json)?,
     }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// `sesamec explain wiring FILE`
+fn explain_wiring(shell: Shell, language: &Language, file: &Path, text: &str) -> anyhow::Result<ExitCode> {
+    let checked = check_text(shell, language, file, text, Format::Human)?;
+    // All campaigns of a space need the same remappings.
+    let Some(runner) = checked.plans.first() else { bail!("{} has no campaign", file.display()) };
+    shell::asked_for(&visible(&crate::wiring::text(&runner.plan)))?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -110,7 +110,7 @@ mod tests {
 
     fn topic(paths: &[&str]) -> Topic {
         let paths = paths.iter().map(|&path| path.to_owned()).collect();
-        Topic { name: "t".into(), doc: String::new(), paths, ty: Type::Bool }
+        Topic { paths, ..sesame_plan::testing::topic("t", &[], Type::Bool) }
     }
 
     #[test]

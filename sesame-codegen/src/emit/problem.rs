@@ -61,6 +61,11 @@ pub enum Problem {
     /// The simulator's program, or one of its arguments, is not one.
     #[error("the simulator's program and arguments must be texts without NUL, the program not empty")]
     SimulatorProgram,
+    /// A program that is launched, or the one that ends the system, or one of their arguments, is not one.
+    #[error(
+        "a program that is launched or terminates others is empty, or it or an argument contains the character NUL"
+    )]
+    LaunchedProgram,
 }
 
 fn template_names() -> String {
@@ -113,7 +118,16 @@ pub(super) fn problems(plans: &[RunnerPlan], dependencies: &BTreeMap<String, tom
                 let nul = std::iter::once(program).chain(arguments).any(|text| text.contains('\0'));
                 (program.is_empty() || nul).then_some(Problem::SimulatorProgram)
             }
+            Transport::Ros2(_) => None,
         };
+        let lifecycle = &plan.simulator.lifecycle;
+        let launches = plan.nodes.iter().filter_map(|node| node.launch.as_ref()).chain(&lifecycle.launch);
+        let mut commands = launches.map(|launch| &launch.command).chain(&lifecycle.terminate);
+        let bad = commands.any(|command| {
+            let nul = std::iter::once(&command.program).chain(&command.arguments).any(|text| text.contains('\0'));
+            command.program.is_empty() || nul
+        });
+        let problem = problem.or(bad.then_some(Problem::LaunchedProgram));
         problems.extend(problem.filter(|problem| !problems.contains(problem)));
     }
     for name in dependencies.keys().filter(|name| !package::is_dependency(name)) {

@@ -30,7 +30,7 @@ impl Selection {
         }
     }
 
-    fn condition(&self, condition: &from::Condition) -> to::Condition {
+    pub(super) fn condition(&self, condition: &from::Condition) -> to::Condition {
         let both = |left: &from::Condition, right: &from::Condition| {
             (Box::new(self.condition(left)), Box::new(self.condition(right)))
         };

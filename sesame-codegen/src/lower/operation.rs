@@ -3,7 +3,7 @@
 use sesame_dsl::model::{self, Space};
 use sesame_plan as plan;
 
-use super::id::topic_id;
+use super::id::{node_id, topic_id};
 use super::system::unit;
 use crate::plan::{Called, Offline, OperationPlan};
 
@@ -16,6 +16,8 @@ pub(super) fn operation(
         name: operation.declaration.name.clone(),
         doc: operation.declaration.doc.clone(),
         topic: operation.topic().map(topic_id),
+        from: operation.from.iter().map(|&id| node_id(id)).collect(),
+        to: operation.to.iter().map(|&id| node_id(id)).collect(),
         places: operation.target.iter().flat_map(|target| &target.places).cloned().collect(),
         kind: operation.kind.clone(),
         parameters: operation.parameters.iter().map(parameter).collect(),

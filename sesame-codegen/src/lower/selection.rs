@@ -52,6 +52,7 @@ impl Selection {
         }
         let expectations = tests.iter().flat_map(|&test| &space.tests[test].expectations);
         metrics.extend(expectations.map(|expectation| expectation.metric));
+        campaign.end_when.iter().for_each(|condition| condition.metrics_into(&mut metrics));
         metrics.sort();
         metrics.dedup();
         Selection { metrics, operations, tests }
@@ -146,6 +147,7 @@ impl Selection {
             stop: campaign.stop.clone(),
             seed: campaign.seed,
             end_after: campaign.end_after,
+            end_when: campaign.end_when.as_ref().map(|condition| self.condition(condition)),
             record: campaign.record,
         }
     }

@@ -1,6 +1,6 @@
-//! Messages, topics and nodes, from the model to the plan.
+//! Messages, topics, nodes and what starts them, from the model to the plan.
 
-use sesame_dsl::model::{self, Id as _};
+use sesame_dsl::model::{self, Id as _, Space};
 use sesame_dsl::units::Unit;
 use sesame_plan as plan;
 
@@ -31,12 +31,18 @@ fn ty(of: &model::Type) -> plan::Type {
     }
 }
 
-pub(super) fn topic(topic: &model::Topic) -> plan::Topic {
+pub(super) fn topic(space: &Space, topic: &model::Topic) -> plan::Topic {
+    let interface = match topic.ty {
+        model::Type::Message(id) => space.messages[id].interface.clone(),
+        _ => None,
+    };
     plan::Topic {
         name: topic.declaration.name.clone(),
         doc: topic.declaration.doc.clone(),
         paths: topic.paths.clone(),
         ty: ty(&topic.ty),
+        interface,
+        channel: topic.channel,
     }
 }
 
@@ -46,7 +52,41 @@ pub(super) fn node(node: &model::Node) -> plan::Node {
         doc: node.declaration.doc.clone(),
         publishes: node.publishes.iter().map(|&id| topic_id(id)).collect(),
         subscribes: node.subscribes.iter().map(|&id| topic_id(id)).collect(),
+        named: node.named.clone(),
+        launch: node.launch.as_ref().map(launch),
+        answers: node
+            .answers
+            .iter()
+            .map(|&(to, with)| plan::Answer { to: topic_id(to), with: topic_id(with) })
+            .collect(),
+        every_step: node.every_step.iter().map(|&id| topic_id(id)).collect(),
     }
+}
+
+pub(super) fn lifecycle(lifecycle: &model::Lifecycle) -> plan::Lifecycle {
+    let model::Lifecycle { launch: launched, terminate, relay_budget } = lifecycle;
+    plan::Lifecycle {
+        launch: launched.as_ref().map(launch),
+        terminate: terminate.as_ref().map(command),
+        relay_budget: relay_budget.map(|budget| plan::RelayBudget { latency: budget.latency, jitter: budget.jitter }),
+    }
+}
+
+fn launch(launch: &model::Launch) -> plan::Launch {
+    let ready = |ready: &model::Ready| plan::Ready {
+        when: match &ready.when {
+            model::ReadyWhen::Topic(topic) => plan::ReadyWhen::Topic { topic: topic_id(*topic) },
+            model::ReadyWhen::Port(port) => plan::ReadyWhen::Port { port: port.clone() },
+            model::ReadyWhen::Clock => plan::ReadyWhen::Clock,
+            model::ReadyWhen::Line(text) => plan::ReadyWhen::Line { text: text.clone() },
+        },
+        within: ready.within,
+    };
+    plan::Launch { command: command(&launch.command), ready: launch.ready.as_ref().map(ready) }
+}
+
+fn command(command: &model::Command) -> plan::Command {
+    plan::Command { program: command.program.clone(), arguments: command.arguments.clone() }
 }
 
 pub(super) fn unit(unit: Option<&Unit>) -> Option<String> {

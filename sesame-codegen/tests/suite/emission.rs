@@ -4,6 +4,7 @@ use proptest::prelude::*;
 use sesame_codegen::emit::{Problem, emit};
 use sesame_codegen::files::Tree;
 use sesame_codegen::plan::RunnerPlan;
+use sesame_plan::testing::node;
 
 use crate::plans::{awkward, environment, small, with_program};
 
@@ -53,6 +54,32 @@ fn a_simulator_that_is_a_program_needs_its_transport_and_no_crate() {
 }
 
 #[test]
+fn a_runner_of_a_ros_system_has_its_transport_and_says_how_nodes_are_remapped() {
+    let mut runner = with_program("c");
+    runner.plan.nodes = vec![sesame_plan::Node { publishes: vec![sesame_plan::TopicId(0)], ..node("arm") }];
+    let path = format!("/{}", runner.plan.topics[0].paths[0]);
+    runner.plan.topics[0].paths = vec![path.clone()];
+    let cut = |cut| sesame_plan::Wiring { cut, ..sesame_plan::Wiring::default() };
+    runner.plan.simulator.transport = sesame_plan::Transport::Ros2(sesame_plan::Ros2 {
+        domain: 0,
+        clock: sesame_plan::Clock::Wall,
+        step: None,
+        reset: None,
+        interfaces: Vec::new(),
+        wiring: (0..runner.plan.topics.len()).map(|topic| cut(topic == 0)).collect(),
+    });
+    let without_hooks = RunnerPlan { hooks: Vec::new(), operations: Vec::new(), ..runner.clone() };
+    assert_eq!(without_hooks.needs_rust(), !cfg!(feature = "ros2"));
+    let trees = emit(&[runner], &environment()).unwrap();
+    let file = |path: &str| trees[1].files[path].text().into_owned();
+    assert!(file("src/generated/campaign.rs").contains("::sesame_runtime::transport::ros2("));
+    let features = r#"features = ["campaign", "in-process", "mcap", "process", "ros2"]"#;
+    assert!(file("Cargo.toml").contains(features), "{}", file("Cargo.toml"));
+    let line = format!("# node arm\nros2 run … --ros-args -r {path}:={path}/undisturbed\n```\n");
+    assert!(file("README.md").contains(&line), "{}", file("README.md"));
+}
+
+#[test]
 fn a_program_that_no_system_could_start_is_refused() {
     let mut runner = with_program("c");
     let transport = |program: &str, argument: &str| sesame_plan::Transport::Process {
@@ -64,6 +91,10 @@ fn a_program_that_no_system_could_start_is_refused() {
         runner.plan.simulator.transport = transport(program, argument);
         assert_eq!(problems(runner.clone()).len(), 1, "{program:?} {argument:?}");
     }
+    let mut runner = with_program("c");
+    let command = sesame_plan::Command { program: "./stop".into(), arguments: vec!["\0".into()] };
+    runner.plan.simulator.lifecycle.terminate = Some(command);
+    assert_eq!(problems(runner).len(), 1);
 }
 
 #[test]

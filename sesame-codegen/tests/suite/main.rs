@@ -14,4 +14,5 @@ mod originals;
 mod plans;
 mod random_originals;
 mod regeneration;
+mod scan;
 mod surroundings;

@@ -115,6 +115,31 @@ fn written(system: &str, plan: &CampaignPlan) -> String {
     text
 }
 
+#[test]
+fn nodes_of_operations_are_written_and_read_back() {
+    let system = r#"space everything
+        system {
+          simulator sim = ros2
+          message Level = "std_msgs/msg/Float64" { data: real[mm] }
+          topic level = "level" : Level
+          node a { publishes level }  node b { publishes level  subscribes level }  node c { subscribes level }
+        }
+        metric m0 maximise = max(level.data)
+        "#;
+    let text = format!(
+        "{system} operation lost on level from b, a = packet loss [0%, 1%]
+         operation late on level to c = latency [0s, 1s]
+         operation biased on level.data from a to b, c = bias [0mm, 1mm]
+         campaign look {{ objectives m0  operations lost, late, biased 1 per test  search random {{ evaluations 1 }}
+                         end after 5s }}"
+    );
+    let before = plan(&text);
+    assert_eq!(before.operations[0].from.len(), 2);
+    let again = written(system, &before);
+    assert!(again.contains("on level.data from a to b, c = bias"), "{again}");
+    assert_eq!(plan(&again), before);
+}
+
 /// Finite numbers of every size, and those that people write.
 fn number() -> impl Strategy<Value = f64> + Clone {
     use prop::num::f64::{NEGATIVE, NORMAL, POSITIVE, SUBNORMAL, ZERO};
@@ -153,6 +178,7 @@ fn domain(kind: &OperationKind, parameter: &Parameter) -> BoxedStrategy<Domain> 
             let whole = || (-1_000_000_000_000i64..1_000_000_000_000).prop_map(|whole| whole as f64);
             let numbers = match kind {
                 OperationKind::PacketLoss | OperationKind::BurstLoss => ordered(share()).boxed(),
+                OperationKind::Slow { .. } => ordered(share().prop_map(|share| share.clamp(1e-9, 0.999))).boxed(),
                 OperationKind::Duplicate => ordered((1..100u32).prop_map(f64::from)).boxed(),
                 OperationKind::RateLimit => ordered(1e-3..1e6f64).boxed(),
                 OperationKind::Latency { .. } | OperationKind::Reorder { .. } | OperationKind::Stale => {
@@ -408,7 +434,7 @@ pub(crate) fn plans(like: &CampaignPlan) -> impl Strategy<Value = Shown> + use<>
     let (like, metrics) = (like.clone(), u32::try_from(like.metrics.len()).expect("there are a few metrics"));
     let settings = like.clone();
     let campaigns = (1.0..1e4f64).prop_flat_map(move |end| campaign(&settings.campaign, &settings.metrics, end));
-    let operations = prop::sample::subsequence(like.operations.clone(), 1..12);
+    let operations = prop::sample::subsequence(like.operations.clone(), 1..=like.operations.len().min(11));
     (campaigns, operations)
         .prop_flat_map(move |(mut campaign, operations)| {
             campaign.operations = (0..).map(OperationId).take(operations.len()).collect();
@@ -472,6 +498,47 @@ fn reads_back(system: &str, original: &CampaignPlan) -> TestCaseResult {
     Ok(())
 }
 
+/// A campaign with an operation of each kind on nodes and parameters, the system of which is one of ROS 2.
+fn nodes() -> (String, CampaignPlan) {
+    let system = r#"space everything
+        system {
+          simulator sim = ros2 { clock "/clock" }
+          message Level = "std_msgs/msg/Float64" { data: real[mm] }
+          topic level = "level" : Level
+          node a { publishes level  launch "./a" "{ros-args}" }  node b { subscribes level }
+        }
+        metric m0 maximise = max(level.data)
+        metric m1 minimise = min(level.data)
+        requirement R1 "nothing is hit" = m0 <= 0mm
+        "#;
+    let text = format!(
+        r#"{system} operation wrong on parameter "limits.\"speed\"" of b = set [-1, 3]
+           operation wrong_too on parameter "gain" of a = set [0, 1]
+           operation halted on node a = pause
+           operation slowed on node a = slow [1%, 2%]
+           operation killed on node a = kill
+           campaign look {{ objectives m0, m1  operations wrong, wrong_too, halted, slowed, killed 1 per test
+                           search random {{ evaluations 1 }}  end after 5s }}"#
+    );
+    (system.to_owned(), plan(&text))
+}
+
+#[test]
+fn what_operations_on_nodes_do_is_written_and_read_back() {
+    let (system, like) = nodes();
+    let node = |operation: &Operation| like.node(operation.kind.node().unwrap()).name.as_str();
+    let on: Vec<&str> = like.operations.iter().map(node).collect();
+    assert_eq!(on, ["b", "a", "a", "a", "a"]);
+    assert!(like.operations.iter().all(|operation| operation.topic.is_none() && operation.places.is_empty()));
+    let again = written(&system, &like);
+    for line in
+        [r#"on parameter "limits.\"speed\"" of b = set [-1, 3]"#, "on node a = slow [1%, 2%]", "on node a = kill"]
+    {
+        assert!(again.contains(line), "{again}");
+    }
+    reads_back(&system, &like).unwrap();
+}
+
 #[test]
 fn each_kind_of_operation_reads_back_in_every_unit() {
     let (system, like) = everything();
@@ -482,10 +549,11 @@ fn each_kind_of_operation_reads_back_in_every_unit() {
 
 #[test]
 fn what_is_written_reads_back_as_the_same_plan() {
-    let (system, like) = everything();
-    let cases = ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(48) };
-    let outcome = TestRunner::new(cases).run(&plans(&like), |Shown(original)| reads_back(&system, &original));
-    if let Err(failure) = outcome {
-        panic!("{failure}");
+    for (system, like) in [everything(), nodes()] {
+        let cases = ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(48) };
+        let outcome = TestRunner::new(cases).run(&plans(&like), |Shown(original)| reads_back(&system, &original));
+        if let Err(failure) = outcome {
+            panic!("{failure}");
+        }
     }
 }

@@ -72,12 +72,7 @@ pub(crate) fn small(campaign: &str) -> RunnerPlan {
                 topic("zones", "", &["safetyzones/Z1", "safetyzones/Z2"], Type::Message { id: MessageId(0) }),
                 topic("speed", "Of the fastest gripper.", &["cell/gripper_speed"], real("m/s")),
             ],
-            nodes: vec![Node {
-                name: "plc".into(),
-                doc: String::new(),
-                publishes: vec![TopicId(0)],
-                subscribes: vec![TopicId(1)],
-            }],
+            nodes: vec![Node { publishes: vec![TopicId(0)], subscribes: vec![TopicId(1)], ..testing::node("plc") }],
             metrics: vec![Metric {
                 unit: Some("s".into()),
                 direction: Some(Direction::Minimise),

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::eddi::Gate;
-use crate::model::{ActivationMode, MetricId, MetricSource, Operation, OperationId, Space, TopicId};
+use crate::model::{ActivationMode, MetricId, MetricSource, Operation, OperationId, ReadyWhen, Space, TopicId};
 use crate::span::FileId;
 
 /// Operations of the file itself that no campaign and no test uses.
@@ -52,6 +52,9 @@ fn used_metrics(space: &Space) -> BTreeSet<MetricId> {
         {
             used.extend(grown.variables.iter().map(|variable| variable.metric));
         }
+        let mut compared = Vec::new();
+        campaign.end_when.iter().for_each(|condition| condition.metrics_into(&mut compared));
+        used.extend(compared);
     }
     for activation in space.tests.values().flat_map(|test| &test.operations).map(|operation| &operation.activation) {
         let mut compared = Vec::new();
@@ -110,7 +113,11 @@ fn used_topics(space: &Space) -> BTreeSet<TopicId> {
         used.extend(eddi.otherwise.mitigation.iter().map(|mitigation| mitigation.field.topic));
     }
     used.extend(space.eddis.values().map(|eddi| eddi.publishes));
-    used.extend(space.lifecycle.launch.iter().filter_map(|launch| launch.ready).map(|ready| ready.topic));
+    let launches = space.nodes.values().filter_map(|node| node.launch.as_ref()).chain(&space.lifecycle.launch);
+    used.extend(launches.filter_map(|launch| launch.ready.as_ref()).filter_map(|ready| match ready.when {
+        ReadyWhen::Topic(topic) => Some(topic),
+        ReadyWhen::Port(_) | ReadyWhen::Clock | ReadyWhen::Line(_) => None,
+    }));
     used
 }
 

@@ -2,17 +2,18 @@
 //!
 //! Files are taken apart field by field where they hold names, so that a new one cannot be forgotten.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Definition, DefinitionId, Index, Kind, Reference};
 use crate::import::Merged;
 use crate::span::{FileId, Span};
 use crate::syntax::ast::eddi::Eddi;
+use crate::syntax::ast::lifecycle::{Launch, ReadyWhen};
 use crate::syntax::ast::physical::Physical;
 use crate::syntax::ast::{
     self, Activation, ActivationMode, Campaign, Contained, Expression, ExpressionKind, Formula, FormulaKind, Head,
-    Metric, MetricSource, Name, Operation, OperationBody, OperationKind, Path, Step, System, Test, TriggerEnd, Type,
-    TypeKind,
+    Metric, MetricSource, Name, Operation, OperationBody, OperationKind, Path, Resource, Step, System, Test,
+    TriggerEnd, Type, TypeKind,
 };
 
 /// Makes the index of what was read.
@@ -98,6 +99,8 @@ struct Indexer<'a> {
     members: BTreeMap<(DefinitionId, &'a str), DefinitionId>,
     /// The types of topics and fields.
     types: BTreeMap<DefinitionId, &'a Type>,
+    /// Messages with a type of ROS.
+    of_ros: BTreeSet<DefinitionId>,
     /// The names of the space, which are not settled before all are there.
     heads: Vec<(&'a Name, DefinitionId)>,
 }
@@ -140,12 +143,15 @@ impl<'a> Indexer<'a> {
     }
 
     fn declare_system(&mut self, system: &'a System) -> SystemIds {
-        let System { simulators, messages, topics, nodes, .. } = system;
+        let System { simulators, messages, topics, services, nodes, .. } = system;
         let simulators = simulators.iter().map(|simulator| self.declare(Kind::Simulator, &simulator.head)).collect();
         let mut message_ids = Vec::new();
         for message in messages {
             let id = self.declare(Kind::Message, &message.head);
             message_ids.push(id);
+            if message.ros_type.is_some() {
+                self.of_ros.insert(id);
+            }
             for field in &message.fields {
                 let field_id = self.declare_member(Kind::Field, &field.head, id);
                 self.types.insert(field_id, &field.ty);
@@ -157,13 +163,18 @@ impl<'a> Indexer<'a> {
             self.types.insert(id, &topic.ty);
             topic_ids.push(id);
         }
+        for service in services {
+            self.declare(Kind::Service, &service.head);
+            self.declare(Kind::Topic, &service.request);
+            self.declare(Kind::Topic, &service.reply);
+        }
         let nodes = nodes.iter().map(|node| self.declare(Kind::Node, &node.head)).collect();
         SystemIds { simulators, messages: message_ids, topics: topic_ids, nodes }
     }
 
     fn declare_operation(&mut self, operation: &'a Operation) -> DefinitionId {
         let id = self.declare(Kind::Operation, &operation.head);
-        if let Some(OperationKind::Custom(custom)) = operation.body.as_ref().map(|body| &body.kind) {
+        if let OperationKind::Custom(custom) = &operation.body.kind {
             for parameter in &custom.parameters {
                 let full_span = parameter.name.span.to(parameter.span);
                 let parameter_id = self.add(Kind::Parameter, &parameter.name, full_span, &parameter.doc, Some(id));
@@ -233,7 +244,12 @@ impl<'a> Indexer<'a> {
         let target = match &ty?.kind {
             TypeKind::Message(message) => {
                 let message = self.names.get(message.text.as_str()).copied();
-                message.and_then(|message| self.members.get(&(message, name.text.as_str())).copied())
+                let member = message.and_then(|message| self.members.get(&(message, name.text.as_str())).copied());
+                // What a type of ROS holds beside the fields of its block, only resolution knows.
+                if member.is_none() && message.is_some_and(|message| self.of_ros.contains(&message)) {
+                    return None;
+                }
+                member
             }
             _ => None,
         };
@@ -308,6 +324,7 @@ impl<'a> Indexer<'a> {
             simulators: _,
             messages,
             topics,
+            services: _,
             nodes,
             launches,
             terminates: _,
@@ -325,11 +342,24 @@ impl<'a> Indexer<'a> {
         for (node, &id) in nodes.iter().zip(&ids.nodes) {
             self.mention_all(&node.publishes, id);
             self.mention_all(&node.subscribes, id);
+            self.mention_all(&node.every_step, id);
+            for answer in node.answers.iter().flat_map(|(_, answers)| answers) {
+                self.mention(&answer.to, id);
+                self.mention(&answer.with, id);
+            }
+            self.launches(&node.launches, id);
         }
+        // What is launched has no name of its own; it is the simulator's system.
+        if let Some(&within) = ids.simulators.first() {
+            self.launches(launches, within);
+        }
+    }
+
+    fn launches(&mut self, launches: &'a [(Span, Launch)], within: DefinitionId) {
         for (_, ready) in launches.iter().flat_map(|(_, launch)| &launch.ready) {
-            // What is launched has no name of its own; it is the simulator's system.
-            let Some(&within) = ids.simulators.first() else { continue };
-            self.mention(&ready.topic, within);
+            if let ReadyWhen::Topic(topic) = &ready.when {
+                self.mention(topic, within);
+            }
         }
     }
 
@@ -361,19 +391,20 @@ impl<'a> Indexer<'a> {
     }
 
     fn operation(&mut self, operation: &'a Operation, id: DefinitionId) {
-        let Some(body) = &operation.body else { return };
         let OperationBody {
             target,
+            resource,
             from,
             to,
             kind: _,
+            kind_word: _,
             within: _,
             lengths: _,
             priority: _,
             inclusion: _,
             untimed: _,
             contains,
-        } = body;
+        } = &operation.body;
         for place in target.iter().flat_map(|target| &target.places) {
             let mut target = self.mention(&place.topic, id);
             for step in &place.steps {
@@ -381,6 +412,9 @@ impl<'a> Indexer<'a> {
                     target = self.field(target, name, id);
                 }
             }
+        }
+        if let Some(Resource { parameter: _, node, span: _ }) = resource {
+            self.mention(node, id);
         }
         for (_, names) in from.iter().chain(to) {
             for name in names {
@@ -434,7 +468,7 @@ impl<'a> Indexer<'a> {
             stops: _,
             repeats,
             passives: _,
-            ends: _,
+            ends,
             records: _,
             has_errors: _,
             inherited_errors: _,
@@ -456,6 +490,9 @@ impl<'a> Indexer<'a> {
         }
         for repeat in repeats {
             self.mention(&repeat.test, id);
+        }
+        for condition in ends.iter().filter_map(|(_, end)| end.when.as_ref()) {
+            self.expression(condition, id);
         }
     }
 

@@ -1,6 +1,6 @@
 //! Campaigns: how tests are found and run.
 
-use super::condition::ConditionSpace;
+use super::condition::{Condition, ConditionSpace};
 use sesame_plan::{Confirmation, Copies, Dimension, Exploration, Recorded, StopRule, Strategy};
 
 use super::declaration::Declaration;
@@ -36,6 +36,8 @@ pub struct Campaign {
     pub seed: u64,
     /// Simulation time at which a test ends, in seconds; positive.
     pub end_after: f64,
+    /// What ends a test before that time. Default nothing.
+    pub end_when: Option<Condition>,
     /// Of which tests the messages are recorded. Default none.
     pub record: Option<Recorded>,
 }

@@ -4,7 +4,7 @@ use super::condition::{Condition, Constraint};
 use sesame_plan::{Bound, Choice, Moment, OperationKind, Shape, Step};
 
 use super::declaration::Declaration;
-use super::ids::{MetricId, OperationId, TopicId};
+use super::ids::{MetricId, NodeId, OperationId, TopicId};
 use super::metrics::Range;
 use crate::units::Unit;
 
@@ -13,8 +13,13 @@ use crate::units::Unit;
 pub struct Operation {
     /// Its name and doc comment.
     pub declaration: Declaration,
-    /// What it disturbs; `None` exactly for a custom one before the start or after the end.
+    /// What it disturbs; `None` exactly for one that acts on no messages: a custom one before the start or after the
+    /// end, or one on a node or its parameters, which [`OperationKind::node`] names by its position in the space.
     pub target: Option<Target>,
+    /// Only messages that these nodes publish, in written order; none for all messages.
+    pub from: Vec<NodeId>,
+    /// Only messages on their way to these nodes, in written order; none for all messages.
+    pub to: Vec<NodeId>,
     /// What it does.
     pub kind: OperationKind,
     /// The parameters a test chooses, in the order in which a plan has them.

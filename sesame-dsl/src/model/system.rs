@@ -4,6 +4,7 @@ use super::declaration::Declaration;
 use super::ids::{MessageId, TopicId};
 use crate::span::Span;
 use crate::units::Unit;
+use sesame_plan::{Channel, Clock, Stepping};
 
 /// The simulator under test.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,6 +37,17 @@ pub enum Transport {
         /// Simulation time of one step, in nanoseconds; positive. `None` for a simulator that runs freely.
         step_ns: Option<u64>,
     },
+    /// Nodes of ROS 2.
+    Ros2 {
+        /// The domain of worker 0, at most 232. Default 0.
+        domain: u16,
+        /// What simulation time is; its topic is absolute. Default wall time.
+        clock: Clock,
+        /// How it is stepped, by absolute names; `None` for one that runs freely.
+        step: Option<Stepping>,
+        /// The service that resets it, absolute; `None` for one that is launched again.
+        reset: Option<String>,
+    },
 }
 
 /// What a system says beside its simulator.
@@ -49,12 +61,12 @@ pub struct Lifecycle {
     pub relay_budget: Option<RelayBudget>,
 }
 
-/// A program that starts the system.
+/// A program that starts the system, or a node.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Launch {
     /// The program.
     pub command: Command,
-    /// When the system counts as ready; `None` is at once.
+    /// When it counts as ready; `None` is at once.
     pub ready: Option<Ready>,
 }
 
@@ -69,13 +81,26 @@ pub struct Command {
     pub arguments: Vec<String>,
 }
 
-/// When a launched system is ready: at the first message of a topic.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// When a launched program is ready.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Ready {
-    /// The topic.
-    pub topic: TopicId,
+    /// What shows it.
+    pub when: ReadyWhen,
     /// Wall time after which it has failed to start, in seconds; positive.
     pub within: f64,
+}
+
+/// What shows that a launched program is ready.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ReadyWhen {
+    /// The first message of a topic.
+    Topic(TopicId),
+    /// A connection to a TCP port; a number once placeholders are replaced.
+    Port(String),
+    /// The clock of a simulator that has one advances.
+    Clock,
+    /// A line of output contains this text.
+    Line(String),
 }
 
 /// What a relay may add to a message's way, in seconds of wall time; 0 or more.
@@ -94,8 +119,10 @@ pub struct RelayBudget {
 pub struct Message {
     /// Its name and doc comment.
     pub declaration: Declaration,
-    /// Its fields, in declaration order; names are unique among them.
+    /// Its fields, in declaration order; names are unique among them. Of a ROS type, in the order of the wire.
     pub fields: Vec<Field>,
+    /// Its type in ROS, for example `sensor_msgs/msg/JointState`: that of one of [`crate::model::Space::interfaces`].
+    pub interface: Option<String>,
 }
 
 /// One field of a message type. Its name is the one on the wire, so a keyword of the language is allowed.
@@ -133,14 +160,17 @@ pub struct Topic {
     pub declaration: Declaration,
     /// The path as written, for example `safetyzones/{Z1,Z2}`.
     pub written: String,
-    /// Names on the wire: one, or the members of the group in written order. No other topic has any of them.
+    /// Names on the wire: one, or the members of the group in written order. No other topic of this channel has any of
+    /// them. In ROS they are absolute.
     pub paths: Vec<String>,
-    /// What it carries.
+    /// What it carries; in ROS a message with an interface.
     pub ty: Type,
+    /// Whether it is a topic of the middleware, or one direction of a service.
+    pub channel: Channel,
 }
 
 /// A node: a program that publishes and subscribes.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Node {
     /// Its name and doc comment.
     pub declaration: Declaration,
@@ -148,6 +178,14 @@ pub struct Node {
     pub publishes: Vec<TopicId>,
     /// Topics it subscribes to.
     pub subscribes: Vec<TopicId>,
+    /// Its name in the middleware, where one is written.
+    pub named: Option<String>,
+    /// What starts it; `None` for a node that others start.
+    pub launch: Option<Launch>,
+    /// What it publishes for each message that it receives: topics that it subscribes to, with those that it publishes.
+    pub answers: Vec<(TopicId, TopicId)>,
+    /// On which topics it publishes one message in every step of the simulator.
+    pub every_step: Vec<TopicId>,
 }
 
 /// A value inside the messages of a topic.

@@ -3,14 +3,15 @@
 use sesame_plan::Times;
 
 use super::exploration::exploring;
-use super::{Kind, Resolver, lengths, list};
+use super::words::list;
+use super::{Kind, Resolver, lengths};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{
     self, Activation, ActivationMode, Averaging, CampaignId, Copies, Id as _, MetricId, OperationId, OwnSetting, Range,
     Search, Setting, Strategy, StrategyKind, StrategyProperties, TestId, TestTemplate,
 };
 use crate::span::Span;
-use crate::syntax::ast::{self, Count};
+use crate::syntax::ast::{self, Count, EndOfTest};
 use crate::units::Unit;
 
 /// The seed of a campaign that gives none.
@@ -28,6 +29,10 @@ impl<'a> Resolver<'a> {
             None => Some(None),
         };
         let end_after = self.end(campaign);
+        let end_when = match campaign.ends.first().and_then(|(_, end)| end.when.as_ref()) {
+            Some(condition) => self.switch(condition).map(Some),
+            None => Some(None),
+        };
         let objectives = self.objectives(campaign);
         let observed = match self.single(&campaign.observes, "observes") {
             Some(names) => self.find_all(names, Kind::Metric),
@@ -103,12 +108,13 @@ impl<'a> Resolver<'a> {
             stop: stop?,
             seed: seed?,
             end_after: end_after?,
+            end_when: end_when?,
             record,
         })
     }
 
     fn end(&mut self, campaign: &'a ast::Campaign) -> Option<f64> {
-        let Some(end) = self.single(&campaign.ends, "end after") else {
+        let Some(EndOfTest { after: end, .. }) = self.single(&campaign.ends, "end after") else {
             if !campaign.has_errors {
                 self.missing(&campaign.head.name, "the time at which its tests end", "end after 70s");
             }
@@ -254,9 +260,10 @@ impl<'a> Resolver<'a> {
             return;
         }
         let Some(within) = self.operations[index].as_ref().and_then(|operation| operation.within) else { return };
-        let Some(body) = &self.file.operations[index].body else { return };
+        let body = &self.file.operations[index].body;
         let Some((_, written)) = body.within.first() else { return };
         let Some((_, end_written)) = campaign.ends.first() else { return };
+        let end_written = &end_written.after;
         let end_text = self.text(end_written.span);
         let diagnostic = if within.low >= end {
             let title = format!("`{}` can never be active in campaign `{}`", name.text, campaign.head.name.text);

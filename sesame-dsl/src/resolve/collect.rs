@@ -43,7 +43,9 @@ impl<'a> Resolver<'a> {
         };
         add(Kind::Simulator, self.simulators().map(|simulator| &simulator.head).collect());
         add(Kind::Message, self.ast_messages().map(|message| &message.head).collect());
-        add(Kind::Topic, self.ast_topics().map(|topic| &topic.head).collect());
+        let of_services = self.ast_services().flat_map(|service| [&service.request, &service.reply]);
+        add(Kind::Topic, self.ast_topics().map(|topic| &topic.head).chain(of_services).collect());
+        add(Kind::Service, self.ast_services().map(|service| &service.head).collect());
         add(Kind::Node, self.ast_nodes().map(|node| &node.head).collect());
         add(Kind::Metric, file.metrics.iter().map(|metric| &metric.head).collect());
         add(Kind::Requirement, file.requirements.iter().map(|requirement| &requirement.head).collect());
@@ -65,10 +67,7 @@ impl<'a> Resolver<'a> {
         for (kind, index, head) in heads {
             let name = head.name.text.as_str();
             let custom = *kind == Kind::Operation
-                && matches!(
-                    self.file.operations[*index].body.as_ref().map(|body| &body.kind),
-                    Some(ast::OperationKind::Custom(_))
-                );
+                && matches!(self.file.operations[*index].body.kind, ast::OperationKind::Custom(_));
             let (what, generated) = match kind {
                 // A metric is a module and a file as well as a type; equal camel case implies the others' equality but
                 // for digits, so both are looked at.

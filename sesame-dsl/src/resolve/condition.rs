@@ -1,6 +1,7 @@
 //! Conditions: those of tests, the building blocks of those that a campaign grows, and what operations require of them.
 
-use super::{Kind, Resolver, list};
+use super::words::list;
+use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::condition::{
     Comparison, Condition, ConditionSpace, Constraint, Integers, Operand, ValueRange, Variable,
@@ -43,8 +44,8 @@ impl<'a> Resolver<'a> {
         self.count(times, 1, "the number of activations")
     }
 
-    /// A whole condition, which switches an operation on or off.
-    fn switch(&mut self, expression: &'a ast::Expression) -> Option<Condition> {
+    /// A whole condition, which switches an operation on or off or ends a test.
+    pub(super) fn switch(&mut self, expression: &'a ast::Expression) -> Option<Condition> {
         let condition = self.condition_over_metrics(expression)?;
         let depth = condition.depth();
         if depth > Condition::MAX_DEPTH {
@@ -443,7 +444,7 @@ impl<'a> Resolver<'a> {
     ) {
         let Some(operation) = &self.operations[index] else { return };
         let constraints = operation.constraints.clone();
-        let Some(body) = &self.file.operations[index].body else { return };
+        let body = &self.file.operations[index].body;
         let written = body.contains.iter().flat_map(|(_, contained)| contained);
         let mut failed = false;
         for (constraint, written) in constraints.iter().zip(written) {

@@ -4,7 +4,8 @@ use sesame_grammar::Rule;
 
 use super::Resolver;
 use super::quantity::is_of_times;
-use super::system::type_in_words;
+use super::resource::acts_on_nodes;
+use super::words::type_in_words;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{
     Distribution, Domain, Drain, Id as _, NotFinite, OperationKind, Parameter, Range, Shape, Step, Target, TopicId,
@@ -27,9 +28,13 @@ enum Held {
 pub(super) type Resolved = (Target, OperationKind, Vec<Parameter>);
 
 impl<'a> Resolver<'a> {
-    /// An operation of any kind but a custom one.
-    pub(super) fn disturbance(&mut self, target: &'a ast::Target, kind: &'a ast::OperationKind) -> Option<Resolved> {
-        match kind {
+    /// An operation on messages, of any kind but a custom one.
+    pub(super) fn disturbance(&mut self, target: &'a ast::Target, body: &'a ast::OperationBody) -> Option<Resolved> {
+        match &body.kind {
+            ast::OperationKind::Plain { rule, .. } if acts_on_nodes(*rule) => {
+                self.needs_a_node(target, *rule, body.kind_word);
+                None
+            }
             ast::OperationKind::Plain { rule, amounts } => self.plain(target, *rule, amounts.as_ref()),
             ast::OperationKind::Random { absolute, amounts } => self.random_value(target, *absolute, amounts),
             ast::OperationKind::RandomText(texts) => {
@@ -498,7 +503,7 @@ fn whole_or_parts(target: Target) -> Target {
 }
 
 /// A parameter of which a test chooses one number.
-fn number(name: &str, unit: Option<Unit>, range: Range) -> Parameter {
+pub(super) fn number(name: &str, unit: Option<Unit>, range: Range) -> Parameter {
     let domain = Domain::Number { range, shape: Shape::Value, integer: false };
     Parameter { name: name.to_owned(), doc: String::new(), unit, domain }
 }

@@ -65,11 +65,8 @@ impl<'a> Resolver<'a> {
         if fits {
             return Some(TopicId::from_index(index));
         }
-        let is = if topic.paths.len() > 1 {
-            "a group of topics".to_owned()
-        } else {
-            super::system::type_in_words(&topic.ty)
-        };
+        let is =
+            if topic.paths.len() > 1 { "a group of topics".to_owned() } else { super::words::type_in_words(&topic.ty) };
         let title = format!("a monitor cannot publish its state on `{}`", name.text);
         let diagnostic = Diagnostic::new(Code::WRONG_TYPE, name.span, title).label(format!("it is {is}"));
         self.report(diagnostic.note(
@@ -112,7 +109,7 @@ impl<'a> Resolver<'a> {
             diagnostic = match most_similar(&name.text, guarantees.iter().copied()) {
                 Some(similar) => diagnostic.did_you_mean(name.span, similar),
                 None if guarantees.is_empty() => diagnostic.note("it has no guarantees"),
-                None => diagnostic.note(format!("its guarantees are {}", super::list(&guarantees))),
+                None => diagnostic.note(format!("its guarantees are {}", super::words::list(&guarantees))),
             };
             self.report(diagnostic);
             return None;
@@ -167,7 +164,7 @@ impl<'a> Resolver<'a> {
             let title = if through.is_empty() {
                 format!("monitor `{}` depends on itself", first.text)
             } else {
-                format!("monitor `{}` depends on itself through {}", first.text, super::list(&through))
+                format!("monitor `{}` depends on itself through {}", first.text, super::words::list(&through))
             };
             let closing = cycle[cycle.len() - 1].1;
             let mut diagnostic = Diagnostic::new(Code::CIRCLE, closing, title).label("this demand closes the cycle");
@@ -309,7 +306,7 @@ impl<'a> Resolver<'a> {
         diagnostic = match most_similar(&name.text, known.iter().copied()) {
             Some(similar) => diagnostic.did_you_mean(name.span, similar),
             None if known.is_empty() => diagnostic.note("it has no evidence and no demands"),
-            None => diagnostic.note(format!("its evidence and demands are {}", super::list(&known))),
+            None => diagnostic.note(format!("its evidence and demands are {}", super::words::list(&known))),
         };
         self.report(diagnostic);
         None
@@ -346,7 +343,7 @@ impl<'a> Resolver<'a> {
                     written::Mitigation::Text(text) => text.span,
                 };
                 let title = format!("`{}` cannot be the value of {what}", self.text(span));
-                let label = format!("{what} is {}", super::system::type_in_words(&ty));
+                let label = format!("{what} is {}", super::words::type_in_words(&ty));
                 self.report(Diagnostic::new(Code::WRONG_TYPE, span, title).label(label));
                 return None;
             }

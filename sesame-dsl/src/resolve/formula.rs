@@ -231,7 +231,7 @@ impl<'a> Resolver<'a> {
     fn per(&mut self, path: &'a Path, inputs: &[Input]) -> Option<FieldPath> {
         let (field, ty) = self.field(path)?;
         if !matches!(ty, Type::Text | Type::Int(_)) {
-            let is = super::system::type_in_words(&ty);
+            let is = super::words::type_in_words(&ty);
             let title = format!("`per` needs a `text` or an integer, but `{}` is {is}", self.text(path.span));
             let label = "expected a `text` or an integer";
             self.report(Diagnostic::new(Code::WRONG_TYPE, path.span, title).label(label));

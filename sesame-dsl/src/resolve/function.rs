@@ -172,7 +172,7 @@ impl<'a> Resolver<'a> {
         let synonym = meanings(&name.text, expected).first().map(|synonym| synonym.meant);
         diagnostic = match synonym.or_else(|| most_similar(&name.text, known.iter().copied())) {
             Some(similar) => diagnostic.did_you_mean(name.span, similar),
-            None => diagnostic.note(format!("the functions allowed here are {}", super::list(known))),
+            None => diagnostic.note(format!("the functions allowed here are {}", super::words::list(known))),
         };
         self.report(diagnostic);
     }

@@ -3,7 +3,8 @@
 use sesame_notation::quoted;
 
 use super::quantity::percent;
-use super::{Kind, Resolver, list};
+use super::words::list;
+use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{self, Activation, Choice, Domain, Id as _, OperationId, OperationKind, Parameter, Range, Shape};
 
@@ -20,7 +21,7 @@ impl<'a> Resolver<'a> {
     }
 
     fn operation(&mut self, operation: &'a ast::Operation) -> Option<model::Operation> {
-        let body = operation.body.as_ref()?;
+        let body = &operation.body;
         let what = self.target_and_kind(body);
         let within = match self.single(&body.within, "within") {
             Some(range) => self.within(range).map(Some),
@@ -39,12 +40,15 @@ impl<'a> Resolver<'a> {
             None => Some(1.0),
         };
         self.at_most_one(&body.untimed, "untimed");
-        self.between_nodes(body);
+        let between = self.between_nodes(body);
         let constraints = self.constraints(&body.contains);
         let (target, kind, parameters) = what?;
+        let [from, to] = between?;
         Some(model::Operation {
             declaration: self.declaration(&operation.head),
             target,
+            from,
+            to,
             kind,
             parameters,
             within: within?,
@@ -60,11 +64,20 @@ impl<'a> Resolver<'a> {
         &mut self,
         body: &'a ast::OperationBody,
     ) -> Option<(Option<model::Target>, OperationKind, Vec<Parameter>)> {
-        if let ast::OperationKind::Custom(custom) = &body.kind {
+        if let (ast::OperationKind::Custom(custom), None) = (&body.kind, &body.resource) {
             return self.custom(custom, body);
         }
-        let target = body.target.as_ref().expect("the grammar gives all kinds but custom ones a topic");
-        let (target, kind, parameters) = self.disturbance(target, &body.kind)?;
+        let (target, kind, parameters) = match (&body.resource, &body.target) {
+            (Some(resource), _) => {
+                let (kind, parameters) = self.on_resource(resource, body)?;
+                (None, kind, parameters)
+            }
+            (None, Some(target)) => {
+                let (target, kind, parameters) = self.disturbance(target, body)?;
+                (Some(target), kind, parameters)
+            }
+            (None, None) => unreachable!("only custom operations can act on nothing"),
+        };
         let mut said: Vec<Span> = Vec::new();
         for parameter in &parameters {
             let (Domain::Number { range, .. }, Some(span)) = (&parameter.domain, body.kind.written(&parameter.name))
@@ -78,7 +91,7 @@ impl<'a> Resolver<'a> {
             }
             said.push(span);
         }
-        Some((Some(target), kind, parameters))
+        Some((target, kind, parameters))
     }
 
     /// Warns of a range that leaves nothing to choose.
@@ -228,7 +241,7 @@ impl<'a> Resolver<'a> {
             (&activation, operation.within, &test.activation)
             && !within.contains(*window)
         {
-            let declared = self.file.operations[index].body.as_ref().and_then(|body| body.within.first());
+            let declared = self.file.operations[index].body.within.first();
             let mut diagnostic = Diagnostic::new(
                 Code::BAD_WINDOW,
                 written.span,
@@ -435,7 +448,7 @@ impl<'a> Resolver<'a> {
 
     /// Where the permitted values of a parameter are declared.
     fn declared(&self, index: usize, parameter: &Parameter) -> Option<Span> {
-        match &self.file.operations[index].body.as_ref()?.kind {
+        match &self.file.operations[index].body.kind {
             ast::OperationKind::Custom(custom) => {
                 custom.parameters.iter().find(|written| written.name.text == parameter.name).map(|written| written.span)
             }

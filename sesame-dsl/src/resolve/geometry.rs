@@ -180,7 +180,7 @@ impl<'a> Resolver<'a> {
             return Some((field, unit));
         }
         let title = format!("`{}` is not a point", self.text(path.span));
-        let label = format!("it is {}", super::system::type_in_words(&ty));
+        let label = format!("it is {}", super::words::type_in_words(&ty));
         self.report(Diagnostic::new(Code::WRONG_TYPE, path.span, title).label(label));
         None
     }

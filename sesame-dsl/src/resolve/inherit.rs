@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::list;
+use super::words::list;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::syntax::ast::{ActivationMode, Campaign, Exploration, ExplorationKind, File};
 

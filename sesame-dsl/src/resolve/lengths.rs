@@ -43,7 +43,7 @@ impl<'a> Resolver<'a> {
 
     /// Where the lengths of an operation are written.
     fn written_lengths(&self, index: usize) -> Option<Span> {
-        let body = self.file.operations[index].body.as_ref()?;
+        let body = &self.file.operations[index].body;
         body.lengths.first().map(|(_, range)| range.span)
     }
 
@@ -107,6 +107,7 @@ impl<'a> Resolver<'a> {
         let (Some(written), Some((_, end_written))) = (self.written_lengths(index), campaign.ends.first()) else {
             return;
         };
+        let end_written = &end_written.after;
         let room = end - begin;
         // That was reported of its window.
         let leaves_the_end = within.is_some_and(|within| within.high > end);

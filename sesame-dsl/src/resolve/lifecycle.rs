@@ -1,12 +1,21 @@
 //! The clauses of a system beside its simulator: launching, terminating, the budget of the relay.
 
+use super::placeholders::Place;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{self, Id as _, Lifecycle, TopicId};
+use crate::model::{self, Id as _, Lifecycle, ReadyWhen, TopicId};
 use crate::span::Span;
 use crate::syntax::ast::lifecycle as written;
-use crate::syntax::ast::{Quantity, System};
+use crate::syntax::ast::{self, Name, Quantity, System, Text};
 use crate::units::Unit;
+
+/// What a node says beside its topics.
+pub(super) struct RestOfNode {
+    pub(super) named: Option<String>,
+    pub(super) launch: Option<model::Launch>,
+    pub(super) answers: Vec<(TopicId, TopicId)>,
+    pub(super) every_step: Vec<TopicId>,
+}
 
 impl<'a> Resolver<'a> {
     pub(super) fn lifecycle(&mut self) -> Option<Lifecycle> {
@@ -39,26 +48,150 @@ impl<'a> Resolver<'a> {
         let spans: Vec<Span> =
             systems.iter().flat_map(|system| clauses(system).iter().map(|(span, _)| *span)).collect();
         self.at_most_one(&spans, what);
+        if what != "relay budget"
+            && let Some(&span) = spans.first()
+        {
+            self.has_programs(span, what);
+        }
         systems.iter().find_map(|system| clauses(system).first())
+    }
+
+    /// Reports a command for a simulator that is part of the runner.
+    fn has_programs(&mut self, span: Span, what: &str) {
+        let Some(("in_process", simulator)) = self.other_than_ros2() else { return };
+        let title = format!("`{what}` has nothing to do: simulator kind `in_process` is part of the runner");
+        let diagnostic = Diagnostic::new(Code::NOTHING_TO_LAUNCH, span, title)
+            .label(format!("remove this `{what}`"))
+            .secondary(simulator, "the simulator is declared here")
+            .note(
+                "what the simulator needs, it starts in `Simulator::reset`, or a custom operation `before start` does",
+            );
+        self.report(diagnostic);
+    }
+
+    /// What a node says beside its topics.
+    pub(super) fn rest_of_node(
+        &mut self,
+        node: &'a ast::Node,
+        publishes: Option<&[TopicId]>,
+        subscribes: Option<&[TopicId]>,
+    ) -> Option<RestOfNode> {
+        let named = match &node.named {
+            Some(written) => match self.other_than_ros2() {
+                Some((kind, simulator)) => {
+                    let title = format!("simulator kind `{kind}` has no names of nodes");
+                    let diagnostic = Diagnostic::new(Code::NOT_ROS, written.span, title)
+                        .label("only nodes of a `ros2` simulator have a name beside their own; remove it")
+                        .secondary(simulator, "the simulator is declared here");
+                    self.report(diagnostic);
+                    None
+                }
+                None => self.ros_name(written, "node").map(Some),
+            },
+            None => Some(None),
+        };
+        let launch = match self.single(&node.launches, "launch") {
+            Some(launch) => {
+                let span = node.launches[0].0;
+                self.has_programs(span, "launch");
+                self.launch(span, launch).map(Some)
+            }
+            None => Some(None),
+        };
+        let mut answers = Some(Vec::new());
+        for answer in self.single(&node.answers, "answers").into_iter().flatten() {
+            let to = self.answered(node, &answer.to, subscribes, "subscribe to");
+            let with = self.answered(node, &answer.with, publishes, "publish");
+            match (&mut answers, to, with) {
+                (Some(answers), Some(to), Some(with)) => answers.push((to, with)),
+                _ => answers = None,
+            }
+        }
+        let mut every_step = Some(Vec::new());
+        for name in self.single(&node.every_step, "every step").into_iter().flatten() {
+            match (&mut every_step, self.answered(node, name, publishes, "publish")) {
+                (Some(topics), Some(topic)) => topics.push(topic),
+                _ => every_step = None,
+            }
+        }
+        Some(RestOfNode { named: named?, launch: launch?, answers: answers?, every_step: every_step? })
+    }
+
+    /// A topic of an answer, which is among those that the node says it publishes or subscribes to.
+    fn answered(&mut self, node: &ast::Node, name: &'a Name, among: Option<&[TopicId]>, does: &str) -> Option<TopicId> {
+        let topic = TopicId::from_index(self.find(name, Kind::Topic)?);
+        if among?.contains(&topic) {
+            return Some(topic);
+        }
+        let title = format!("node `{}` does not {does} `{}`", node.head.name.text, name.text);
+        let diagnostic = Diagnostic::new(Code::WHICH_NODES, name.span, title)
+            .label(format!("a node answers what it subscribes to with what it publishes; add `{}` there", name.text))
+            .secondary(node.head.name.span, "the node is declared here");
+        self.report(diagnostic);
+        None
+    }
+
+    fn ready(&mut self, ready: &'a written::Ready) -> Option<model::Ready> {
+        let when = match &ready.when {
+            written::ReadyWhen::Topic(topic) => {
+                self.find(topic, Kind::Topic).map(|topic| ReadyWhen::Topic(TopicId::from_index(topic)))
+            }
+            written::ReadyWhen::Port(port) => self.port(port).map(ReadyWhen::Port),
+            written::ReadyWhen::Clock(span) => self.clock(*span),
+            written::ReadyWhen::Line(text) => Some(ReadyWhen::Line(text.text.clone())),
+        };
+        let within = self.positive(&ready.within, &Unit::seconds(), "the time until the program is ready");
+        Some(model::Ready { when: when?, within: within? })
+    }
+
+    /// The number of a port, or a text that is one once its placeholders are replaced.
+    fn port(&mut self, port: &Text) -> Option<String> {
+        if port.text.trim().is_empty() || !self.placeholders(port, Place::Port) {
+            return None;
+        }
+        let replaced = port.text.contains("{port}") || port.text.contains("{worker}");
+        let number = port.text.replace("{port}", "1").replace("{worker}", "1");
+        let sound = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
+        if !sound || (!replaced && !number.parse::<u16>().is_ok_and(|port| port > 0)) {
+            let title = format!("`{}` is not a port", port.text);
+            let diagnostic = Diagnostic::new(Code::OUT_OF_RANGE, port.span, title)
+                .label("expected a number from 1 to 65535, or a text such as `\"{port}\"`");
+            self.report(diagnostic);
+            return None;
+        }
+        Some(port.text.clone())
+    }
+
+    /// The clock of the simulator, which only some have.
+    fn clock(&mut self, span: Span) -> Option<ReadyWhen> {
+        let has_a_clock = |ros2: &ast::Ros2| ros2.clocks.iter().any(|(_, clock)| matches!(clock, ast::Clock::Topic(_)));
+        if self.ast_ros2().is_some_and(has_a_clock) || self.simulators().next().is_none_or(|it| it.transport.is_none())
+        {
+            return Some(ReadyWhen::Clock);
+        }
+        let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, span, "the simulator has no clock that could advance")
+            .label("only a `ros2` simulator with a `clock \"TOPIC\"` has one")
+            .note("wait for a `topic`, a `port` or a `line` instead");
+        self.report(diagnostic);
+        None
     }
 
     fn launch(&mut self, span: Span, launch: &'a written::Launch) -> Option<model::Launch> {
         let command = self.command(span, &launch.command);
         let ready = match self.single(&launch.ready, "ready when") {
-            Some(ready) => {
-                let topic = self.find(&ready.topic, Kind::Topic);
-                let within = self.positive(&ready.within, &Unit::seconds(), "the time until the system is ready");
-                Some(model::Ready { topic: TopicId::from_index(topic?), within: within? })
-            }
-            None => None,
+            Some(ready) => self.ready(ready).map(Some),
+            None => Some(None),
         };
-        Some(model::Launch { command: command?, ready })
+        Some(model::Launch { command: command?, ready: ready? })
     }
 
     fn command(&mut self, span: Span, command: &'a written::Command) -> Option<model::Command> {
+        let sound = command.arguments.iter().map(|argument| self.placeholders(argument, Place::Argument));
+        let sound = sound.fold(true, |all, one| all & one);
         // Empty texts were reported where they were read.
         let arguments = command.arguments.iter().map(|argument| argument.text.clone()).collect();
-        Some(model::Command { span, program: self.program(&command.program)?, arguments })
+        let program = self.program(&command.program)?;
+        sound.then_some(model::Command { span, program, arguments })
     }
 
     fn relay_budget(&mut self, span: Span, budget: &'a written::RelayBudget) -> Option<model::RelayBudget> {

@@ -107,12 +107,12 @@ impl<'a> Resolver<'a> {
         if of_first == of_other {
             return Some(());
         }
-        let declared = [first, other].map(|topic| self.ast_topics().nth(topic.index()));
-        let [Some(first), Some(other)] = declared else { return None };
-        let title = format!("`{}` and `{}` have different members", first.head.name.text, other.head.name.text);
+        let name = |topic: TopicId| self.system.topics[topic.index()].as_ref().map(|topic| &topic.declaration.name);
+        let title = format!("`{}` and `{}` have different members", name(first)?, name(other)?);
         let mut diagnostic = Diagnostic::new(Code::UNPAIRED, whole, title).label("the members cannot be paired");
         for (topic, names) in [(first, &of_first), (other, &of_other)] {
-            diagnostic = diagnostic.secondary(topic.path.span, format!("with the members {}", super::list(names)));
+            let span = self.path_of_topic(topic)?.span;
+            diagnostic = diagnostic.secondary(span, format!("with the members {}", super::words::list(names)));
         }
         let sorted = |mut names: Vec<&'a str>| {
             names.sort_unstable();
@@ -128,6 +128,6 @@ impl<'a> Resolver<'a> {
     }
 
     fn names_of_members(&self, topic: TopicId) -> Vec<&'a str> {
-        self.ast_topics().nth(topic.index()).map_or(Vec::new(), |topic| members_of_path(&topic.path.text))
+        self.path_of_topic(topic).map_or(Vec::new(), |path| members_of_path(&path.text))
     }
 }

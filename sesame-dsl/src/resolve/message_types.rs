@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::ros_types::Layout;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{self, Id as _, MessageId, Type};
@@ -13,40 +14,38 @@ use crate::syntax::ast::{self, Name, TypeKind};
 impl<'a> Resolver<'a> {
     pub(super) fn messages(&mut self) {
         let messages: Vec<&'a ast::Message> = self.ast_messages().collect();
+        self.layouts(&messages);
         let (order, cyclic) = self.topological_order(&messages);
         self.system.message_ids = vec![MessageId::from_index(0); messages.len()];
-        for (id, &index) in order.iter().enumerate() {
-            self.system.message_ids[index] = MessageId::from_index(id);
-        }
-        // The number of values of each message, by its id.
-        let mut values: Vec<u64> = Vec::new();
         for &index in &order {
-            let message = self.message(messages[index]).filter(|_| !cyclic[index]);
-            let held = message.iter().flat_map(|message| &message.fields);
-            let count = held.map(|field| values_in(&field.ty, &values)).fold(0, u64::saturating_add);
-            values.push(count);
-            if count > MAX_VALUES {
-                self.too_many_values(messages[index], message.as_ref(), count, &values);
-            }
-            self.system.messages.push(message.filter(|_| count <= MAX_VALUES));
+            let layout = std::mem::take(&mut self.system.ros.layouts[index]);
+            let message = self.message(messages[index], layout).filter(|_| !cyclic[index]);
+            self.system.message_ids[index] = self.add_message(message, messages[index].head.name.span);
         }
     }
 
+    /// Adds a message after those it contains, unless it is too large.
+    pub(super) fn add_message(&mut self, message: Option<model::Message>, at: Span) -> MessageId {
+        let held = message.iter().flat_map(|message| &message.fields);
+        let count = held.map(|field| values_in(&field.ty, &self.system.values)).fold(0, u64::saturating_add);
+        let id = MessageId::from_index(self.system.messages.len());
+        self.system.values.push(count);
+        if let Some(message) = message.as_ref().filter(|_| count > MAX_VALUES) {
+            self.too_many_values(message, at, count);
+        }
+        self.system.messages.push(message.filter(|_| count <= MAX_VALUES));
+        id
+    }
+
     /// Reports a message that is too large, unless a message in it is too large and was reported.
-    fn too_many_values(
-        &mut self,
-        message: &ast::Message,
-        resolved: Option<&model::Message>,
-        count: u64,
-        values: &[u64],
-    ) {
-        let fields = resolved.map_or(&[][..], |message| &message.fields);
+    fn too_many_values(&mut self, message: &model::Message, at: Span, count: u64) {
+        let model::Message { declaration, fields, interface: _ } = message;
+        let values = &self.system.values;
         if fields.iter().any(|field| values_in(&field.ty, values) > MAX_VALUES) {
             return;
         }
-        let name = &message.head.name;
-        let title = format!("message `{}` has {count} values, but the limit is {MAX_VALUES}", name.text);
-        let mut diagnostic = Diagnostic::new(Code::LARGE_MESSAGE, name.span, title)
+        let title = format!("message `{}` has {count} values, but the limit is {MAX_VALUES}", declaration.name);
+        let mut diagnostic = Diagnostic::new(Code::LARGE_MESSAGE, at, title)
             .label("including the values of the messages in it")
             .note("a list counts as one of its elements");
         let largest = fields.iter().max_by_key(|field| values_in(&field.ty, values));
@@ -70,14 +69,14 @@ impl<'a> Resolver<'a> {
         // Contained messages by position, with the place of the mention. Unknown names are reported where types are.
         let contained: Vec<Vec<(usize, Span)>> = messages
             .iter()
-            .map(|message| {
+            .enumerate()
+            .map(|(index, message)| {
                 let names = message.fields.iter().filter_map(|field| message_name(&field.ty));
-                names
-                    .filter_map(|name| {
-                        let definition = self.names.get(name.text.as_str())?;
-                        (definition.kind == Kind::Message).then_some((definition.index, name.span))
-                    })
-                    .collect()
+                let of_fields = names.filter_map(|name| {
+                    let definition = self.names.get(name.text.as_str())?;
+                    (definition.kind == Kind::Message).then_some((definition.index, name.span))
+                });
+                of_fields.chain(self.contained_by_layout(index, message)).collect()
             })
             .collect();
         let mut marks = vec![Mark::New; messages.len()];
@@ -124,7 +123,7 @@ impl<'a> Resolver<'a> {
             format!("message `{}` contains itself", first.text)
         } else {
             let through: Vec<&str> = cycle.iter().skip(1).map(|&index| name(index).text.as_str()).collect();
-            format!("message `{}` contains itself through {}", first.text, super::list(&through))
+            format!("message `{}` contains itself through {}", first.text, super::words::list(&through))
         };
         let diagnostic = Diagnostic::new(Code::RECURSIVE_MESSAGE, mention, title)
             .label("a value of this type would be infinite")
@@ -132,7 +131,7 @@ impl<'a> Resolver<'a> {
         self.report(diagnostic);
     }
 
-    fn message(&mut self, message: &'a ast::Message) -> Option<model::Message> {
+    fn message(&mut self, message: &'a ast::Message, layout: Layout) -> Option<model::Message> {
         let mut first: BTreeMap<&str, Span> = BTreeMap::new();
         let mut fields = Vec::new();
         let mut complete = !message.has_errors;
@@ -145,15 +144,36 @@ impl<'a> Resolver<'a> {
             }
             first.entry(&name.text).or_insert(name.span);
             match self.type_of(&field.ty) {
-                Some(ty) => fields.push(model::Field { declaration: self.declaration(&field.head), ty }),
+                Some(ty) => fields.push((field, ty)),
                 None => complete = false,
             }
         }
-        if message.fields.is_empty() && !message.has_errors {
+        let interface = match layout {
+            Layout::Found(found) => {
+                let message = self.message_of_layout(message, fields, &found)?;
+                return complete.then_some(message);
+            }
+            Layout::Block(name) => {
+                let layout = self.layout_of_block(&name, &fields)?;
+                if complete {
+                    self.keep(&[layout]);
+                }
+                Some(name)
+            }
+            Layout::None => {
+                // Of a type that has a mistake nothing is known.
+                complete &= message.ros_type.is_none();
+                None
+            }
+        };
+        if message.fields.is_empty() && message.block && !message.has_errors && interface.is_none() {
             self.missing(&message.head.name, "a field", "level: real[mm]");
             complete = false;
         }
-        complete.then(|| model::Message { declaration: self.declaration(&message.head), fields })
+        let declared = fields.into_iter();
+        let fields = declared.map(|(field, ty)| model::Field { declaration: self.declaration(&field.head), ty });
+        let fields = fields.collect();
+        complete.then(|| model::Message { declaration: self.declaration(&message.head), fields, interface })
     }
 
     pub(super) fn type_of(&mut self, ty: &'a ast::Type) -> Option<Type> {

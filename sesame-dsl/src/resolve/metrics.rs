@@ -113,7 +113,7 @@ impl<'a> Resolver<'a> {
         match self.type_of(ty)? {
             real @ Type::Real(_) => Some(real),
             other => {
-                let title = format!("a metric must be a real number, not {}", super::system::type_in_words(&other));
+                let title = format!("a metric must be a real number, not {}", super::words::type_in_words(&other));
                 let diagnostic = Diagnostic::new(Code::WRONG_TYPE, ty.span, title)
                     .label("expected `real` or, with a unit, for example `real[m]`")
                     .fix("use `real`", ty.span, "real");

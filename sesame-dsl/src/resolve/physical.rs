@@ -145,7 +145,7 @@ impl<'a> Resolver<'a> {
                 diagnostic = match most_similar(&name.text, known.iter().copied()) {
                     Some(similar) => diagnostic.did_you_mean(name.span, similar),
                     None if known.is_empty() => diagnostic.note(format!("`{word}` has no settings")),
-                    None => diagnostic.note(format!("the settings of `{word}` are {}", super::list(&known))),
+                    None => diagnostic.note(format!("the settings of `{word}` are {}", super::words::list(&known))),
                 };
                 self.report(diagnostic);
                 complete = false;

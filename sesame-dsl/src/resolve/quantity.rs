@@ -184,9 +184,14 @@ impl Resolver<'_> {
 
     /// A range of percentages between 0 and 100, as probabilities.
     pub(super) fn probabilities(&mut self, range: &ast::Range, what: &str) -> Option<Range> {
-        let found = self.range(range, Some(&percent()), what)?;
         let all = Range { low: 0.0, high: 100.0 };
-        self.inside(found, range.span, all, what, "0% to 100%", None).then(|| Range {
+        self.percentages(range, what, all, "0% to 100%")
+    }
+
+    /// A range of percentages that are permitted, as fractions; `permitted` is what is permitted in words.
+    pub(super) fn percentages(&mut self, range: &ast::Range, what: &str, all: Range, permitted: &str) -> Option<Range> {
+        let found = self.range(range, Some(&percent()), what)?;
+        self.inside(found, range.span, all, what, permitted, None).then(|| Range {
             low: self.probability(&range.low, found.low),
             high: self.probability(&range.high, found.high),
         })

@@ -37,6 +37,7 @@ impl<'a> Resolver<'a> {
                 };
                 Transport::Process { program: program?, arguments, step_ns }
             }
+            ast::Transport::Ros2(ros2) => self.ros2(name, ros2)?,
         };
         Some(Simulator { declaration: self.declaration(&simulator.head), transport })
     }
@@ -106,7 +107,7 @@ impl<'a> Resolver<'a> {
         None
     }
 
-    fn step(&mut self, step: &ast::Quantity) -> Option<u64> {
+    pub(super) fn step(&mut self, step: &ast::Quantity) -> Option<u64> {
         let nanoseconds = Unit::parse("ns").expect("`ns` is in the table");
         let seconds = Unit::seconds();
         self.value(step, Some(&seconds), "a step size")?;

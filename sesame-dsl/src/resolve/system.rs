@@ -3,13 +3,14 @@
 use std::collections::{BTreeMap, HashSet};
 use std::hash::Hash;
 
+use super::words::type_in_words;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{self, Id as _, Simulator, TopicId, Type};
+use crate::model::{self, Channel, Id as _, Simulator, TopicId, Type};
 use crate::similar::most_similar;
 use crate::span::Span;
 use crate::syntax::ast::{self, Name};
-use crate::units::{Dimension, Unit, dimension};
+use crate::units::Unit;
 
 impl<'a> Resolver<'a> {
     pub(super) fn ast_messages(&self) -> impl Iterator<Item = &'a ast::Message> + use<'a> {
@@ -28,6 +29,7 @@ impl<'a> Resolver<'a> {
         let simulator = self.simulators().next().and_then(|simulator| self.simulator(simulator));
         self.messages();
         self.topics();
+        self.services();
         self.nodes();
         simulator
     }
@@ -36,17 +38,11 @@ impl<'a> Resolver<'a> {
         let mut paths: BTreeMap<String, Span> = BTreeMap::new();
         for topic in self.ast_topics() {
             let ty = self.type_of(&topic.ty);
-            let members = self.topic_paths(&topic.path);
+            let ty = ty.filter(|ty| self.has_a_layout(topic, ty));
+            let members = self.topic_paths(&topic.path, "topic");
             for member in members.iter().flatten() {
                 if let Some(&first) = paths.get(member) {
-                    let diagnostic = Diagnostic::new(
-                        Code::SAME_PATH,
-                        topic.path.span,
-                        format!("two topics have the path `{member}`"),
-                    )
-                    .label("used again here")
-                    .secondary(first, "first used here");
-                    self.report(diagnostic);
+                    self.same_path("topics", member, topic.path.span, first);
                 } else {
                     paths.insert(member.clone(), topic.path.span);
                 }
@@ -56,20 +52,73 @@ impl<'a> Resolver<'a> {
                 written: topic.path.text.clone(),
                 paths,
                 ty,
+                channel: Channel::Topic,
             });
             self.system.topics.push(resolved);
         }
     }
 
-    /// The paths of a topic: one, or the members of its group.
-    fn topic_paths(&mut self, path: &ast::Text) -> Option<Vec<String>> {
+    pub(super) fn same_path(&mut self, what: &str, path: &str, again: Span, first: Span) {
+        let diagnostic = Diagnostic::new(Code::SAME_PATH, again, format!("two {what} have the path `{path}`"))
+            .label("used again here")
+            .secondary(first, "first used here");
+        self.report(diagnostic);
+    }
+
+    /// Whether a topic carries what its simulator can: in ROS a message with a ROS type.
+    fn has_a_layout(&mut self, topic: &ast::Topic, ty: &Type) -> bool {
+        if self.ast_ros2().is_none() {
+            return true;
+        }
+        let diagnostic = Diagnostic::new(
+            Code::NOT_ROS,
+            topic.ty.span,
+            format!("topic `{}` does not carry a message of ROS", topic.head.name.text),
+        );
+        let diagnostic = match ty {
+            Type::Message(id) => {
+                let Some(message) = self.system.messages[id.index()].as_ref() else { return true };
+                if message.interface.is_some() {
+                    return true;
+                }
+                let name = &message.declaration.name;
+                diagnostic
+                    .label(format!("message `{name}` has no ROS type"))
+                    .secondary(message.declaration.span, "the message is declared here")
+                    .note(format!(
+                        "write its type after its name, for example `message {name} = \"cell_msgs/msg/{name}\"`"
+                    ))
+            }
+            other => {
+                let example = match other {
+                    Type::Bool => "std_msgs/msg/Bool",
+                    Type::Int(_) => "std_msgs/msg/Int32",
+                    Type::Text => "std_msgs/msg/String",
+                    Type::Point(_) => "geometry_msgs/msg/Point",
+                    _ => "std_msgs/msg/Float64",
+                };
+                let name = example.rsplit('/').next().unwrap_or_default();
+                diagnostic.label("in ROS a topic carries messages").note(format!(
+                    "declare the message, for example `message {name} = \"{example}\"`, and write `{name}` here"
+                ))
+            }
+        };
+        self.report(diagnostic);
+        false
+    }
+
+    /// The paths of a topic or service: one, or the members of its group. In ROS they are absolute.
+    pub(super) fn topic_paths(&mut self, path: &ast::Text, what: &str) -> Option<Vec<String>> {
         if path.text.trim().is_empty() {
             return None;
         }
         match expand_group(&path.text) {
+            Ok(paths) if self.ast_ros2().is_some() => {
+                paths.iter().map(|name| self.absolute(name, path.span, what)).collect()
+            }
             Ok(paths) => Some(paths),
             Err(why) => {
-                let title = format!("`{}` is not the path of a topic", path.text);
+                let title = format!("`{}` is not the path of a {what}", path.text);
                 self.report(Diagnostic::new(Code::BAD_PATH, path.span, title).label(why));
                 None
             }
@@ -85,13 +134,26 @@ impl<'a> Resolver<'a> {
             };
             let publishes = topics(&node.publishes, "publishes");
             let subscribes = topics(&node.subscribes, "subscribes");
-            let resolved = publishes.zip(subscribes).map(|(publishes, subscribes)| model::Node {
+            let rest = self.rest_of_node(node, publishes.as_deref(), subscribes.as_deref());
+            let lists = publishes.zip(subscribes).zip(rest);
+            let resolved = lists.map(|((publishes, subscribes), rest)| model::Node {
                 declaration: self.declaration(&node.head),
                 publishes,
                 subscribes,
+                named: rest.named,
+                launch: rest.launch,
+                answers: rest.answers,
+                every_step: rest.every_step,
             });
             self.system.nodes.push(resolved);
         }
+    }
+
+    /// The path of a topic as it is written.
+    pub(super) fn path_of_topic(&self, topic: TopicId) -> Option<&'a ast::Text> {
+        let paths = self.ast_topics().map(|topic| &topic.path);
+        let of_services = self.ast_services().flat_map(|service| [&service.path, &service.path]);
+        paths.chain(of_services).nth(topic.index())
     }
 
     /// What a path refers to: its topic, and the type at its end. `None` was reported, here or before.
@@ -184,7 +246,7 @@ impl<'a> Resolver<'a> {
             if self.compared.more(known.len()) {
                 diagnostic = match most_similar(&name.text, known.iter().copied()) {
                     Some(similar) => diagnostic.did_you_mean(name.span, similar),
-                    None => diagnostic.note(format!("its fields are {}", super::list(&known))),
+                    None => diagnostic.note(format!("its fields are {}", super::words::list(&known))),
                 };
             }
             self.report(diagnostic);
@@ -228,22 +290,6 @@ impl<'a> Resolver<'a> {
         }
         self.report(diagnostic);
         None
-    }
-}
-
-pub(super) fn type_in_words(ty: &Type) -> String {
-    let unit = |unit: &Option<Unit>| match unit {
-        Some(it) if dimension(Some(it)) != Dimension::NONE => format!(" in `{}`", it.text()),
-        _ => String::new(),
-    };
-    match ty {
-        Type::Bool => "a `bool`".to_owned(),
-        Type::Int(it) => format!("an integer{}", unit(it)),
-        Type::Real(it) => format!("a number{}", unit(it)),
-        Type::Text => "a `text`".to_owned(),
-        Type::Point(it) => format!("a point{}", unit(it)),
-        Type::List(_) => "a list".to_owned(),
-        Type::Message(_) => "a message".to_owned(),
     }
 }
 

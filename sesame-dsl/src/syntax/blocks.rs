@@ -142,6 +142,7 @@ pub(super) const BLOCKS: &[Block] = &[
             Member::declaration(Rule::simulator, "simulator"),
             Member::declaration(Rule::message, "message"),
             Member::declaration(Rule::topic, "topic"),
+            Member::declaration(Rule::service, "service"),
             Member::declaration(Rule::node, "node"),
             Member::new(Rule::launch, "launch"),
             Member::new(Rule::terminate, "terminate"),
@@ -158,7 +159,18 @@ pub(super) const BLOCKS: &[Block] = &[
         "process",
         &[Member::new(Rule::setting_step, "step"), Member::like(Rule::free_running, "free", "free running")],
     ),
-    Block::settings(Rule::launch_settings, "launch", &[Member::like(Rule::ready, "ready", "ready when topic")]),
+    Block::settings(
+        Rule::ros2_settings,
+        "ros2",
+        &[
+            Member::new(Rule::setting_domain, "domain"),
+            Member::new(Rule::setting_types, "types"),
+            Member::new(Rule::setting_clock, "clock"),
+            Member::new(Rule::step_by, "step"),
+            Member::like(Rule::setting_reset, "reset", "reset by service"),
+        ],
+    ),
+    Block::settings(Rule::launch_settings, "launch", &[Member::like(Rule::ready, "ready", "ready when")]),
     Block::settings(
         Rule::budget_settings,
         "relay budget",
@@ -176,7 +188,13 @@ pub(super) const BLOCKS: &[Block] = &[
         name: "node",
         error: Rule::error_node_member,
         one: Rule::one_node_member,
-        members: &[Member::new(Rule::publishes, "publishes"), Member::new(Rule::subscribes, "subscribes")],
+        members: &[
+            Member::new(Rule::publishes, "publishes"),
+            Member::new(Rule::subscribes, "subscribes"),
+            Member::new(Rule::launch, "launch"),
+            Member::new(Rule::answers, "answers"),
+            Member::like(Rule::every_step, "every", "every step"),
+        ],
     },
     Block {
         rule: Rule::hook_block,

@@ -482,6 +482,7 @@ fn phrases_of(rule: Rule) -> Vec<String> {
         Rule::window | Rule::from_nodes | Rule::campaign_from => &["`from`"],
         Rule::moment => &["`before start`"],
         Rule::until_condition => &["`until`"],
+        Rule::end_when => &["`or when`"],
         Rule::for_length | Rule::for_lengths => &["`for`"],
         Rule::at_most_times => &["`at most`"],
         Rule::may_overlap => &["`may overlap`"],
@@ -519,13 +520,21 @@ fn phrases_of(rule: Rule) -> Vec<String> {
         Rule::fixed => &["`at`"],
         Rule::expand => &["`expand`"],
         Rule::fit_delay => &["`relay delay`"],
-        Rule::fit_parameter => &["`parameter`"],
+        Rule::fit_parameter | Rule::on_parameter => &["`parameter`"],
         Rule::drain => &["`drain`"],
         Rule::direction => &["`maximise`", "`minimise`"],
         Rule::default_value => &["`default`"],
         Rule::value_mode => &["`offset`", "`absolute`"],
         Rule::in_process => &["`in_process`"],
         Rule::process => &["`process`"],
+        Rule::ros2 => &["`ros2`"],
+        Rule::ros_type => &["`=` and a ROS type"],
+        Rule::wire_type => &["`as`"],
+        Rule::answer => &["an answer such as `joints with commands`"],
+        Rule::ready_topic => &["`topic`"],
+        Rule::ready_port => &["`port`"],
+        Rule::ready_line => &["`line`"],
+        Rule::ready_clock => &["`clock`"],
         Rule::random_value => &["`random`"],
         Rule::packet_loss | Rule::k_packet => &["`packet loss`"],
         Rule::stuck_at | Rule::k_stuck => &["`stuck at`"],
@@ -549,6 +558,11 @@ fn phrases_of(rule: Rule) -> Vec<String> {
         Rule::corners => &["a box such as `[(0, 0, 0)m, (1, 1, 1)m]`"],
         Rule::latency => &["`latency`"],
         Rule::blackhole => &["`blackhole`"],
+        Rule::on_node => &["`node`"],
+        Rule::set_parameter => &["`set`"],
+        Rule::pause => &["`pause`"],
+        Rule::slow => &["`slow`"],
+        Rule::kill => &["`kill`"],
         Rule::formula => &["a formula such as `last(cycle)`"],
         Rule::expression
         | Rule::switch
@@ -576,13 +590,7 @@ fn phrases_of(rule: Rule) -> Vec<String> {
         Rule::formula_whole => &["`whole windows`"],
         Rule::fuzzing_time => &["`fuzzing_time()`"],
         Rule::minus => &["`-`"],
-        Rule::k_not
-        | Rule::k_always
-        | Rule::k_eventually
-        | Rule::k_node
-        | Rule::k_parameter
-        | Rule::k_pair
-        | Rule::element => &[],
+        Rule::k_not | Rule::k_always | Rule::k_eventually | Rule::k_pair | Rule::element => &[],
         _ => {
             let members: Vec<String> = blocks::members(rule).map(blocks::Member::phrase).collect();
             if !members.is_empty() {

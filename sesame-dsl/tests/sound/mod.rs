@@ -44,7 +44,10 @@ pub(crate) fn has_a_sound_answer(text: &str) -> (FileId, Analysis) {
     }
     let Index { definitions, references, unread } = &analysis.index;
     for definition in definitions {
-        assert_eq!(sources.snippet(definition.span), definition.name);
+        // The topics of a service stand where its name does.
+        let written = sources.snippet(definition.span);
+        let of_service = ["_request", "_reply"].iter().any(|end| definition.name == format!("{written}{end}"));
+        assert!(definition.name == written || of_service, "{definition:?}");
         let within = definition.full_span.range();
         assert!(sources.file(definition.span.file).text().get(within).is_some(), "{definition:?}");
     }

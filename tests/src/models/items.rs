@@ -183,12 +183,8 @@ impl Space {
             members.push(format!("{}  node {name} {{ {lists} }}\n", docs(&mut self.draw)));
         }
         if self.draw.chance(0.2) {
-            let topic = &self.topics[0].name;
-            members.push(format!(
-                "  launch {} {} {{ ready when topic {topic} within 5s }}\n  relay budget {{ latency 5ms }}\n",
-                quoted("./start"),
-                quoted(&text(&mut self.draw))
-            ));
+            // A simulator of this kind has nothing to launch.
+            members.push(format!("  relay budget {{ latency 5ms }} // {}\n", quoted(&text(&mut self.draw))));
         }
         let order = self.draw.0.permutation(members.len());
         let members: String = order.into_iter().map(|at| members[at].as_str()).collect();

@@ -38,7 +38,8 @@ impl CampaignPlan {
         at("confirm", campaign.confirm.as_ref().map_or(Ok(()), confirmation))?;
         at("neighbours", campaign.neighbours.map_or(Ok(()), at_least_one))?;
         each("stop", &campaign.stop, stop_rule)?;
-        at("end_after", positive(campaign.end_after))
+        at("end_after", positive(campaign.end_after))?;
+        at("end_when", campaign.end_when.as_ref().map_or(Ok(()), |condition| self.condition(condition)))
     }
 
     fn condition_space(&self, space: &ConditionSpace) -> Checked {

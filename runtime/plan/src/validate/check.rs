@@ -46,7 +46,7 @@ pub(super) fn at(part: &str, checked: Checked) -> Checked {
     })
 }
 
-pub(super) fn each<T>(part: &str, items: &[T], mut check: impl FnMut(&T) -> Checked) -> Checked {
+pub(super) fn each<'t, T>(part: &str, items: &'t [T], mut check: impl FnMut(&'t T) -> Checked) -> Checked {
     items.iter().enumerate().try_for_each(|(index, item)| at(part, at(&format!("[{index}]"), check(item))))
 }
 

@@ -51,6 +51,12 @@ pub fn adopted(is_own: impl Fn(u32) -> bool) -> Vec<Process> {
     }
 }
 
+/// The living processes below a process.
+#[cfg(all(feature = "process", target_os = "linux"))]
+pub(crate) fn below(id: u32) -> Vec<Process> {
+    linux::below(&linux::all(), vec![id])
+}
+
 /// Waits up to `patience` until all these processes have ended; then ends the remaining ones, all processes below them,
 /// and all in groups and sessions that they lead. Returns how many remain: processes that the system blocks, or does
 /// not permit us to end. Children of this process among them are reaped, so no other code may wait for them.

@@ -3,7 +3,8 @@
 //!
 //! It becomes the parent of every process below the program whose own parent ends, in any session. It waits until
 //! the program has exited, or until the program's input is closed: by the worker, or because the worker has ended. In
-//! that case the program has its time to exit by itself. Then the keeper ends all remaining processes, reports how the
+//! that case the program has its time to exit by itself; one in the background, which has no input of its own, is asked
+//! with `SIGTERM`. Then the keeper ends all remaining processes, reports how the
 //! program ended, and exits. If the keeper is killed, the system ends the program, and the program's children become
 //! the worker's.
 
@@ -13,7 +14,7 @@ use std::io::{self, PipeReader, PipeWriter, Read as _, Write as _};
 use std::os::fd::AsRawFd as _;
 use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
 use std::path::Path;
-use std::process::{Command, ExitCode, ExitStatus};
+use std::process::{Command, ExitCode, ExitStatus, Stdio};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
@@ -26,7 +27,7 @@ use rustix::process::{
 };
 
 use crate::lifecycle::descendants;
-use crate::lifecycle::limits::{END_LIMIT, reason};
+use crate::lifecycle::limits::{BACKGROUND_END_LIMIT, END_LIMIT, NOT_FOUND, reason};
 
 /// How often a keeper checks that its worker is alive: the program itself may hold its input open.
 const CHECK: Timespec = Timespec { tv_sec: 0, tv_nsec: 250_000_000 };
@@ -67,14 +68,29 @@ impl Report {
 }
 
 /// The command of a keeper, without the program and its arguments.
-pub(super) fn command(report: &Report) -> Command {
+pub(super) fn command(report: &Report, background: bool) -> Command {
     // This is the running executable even if its file was replaced.
     let mut command = Command::new("/proc/self/exe");
     if let Some(name) = std::env::args_os().next() {
         command.arg0(name);
     }
-    command.arg("simulator").arg(std::process::id().to_string()).arg(report.name()).arg("--");
+    command.arg("simulator").arg(std::process::id().to_string()).arg(report.name());
+    if background {
+        command.arg("--background");
+    }
+    command.arg("--");
     command
+}
+
+/// What a keeper starts.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Kept<'a> {
+    /// The program.
+    pub(crate) program: &'a OsStr,
+    /// Its arguments.
+    pub(crate) arguments: &'a [OsString],
+    /// Whether it has no input of its own.
+    pub(crate) background: bool,
 }
 
 /// The state of a program.
@@ -86,8 +102,9 @@ enum Stage {
 }
 
 /// Starts a program, waits until it has ended, and ends everything it leaves behind. If it cannot be started, `failed`
-/// is called with the reason, with the program's standard output.
-pub(crate) fn keep(worker: u32, report: &Path, program: &OsStr, arguments: &[OsString], failed: fn(&str)) -> ExitCode {
+/// is called with the reason, with the program's standard output and standard error.
+pub(crate) fn keep(worker: u32, report: &Path, kept: &Kept<'_>, failed: fn(&str)) -> ExitCode {
+    let &Kept { program, arguments, background } = kept;
     descendants::adopt_orphans();
     // Without it the keeper's own status is used.
     let report = File::options().write(true).open(report).ok();
@@ -95,7 +112,11 @@ pub(crate) fn keep(worker: u32, report: &Path, program: &OsStr, arguments: &[OsS
     if let Some(name) = std::env::args_os().next() {
         command.arg0(name);
     }
-    command.arg("simulated").arg(std::process::id().to_string()).arg("--").arg(program).args(arguments);
+    command.arg("simulated").arg(std::process::id().to_string());
+    if background {
+        command.arg("--background").stdin(Stdio::null());
+    }
+    command.arg("--").arg(program).args(arguments);
     let child = match command.process_group(0).spawn() {
         Ok(child) => Pid::from_child(&child),
         Err(error) => {
@@ -109,7 +130,7 @@ pub(crate) fn keep(worker: u32, report: &Path, program: &OsStr, arguments: &[OsS
 
     let shared = Arc::new((Mutex::new(Stage::Running), Condvar::new()));
     let watched = Arc::clone(&shared);
-    thread::spawn(move || end_after_input(worker, child, &watched));
+    thread::spawn(move || end_after_input(worker, child, background, &watched));
     let Some(status) = reap_until_ended(child, &shared) else { return ExitCode::FAILURE };
     let (status, stopped) = status;
     descendants::end_adopted(|_| false, Duration::ZERO);
@@ -123,11 +144,17 @@ pub(crate) fn keep(worker: u32, report: &Path, program: &OsStr, arguments: &[OsS
 }
 
 /// Ends the program if it does not exit by itself in time after its input was closed.
-fn end_after_input(worker: u32, child: Pid, shared: &(Mutex<Stage>, Condvar)) {
+fn end_after_input(worker: u32, child: Pid, background: bool, shared: &(Mutex<Stage>, Condvar)) {
     wait_for_end_of_input(worker);
     let (stage, changed) = shared;
     let running = stage.lock().unwrap_or_else(PoisonError::into_inner);
-    let waited = changed.wait_timeout_while(running, END_LIMIT, |stage| *stage == Stage::Running);
+    if background && *running == Stage::Running {
+        // One that was paused must go on to hear it.
+        kill_process_group(child, Signal::TERM).ok();
+        kill_process_group(child, Signal::CONT).ok();
+    }
+    let limit = if background { BACKGROUND_END_LIMIT } else { END_LIMIT };
+    let waited = changed.wait_timeout_while(running, limit, |stage| *stage == Stage::Running);
     let (mut stage, _) = waited.unwrap_or_else(PoisonError::into_inner);
     if *stage == Stage::Running {
         *stage = Stage::Stopped;
@@ -182,5 +209,5 @@ pub(crate) fn become_program(keeper: u32, program: &OsStr, arguments: &[OsString
     }
     let error = Command::new(program).args(arguments).exec();
     failed(&format!("cannot start `{}`: {}", program.display(), reason(&error)));
-    ExitCode::FAILURE
+    u8::try_from(NOT_FOUND).map_or(ExitCode::FAILURE, ExitCode::from)
 }

@@ -3,7 +3,7 @@
 pub use self::system::has_ended;
 #[cfg(target_os = "linux")]
 pub use self::system::is_ours;
-pub use self::system::{kill, own, was_killed};
+pub use self::system::{ask_to_end, kill, own, was_killed};
 
 #[cfg(unix)]
 mod system {
@@ -29,6 +29,13 @@ mod system {
     pub fn kill(child: &mut Child) {
         // An error means that the group has already ended.
         kill_process_group(Pid::from_child(child), Signal::KILL).ok();
+    }
+
+    /// Asks the process and its group to end. It must not have been reaped.
+    pub fn ask_to_end(child: &mut Child) {
+        kill_process_group(Pid::from_child(child), Signal::TERM).ok();
+        // One that was paused must go on to hear it.
+        kill_process_group(Pid::from_child(child), Signal::CONT).ok();
     }
 
     /// Whether a process is in the group of this process.
@@ -58,6 +65,11 @@ mod system {
 
     pub fn kill(child: &mut Child) {
         child.kill().ok();
+    }
+
+    /// There is no way to ask.
+    pub fn ask_to_end(child: &mut Child) {
+        kill(child);
     }
 
     /// The status does not show it here.

@@ -1,22 +1,24 @@
 //! A program: started without a shell in a process group of its own, and ended with everything it started.
 //!
-//! In every case its input is closed first, and it has [`END_LIMIT`] to exit by itself. Everything that it leaves
-//! behind when it exits is ended at once, so no process holds its output open, and the end of the output means the end
-//! of the program. On Linux its [keeper](super::keeper) does this, even after the worker has ended.
+//! In every case its input is closed first, and it has [`END_LIMIT`] to exit by itself; a program without an input is
+//! asked with `SIGTERM` instead. Everything that it leaves behind when it exits is ended at once, so no process holds
+//! its output open, and the end of the output means the end of the program. On Linux its [keeper](super::keeper) does
+//! this, even after the worker has ended.
 
 use std::fmt::Write as _;
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::{Child, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, Weak};
 use std::thread;
 use std::time::Duration;
 
 #[cfg(target_os = "linux")]
 use crate::lifecycle::keeper::Report;
-use crate::lifecycle::limits::{END_LIMIT, reason};
+use crate::lifecycle::limits::{BACKGROUND_END_LIMIT, END_LIMIT, NOT_FOUND, reason};
+use crate::lifecycle::output::{OutputTail, Watch};
 use crate::lifecycle::process_group;
-use crate::lifecycle::stderr::StderrTail;
 
 /// How much longer a keeper may take to end everything that the program started, and then itself.
 #[cfg(target_os = "linux")]
@@ -24,6 +26,9 @@ const KEEPER_LIMIT: Duration = Duration::from_secs(7);
 
 /// The programs started by this process that may be alive.
 static RUNNING: Mutex<Vec<Weak<Handle>>> = Mutex::new(Vec::new());
+
+/// Set when a program in the background ends that was not asked to.
+pub(crate) type Alarm = Arc<AtomicBool>;
 
 /// A program that can be started.
 #[derive(Debug, Clone)]
@@ -34,6 +39,8 @@ pub(crate) struct Program {
     pub(crate) arguments: Vec<String>,
     /// The folder it runs in.
     pub(crate) folder: PathBuf,
+    /// What is in its environment beside what it inherits.
+    pub(crate) environment: Vec<(String, String)>,
     /// Whether this process is a runner, whose executable can be the keeper.
     #[cfg_attr(not(target_os = "linux"), expect(dead_code, reason = "only Linux has keepers"))]
     pub(crate) in_runner: bool,
@@ -51,8 +58,33 @@ impl Program {
         })
     }
 
-    /// Starts it.
+    /// Starts it, to be spoken to on its standard input and heard on its standard output.
     pub(crate) fn start(&self) -> Result<(Running, Input, ChildStdout), StartError> {
+        let (mut child, keeper) = self.spawn(false)?;
+        let input = child.stdin.take().expect("it is piped");
+        let output = child.stdout.take().expect("it is piped");
+        let stderr = OutputTail::capture(child.stderr.take().expect("it is piped"), "the simulator");
+        let handle = Handle::new(child, Some(input), keeper.is_some(), None);
+        Ok((Running { handle: Arc::clone(&handle), output: stderr, keeper }, Input(handle), output))
+    }
+
+    /// Starts it in the background: its standard input is empty, and all that it writes is logged. `watch` sees that
+    /// too, and `alarm` is set if it ends unasked.
+    pub(super) fn start_in_background(&self, watch: &Watch, alarm: &Alarm) -> Result<Running, StartError> {
+        let (mut child, keeper) = self.spawn(true)?;
+        let output = OutputTail::capture_both(
+            child.stdout.take().expect("it is piped"),
+            child.stderr.take().expect("it is piped"),
+            &format!("`{}`", self.shown()),
+            watch,
+        );
+        // The keeper's input, whose end tells it to end the program.
+        let input = child.stdin.take();
+        let handle = Handle::new(child, input, keeper.is_some(), Some(Arc::clone(alarm)));
+        Ok(Running { handle, output, keeper })
+    }
+
+    fn spawn(&self, background: bool) -> Result<(Child, Option<Report>), StartError> {
         let refused = |reason| StartError { command: self.shown(), folder: self.folder.clone(), reason };
         let failed = |error: &io::Error| refused(reason(error));
         if !self.folder.is_dir() {
@@ -61,22 +93,20 @@ impl Program {
         }
         // A worker runs in its own folder; the program runs beside the space.
         let own_folder = std::env::current_dir().map_err(|error| failed(&error))?;
-        let (mut command, keeper) = self.command().map_err(|error| failed(&error))?;
+        let (mut command, keeper) = self.command(background).map_err(|error| failed(&error))?;
         process_group::own(&mut command);
-        let mut child = command
+        let input = if background && keeper.is_none() { Stdio::null() } else { Stdio::piped() };
+        let child = command
             .current_dir(&self.folder)
             .env_remove("SESAME_WORKER_TOKEN")
             .env("SESAME_WORKER_FOLDER", own_folder)
-            .stdin(Stdio::piped())
+            .envs(self.environment.iter().map(|(name, value)| (name, value)))
+            .stdin(input)
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
             .map_err(|error| failed(&error))?;
-        let input = child.stdin.take().expect("it is piped");
-        let output = child.stdout.take().expect("it is piped");
-        let stderr = StderrTail::capture(child.stderr.take().expect("it is piped"));
-        let handle = Handle::new(child, input, keeper.is_some());
-        Ok((Running { handle: Arc::clone(&handle), stderr, keeper }, Input(handle), output))
+        Ok((child, keeper))
     }
 
     /// The program's path: a path with a folder is relative to the program's folder, a name is looked up on `PATH`.
@@ -90,20 +120,20 @@ impl Program {
 
     /// The command that starts it, and where its keeper reports, if it has one.
     #[cfg(target_os = "linux")]
-    fn command(&self) -> io::Result<(Command, Option<Report>)> {
+    fn command(&self, background: bool) -> io::Result<(Command, Option<Report>)> {
         if !self.in_runner {
             return Ok((plain(self), None));
         }
         // If the keeper is killed, this process becomes the parent of its children.
         crate::lifecycle::descendants::adopt_orphans();
         let report = Report::new()?;
-        let mut command = super::keeper::command(&report);
+        let mut command = super::keeper::command(&report, background);
         command.arg(self.path()).args(&self.arguments);
         Ok((command, Some(report)))
     }
 
     #[cfg(not(target_os = "linux"))]
-    fn command(&self) -> io::Result<(Command, Option<Report>)> {
+    fn command(&self, _background: bool) -> io::Result<(Command, Option<Report>)> {
         Ok((plain(self), None))
     }
 }
@@ -133,8 +163,8 @@ pub(crate) struct StartError {
 /// but may be called from any thread, even while another one communicates with them.
 pub(crate) fn end_programs() {
     let running: Vec<Arc<Handle>> = lock(&RUNNING).iter().filter_map(Weak::upgrade).collect();
-    // All inputs are closed first, so that the programs exit at the same time.
-    let closed: Vec<bool> = running.iter().map(|handle| handle.try_close_input()).collect();
+    // All are asked first, so that the programs exit at the same time.
+    let closed: Vec<bool> = running.iter().map(|handle| handle.ask_to_end()).collect();
     for (handle, closed) in running.iter().zip(closed) {
         if closed {
             handle.wait();
@@ -169,8 +199,12 @@ impl Drop for Input {
 pub(crate) struct PostMortem {
     /// The way it ended, as a phrase.
     pub(crate) how: String,
-    /// The last lines of its standard error.
+    /// The last lines of its standard error; of a program in the background, of all that it wrote.
     pub(crate) last_lines: String,
+    /// Whether it cannot have been started: the exit status says so by the convention of shells.
+    pub(crate) not_found: bool,
+    /// Whether it exited with status 0.
+    pub(crate) success: bool,
     /// Whether it was killed by another process or the system.
     pub(crate) killed: bool,
 }
@@ -179,7 +213,7 @@ pub(crate) struct PostMortem {
 /// the program has no time to exit by itself.
 pub(crate) struct Running {
     handle: Arc<Handle>,
-    stderr: StderrTail,
+    output: OutputTail,
     #[cfg_attr(not(target_os = "linux"), expect(dead_code, reason = "only Linux has keepers"))]
     keeper: Option<Report>,
 }
@@ -189,16 +223,54 @@ impl Running {
     pub(crate) fn post_mortem(mut self) -> PostMortem {
         let in_time = self.handle.wait();
         let status = self.handle.end();
-        let (how, killed) = match self.ended_by_itself(status.filter(|_| in_time)) {
-            Some(status) => (format!("ended ({status})"), process_group::was_killed(status)),
-            None => ("closed its standard output, but did not exit,".to_owned(), false),
+        let status = self.ended_by_itself(status.filter(|_| in_time));
+        let how = match status {
+            Some(status) => format!("ended ({status})"),
+            None => "closed its standard output, but did not exit,".to_owned(),
         };
-        PostMortem { how, last_lines: self.stderr.last_lines(), killed }
+        PostMortem {
+            how,
+            last_lines: self.output.last_lines(),
+            not_found: status.and_then(|status| status.code()) == Some(NOT_FOUND),
+            success: status.is_some_and(|status| status.success()),
+            killed: status.is_some_and(process_group::was_killed),
+        }
     }
 
-    /// A new test begins: forgets everything written to standard error so far.
-    pub(crate) fn clear_stderr(&mut self) {
-        self.stderr.clear();
+    /// A new test begins: forgets everything written so far.
+    pub(crate) fn clear_output(&mut self) {
+        self.output.clear();
+    }
+
+    /// The last lines of a program that is running.
+    pub(crate) fn last_lines_so_far(&self) -> String {
+        self.output.last_lines_so_far()
+    }
+
+    /// Whether it has ended, with everything that it left behind.
+    pub(crate) fn has_ended(&self) -> bool {
+        lock(&self.handle.process).ended
+    }
+
+    /// Waits at most this long until it has ended; whether it has.
+    pub(crate) fn wait_for_end(&self, limit: Duration) -> bool {
+        self.handle.wait_for(limit)
+    }
+
+    /// Its end is expected from now on: it sets no alarm.
+    pub(crate) fn expect_end(&self) {
+        self.handle.asked.store(true, Ordering::Relaxed);
+    }
+
+    /// Asks it to end: closes its input, or sends `SIGTERM` to a program in the background. Dropping it then waits.
+    pub(crate) fn ask_to_end(&self) {
+        self.handle.ask_to_end();
+    }
+
+    /// The process of the program, or of its keeper, and whether it is the keeper's.
+    #[cfg(target_os = "linux")]
+    pub(crate) fn process(&self) -> (u32, bool) {
+        (self.handle.id, self.handle.kept)
     }
 
     /// The status of a program that exited by itself, as its keeper reports it, if there is one.
@@ -213,7 +285,7 @@ impl Running {
 
 impl Drop for Running {
     fn drop(&mut self) {
-        if lock(&self.handle.input).is_none() {
+        if self.handle.is_asked() {
             self.handle.wait();
         }
         self.handle.end();
@@ -223,8 +295,11 @@ impl Drop for Running {
 /// A process, or its keeper, shared between threads.
 struct Handle {
     id: u32,
-    #[cfg_attr(not(target_os = "linux"), expect(dead_code, reason = "only Linux has keepers"))]
     kept: bool,
+    /// Of a program in the background, which has no input of its own: set if it ends unasked.
+    alarm: Option<Alarm>,
+    /// A program in the background was asked to end.
+    asked: AtomicBool,
     /// Locked while a line is written, which blocks until the program reads it.
     input: Mutex<Option<ChildStdin>>,
     process: Mutex<Process>,
@@ -240,11 +315,13 @@ struct Process {
 }
 
 impl Handle {
-    fn new(child: Child, input: ChildStdin, kept: bool) -> Arc<Handle> {
+    fn new(child: Child, input: Option<ChildStdin>, kept: bool, alarm: Option<Alarm>) -> Arc<Handle> {
         let handle = Arc::new(Handle {
             id: child.id(),
             kept,
-            input: Mutex::new(Some(input)),
+            alarm,
+            asked: AtomicBool::new(false),
+            input: Mutex::new(input),
             process: Mutex::new(Process { child, ended: false, status: None }),
             ended: Condvar::new(),
         });
@@ -271,24 +348,32 @@ impl Handle {
             self.end_orphans();
         }
         lock(&self.process).ended = true;
+        if let Some(alarm) = self.alarm.as_ref().filter(|_| !self.asked.load(Ordering::Relaxed)) {
+            alarm.store(true, Ordering::Relaxed);
+        }
         self.ended.notify_all();
     }
 
     /// Waits for the process, whose input is closed, to exit by itself; returns whether it did so in time.
     fn wait(&self) -> bool {
+        self.wait_for(self.limit())
+    }
+
+    fn wait_for(&self, limit: Duration) -> bool {
         let process = lock(&self.process);
         let running = |process: &mut Process| !process.ended && process.status.is_none();
-        let waited = self.ended.wait_timeout_while(process, self.limit(), running);
+        let waited = self.ended.wait_timeout_while(process, limit, running);
         let (process, _) = waited.unwrap_or_else(PoisonError::into_inner);
         process.ended
     }
 
     fn limit(&self) -> Duration {
+        let own = if self.alarm.is_some() { BACKGROUND_END_LIMIT } else { END_LIMIT };
         #[cfg(target_os = "linux")]
         if self.kept {
-            return END_LIMIT + KEEPER_LIMIT;
+            return own + KEEPER_LIMIT;
         }
-        END_LIMIT
+        own
     }
 
     /// Ends the process and everything it started, at once.
@@ -321,15 +406,24 @@ impl Handle {
         }
     }
 
-    /// Closes the input, unless a line is being written at the moment.
-    fn try_close_input(&self) -> bool {
+    /// Closes the input, unless a line is being written at the moment; whether it did. A program in the background that
+    /// has no keeper gets a signal in its place.
+    fn ask_to_end(&self) -> bool {
         match self.input.try_lock() {
-            Ok(mut input) => {
-                *input = None;
-                true
-            }
-            Err(_) => false,
+            Ok(mut input) => *input = None,
+            Err(_) => return false,
         }
+        if self.alarm.is_some() && !self.asked.swap(true, Ordering::Relaxed) && !self.kept {
+            let mut process = lock(&self.process);
+            if !process.ended && process.status.is_none() {
+                process_group::ask_to_end(&mut process.child);
+            }
+        }
+        true
+    }
+
+    fn is_asked(&self) -> bool {
+        if self.alarm.is_some() { self.asked.load(Ordering::Relaxed) } else { lock(&self.input).is_none() }
     }
 
     /// Waits until the process has ended, and returns whether a signal ended it. The process is not reaped, so its id

@@ -1,15 +1,19 @@
 //! What passes between the relay and a transport.
 
 use sesame_base::time::SimTime;
+use sesame_plan::NodeId;
 
+use crate::fuzz::Order;
 use crate::value::Value;
 use crate::wire::{Wire, WireTable};
 
 /// A message that is to reach its subscribers now.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Delivery {
-    /// On which wire.
+    /// On which wire. A message on a wire that has links is for the subscribers without a link of their own.
     pub wire: Wire,
+    /// It comes from the message with this number among those published on the wire, from 0.
+    pub index: u64,
     /// What.
     pub value: Value,
 }
@@ -24,8 +28,25 @@ pub trait Exchange {
     fn subscribed(&mut self, wire: Wire);
     /// Simulation time is `now` from here on; it never goes back.
     fn advance(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>);
-    /// A message was published at `now`.
-    fn message(&mut self, now: SimTime, wire: Wire, value: Value, deliveries: &mut Vec<Delivery>);
+    /// A message was published at `now`, by this node if the transport can tell. It gets the next number of its wire,
+    /// from 0.
+    fn message_from(
+        &mut self,
+        now: SimTime,
+        wire: Wire,
+        publisher: Option<NodeId>,
+        value: Value,
+        deliveries: &mut Vec<Delivery>,
+    );
+    /// A message was published at `now`, by whatever node.
+    fn message(&mut self, now: SimTime, wire: Wire, value: Value, deliveries: &mut Vec<Delivery>) {
+        self.message_from(now, wire, None, value, deliveries);
+    }
+    /// What operations on nodes want done since the last call, in this order. A transport without nodes has nothing to
+    /// do with them.
+    fn take_orders(&mut self) -> Vec<Order>;
+    /// What the operation at this position of the test wanted was done, and made a difference: that is an effect.
+    fn carried_out(&mut self, now: SimTime, operation: usize);
     /// The next moment at which the relay has something to do even without a message: a held message is due, or an
     /// operation may be switched. Until then, advancing time has no effect. `None` if only a message can cause
     /// anything.

@@ -13,6 +13,9 @@ impl Relay<'_> {
             message.next_stage += 1;
             let heard = self.heard[message.wire.index()];
             let stage = &mut self.operations[at];
+            if !stage.concerns(message.publisher) {
+                continue;
+            }
             let queued_until = if stage.holds_order { self.queue.last_release(at, message.wire) } else { None };
             let active = stage.activity.is_active();
             if active {
@@ -71,13 +74,24 @@ impl Relay<'_> {
                 return;
             }
         }
-        if self.phase != Phase::Over {
-            self.metrics.delivered(now, message.wire, message.published, &message.value);
-            for tap in &mut self.taps {
-                tap.delivered(now, message.wire, message.published, &message.value);
+        if self.wires.link(message.wire).is_none() {
+            if self.phase != Phase::Over {
+                self.metrics.delivered(now, message.wire, message.published, &message.value);
+                for tap in &mut self.taps {
+                    tap.delivered(now, message.wire, message.published, &message.value);
+                }
             }
+            self.fan_out(now, &message, deliveries);
         }
-        deliveries.push(Delivery { wire: message.wire, value: message.value });
+        deliveries.push(Delivery { wire: message.wire, index: message.published, value: message.value });
+    }
+
+    /// Sends a copy of a message on each of the links of its wire.
+    fn fan_out(&mut self, now: SimTime, message: &Held, deliveries: &mut Vec<Delivery>) {
+        let wires = self.wires;
+        for link in wires.links().iter().filter(|link| link.of == message.wire) {
+            self.pass(now, Held { wire: link.wire, next_stage: 0, ..message.clone() }, deliveries);
+        }
     }
 
     /// Takes a message through a custom operation and on, followed by the messages that the operation injects.

@@ -5,6 +5,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use sesame_base::time::SimTime;
+use sesame_plan::NodeId;
 use sesame_rng::derive_seed;
 
 use crate::relay::MessageRef;
@@ -12,9 +13,11 @@ use crate::value::Value;
 use crate::wire::Wire;
 
 /// A message on its way through its pipeline.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Held {
     pub(super) wire: Wire,
+    /// Who published it, if the transport can tell.
+    pub(super) publisher: Option<NodeId>,
     /// Its index among the messages published on its wire; for an injected message, the index of the original one.
     pub(super) published: u64,
     /// The key of its random numbers: its index, or for an injected message a number of its own.
@@ -34,7 +37,7 @@ impl Held {
     /// its own, so later operations draw other random numbers for it.
     pub(super) fn beside(&self, operation: usize, number: u64, value: Value) -> Held {
         let index = derive_seed(self.index, "injected", &[operation as u64, number]);
-        Held { wire: self.wire, published: self.published, index, value, next_stage: self.next_stage }
+        Held { index, value, ..*self }
     }
 }
 

@@ -3,7 +3,7 @@
 use sesame_base::activation::Activity;
 use sesame_base::observation::Counters;
 use sesame_base::time::SimTime;
-use sesame_plan::OperationId;
+use sesame_plan::{NodeId, OperationId};
 
 use crate::fuzz::Disturbance;
 
@@ -11,6 +11,8 @@ use crate::fuzz::Disturbance;
 pub(super) struct Stage {
     pub(super) operation: OperationId,
     pub(super) name: String,
+    /// Only messages that these nodes publish; none for all.
+    pub(super) from: Vec<NodeId>,
     pub(super) disturbance: Disturbance,
     /// Whether it observes messages while it is inactive.
     pub(super) observes_inactive: bool,
@@ -31,6 +33,11 @@ pub(super) struct Stage {
 }
 
 impl Stage {
+    /// Whether it acts on messages of this publisher.
+    pub(super) fn concerns(&self, publisher: Option<NodeId>) -> bool {
+        self.from.is_empty() || publisher.is_some_and(|publisher| self.from.contains(&publisher))
+    }
+
     /// Counts an action on this many messages on a wire with or without a receiver.
     pub(super) fn count(
         &mut self,

@@ -58,7 +58,7 @@ fn relayed_with(
             relay.message(now, wires.find(path).unwrap(), value.clone(), &mut out);
         }
         delivered.extend(
-            out.into_iter().map(|Delivery { wire, value }| (now.seconds(), wires.path(wire).to_owned(), value)),
+            out.into_iter().map(|Delivery { wire, value, .. }| (now.seconds(), wires.path(wire).to_owned(), value)),
         );
     }
     (delivered, relay.finish(SimTime::from_seconds(10.0)))

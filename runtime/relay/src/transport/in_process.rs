@@ -120,7 +120,7 @@ impl InProcessBus {
 
     /// Puts the relay's deliveries into the inboxes of their subscribers.
     fn deliver(&mut self) {
-        for Delivery { wire, value } in self.deliveries.drain(..) {
+        for Delivery { wire, value, .. } in self.deliveries.drain(..) {
             let line = self.by_wire[wire.index()].map(|line| &mut self.lines[line]);
             if let Some(inbox) = line.and_then(|line| line.inbox.as_mut()) {
                 inbox.push_back(value);

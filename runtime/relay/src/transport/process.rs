@@ -11,6 +11,7 @@
 
 mod fault;
 mod free_running;
+mod launched;
 mod lock_stepped;
 mod protocol;
 mod session;
@@ -28,27 +29,52 @@ use sesame_plan::CampaignPlan;
 
 use self::free_running::FreeRunning;
 use self::lock_stepped::LockStepped;
+#[cfg(target_os = "linux")]
+use crate::lifecycle::Kept;
+use crate::lifecycle::launch::{Launched, Place};
 use crate::lifecycle::{self, Program};
 use crate::transport::{Connect, Transport};
 
 /// Ends all simulators of this process with everything they started. It does the same as closing each of them, but may
 /// be called from any thread, even while another one communicates with them.
+///
+/// Before that, it runs the commands with which spaces end what they launch.
 pub fn end_simulators() {
+    lifecycle::launch::terminate_all();
     lifecycle::end_programs();
 }
 
-/// Starts a simulator, waits until it has ended, and ends everything it leaves behind: what a runner does as the keeper
-/// of its worker's simulator.
+/// Starts a simulator, or a program in the background that a plan launches, waits until it has ended, and ends
+/// everything it leaves behind: what a runner does as the keeper of its worker's programs.
 #[cfg(target_os = "linux")]
-pub fn keep_simulator(worker: u32, report: &Path, program: &OsStr, arguments: &[OsString]) -> ExitCode {
-    lifecycle::keep(worker, report, program, arguments, send_failed)
+pub fn keep_simulator(
+    worker: u32,
+    report: &Path,
+    program: &OsStr,
+    arguments: &[OsString],
+    background: bool,
+) -> ExitCode {
+    lifecycle::keep(worker, report, &Kept { program, arguments, background }, refused(background))
 }
 
-/// Replaces this process by a simulator that ends when its keeper does, even if the keeper is killed while the
-/// simulator hangs. Only returns if that fails.
+/// Replaces this process by a simulator, or a program in the background, that ends when its keeper does, even if the
+/// keeper is killed while it hangs. Only returns if that fails.
 #[cfg(target_os = "linux")]
-pub fn become_simulator(keeper: u32, program: &OsStr, arguments: &[OsString]) -> ExitCode {
-    lifecycle::become_program(keeper, program, arguments, send_failed)
+pub fn become_simulator(keeper: u32, program: &OsStr, arguments: &[OsString], background: bool) -> ExitCode {
+    lifecycle::become_program(keeper, program, arguments, refused(background))
+}
+
+/// How the worker is told that a program cannot be started.
+#[cfg(target_os = "linux")]
+fn refused(background: bool) -> fn(&str) {
+    if background { say_refused } else { send_failed }
+}
+
+/// Says it as the last words of a program in the background.
+#[cfg(target_os = "linux")]
+fn say_refused(reason: &str) {
+    // If this fails, the worker has ended and reads nothing.
+    writeln!(std::io::stderr(), "{reason}").ok();
 }
 
 /// Sends `failed` in place of the simulator, which cannot be started.
@@ -79,12 +105,17 @@ fn transport(plan: &CampaignPlan, folder: PathBuf, in_runner: bool) -> Box<dyn T
     let sesame_plan::Transport::Process { program, arguments, step_ns } = &plan.simulator.transport else {
         unreachable!("the generator connects each kind of simulator by its own transport")
     };
-    let program = Program { name: program.clone(), arguments: arguments.clone(), folder, in_runner };
+    let launched = Launched::new(plan, Place { in_runner, ..Place::of_worker(folder.clone()) });
+    let program =
+        Program { name: program.clone(), arguments: arguments.clone(), folder, environment: Vec::new(), in_runner };
     match step_ns {
-        Some(step) => {
-            Box::new(LockStepped::new(plan, program, SimTime::from_nanos(i64::try_from(*step).unwrap_or(i64::MAX))))
-        }
-        None => Box::new(FreeRunning::new(plan, program)),
+        Some(step) => Box::new(LockStepped::new(
+            plan,
+            program,
+            launched,
+            SimTime::from_nanos(i64::try_from(*step).unwrap_or(i64::MAX)),
+        )),
+        None => Box::new(FreeRunning::new(plan, program, launched)),
     }
 }
 

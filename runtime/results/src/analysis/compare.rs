@@ -217,7 +217,11 @@ fn measure(run: &Run, cells: Option<&(Grid, u32)>) -> Result<Measured, RecordErr
         measured.tests += 1;
         measured.unique += u32::from(test.duplicate_of.is_none());
         match test.outcome {
-            Outcome::Completed | Outcome::Unknown => {}
+            Outcome::Completed
+            | Outcome::Unknown
+            | Outcome::LaunchFailed { .. }
+            | Outcome::Disconnect { .. }
+            | Outcome::WrongClock { .. } => {}
             Outcome::NoEffect => measured.no_effect += 1,
             Outcome::Crash { .. } => measured.crashes += 1,
             Outcome::Timeout { .. } => measured.timeouts += 1,

@@ -105,6 +105,9 @@ pub(crate) fn tally_words(tally: Tally) -> String {
 /// The outcomes that are findings themselves, by their words.
 pub(crate) const FAILURES: [&str; 2] = ["crash", "timeout"];
 
+/// The outcomes that say nothing about the system, by their words. They are no findings, but listed.
+pub(crate) const OF_ENVIRONMENT: [&str; 3] = ["launch_failed", "disconnect", "wrong_clock"];
+
 /// Whether a run ended with this outcome, as a verdict: violated if it did. No run is inconclusive about it.
 pub(crate) fn failed(outcome: &Outcome, word: &str) -> Verdict {
     if outcome.word() == word { Verdict::Violated } else { Verdict::Satisfied }

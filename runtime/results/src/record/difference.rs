@@ -107,12 +107,10 @@ impl Differences {
 }
 
 fn outcome(outcome: &Outcome) -> String {
-    match outcome {
-        Outcome::Crash { message } => format!("{}: {message}", outcome.word()),
-        // How long it was waited for is wall time.
-        Outcome::Completed | Outcome::NoEffect | Outcome::Unknown | Outcome::Timeout { .. } => {
-            outcome.word().to_owned()
-        }
+    match outcome.message() {
+        Some(message) => format!("{}: {message}", outcome.word()),
+        // Of a timeout, how long it was waited for is wall time.
+        None => outcome.word().to_owned(),
     }
 }
 

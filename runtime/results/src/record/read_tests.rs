@@ -424,6 +424,9 @@ impl Repository {
             ("void", None, None) if self.schema < STANDARD_WORDS_SINCE => Ok(Outcome::NoEffect),
             ("unknown", None, None) => Ok(Outcome::Unknown),
             ("crash", Some(message), None) => Ok(Outcome::Crash { message }),
+            ("launch_failed", Some(message), None) => Ok(Outcome::LaunchFailed { message }),
+            ("disconnect", Some(message), None) => Ok(Outcome::Disconnect { message }),
+            ("wrong_clock", Some(message), None) => Ok(Outcome::WrongClock { message }),
             // A length of wall time, as programs count it.
             ("timeout", None, Some(limit)) if Duration::try_from_secs_f64(limit).is_ok() => {
                 Ok(Outcome::Timeout { limit })

@@ -110,9 +110,8 @@ impl Recorder {
         let unrecordable =
             |what: String| RecordError::Unrecordable { test: TestNumber(*test), what, path: path.clone() };
         let (detail, limit) = match outcome {
-            Outcome::Completed | Outcome::NoEffect | Outcome::Unknown => (None, None),
-            Outcome::Crash { message } => (Some(message.as_str()), None),
             Outcome::Timeout { limit } => (None, Some(*limit)),
+            outcome => (outcome.message(), None),
         };
         let shown = values.iter().flat_map(|shown| [shown.value, shown.reach.low, shown.reach.high, shown.not_finite]);
         let numbers = shown.flatten().chain([*end]).chain(limit);

@@ -51,10 +51,12 @@ CREATE TABLE tests (
     known_test      TEXT,           -- name of the regression test in the .sesame file
     generation      INTEGER,
     simulator_seed  TEXT NOT NULL,
-    outcome         TEXT NOT NULL CHECK (outcome IN ('completed', 'no_effect', 'unknown', 'crash', 'timeout')),
+    outcome         TEXT NOT NULL CHECK (outcome IN ('completed', 'no_effect', 'unknown', 'crash', 'timeout',
+                                    'launch_failed', 'disconnect', 'wrong_clock')),
                                     -- no_effect: no operation had an effect;
-                                    -- unknown: imported from a program that did not count effects
-    outcome_detail  TEXT,           -- what is known of a crash
+                                    -- unknown: imported from a program that did not count effects;
+                                    -- launch_failed, disconnect, wrong_clock: the environment's fault, no findings
+    outcome_detail  TEXT,           -- what is known of the cause
     time_limit_s    REAL,           -- of a timeout, in seconds of wall time
     end_s           REAL NOT NULL,  -- when the run ended
     messages        INTEGER NOT NULL, -- handled by the relay
@@ -179,8 +181,9 @@ CREATE TABLE repetitions (
     test            INTEGER NOT NULL REFERENCES tests,
     position        INTEGER NOT NULL, -- among the repetitions of its test, from 1
     simulator_seed  TEXT NOT NULL,
-    outcome         TEXT NOT NULL CHECK (outcome IN ('completed', 'no_effect', 'crash', 'timeout')),
-    outcome_detail  TEXT,           -- what is known of a crash
+    outcome         TEXT NOT NULL CHECK (outcome IN ('completed', 'no_effect', 'crash', 'timeout',
+                                    'launch_failed', 'disconnect', 'wrong_clock')),
+    outcome_detail  TEXT,           -- what is known of the cause
     time_limit_s    REAL,           -- of a timeout, in seconds of wall time
     end_s           REAL NOT NULL,  -- when the run ended
     messages        INTEGER NOT NULL, -- handled by the relay

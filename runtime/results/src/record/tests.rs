@@ -20,6 +20,7 @@ use super::*;
 mod damage;
 mod digests;
 mod earlier;
+mod environment;
 mod robustness;
 mod runs;
 

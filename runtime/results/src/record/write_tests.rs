@@ -119,9 +119,8 @@ pub(super) fn write_test(
         Origin::Reference | Origin::Search => None,
     };
     let (detail, limit) = match &observation.outcome {
-        Outcome::Completed | Outcome::NoEffect | Outcome::Unknown => (None, None),
-        Outcome::Crash { message } => (Some(message.as_str()), None),
         Outcome::Timeout { limit } => (None, Some(*limit)),
+        outcome => (outcome.message(), None),
     };
     transaction
         .prepare_cached(

@@ -5,12 +5,12 @@
 
 use serde::Serialize;
 
-use sesame_base::observation::Outcome;
 use sesame_base::test_number::TestNumber;
 use sesame_notation as notation;
 use sesame_plan::{Bound, CampaignPlan, Expectation, MetricId};
 
 use crate::record::{RecordError, Repository, TestRecord, Verdict, verdict};
+use crate::report::facts::wording::outcome_words;
 
 /// A test in the words of the language.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -78,8 +78,9 @@ fn block(plan: &CampaignPlan, doc: &str, record: &TestRecord, name: &str) -> Str
 /// What is expected of the test, or a comment that says why nothing is.
 fn expectations(plan: &CampaignPlan, record: &TestRecord) -> Vec<String> {
     let outcome = &record.observation.outcome;
-    if matches!(outcome, Outcome::Crash { .. } | Outcome::Timeout { .. }) {
-        return vec![format!("// Its run ended as a {}, so there is no value to expect.", outcome.word())];
+    if !outcome.is_whole() {
+        let words = outcome_words(outcome.word());
+        return vec![format!("// Its run ended as a {words}, so there is no value to expect.")];
     }
     let mut metrics = plan.campaign.objectives.clone();
     let searched = !metrics.is_empty();

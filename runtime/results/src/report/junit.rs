@@ -149,6 +149,9 @@ fn failure_case(class: &str, failure: &Failure) -> Case {
     let (tag, kind) = match outcome.as_str() {
         _ if !failure.stands() => ("skipped", None),
         "timeout" => ("error", Some("timeout")),
+        "launch_failed" => ("error", Some("launch_failed")),
+        "disconnect" => ("error", Some("disconnect")),
+        "wrong_clock" => ("error", Some("wrong_clock")),
         _ => ("error", Some("crash")),
     };
     Case {

@@ -15,6 +15,7 @@ use crate::report::facts::repetition::ViolationRate;
 use crate::report::facts::show::{OperationReport, TestReport, VerdictReport};
 use crate::report::facts::shrinking::Shrinking;
 use crate::report::facts::summary::Summary;
+use crate::report::facts::wording::outcome_words;
 
 /// The whole in one sentence: `Front of 6 tests, 2 requirements violated (R1 by 31 tests, R4 by 3)`.
 pub fn headline(summary: &Summary) -> String {
@@ -41,10 +42,16 @@ pub fn headline(summary: &Summary) -> String {
         all if satisfied == all => parts.push(plural(all, "expectation satisfied", "expectations satisfied")),
         all => parts.push(format!("{satisfied} of {} satisfied", plural(all, "expectation", "expectations"))),
     }
-    for (word, several) in [("crash", "crashes"), ("timeout", "timeouts")] {
+    for (word, one, several) in [
+        ("crash", "crash", "crashes"),
+        ("timeout", "timeout", "timeouts"),
+        ("launch_failed", "failed launch", "failed launches"),
+        ("disconnect", "disconnect", "disconnects"),
+        ("wrong_clock", "wrong clock", "wrong clocks"),
+    ] {
         let count = summary.failures.iter().filter(|failure| failure.outcome == word && failure.stands()).count();
         if count > 0 {
-            parts.push(plural(count, word, several));
+            parts.push(plural(count, one, several));
         }
     }
     let mut sentence = parts.join(", ");
@@ -53,6 +60,9 @@ pub fn headline(summary: &Summary) -> String {
     }
     sentence
 }
+
+/// What the table of quarantined tests is called.
+pub(crate) const QUARANTINED: &str = "Quarantined: crashed in three runs, and not run again";
 
 /// How many tests ran, and how many of these say nothing about the system.
 pub(crate) fn counts_sentence(summary: &Summary) -> String {
@@ -149,7 +159,7 @@ pub(crate) fn values_sentence(confirmation: Confirmation) -> String {
 /// How a test ended, in a sentence.
 pub(crate) fn outcome_sentence(test: &TestReport) -> String {
     let mut sentence = match &test.detail {
-        Some(detail) => format!("{} at {} s: {}", test.outcome, fixed(test.end, 2), visible(detail)),
+        Some(detail) => format!("{} at {} s: {}", outcome_words(&test.outcome), fixed(test.end, 2), visible(detail)),
         None => format!("{} at {} s", outcome_words(&test.outcome), fixed(test.end, 2)),
     };
     let _ =
@@ -164,11 +174,6 @@ pub(crate) fn outcome_sentence(test: &TestReport) -> String {
         sentence.push_str(", on the front");
     }
     sentence
-}
-
-/// The word of an outcome as prose has it.
-pub(crate) fn outcome_words(word: &str) -> String {
-    word.replace('_', " ")
 }
 
 /// When an operation was to be active: its window, or the conditions that switched it; a dash for an offline one.
@@ -225,7 +230,8 @@ pub(crate) fn choices_text(operation: &OperationReport) -> String {
 pub(crate) fn effect_text(operation: &OperationReport) -> String {
     let Some(counters) = operation.counters else { return "unknown".to_owned() };
     let Counters { seen, changed, dropped, delayed, queued, injected, side_effects, unheard } = counters;
-    let mut words = vec![format!("{seen} seen")];
+    // An operation on a node sees no messages.
+    let mut words = if operation.resource.is_some() { Vec::new() } else { vec![format!("{seen} seen")] };
     let named = [
         (changed, "changed"),
         (dropped, "dropped"),

@@ -12,12 +12,12 @@ use crate::report::facts::show::{MetricReport, OperationReport, TestList, Verdic
 use crate::report::facts::shrinking::{NamedValue, ShrinkStep, Shrinking, TestSize};
 use crate::report::facts::stacked::Stacked;
 use crate::report::facts::summary::{
-    ExpectationSummary, Failure, NotFinite, Objective, RequirementSummary, Spread, Summary,
+    ExpectationSummary, Failure, NotFinite, Objective, Quarantined, RequirementSummary, Spread, Summary,
 };
+use crate::report::facts::wording::outcome_words;
 use crate::report::facts::wording::value_text;
 use crate::report::sentences::{
-    as_expected, beyond_text, choices_text, effect_text, outcome_words, planned_text, rate_text, spans_text,
-    verdict_value_text,
+    as_expected, beyond_text, choices_text, effect_text, planned_text, rate_text, spans_text, verdict_value_text,
 };
 
 /// The time of a failure, in seconds.
@@ -145,7 +145,16 @@ pub(super) fn violation_rates(rates: &[ViolationRate]) -> Table {
     table
 }
 
-/// Crashes and timeouts.
+/// What the table of failures is called.
+pub(super) fn failures_title(failures: &[Failure]) -> &'static str {
+    if failures.iter().any(Failure::is_of_environment) {
+        "Crashes, timeouts, and runs that the environment broke off"
+    } else {
+        "Crashes and timeouts"
+    }
+}
+
+/// Crashes and timeouts, and runs that the environment broke off.
 pub(super) fn failures(failures: &[Failure]) -> Table {
     let again = failures.iter().any(|failure| failure.again.is_some());
     let mut columns = vec![Column::heading("test"), Column::words("outcome"), Column::number("at")];
@@ -153,11 +162,23 @@ pub(super) fn failures(failures: &[Failure]) -> Table {
     columns.push(Column::sentence("cause"));
     let mut table = Table::with(columns);
     for failure in failures {
-        let mut cells: Vec<Cell> =
-            vec![Datum::Test(failure.test).into(), Datum::text(&failure.outcome).bad_if(true), at(failure.at).into()];
+        let mut cells: Vec<Cell> = vec![
+            Datum::Test(failure.test).into(),
+            Datum::text(outcome_words(&failure.outcome)).bad_if(!failure.is_of_environment()),
+            at(failure.at).into(),
+        ];
         cells.extend(again.then(|| Datum::maybe(failure.again.as_ref().map(FindingAgain::words)).into()));
         cells.push(Datum::text(&failure.detail).into());
         table.row(cells);
+    }
+    table
+}
+
+/// Tests that are not run again.
+pub(super) fn quarantined(found: &[Quarantined]) -> Table {
+    let mut table = Table::with([Column::heading("test"), Column::sentence("cause")]);
+    for found in found {
+        table.row([Datum::Test(found.test), Datum::text(&found.detail)]);
     }
     table
 }
@@ -206,7 +227,7 @@ pub(super) fn operations(operations: &[OperationReport]) -> Table {
     let mut table = Table::with([
         Column::heading("operation"),
         Column::words("kind"),
-        Column::words("topic"),
+        Column::words("acts on"),
         Column::words("planned"),
         Column::words("observed"),
         Column::words("choices"),
@@ -216,7 +237,7 @@ pub(super) fn operations(operations: &[OperationReport]) -> Table {
         table.row([
             Datum::text(&operation.operation),
             Datum::text(&operation.kind),
-            Datum::text(operation.topic.clone().unwrap_or_default()),
+            Datum::text(operation.topic.as_ref().or(operation.resource.as_ref()).cloned().unwrap_or_default()),
             Datum::Text(planned_text(operation)),
             Datum::Text(operation.observed.as_deref().map_or("unknown".to_owned(), spans_text)),
             Datum::Text(choices_text(operation)),

@@ -1,6 +1,7 @@
 //! Reports on a made-up campaign, read as a user reads them.
 
-use sesame_plan::Task;
+use sesame_base::observation::Counters;
+use sesame_plan::{Activation, Choice, NodeId, OperationId, OperationKind, Task, Test, TestOperation};
 
 use super::*;
 use crate::record::{Origin, Repository, Standing, Verdict, sample};
@@ -72,6 +73,48 @@ fn everything_on_one_test_is_shown() {
     for name in ["reference", "known_jitter", "T17", "T23", "T44"] {
         insta::assert_snapshot!(format!("test_{name}"), test_text(&show(&repository, name).unwrap(), WIDE));
     }
+}
+
+#[test]
+fn what_acts_on_nodes_is_shown_with_the_node_or_the_parameter() {
+    let mut plan = sample::plan();
+    plan.nodes = vec![sesame_plan::testing::node("cell_node")];
+    let node = NodeId(0);
+    let kinds = [
+        OperationKind::Set { node, parameter: "limits.payload".to_owned() },
+        OperationKind::Pause { node },
+        OperationKind::Slow { node },
+        OperationKind::Kill { node },
+    ];
+    let used = kinds.into_iter().map(|kind| {
+        let operation = sesame_plan::testing::operation(0, kind);
+        let id = OperationId(u32::try_from(plan.operations.len()).unwrap());
+        let parameters = operation.parameters.iter().map(|_| Choice::Value { value: 0.25 }).collect();
+        plan.operations.push(operation);
+        let activation = Activation::Time { start: 1.0, end: 2.0 };
+        TestOperation { operation: id, parameters, activation, operation_seed: 0 }
+    });
+    let test = Test { operations: used.collect() };
+    let folder = tempfile::tempdir().unwrap();
+    let mut recorder = crate::record::Recorder::create(folder.path(), &plan, 42, 1).unwrap();
+    let mut record = sample::records(&plan, 2).remove(1);
+    record.observation = sample::observe(&plan, &test, 1);
+    record.test = test;
+    for operation in &mut record.observation.operations {
+        operation.counters = Counters { side_effects: 1, ..Counters::default() };
+    }
+    let number = record.number;
+    recorder.commit(&record).unwrap();
+    let repository = recorder.finish("all evaluations done").unwrap();
+    let report = show(&repository, &format!("T{number}")).unwrap();
+    let json = serde_json::to_value(&report).unwrap();
+    assert_eq!(json["operations"][0]["resource"], "parameter \"limits.payload\" of cell_node");
+    assert!(json["operations"][0]["topic"].is_null());
+    let text = test_text(&report, WIDE);
+    for part in ["node cell_node", "parameter \"limits.payload\" of cell_node", "share 25 %", "value 0.25"] {
+        assert!(text.contains(part), "{text}");
+    }
+    assert!(text.contains("1 side effects") && !text.contains("seen"), "{text}");
 }
 
 /// The page as any XML parser sees it.

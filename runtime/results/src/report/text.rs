@@ -9,7 +9,7 @@ use crate::report::facts::show::{TestList, TestReport};
 use crate::report::facts::shrinking::Shrinking;
 use crate::report::facts::summary::Summary;
 use crate::report::sentences::{
-    beyond_sentence, confirmation_sentence, counts_sentence, coverage_sentence, headline, once_sentence,
+    QUARANTINED, beyond_sentence, confirmation_sentence, counts_sentence, coverage_sentence, headline, once_sentence,
     outcome_sentence, shrinking_sentence, values_sentence,
 };
 use crate::report::tables;
@@ -35,7 +35,8 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
     if let Some(repetition) = &summary.repetition {
         section(&mut text, &repetition.title, &tables::violation_rates(&repetition.requirements), options);
     }
-    section(&mut text, "Crashes and timeouts", &tables::failures(&summary.failures), options);
+    section(&mut text, tables::failures_title(&summary.failures), &tables::failures(&summary.failures), options);
+    section(&mut text, QUARANTINED, &tables::quarantined(&summary.quarantined), options);
     section(&mut text, "Numbers that are not finite", &tables::not_finite(&summary.not_finite), options);
     text.push('\n');
     if let Some(coverage) = &summary.coverage {

@@ -48,7 +48,9 @@ fn attacked(strangers: impl Fn(&Attack) + Sync) -> (io::Result<TcpStream>, Durat
     thread::scope(|scope| {
         scope.spawn(|| strangers(&attack));
         has_begun.recv_timeout(Duration::from_secs(60)).expect("the attack begins");
-        let worker = scope.spawn(move || connect(address, &Hello { lock_stepped: true, token: Some(token) }));
+        let worker = scope.spawn(move || {
+            connect(address, &Hello { lock_stepped: true, end_limit: Duration::ZERO, token: Some(token) })
+        });
         let started = Instant::now();
         let accepted = port.accept(LIMIT, &mut || Ok(())).map(|(stream, _)| stream);
         let took = started.elapsed();
@@ -135,8 +137,10 @@ fn a_frame_of_a_gibibyte_is_refused_by_its_length() {
 #[test]
 fn a_wrong_greeting_and_a_wrong_token_are_turned_away() {
     survives(|attack| {
-        let wrong = serde_json::to_vec(&Hello { lock_stepped: true, token: Some("0".repeat(32)) }).unwrap();
-        let none = serde_json::to_vec(&Hello { lock_stepped: true, token: None }).unwrap();
+        let wrong =
+            serde_json::to_vec(&Hello { lock_stepped: true, end_limit: Duration::ZERO, token: Some("0".repeat(32)) })
+                .unwrap();
+        let none = serde_json::to_vec(&Hello { lock_stepped: true, end_limit: Duration::ZERO, token: None }).unwrap();
         for body in [wrong.as_slice(), &none, b"{}", b"GET / HTTP/1.1\r\n\r\n", &[0; 1024], b""] {
             let mut stream = TcpStream::connect(attack.address).unwrap();
             stream.write_all(&u32::try_from(body.len()).unwrap().to_le_bytes()).unwrap();
@@ -163,7 +167,8 @@ fn a_worker_that_speaks_slowly_is_understood() {
     let (address, token) = (port.address().unwrap(), port.token().to_owned());
     let worker = thread::spawn(move || {
         let mut whole = Vec::new();
-        protocol::send(&mut whole, &Hello { lock_stepped: true, token: Some(token) }).unwrap();
+        protocol::send(&mut whole, &Hello { lock_stepped: true, end_limit: Duration::ZERO, token: Some(token) })
+            .unwrap();
         // What follows the greeting is not taken with it.
         protocol::send(&mut whole, &"what follows").unwrap();
         let mut stream = TcpStream::connect(address).unwrap();

@@ -54,7 +54,7 @@ proptest! {
         parts in proptest::collection::vec(1usize..40, 0..60),
     ) {
         let mut bytes = Vec::new();
-        send(&mut bytes, &Hello { lock_stepped: true, token: token.clone() }).unwrap();
+        send(&mut bytes, &Hello { lock_stepped: true, end_limit: Duration::ZERO, token: token.clone() }).unwrap();
         let whole = bytes.len();
         prop_assume!(whole <= 4 + GREETING_LIMIT);
         bytes.extend(follows);

@@ -1,8 +1,11 @@
 //! Campaigns: how tests are found and run.
 
+use std::sync::Arc;
+
 use sesame_plan::{Copies, Setting, StrategyKind};
 
 use super::exploration::{Confirm, Coverage, Exploration, Stop};
+use super::formula::Expression;
 use super::words::{Count, Head, Name, Quantity, Range};
 use crate::span::Span;
 
@@ -24,13 +27,21 @@ pub(crate) struct Campaign {
     pub(crate) stops: Vec<Stop>,
     pub(crate) repeats: Vec<Repeat>,
     pub(crate) passives: Vec<Passive>,
-    pub(crate) ends: Vec<(Span, Quantity)>,
+    pub(crate) ends: Vec<(Span, EndOfTest)>,
     pub(crate) records: Vec<(Span, Record)>,
     /// Something of it could not be read or is not supported: what is missing may be there. So too with a `from`, since
     /// what the other campaign lacks is said of that one.
     pub(crate) has_errors: bool,
     /// Something of it, or of what it inherits from, could not be read: nothing is known of what it has not.
     pub(crate) inherited_errors: bool,
+}
+
+/// When tests end.
+#[derive(Debug, Clone)]
+pub(crate) struct EndOfTest {
+    pub(crate) after: Quantity,
+    /// What ends one before; shared with the campaigns that inherit it.
+    pub(crate) when: Option<Arc<Expression>>,
 }
 
 /// Which clauses a campaign has from another, as far as it matters for what is said of them.

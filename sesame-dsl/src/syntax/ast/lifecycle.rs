@@ -17,11 +17,22 @@ pub(crate) struct Command {
     pub(crate) arguments: Vec<Text>,
 }
 
-/// When a launched system counts as ready.
+/// When a launched program counts as ready.
 #[derive(Debug)]
 pub(crate) struct Ready {
-    pub(crate) topic: Name,
+    pub(crate) when: ReadyWhen,
     pub(crate) within: Quantity,
+}
+
+/// What shows that a launched program is ready.
+#[derive(Debug)]
+pub(crate) enum ReadyWhen {
+    Topic(Name),
+    /// The number, or a text with placeholders.
+    Port(Text),
+    /// The word.
+    Clock(Span),
+    Line(Text),
 }
 
 /// What a relay may add.

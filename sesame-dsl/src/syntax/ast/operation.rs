@@ -8,17 +8,20 @@ use crate::span::Span;
 #[derive(Debug)]
 pub(crate) struct Operation {
     pub(crate) head: Head,
-    /// `None` for a kind that is not supported yet.
-    pub(crate) body: Option<OperationBody>,
+    pub(crate) body: OperationBody,
 }
 
 #[derive(Debug)]
 pub(crate) struct OperationBody {
     /// `None` for an operation on no topic.
     pub(crate) target: Option<Target>,
+    /// What it acts on instead of messages; not together with a target.
+    pub(crate) resource: Option<Resource>,
     pub(crate) from: Option<(Span, Vec<Name>)>,
     pub(crate) to: Option<(Span, Vec<Name>)>,
     pub(crate) kind: OperationKind,
+    /// The first word of the kind.
+    pub(crate) kind_word: Span,
     pub(crate) within: Vec<(Span, Range)>,
     /// `for`
     pub(crate) lengths: Vec<(Span, Range)>,
@@ -35,6 +38,14 @@ pub(crate) struct Target {
     pub(crate) topic: Name,
     /// At least one.
     pub(crate) places: Vec<Place>,
+    pub(crate) span: Span,
+}
+
+/// A node, or a parameter of one, with the words before it.
+#[derive(Debug)]
+pub(crate) struct Resource {
+    pub(crate) parameter: Option<Text>,
+    pub(crate) node: Name,
     pub(crate) span: Span,
 }
 

@@ -1,7 +1,7 @@
 //! The system under test: simulator, messages, topics, nodes.
 
 use super::lifecycle::{Command, Launch, RelayBudget};
-use super::words::{Head, Name, Quantity, Text, UnitName};
+use super::words::{Count, Head, Name, Quantity, Text, UnitName};
 use crate::span::Span;
 
 #[derive(Debug)]
@@ -11,6 +11,7 @@ pub(crate) struct System {
     pub(crate) simulators: Vec<Simulator>,
     pub(crate) messages: Vec<Message>,
     pub(crate) topics: Vec<Topic>,
+    pub(crate) services: Vec<Service>,
     pub(crate) nodes: Vec<Node>,
     pub(crate) launches: Vec<(Span, Launch)>,
     pub(crate) terminates: Vec<(Span, Command)>,
@@ -29,6 +30,7 @@ pub(crate) struct Simulator {
 pub(crate) enum Transport {
     InProcess(InProcess),
     Process(Process),
+    Ros2(Ros2),
 }
 
 #[derive(Debug)]
@@ -49,9 +51,53 @@ pub(crate) struct Process {
     pub(crate) has_errors: bool,
 }
 
+/// Nodes of ROS 2.
+#[derive(Debug, Default)]
+pub(crate) struct Ros2 {
+    pub(crate) domains: Vec<(Span, Count)>,
+    /// Folders that hold packages with definitions of messages.
+    pub(crate) types: Vec<(Span, Vec<Text>)>,
+    pub(crate) clocks: Vec<(Span, Clock)>,
+    pub(crate) steps: Vec<(Span, Stepping)>,
+    /// The service that resets the simulator.
+    pub(crate) resets: Vec<(Span, Text)>,
+    pub(crate) has_errors: bool,
+}
+
+#[derive(Debug)]
+pub(crate) enum Clock {
+    Wall,
+    Topic(Text),
+}
+
+/// A step, and what takes it.
+#[derive(Debug)]
+pub(crate) struct Stepping {
+    pub(crate) time: Quantity,
+    /// `None` if it is not said.
+    pub(crate) by: Option<StepBy>,
+}
+
+#[derive(Debug)]
+pub(crate) struct StepBy {
+    pub(crate) channel: StepChannel,
+    pub(crate) path: Text,
+    pub(crate) span: Span,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum StepChannel {
+    Service,
+    Topic,
+}
+
 #[derive(Debug)]
 pub(crate) struct Message {
     pub(crate) head: Head,
+    /// Its type in ROS.
+    pub(crate) ros_type: Option<Text>,
+    /// Whether it has a block of fields.
+    pub(crate) block: bool,
     pub(crate) fields: Vec<Field>,
     pub(crate) has_errors: bool,
 }
@@ -60,6 +106,8 @@ pub(crate) struct Message {
 pub(crate) struct Field {
     pub(crate) head: Head,
     pub(crate) ty: Type,
+    /// Its type on the wire, as in a `.msg` file.
+    pub(crate) wire: Option<Text>,
 }
 
 #[derive(Debug, Clone)]
@@ -87,9 +135,33 @@ pub(crate) struct Topic {
     pub(crate) ty: Type,
 }
 
+/// A service of ROS: two topics, one for each direction.
+#[derive(Debug)]
+pub(crate) struct Service {
+    pub(crate) head: Head,
+    /// The topic of its requests, whose name is not written.
+    pub(crate) request: Head,
+    /// The topic of its replies, whose name is not written.
+    pub(crate) reply: Head,
+    pub(crate) path: Text,
+    pub(crate) ros_type: Text,
+}
+
 #[derive(Debug)]
 pub(crate) struct Node {
     pub(crate) head: Head,
+    /// Its name in the middleware.
+    pub(crate) named: Option<Text>,
     pub(crate) publishes: Vec<(Span, Vec<Name>)>,
     pub(crate) subscribes: Vec<(Span, Vec<Name>)>,
+    pub(crate) launches: Vec<(Span, Launch)>,
+    pub(crate) answers: Vec<(Span, Vec<Answer>)>,
+    pub(crate) every_step: Vec<(Span, Vec<Name>)>,
+}
+
+/// What a node publishes for each message that it receives.
+#[derive(Debug)]
+pub(crate) struct Answer {
+    pub(crate) to: Name,
+    pub(crate) with: Name,
 }

@@ -1,12 +1,14 @@
 //! Campaigns: their clauses, searches, and what conditions are grown from.
 
+use std::sync::Arc;
+
 use sesame_grammar::Rule;
 use sesame_plan::{Copies, Setting, StrategyKind};
 
 use super::reader::{Pair, Reader, child, children, expect_child};
 use crate::span::Span;
 use crate::syntax::ast::{
-    ActivationMode, ByCondition, Campaign, Count, Inherited, Operations, Passive, Record, Repeat, Search,
+    ActivationMode, ByCondition, Campaign, Count, EndOfTest, Inherited, Operations, Passive, Record, Repeat, Search,
 };
 
 impl Reader<'_> {
@@ -63,7 +65,12 @@ impl Reader<'_> {
                 Rule::confirm => campaign.confirms.push(reader.confirm(&member, span)),
                 Rule::stop => campaign.stops.push(reader.stop(&member, span)),
                 Rule::construct => campaign.explorations.push(reader.construct(&member, span)),
-                Rule::end => campaign.ends.push((span, reader.signed(&expect_child(&member, Rule::signed)))),
+                Rule::end => {
+                    let after = reader.signed(&expect_child(&member, Rule::signed));
+                    let when = child(&member, Rule::end_when);
+                    let when = when.map(|when| Arc::new(reader.switch(&expect_child(&when, Rule::switch))));
+                    campaign.ends.push((span, EndOfTest { after, when }));
+                }
                 Rule::record => {
                     let all = child(&member, Rule::k_all).is_some();
                     campaign.records.push((span, if all { Record::All } else { Record::Failing }));

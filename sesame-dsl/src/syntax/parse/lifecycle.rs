@@ -2,20 +2,37 @@
 
 use sesame_grammar::Rule;
 
-use super::reader::{Pair, Reader, child, children, expect_child};
-use crate::syntax::ast::lifecycle::{Command, Launch, Ready, RelayBudget};
+use super::reader::{Pair, Reader, child, children, expect_child, first_of};
+use crate::syntax::ast::Text;
+use crate::syntax::ast::lifecycle::{Command, Launch, Ready, ReadyWhen, RelayBudget};
 
 impl Reader<'_> {
     pub(super) fn launch(&mut self, pair: &Pair<'_>) -> Launch {
         let mut launch = Launch { command: self.command(pair), ready: vec![] };
         if let Some(settings) = child(pair, Rule::launch_settings) {
             self.members(&settings, |reader, ready| {
-                let topic = reader.name(&expect_child(&ready, Rule::name));
+                let when = reader.ready_when(&ready);
                 let within = reader.signed(&expect_child(&ready, Rule::signed));
-                launch.ready.push((reader.keyword_span(&ready), Ready { topic, within }));
+                launch.ready.push((reader.keyword_span(&ready), Ready { when, within }));
             });
         }
         launch
+    }
+
+    fn ready_when(&mut self, ready: &Pair<'_>) -> ReadyWhen {
+        let forms = [Rule::ready_topic, Rule::ready_port, Rule::ready_line, Rule::ready_clock];
+        let when = first_of(ready, &forms).expect("something shows that it is ready");
+        match when.as_rule() {
+            Rule::ready_topic => ReadyWhen::Topic(self.name(&expect_child(&when, Rule::name))),
+            Rule::ready_port => ReadyWhen::Port(if let Some(text) = child(&when, Rule::text) {
+                self.text_of(&text)
+            } else {
+                let number = expect_child(&when, Rule::number);
+                Text { text: number.as_str().to_owned(), span: self.span(&number) }
+            }),
+            Rule::ready_line => ReadyWhen::Line(self.text_of(&expect_child(&when, Rule::text))),
+            _ => ReadyWhen::Clock(self.span(&when)),
+        }
     }
 
     pub(super) fn command(&mut self, pair: &Pair<'_>) -> Command {

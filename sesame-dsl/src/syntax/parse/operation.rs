@@ -7,18 +7,15 @@ use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::span::Span;
 use crate::syntax::ast::{
     Amounts, Contained, Custom, CustomParameter, Distribution, Domain, Drain, Moment, NotFinite, Operation,
-    OperationBody, OperationKind, Place, Point, Range, Step, Stuck, Target, Text, UnitName,
+    OperationBody, OperationKind, Place, Point, Range, Resource, Step, Stuck, Target, Text, UnitName,
 };
 
 impl Reader<'_> {
     pub(super) fn operation(&mut self, pair: &Pair<'_>) -> Operation {
         let head = self.head(pair);
-        let unsupported = first_of(pair, &[Rule::unsupported_operation, Rule::unsupported_kind]);
-        if let Some(unsupported) = unsupported {
-            self.unsupported(&unsupported);
-            return Operation { head, body: None };
-        }
-        let kind = self.operation_kind(pair);
+        let written = after_equals(pair).expect("an operation has a kind");
+        let kind_word = self.keyword_span(&written);
+        let kind = self.operation_kind(&written);
         let mut signed = |rule| {
             let clauses = children(pair, rule);
             clauses
@@ -43,20 +40,29 @@ impl Reader<'_> {
         let from = nodes(Rule::from_nodes);
         let to = nodes(Rule::to_nodes);
         let target = child(pair, Rule::targets).map(|targets| self.target(&targets));
-        Operation {
-            head,
-            body: Some(OperationBody {
-                target,
-                from,
-                to,
-                kind,
-                within,
-                lengths,
-                priority,
-                inclusion,
-                untimed,
-                contains,
-            }),
+        let resource = first_of(pair, &[Rule::on_node, Rule::on_parameter]).map(|resource| self.resource(&resource));
+        let body = OperationBody {
+            target,
+            resource,
+            from,
+            to,
+            kind,
+            kind_word,
+            within,
+            lengths,
+            priority,
+            inclusion,
+            untimed,
+            contains,
+        };
+        Operation { head, body }
+    }
+
+    fn resource(&mut self, pair: &Pair<'_>) -> Resource {
+        Resource {
+            parameter: child(pair, Rule::text).map(|parameter| self.text_of(&parameter)),
+            node: self.name(&expect_child(pair, Rule::name)),
+            span: self.span(pair),
         }
     }
 
@@ -79,39 +85,36 @@ impl Reader<'_> {
         Place { topic: self.name(&expect_child(pair, Rule::name)), steps, span: self.span(pair) }
     }
 
-    fn operation_kind(&mut self, pair: &Pair<'_>) -> OperationKind {
-        let kind = after_equals(pair).expect("an operation has a kind");
+    fn operation_kind(&mut self, kind: &Pair<'_>) -> OperationKind {
         match kind.as_rule() {
-            Rule::random_value => match child(&kind, Rule::value_mode) {
+            Rule::random_value => match child(kind, Rule::value_mode) {
                 Some(mode) => OperationKind::Random {
                     absolute: child(&mode, Rule::k_absolute).is_some(),
-                    amounts: self.amounts(&kind).expect("a random value says what is drawn from"),
+                    amounts: self.amounts(kind).expect("a random value says what is drawn from"),
                 },
-                None => OperationKind::RandomText(self.listed(&expect_child(&kind, Rule::text_domain))),
+                None => OperationKind::RandomText(self.listed(&expect_child(kind, Rule::text_domain))),
             },
             Rule::stuck_at => {
-                OperationKind::StuckAt(match (child(&kind, Rule::text_domain), child(&kind, Rule::truth)) {
+                OperationKind::StuckAt(match (child(kind, Rule::text_domain), child(kind, Rule::truth)) {
                     (Some(texts), _) => Stuck::Texts(self.listed(&texts)),
                     (_, Some(truth)) => Stuck::Truth(child(&truth, Rule::k_true).is_some(), self.span(&truth)),
-                    _ => Stuck::Amounts(self.amounts(&kind).expect("a value is stuck at something")),
+                    _ => Stuck::Amounts(self.amounts(kind).expect("a value is stuck at something")),
                 })
             }
-            Rule::not_finite => {
-                OperationKind::NotFinite(match (child(&kind, Rule::k_nan), child(&kind, Rule::minus)) {
-                    (Some(_), _) => NotFinite::Nan,
-                    (None, None) => NotFinite::Infinity,
-                    (None, Some(_)) => NotFinite::MinusInfinity,
-                })
-            }
+            Rule::not_finite => OperationKind::NotFinite(match (child(kind, Rule::k_nan), child(kind, Rule::minus)) {
+                (Some(_), _) => NotFinite::Nan,
+                (None, None) => NotFinite::Infinity,
+                (None, Some(_)) => NotFinite::MinusInfinity,
+            }),
             Rule::burst_loss => OperationKind::BurstLoss {
-                span: self.keyword_span(&kind).to(self.span(&expect_child(&kind, Rule::k_loss))),
-                enter: self.ranges(&kind, Rule::burst_enter),
-                leave: self.ranges(&kind, Rule::burst_leave),
-                loss: self.ranges(&kind, Rule::burst_drops),
+                span: self.keyword_span(kind).to(self.span(&expect_child(kind, Rule::k_loss))),
+                enter: self.ranges(kind, Rule::burst_enter),
+                leave: self.ranges(kind, Rule::burst_leave),
+                loss: self.ranges(kind, Rule::burst_drops),
             },
             Rule::latency => OperationKind::Latency {
-                range: self.only_range(&kind),
-                distribution: children(&kind, Rule::distribution)
+                range: self.only_range(kind),
+                distribution: children(kind, Rule::distribution)
                     .map(|written| {
                         let word = first_of(&written, &[Rule::k_fixed, Rule::k_uniform, Rule::k_normal]);
                         let distribution = match word.expect("a distribution has a name").as_rule() {
@@ -122,11 +125,11 @@ impl Reader<'_> {
                         (self.span(&written), distribution)
                     })
                     .collect(),
-                drain: self.drains(&kind),
+                drain: self.drains(kind),
             },
-            Rule::reorder => OperationKind::Reorder { range: self.only_range(&kind), drain: self.drains(&kind) },
-            Rule::custom => OperationKind::Custom(self.custom(&kind)),
-            rule => OperationKind::Plain { rule, amounts: self.amounts(&kind) },
+            Rule::reorder => OperationKind::Reorder { range: self.only_range(kind), drain: self.drains(kind) },
+            Rule::custom => OperationKind::Custom(self.custom(kind)),
+            rule => OperationKind::Plain { rule, amounts: self.amounts(kind) },
         }
     }
 

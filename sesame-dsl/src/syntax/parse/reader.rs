@@ -187,13 +187,10 @@ impl Reader<'_> {
     /// Says that a construct belongs to a later version. Its first word decides where; its rule decides what it is
     /// called.
     pub(super) fn unsupported(&mut self, pair: &Pair<'_>) {
-        let words = [Rule::k_node, Rule::k_parameter, Rule::kind_name];
-        let span = first_of(pair, &words).map_or_else(|| self.keyword_span(pair), |word| self.span(&word));
+        let span = self.keyword_span(pair);
         let word = &self.text[span.range()];
         let what = match pair.as_rule() {
             Rule::unsupported_transport => format!("simulator kind `{word}`"),
-            Rule::unsupported_operation => format!("an operation on a `{word}`"),
-            Rule::unsupported_kind => format!("operation kind `{word}`"),
             Rule::unsupported_strategy => format!("search strategy `{word}`"),
             _ => format!("`{word}`"),
         };

@@ -5,7 +5,8 @@ use sesame_grammar::Rule;
 use super::reader::{Pair, Reader, child, children, expect_child, first_of};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::syntax::ast::{
-    Field, Head, InProcess, Message, Node, Process, Simulator, System, Topic, Transport, Type, TypeKind,
+    Answer, Clock, Field, Head, InProcess, Message, Name, Node, Process, Ros2, Service, Simulator, StepBy, StepChannel,
+    Stepping, System, Topic, Transport, Type, TypeKind,
 };
 
 impl Reader<'_> {
@@ -16,6 +17,7 @@ impl Reader<'_> {
             simulators: vec![],
             messages: vec![],
             topics: vec![],
+            services: vec![],
             nodes: vec![],
             launches: vec![],
             terminates: vec![],
@@ -30,6 +32,7 @@ impl Reader<'_> {
                 path: reader.text_of(&expect_child(&member, Rule::text)),
                 ty: reader.type_of(&expect_child(&member, Rule::type_of)),
             }),
+            Rule::service => system.services.push(reader.service(&member)),
             Rule::node => system.nodes.push(reader.node(&member)),
             Rule::launch => system.launches.push((reader.keyword_span(&member), reader.launch(&member))),
             Rule::terminate => system.terminates.push((reader.keyword_span(&member), reader.command(&member))),
@@ -44,9 +47,12 @@ impl Reader<'_> {
             self.unsupported(&unsupported);
             return Simulator { head, transport: None };
         }
-        let transport = match child(pair, Rule::process) {
-            Some(process) => Transport::Process(self.process(&process)),
-            None => Transport::InProcess(self.in_process(&expect_child(pair, Rule::in_process))),
+        let kinds = [Rule::in_process, Rule::process, Rule::ros2];
+        let kind = first_of(pair, &kinds).expect("a simulator has a kind");
+        let transport = match kind.as_rule() {
+            Rule::process => Transport::Process(self.process(&kind)),
+            Rule::ros2 => Transport::Ros2(self.ros2(&kind)),
+            _ => Transport::InProcess(self.in_process(&kind)),
         };
         Simulator { head, transport: Some(transport) }
     }
@@ -83,8 +89,57 @@ impl Reader<'_> {
         transport
     }
 
+    fn ros2(&mut self, pair: &Pair<'_>) -> Ros2 {
+        let mut ros2 = Ros2::default();
+        let Some(settings) = child(pair, Rule::ros2_settings) else { return ros2 };
+        ros2.has_errors = self.members(&settings, |reader, setting| {
+            let span = reader.keyword_span(&setting);
+            let text = |reader: &mut Self| reader.text_of(&expect_child(&setting, Rule::text));
+            match setting.as_rule() {
+                Rule::setting_domain => ros2.domains.push((span, reader.count(&expect_child(&setting, Rule::number)))),
+                Rule::setting_types => {
+                    let texts = expect_child(&setting, Rule::texts);
+                    ros2.types
+                        .push((span, children(&texts, Rule::text).map(|folder| reader.text_of(&folder)).collect()));
+                }
+                Rule::setting_clock => {
+                    let wall = child(&setting, Rule::k_wall).is_some();
+                    ros2.clocks.push((span, if wall { Clock::Wall } else { Clock::Topic(text(reader)) }));
+                }
+                Rule::step_by => {
+                    let time = reader.signed(&expect_child(&setting, Rule::signed));
+                    let by = first_of(&setting, &[Rule::k_service, Rule::k_topic]).map(|channel| {
+                        let topic = channel.as_rule() == Rule::k_topic;
+                        StepBy {
+                            channel: if topic { StepChannel::Topic } else { StepChannel::Service },
+                            path: text(reader),
+                            span: reader.span(&channel),
+                        }
+                    });
+                    ros2.steps.push((span, Stepping { time, by }));
+                }
+                _ => ros2.resets.push((span, text(reader))),
+            }
+        });
+        ros2
+    }
+
+    fn service(&mut self, pair: &Pair<'_>) -> Service {
+        let head = self.head(pair);
+        let mut texts = children(pair, Rule::text).map(|text| self.text_of(&text)).collect::<Vec<_>>().into_iter();
+        let direction = |suffix: &str| Head {
+            name: Name { text: format!("{}_{suffix}", head.name.text), span: head.name.span },
+            ..head.clone()
+        };
+        let [request, reply] = ["request", "reply"].map(direction);
+        let mut next = || texts.next().expect("a service has a path and a type");
+        Service { path: next(), ros_type: next(), head, request, reply }
+    }
+
     fn message(&mut self, pair: &Pair<'_>) -> Message {
         let head = self.head(pair);
+        let ros_type = child(pair, Rule::ros_type).map(|ty| self.text_of(&expect_child(&ty, Rule::text)));
+        let block = child(pair, Rule::open).is_some();
         let mut fields = Vec::new();
         let has_errors = self.members(pair, |reader, field| {
             let name = expect_child(&field, Rule::field_name);
@@ -95,9 +150,10 @@ impl Reader<'_> {
                     full_span: reader.full_span(&field),
                 },
                 ty: reader.type_of(&expect_child(&field, Rule::type_of)),
+                wire: child(&field, Rule::wire_type).map(|wire| reader.text_of(&expect_child(&wire, Rule::text))),
             });
         });
-        Message { head, fields, has_errors }
+        Message { head, ros_type, block, fields, has_errors }
     }
 
     pub(super) fn type_of(&mut self, pair: &Pair<'_>) -> Type {
@@ -131,12 +187,32 @@ impl Reader<'_> {
     }
 
     fn node(&mut self, pair: &Pair<'_>) -> Node {
-        let mut node = Node { head: self.head(pair), publishes: vec![], subscribes: vec![] };
+        let named = child(pair, Rule::text).map(|text| self.text_of(&text));
+        let head = self.head(pair);
+        let mut node = Node {
+            head,
+            named,
+            publishes: vec![],
+            subscribes: vec![],
+            launches: vec![],
+            answers: vec![],
+            every_step: vec![],
+        };
         self.members(pair, |reader, member| {
-            let list = (reader.keyword_span(&member), reader.names(&member));
+            let span = reader.keyword_span(&member);
             match member.as_rule() {
-                Rule::publishes => node.publishes.push(list),
-                _ => node.subscribes.push(list),
+                Rule::publishes => node.publishes.push((span, reader.names(&member))),
+                Rule::subscribes => node.subscribes.push((span, reader.names(&member))),
+                Rule::launch => node.launches.push((span, reader.launch(&member))),
+                Rule::every_step => node.every_step.push((span, reader.names(&member))),
+                _ => {
+                    let answers = children(&member, Rule::answer).map(|answer| {
+                        let mut names = children(&answer, Rule::name).map(|name| reader.name(&name));
+                        let mut next = || names.next().expect("an answer has two names");
+                        Answer { to: next(), with: next() }
+                    });
+                    node.answers.push((span, answers.collect()));
+                }
             }
         });
         node

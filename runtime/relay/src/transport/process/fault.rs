@@ -20,7 +20,7 @@ pub(super) fn explain(
     match fault {
         Fault::Disconnected(awaited) => {
             let Some(running) = running else { unreachable!("only a connected simulator can disconnect") };
-            let PostMortem { how, last_lines, killed } = running.post_mortem();
+            let PostMortem { how, last_lines, killed, .. } = running.post_mortem();
             incidents.killed |= killed;
             TransportError::Disconnected { command: program.shown(), how, awaited, last_lines }
         }

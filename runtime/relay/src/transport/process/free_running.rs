@@ -10,6 +10,7 @@
 use std::io::{BufReader, Write};
 use std::mem;
 use std::process::ChildStdout;
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -17,10 +18,12 @@ use std::time::{Duration, Instant};
 use sesame_base::time::SimTime;
 use sesame_plan::CampaignPlan;
 
-use crate::lifecycle::{Input, Program, Running};
+use crate::lifecycle::launch::Launched;
+use crate::lifecycle::{Alarm, Input, Program, Running};
 use crate::relay::Exchange;
 use crate::simulator::Progress;
 use crate::transport::process::fault::{explain, note_restart};
+use crate::transport::process::launched::{health, launch};
 use crate::transport::process::protocol::{LINE_LIMIT, Line, Read, SimulatorMessage, read_line, request};
 use crate::transport::process::session::{Fault, Topics};
 use crate::transport::{Capabilities, Incidents, Transport, TransportError};
@@ -29,9 +32,14 @@ use crate::transport::{Capabilities, Incidents, Transport, TransportError};
 /// writes before it reads does not block the runner.
 const READ_AHEAD: usize = 1 << 16;
 
+/// How often it is looked whether a launched program has ended.
+const ALARM: Duration = Duration::from_millis(100);
+
 pub(super) struct FreeRunning {
     program: Program,
     connection: Option<Connection>,
+    // Dropped after the simulator, which may need it to the end.
+    launched: Launched,
     plan: CampaignPlan,
     now: SimTime,
     incidents: Incidents,
@@ -41,6 +49,8 @@ struct Connection {
     // Dropped first: the end of its input tells the simulator to exit.
     input: Input,
     lines: Receiver<Received>,
+    /// Set when a launched program has ended.
+    alarm: Option<Alarm>,
     line: Line,
     topics: Topics,
     clock: Clock,
@@ -64,9 +74,10 @@ enum Clock {
 }
 
 impl FreeRunning {
-    pub(super) fn new(plan: &CampaignPlan, program: Program) -> Self {
+    pub(super) fn new(plan: &CampaignPlan, program: Program, launched: Launched) -> Self {
         FreeRunning {
             program,
+            launched,
             connection: None,
             plan: plan.clone(),
             now: SimTime::ZERO,
@@ -83,36 +94,52 @@ impl FreeRunning {
         })
     }
 
-    /// The error for a fault. The connection is closed: a simulator is never used after a fault.
+    /// The error for a fault. The connection is closed: a simulator is never used after a fault. If a launched program
+    /// has ended, that comes first: the simulator may have failed for want of it.
     fn explain(&mut self, fault: Fault) -> TransportError {
+        let ended = health(&mut self.launched, &mut self.incidents).err();
         let running = self.disconnect();
-        explain(&self.program, running, fault, &mut self.incidents)
+        let error = match ended {
+            Some(ended) => ended,
+            None => explain(&self.program, running, fault, &mut self.incidents),
+        };
+        self.close();
+        error
     }
 
     /// Begins a run with the existing process, or with a new one.
     fn begin(&mut self, seed: u64, relay: &mut dyn Exchange) -> Result<(), Fault> {
         let (connection, was_used) = match &mut self.connection {
             Some(connection) => (connection, true),
-            empty => (empty.insert(Connection::start(&self.program)?), false),
+            empty => {
+                launch(&mut self.launched, seed)?;
+                (empty.insert(Connection::start(&self.program, self.launched.alarm())?), false)
+            }
         };
-        connection.running.clear_stderr();
+        connection.running.clear_output();
         connection.reset(&self.plan, seed, was_used, relay)
     }
 }
 
 impl Connection {
-    fn start(program: &Program) -> Result<Self, TransportError> {
+    fn start(program: &Program, alarm: Option<Alarm>) -> Result<Self, TransportError> {
         let (running, input, output) = program.start()?;
         let (lines, topics) = (read_lines(output), Topics::default());
-        Ok(Connection { input, lines, line: Line::default(), topics, clock: Clock::Simulator, resets: false, running })
+        Ok(Connection {
+            input,
+            lines,
+            alarm,
+            line: Line::default(),
+            topics,
+            clock: Clock::Simulator,
+            resets: false,
+            running,
+        })
     }
 
     /// Waits for the next line, at most for this long; false if there was none.
     fn receive(&mut self, wait: Option<Duration>, awaited: &str) -> Result<bool, Fault> {
-        let received = match wait {
-            Some(wait) => self.lines.recv_timeout(wait),
-            None => self.lines.recv().map_err(|_| RecvTimeoutError::Disconnected),
-        };
+        let received = self.next_line(wait);
         self.line.number += u64::from(received.is_ok());
         match received {
             Ok(Received::Line(bytes)) => {
@@ -122,6 +149,27 @@ impl Connection {
             Ok(Received::TooLong) => Err(self.line.too_long(LINE_LIMIT).into()),
             Err(RecvTimeoutError::Timeout) => Ok(false),
             Err(RecvTimeoutError::Disconnected) => Err(Fault::Disconnected(awaited.to_owned())),
+        }
+    }
+
+    fn next_line(&self, wait: Option<Duration>) -> Result<Received, RecvTimeoutError> {
+        let Some(alarm) = &self.alarm else {
+            return match wait {
+                Some(wait) => self.lines.recv_timeout(wait),
+                None => self.lines.recv().map_err(|_| RecvTimeoutError::Disconnected),
+            };
+        };
+        // The end of a launched program is the end of the run, too.
+        let begun = Instant::now();
+        loop {
+            let left = wait.map_or(ALARM, |wait| wait.saturating_sub(begun.elapsed()));
+            match self.lines.recv_timeout(left.min(ALARM)) {
+                Err(RecvTimeoutError::Timeout) if alarm.load(Ordering::Relaxed) => {
+                    return Err(RecvTimeoutError::Disconnected);
+                }
+                Err(RecvTimeoutError::Timeout) if wait.is_none_or(|wait| begun.elapsed() < wait) => {}
+                received => return received,
+            }
         }
     }
 
@@ -245,7 +293,8 @@ impl Transport for FreeRunning {
         }
         if self.connection.is_some() {
             // A fault of a process that was used before may belong to the previous run.
-            let Err(fault) = self.begin(seed, relay) else { return Ok(()) };
+            let ended = health(&mut self.launched, &mut Incidents::default());
+            let Err(fault) = ended.map_err(Fault::from).and_then(|()| self.begin(seed, relay)) else { return Ok(()) };
             let running = self.disconnect();
             note_restart(&self.program, running, fault, &mut self.incidents);
         }
@@ -256,6 +305,9 @@ impl Transport for FreeRunning {
         let Some(connection) = &mut self.connection else {
             return Err(TransportError::Simulator("it was advanced before it was started".to_owned()));
         };
+        if let Err(ended) = health(&mut self.launched, &mut self.incidents) {
+            return Err(self.explain(ended.into()));
+        }
         self.now = connection.time(self.now).min(until);
         connection.advance_to(self.now, relay);
         if self.now >= until {
@@ -285,9 +337,11 @@ impl Transport for FreeRunning {
 
     fn close(&mut self) {
         self.connection = None;
+        self.launched.end();
     }
 
     fn incidents(&mut self) -> Incidents {
+        self.incidents.notes.append(&mut self.launched.take_notes());
         mem::take(&mut self.incidents)
     }
 }

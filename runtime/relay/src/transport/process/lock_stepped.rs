@@ -5,18 +5,21 @@
     reason = "an adapter: it waits for a program, and measures how long its steps take"
 )]
 
-use std::io::BufReader;
+use std::io::{self, BufReader, Read};
 use std::mem;
 use std::process::ChildStdout;
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use sesame_base::time::SimTime;
 use sesame_plan::CampaignPlan;
 
-use crate::lifecycle::{Input, Program, Running};
+use crate::lifecycle::launch::Launched;
+use crate::lifecycle::{Alarm, Input, Program, Running};
 use crate::relay::Exchange;
 use crate::simulator::Progress;
 use crate::transport::process::fault::{explain, note_restart};
+use crate::transport::process::launched::{health, launch};
 use crate::transport::process::session::{Fault, Session};
 use crate::transport::{Capabilities, Incidents, Transport, TransportError};
 
@@ -28,6 +31,8 @@ const LONGEST_WAIT: Duration = Duration::from_millis(100);
 pub(super) struct LockStepped {
     program: Program,
     connection: Option<Connection>,
+    // Dropped after the simulator, which may need it to the end.
+    pub(super) launched: Launched,
     pub(super) plan: CampaignPlan,
     now: SimTime,
     step: SimTime,
@@ -36,7 +41,7 @@ pub(super) struct LockStepped {
 
 struct Connection {
     // Dropped first: the end of its input tells the simulator to exit.
-    session: Session<BufReader<ChildStdout>, Input>,
+    session: Session<BufReader<Attended>, Input>,
     running: Running,
     /// The steps of this run, and when its first step began.
     steps: u32,
@@ -44,9 +49,10 @@ struct Connection {
 }
 
 impl LockStepped {
-    pub(super) fn new(plan: &CampaignPlan, program: Program, step: SimTime) -> Self {
+    pub(super) fn new(plan: &CampaignPlan, program: Program, launched: Launched, step: SimTime) -> Self {
         LockStepped {
             program,
+            launched,
             connection: None,
             plan: plan.clone(),
             now: SimTime::ZERO,
@@ -64,10 +70,17 @@ impl LockStepped {
         })
     }
 
-    /// The error for a fault. The connection is closed: a simulator is never used after a fault.
+    /// The error for a fault. The connection is closed: a simulator is never used after a fault. If a launched program
+    /// has ended, that comes first: the simulator may have failed for want of it.
     fn explain(&mut self, fault: Fault) -> TransportError {
+        let ended = health(&mut self.launched, &mut self.incidents).err();
         let running = self.disconnect();
-        explain(&self.program, running, fault, &mut self.incidents)
+        let error = match ended {
+            Some(ended) => ended,
+            None => explain(&self.program, running, fault, &mut self.incidents),
+        };
+        self.close();
+        error
     }
 
     /// Begins a run with the existing process, or with a new one.
@@ -75,12 +88,14 @@ impl LockStepped {
         let connection = match &mut self.connection {
             Some(connection) => connection,
             empty => {
+                launch(&mut self.launched, seed)?;
                 let (running, input, output) = self.program.start().map_err(TransportError::from)?;
+                let output = Attended { pipe: output, alarm: self.launched.alarm() };
                 let session = Session::new(BufReader::with_capacity(1 << 16, output), input);
                 empty.insert(Connection { session, running, steps: 0, stepping: Instant::now() })
             }
         };
-        connection.running.clear_stderr();
+        connection.running.clear_output();
         connection.session.reset(&self.plan, seed, self.step, relay)?;
         connection.steps = 0;
         connection.stepping = Instant::now();
@@ -120,9 +135,11 @@ impl Transport for LockStepped {
         }
         // A fault of a process that was used before may belong to the previous run, so this run starts a new process.
         if let Some(Connection { session, .. }) = &mut self.connection {
-            let late = waiting::for_a_while(session.input(), Duration::ZERO).then(|| session.surplus_answer().into());
-            let fault = match late {
-                Some(late) => late,
+            let late =
+                || waiting::for_a_while(session.input(), Duration::ZERO).then(|| session.surplus_answer().into());
+            let ended = health(&mut self.launched, &mut Incidents::default()).err();
+            let fault = match ended.map(Fault::Wrong).or_else(late) {
+                Some(fault) => fault,
                 None => match self.begin(seed, relay) {
                     Ok(()) => return Ok(()),
                     Err(fault) if self.is_ready() => return Err(self.explain(fault)),
@@ -141,6 +158,9 @@ impl Transport for LockStepped {
         };
         let mut progress = Progress::Ended;
         if self.now + self.step <= until {
+            if let Err(ended) = health(&mut self.launched, &mut self.incidents) {
+                return Err(self.explain(ended.into()));
+            }
             self.now = self.now + self.step;
             connection.steps += 1;
             let step = connection.session.step(&self.plan, self.now, relay);
@@ -158,10 +178,31 @@ impl Transport for LockStepped {
 
     fn close(&mut self) {
         self.connection = None;
+        self.launched.end();
     }
 
     fn incidents(&mut self) -> Incidents {
+        self.incidents.notes.append(&mut self.launched.take_notes());
         mem::take(&mut self.incidents)
+    }
+}
+
+/// The output of a simulator. It ends, too, when a launched program has ended: the simulator may wait for it for ever.
+struct Attended {
+    pipe: ChildStdout,
+    alarm: Option<Alarm>,
+}
+
+impl Read for Attended {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if let Some(alarm) = &self.alarm {
+            while !waiting::or_ended(&self.pipe, LONGEST_WAIT) {
+                if alarm.load(Ordering::Relaxed) {
+                    return Ok(0);
+                }
+            }
+        }
+        self.pipe.read(buffer)
     }
 }
 
@@ -172,22 +213,48 @@ mod waiting {
     use std::time::Duration;
 
     /// Whether it has, or does so within this time.
-    pub(super) fn for_a_while(input: &BufReader<ChildStdout>, time: Duration) -> bool {
-        !input.buffer().is_empty() || in_the_pipe(input.get_ref(), time)
+    pub(super) fn for_a_while(input: &BufReader<super::Attended>, time: Duration) -> bool {
+        !input.buffer().is_empty() || system::in_the_pipe(&input.get_ref().pipe, time)
+    }
+
+    /// Whether a read does not wait for longer than this: something has come, or the pipe is closed.
+    pub(super) fn or_ended(pipe: &ChildStdout, time: Duration) -> bool {
+        system::in_the_pipe_or_closed(pipe, time)
     }
 
     #[cfg(unix)]
-    fn in_the_pipe(pipe: &ChildStdout, time: Duration) -> bool {
+    mod system {
         use rustix::event::{PollFd, PollFlags, poll};
 
-        let mut pipes = [PollFd::new(pipe, PollFlags::IN)];
-        // If polling fails, so will reading.
-        poll(&mut pipes, time.try_into().ok().as_ref()).is_ok() && pipes[0].revents().contains(PollFlags::IN)
+        use super::{ChildStdout, Duration};
+
+        pub(super) fn in_the_pipe(pipe: &ChildStdout, time: Duration) -> bool {
+            polled(pipe, time).is_some_and(|events| events.contains(PollFlags::IN))
+        }
+
+        pub(super) fn in_the_pipe_or_closed(pipe: &ChildStdout, time: Duration) -> bool {
+            polled(pipe, time).is_none_or(|events| !events.is_empty())
+        }
+
+        /// If polling fails, so will reading.
+        fn polled(pipe: &ChildStdout, time: Duration) -> Option<PollFlags> {
+            let mut pipes = [PollFd::new(pipe, PollFlags::IN)];
+            poll(&mut pipes, time.try_into().ok().as_ref()).ok()?;
+            Some(pipes[0].revents())
+        }
     }
 
     /// The standard library cannot poll a pipe: what is in it is noticed at the next reset.
     #[cfg(not(unix))]
-    fn in_the_pipe(_: &ChildStdout, _: Duration) -> bool {
-        false
+    mod system {
+        use super::{ChildStdout, Duration};
+
+        pub(super) fn in_the_pipe(_: &ChildStdout, _: Duration) -> bool {
+            false
+        }
+
+        pub(super) fn in_the_pipe_or_closed(_: &ChildStdout, _: Duration) -> bool {
+            true
+        }
     }
 }

@@ -263,7 +263,7 @@ impl Topics {
     /// Puts the relay's deliveries to subscribers into the outbox. A message that no operation intercepts is passed on
     /// byte for byte.
     pub(super) fn deliver(&mut self, relay: &dyn Exchange, published: Option<(Wire, &RawValue)>) {
-        for Delivery { wire, value } in self.deliveries.drain(..) {
+        for Delivery { wire, value, .. } in self.deliveries.drain(..) {
             if !self.subscribed.get(wire.index()).copied().unwrap_or(false) {
                 continue;
             }

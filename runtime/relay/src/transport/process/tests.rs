@@ -62,12 +62,17 @@ fn plan_of(program: &str, arguments: &[&str]) -> CampaignPlan {
 
 /// The transport of a plan whose program is stepped.
 fn stepped(plan: &CampaignPlan, folder: PathBuf) -> LockStepped {
-    LockStepped::new(plan, program_of(plan, folder), SimTime::from_nanos(100_000_000))
+    let launched = launched_of(plan, &folder);
+    LockStepped::new(plan, program_of(plan, folder), launched, SimTime::from_nanos(100_000_000))
+}
+
+fn launched_of(plan: &CampaignPlan, folder: &Path) -> Launched {
+    Launched::new(plan, Place { in_runner: false, ..Place::of_worker(folder.to_owned()) })
 }
 
 fn program_of(plan: &CampaignPlan, folder: PathBuf) -> Program {
     let Declared::Process { program, arguments, .. } = plan.simulator.transport.clone() else { unreachable!() };
-    Program { name: program, arguments, folder, in_runner: false }
+    Program { name: program, arguments, folder, environment: Vec::new(), in_runner: false }
 }
 
 fn run(transport: &mut LockStepped, seed: u64) -> Observation {
@@ -146,7 +151,7 @@ fn the_free_running_example_of_the_documentation_is_a_simulator() {
     }
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/transport/process");
     let plan = cart("free_running.py");
-    let mut transport = FreeRunning::new(&plan, program_of(&plan, folder));
+    let mut transport = FreeRunning::new(&plan, program_of(&plan, folder.clone()), launched_of(&plan, &folder));
     let wires = WireTable::new(&plan);
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
     let observed =
@@ -472,7 +477,8 @@ for line in sys.stdin:
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("sim.py"), program).unwrap();
     let plan = plan_of("python3", &["sim.py"]);
-    let mut transport = FreeRunning::new(&plan, program_of(&plan, folder.path().to_owned()));
+    let mut transport =
+        FreeRunning::new(&plan, program_of(&plan, folder.path().to_owned()), launched_of(&plan, folder.path()));
     let wires = WireTable::new(&plan);
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
     for seed in [3, 4] {
@@ -482,4 +488,78 @@ for line in sys.stdin:
         assert_eq!(observed.metrics[1].series, [(0.0, seed as f64)]);
     }
     assert_eq!(std::fs::read(folder.path().join("starts")).unwrap(), b"x");
+}
+
+/// What a program in Python is launched with, ready at the line `up`.
+fn launch_of(program: &str) -> sesame_plan::Launch {
+    let arguments = ["-u", "-c", program].map(str::to_owned).to_vec();
+    sesame_plan::Launch {
+        command: sesame_plan::Command { program: "python3".to_owned(), arguments },
+        ready: Some(sesame_plan::Ready { when: sesame_plan::ReadyWhen::Line { text: "up".to_owned() }, within: 20.0 }),
+    }
+}
+
+/// A stepped simulator beside which this is launched.
+fn launching(resets: &str, step: &str, launched: &str) -> Option<Python> {
+    if !python() {
+        return None;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("sim.py"), format!("{FRAME}{step}").replace("RESETS", resets)).unwrap();
+    let mut plan = plan_of("python3", &["sim.py"]);
+    plan.simulator.lifecycle.launch = Some(launch_of(launched));
+    let transport = stepped(&plan, folder.path().to_owned());
+    Some(Python { folder, transport })
+}
+
+#[test]
+fn what_is_launched_is_there_before_the_simulator_and_anew_for_each_test_unless_it_resets() {
+    let launched = "import time\ntime.sleep(0.2)\nopen('launched', 'a').write('x')\nprint('up')\ntime.sleep(1000)";
+    let step = format!("    assert open('launched').read()\n{STEP}");
+    for (resets, starts) in [("True", 1), ("False", 3)] {
+        let Some(mut python) = launching(resets, &step, launched) else { return };
+        for _ in 0..3 {
+            assert_eq!(run(&mut python.transport, 10).outcome, Outcome::Completed);
+        }
+        let started = std::fs::read(python.folder.path().join("launched")).unwrap();
+        assert_eq!(started.len(), starts, "resets: {resets}");
+        python.transport.close();
+        assert!(!python.transport.launched.is_started());
+    }
+}
+
+#[test]
+fn the_end_of_what_was_launched_is_a_crash_even_if_the_simulator_waits_for_it_for_ever() {
+    let launched = "import time\nprint('up')\ntime.sleep(0.5)\nraise SystemExit('the bridge broke')";
+    let step = "    __import__('time').sleep(1000)";
+    let Some(mut python) = launching("True", step, launched) else { return };
+    let started = Instant::now();
+    let Outcome::Crash { message } = run(&mut python.transport, 1).outcome else { panic!("it is a crash") };
+    assert!(
+        message.contains("of the system ended (exit status: 1); the last lines that it wrote:\nup\nthe bridge broke")
+    );
+    assert!(started.elapsed() < Duration::from_secs(60));
+}
+
+#[test]
+fn what_is_launched_ends_a_free_running_simulator_too() {
+    if !python() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let program = "import json, sys, time\nT = ['arm/command', 'zones/Z1', 'zones/Z2']\nsys.stdin.readline()\n\
+                   print(json.dumps({'ready': {'publishes': T, 'subscribes': T, 'clock': True}}), flush=True)\ntime.sleep(1000)";
+    std::fs::write(folder.path().join("sim.py"), program).unwrap();
+    let mut plan = plan_of("python3", &["sim.py"]);
+    let Declared::Process { step_ns, .. } = &mut plan.simulator.transport else { unreachable!() };
+    *step_ns = None;
+    plan.simulator.lifecycle.launch =
+        Some(launch_of("import time\nprint('up')\ntime.sleep(0.5)\nraise SystemExit('the bridge broke')"));
+    let mut transport = transport(&plan, folder.path().to_owned(), false);
+    let wires = WireTable::new(&plan);
+    let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
+    let test = test_of(Vec::new());
+    let observed = evaluate(&plan, &wires, &metrics, transport.as_mut(), &test, 1, &mut Custom::none()).unwrap();
+    let Outcome::Crash { message } = observed.outcome else { panic!("{:?} is no crash", observed.outcome) };
+    assert!(message.contains("the bridge broke"), "{message}");
 }

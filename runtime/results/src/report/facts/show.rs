@@ -36,7 +36,8 @@ pub struct ListedTest {
     /// What a run is called in a campaign that repeats a test or observes, instead of searching; `None` for others.
     #[serde(skip)]
     pub(crate) repeats: Option<&'static str>,
-    /// `completed`, `no_effect`, `unknown`, `crash` or `timeout`.
+    /// `completed`, `no_effect`, `unknown`, `crash` or `timeout`; of the environment `launch_failed`,
+    /// `disconnect` or `wrong_clock`.
     pub outcome: String,
     /// The equal test whose result stands for this one.
     pub duplicate_of: Option<TestNumber>,
@@ -83,7 +84,8 @@ pub struct TestReport {
     pub simulator_seed: u64,
     /// The equal test whose result stands for this one.
     pub duplicate_of: Option<TestNumber>,
-    /// `completed`, `no_effect`, `unknown`, `crash` or `timeout`.
+    /// `completed`, `no_effect`, `unknown`, `crash` or `timeout`; of the environment `launch_failed`,
+    /// `disconnect` or `wrong_clock`.
     pub outcome: String,
     /// What is known of a crash or timeout.
     pub detail: Option<String>,
@@ -121,8 +123,11 @@ pub struct OperationReport {
     pub operation: String,
     /// Its kind in words.
     pub kind: String,
-    /// The topic it disturbs; `None` for one that acts before the start or after the end.
+    /// The topic it disturbs; `None` for one that acts on no messages.
     pub topic: Option<String>,
+    /// The node or the parameter it acts on, in the words of the language; `None` for one that acts on messages, before
+    /// the start or after the end.
+    pub resource: Option<String>,
     /// When it was to be active, in seconds; `None` where conditions decide that, and for one that acts before the
     /// start or after the end.
     pub planned: Option<Span>,
@@ -338,6 +343,7 @@ fn operations(plan: &CampaignPlan, record: &TestRecord) -> Vec<OperationReport> 
             operation: operation.name.clone(),
             kind: operation.kind.words().to_owned(),
             topic: operation.topic.map(|topic| plan.topic(topic).name.clone()),
+            resource: notation::resource(plan, operation),
             planned,
             conditions,
             observed: effect.map(|effect| effect.intervals.clone()),

@@ -8,11 +8,13 @@ use sesame_base::observation::Outcome;
 use sesame_base::test_number::TestNumber;
 use sesame_plan::{Bound, CampaignPlan, Confirmation, Copies, Direction, MetricId, Requirement};
 
-use crate::analysis::confirmed::{ConfirmedTest, FAILURES, FindingAgain, confirmed_tests, failed, failed_again};
+use crate::analysis::confirmed::{
+    ConfirmedTest, FAILURES, FindingAgain, OF_ENVIRONMENT, confirmed_tests, failed, failed_again,
+};
 use crate::analysis::statistics::Sample;
 use crate::present::number;
 use crate::record::{
-    EventKind, Judge, MetricValue, Origin, RecordError, Repository, Standing, TestRow, Verdict, verdict,
+    EventKind, Judge, MetricValue, Origin, RecordError, Repository, Standing, TestRow, Verdict, is_quarantined, verdict,
 };
 use crate::report::facts::coverage::{CoverageSummary, coverage};
 use crate::report::facts::readable;
@@ -50,8 +52,12 @@ pub struct Summary {
     pub requirements: Vec<RequirementSummary>,
     /// Expectations of regression tests, in the order of the tests.
     pub expectations: Vec<ExpectationSummary>,
-    /// Crashes and timeouts, by test: of its first run, and those that only fresh runs showed.
+    /// Crashes and timeouts, and runs that the environment broke off, by test: of its first run, and those that only
+    /// fresh runs showed.
     pub failures: Vec<Failure>,
+    /// Tests that crashed in each of their first three runs and are not run again, by test.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub quarantined: Vec<Quarantined>,
     /// Tests in which a metric read a number that was not finite, by test.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub not_finite: Vec<NotFinite>,
@@ -84,6 +90,15 @@ pub struct Counts {
     pub crashes: usize,
     /// Of these, timeouts.
     pub timeouts: usize,
+    /// Of these, tests that the environment broke off each time they were run: failed launches, disconnects, wrong
+    /// clocks. They say nothing about the system.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub environment: usize,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 /// What the search optimised.
@@ -184,7 +199,7 @@ pub struct ExpectationSummary {
 pub struct Failure {
     /// The test.
     pub test: TestNumber,
-    /// `crash` or `timeout`.
+    /// `crash` or `timeout`; of the environment `launch_failed`, `disconnect` or `wrong_clock`.
     pub outcome: String,
     /// Simulation time at which it broke off, in seconds.
     pub at: f64,
@@ -196,10 +211,24 @@ pub struct Failure {
 }
 
 impl Failure {
+    /// Whether the environment broke it off: it is no finding.
+    pub fn is_of_environment(&self) -> bool {
+        OF_ENVIRONMENT.contains(&self.outcome.as_str())
+    }
+
     /// Whether it counts as a finding: it does not if fresh runs never show it.
     pub fn stands(&self) -> bool {
         self.again.as_ref().is_none_or(|again| again.standing != Some(Standing::NotConfirmed))
     }
+}
+
+/// A test that is not run again, because it keeps crashing its simulator.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Quarantined {
+    /// The test.
+    pub test: TestNumber,
+    /// What is known of the crash of its first run.
+    pub detail: String,
 }
 
 /// A run in which metrics read numbers that were not finite.
@@ -278,6 +307,7 @@ pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: &[u3
         repetition: repetition(plan, repository.task(), rows),
         shrinking: shrinking(repository, rows)?,
         failures: rows.iter().flat_map(|row| failures(&judge, row)).collect(),
+        quarantined: rows.iter().filter_map(|row| quarantined(plan, &judge, row)).collect(),
         not_finite: rows.iter().filter_map(|row| not_finite(plan, row)).collect(),
         once: rows
             .iter()
@@ -307,6 +337,9 @@ fn counts(plan: &CampaignPlan, rows: &[TestRow]) -> Counts {
             Outcome::NoEffect => counts.no_effect += 1,
             Outcome::Crash { .. } => counts.crashes += 1,
             Outcome::Timeout { .. } => counts.timeouts += 1,
+            Outcome::LaunchFailed { .. } | Outcome::Disconnect { .. } | Outcome::WrongClock { .. } => {
+                counts.environment += 1;
+            }
         }
     }
     counts
@@ -485,7 +518,12 @@ fn failures(judge: &Judge<'_>, row: &TestRow) -> Vec<Failure> {
             again: failed_again(judge, row, word),
         })
     };
-    FAILURES.into_iter().filter_map(of).collect()
+    FAILURES.into_iter().chain(OF_ENVIRONMENT).filter_map(of).collect()
+}
+
+fn quarantined(plan: &CampaignPlan, judge: &Judge<'_>, row: &TestRow) -> Option<Quarantined> {
+    let is_one = row.duplicate_of.is_none() && is_quarantined(plan, &row.outcome, judge.runs(row.number));
+    is_one.then(|| Quarantined { test: TestNumber(row.number), detail: row.outcome.detail().unwrap_or_default() })
 }
 
 fn not_finite(plan: &CampaignPlan, row: &TestRow) -> Option<NotFinite> {

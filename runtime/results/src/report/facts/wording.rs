@@ -39,3 +39,8 @@ pub(crate) fn value_text(shown: MetricValue, unit: Option<&str>) -> String {
         Some(value) => format!("{} (never set)", number::quantity(value, unit)),
     }
 }
+
+/// The word of an outcome as prose has it.
+pub(crate) fn outcome_words(word: &str) -> String {
+    word.replace('_', " ")
+}

@@ -8,7 +8,6 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
 
-use sesame_base::observation::Outcome;
 use sesame_plan::{CampaignPlan, Dimension, Direction, MetricId};
 use sesame_search::sspr::Convention;
 
@@ -17,9 +16,9 @@ use crate::present::markup::Markup;
 use crate::present::number;
 use crate::record::{Judge, Origin, RecordError, Repository, TestRow, Verdict};
 use crate::report::facts::summary::{Summary, shown_value};
+use crate::report::facts::wording::outcome_words;
 use crate::report::html::command;
 use crate::report::html::legend::legend;
-use crate::report::sentences::outcome_words;
 
 /// The most tests that the page holds data of.
 const MOST: usize = 20_000;
@@ -92,7 +91,7 @@ fn chosen<'r>(
     let always =
         |row: &&TestRow| front.contains(&row.number) || drawn.contains(&row.number) || row.origin != Origin::Search;
     let matters = |row: &&TestRow| {
-        matches!(row.outcome, Outcome::Crash { .. } | Outcome::Timeout { .. })
+        !row.outcome.is_whole()
             || plan.requirements.iter().any(|requirement| judge.verdict(row, requirement) == Verdict::Violated)
     };
     let (always, rest): (Vec<&TestRow>, Vec<&TestRow>) = rows.iter().partition(always);

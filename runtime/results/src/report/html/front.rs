@@ -96,6 +96,7 @@ fn caption(summary: &Summary, repository: &Repository) -> String {
         (counts.unmeasured, "unmeasured"),
         (counts.crashes, "crashed"),
         (counts.timeouts, "timed out"),
+        (counts.environment, "broken off by the environment"),
         (counts.duplicates, if counts.duplicates == 1 { "duplicate" } else { "duplicates" }),
     ] {
         if count > 0 {

@@ -2,8 +2,6 @@
 
 use std::path::Path;
 
-use sesame_base::observation::Outcome;
-
 use crate::present::chart::evenly;
 use crate::present::markup::{Markup, fill};
 use crate::present::table::Table;
@@ -18,7 +16,7 @@ use crate::report::html::header::header;
 use crate::report::html::policy::policy;
 use crate::report::html::test::test;
 use crate::report::html::{cells, regions, shrinking};
-use crate::report::sentences::once_sentence;
+use crate::report::sentences::{QUARANTINED, once_sentence};
 use crate::report::tables;
 
 /// Timelines drawn at most; of a larger front evenly chosen ones.
@@ -101,8 +99,7 @@ fn chosen(summary: &Summary, rows: &[TestRow]) -> Vec<Group> {
     let front = evenly(&all, TIMELINES);
     let worst = summary.requirements.iter().filter_map(|requirement| requirement.worst.as_ref());
     let worst = worst.filter_map(|worst| rows.iter().find(|row| row.number == worst.test.0));
-    let failed =
-        rows.iter().filter(|row| matches!(row.outcome, Outcome::Crash { .. } | Outcome::Timeout { .. })).take(4);
+    let failed = rows.iter().filter(|row| !row.outcome.is_whole()).take(4);
     let known = rows.iter().filter(|row| matches!(row.origin, Origin::Known(_))).take(8);
     let mut more: Vec<u32> = Vec::new();
     for row in worst.chain(failed).chain(known) {
@@ -160,7 +157,8 @@ fn sections(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
         section(body, &repetition.title, Some(caption), table, drawn);
     }
     section(body, "Regression tests", None, tables::expectations(&summary.expectations), drawn);
-    section(body, "Crashes and timeouts", None, tables::failures(&summary.failures), drawn);
+    section(body, tables::failures_title(&summary.failures), None, tables::failures(&summary.failures), drawn);
+    section(body, QUARANTINED, None, tables::quarantined(&summary.quarantined), drawn);
     section(body, "Numbers that are not finite", None, tables::not_finite(&summary.not_finite), drawn);
 }
 

@@ -4,7 +4,7 @@
 
 use std::fmt::Write as _;
 
-use sesame_base::observation::{MetricObservation, Outcome};
+use sesame_base::observation::MetricObservation;
 use sesame_base::verdict::ends;
 use sesame_plan::{Bound, CampaignPlan, Metric, MetricSource, Span};
 
@@ -32,7 +32,7 @@ const COLUMNS: f64 = 400.0;
 pub(crate) fn timeline(markup: &mut Markup, plan: &CampaignPlan, record: &TestRecord, report: &TestReport) {
     let end = record.observation.end;
     let time = Axis::exact(0.0, plan.campaign.end_after.max(end), 8);
-    let broke_off = matches!(record.observation.outcome, Outcome::Crash { .. } | Outcome::Timeout { .. });
+    let broke_off = !record.observation.outcome.is_whole();
     let broke_off = broke_off.then_some(end);
     let label = format!("{} over time", report.test);
     let until = coordinate(time.high);
@@ -351,6 +351,8 @@ mod tests {
 
     use sesame_base::observation::Counters;
     use sesame_plan::Task;
+
+    use sesame_base::observation::Outcome;
 
     use super::*;
     use crate::record::{Origin, sample};

@@ -1,0 +1,148 @@
+//! `.msg` and `.srv` files: a line per field or constant.
+
+use sesame_plan::{Primitive, WireType};
+
+use crate::{Constant, Definition, DefinitionError, Field, LONGEST_ARRAY, definition, is_name};
+
+/// The interface that a `.msg` file declares: package and name are those of its folder and of the file.
+pub fn msg(package: &str, name: &str, text: &str) -> Result<Definition, DefinitionError> {
+    part(package, format!("{package}/msg/{name}"), text.lines(), 1)
+}
+
+/// The interfaces of requests and replies that a `.srv` file declares: `NAME_Request` and `NAME_Response`.
+pub fn srv(package: &str, name: &str, text: &str) -> Result<[Definition; 2], DefinitionError> {
+    let lines: Vec<&str> = text.lines().collect();
+    let middle = lines.iter().position(|line| line.trim() == "---").ok_or_else(|| DefinitionError {
+        line: lines.len().max(1),
+        problem: "a line `---` between request and reply is missing".to_owned(),
+    })?;
+    let request = part(package, format!("{package}/srv/{name}_Request"), lines[..middle].iter().copied(), 1)?;
+    let reply =
+        part(package, format!("{package}/srv/{name}_Response"), lines[middle + 1..].iter().copied(), middle + 2)?;
+    Ok([request, reply])
+}
+
+fn part<'a>(
+    package: &str,
+    name: String,
+    lines: impl Iterator<Item = &'a str>,
+    first: usize,
+) -> Result<Definition, DefinitionError> {
+    let (mut fields, mut constants) = (Vec::<Field>::new(), Vec::new());
+    for (at, line) in lines.enumerate() {
+        let wrong = |problem: String| DefinitionError { line: first + at, problem };
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        if line == "---" {
+            return Err(wrong("`---` separates parts of services only".to_owned()));
+        }
+        let (ty, rest) = line.split_once(char::is_whitespace).ok_or_else(|| wrong(format!("`{line}` has no name")))?;
+        let ty = wire_type(package, ty).map_err(wrong)?;
+        let rest = rest.trim_start();
+        let end = rest.find(|c: char| !c.is_ascii_alphanumeric() && c != '_').unwrap_or(rest.len());
+        let (field, rest) = rest.split_at(end);
+        if !is_name(field) {
+            return Err(wrong(format!("`{}` is no name of a field", rest.split_whitespace().next().unwrap_or(field))));
+        }
+        if let Some(value) = rest.trim_start().strip_prefix('=') {
+            constants.push(Constant { name: field.to_owned(), value: constant(&ty, value) });
+            continue;
+        }
+        if !rest.is_empty() && !rest.starts_with(|c: char| c.is_whitespace() || c == '#') {
+            return Err(wrong(format!("`{field}{rest}` is no name of a field")));
+        }
+        if fields.iter().any(|other| other.name == field) {
+            return Err(wrong(format!("field `{field}` is there twice")));
+        }
+        fields.push(Field { name: field.to_owned(), ty });
+    }
+    Ok(definition(name, fields, constants))
+}
+
+/// A constant's value without the comment behind it. Text in quotes may contain the sign of comments.
+fn constant(ty: &WireType, value: &str) -> String {
+    let value = value.trim();
+    let quote = value.chars().next().filter(|first| matches!(first, '"' | '\''));
+    if let (WireType::String | WireType::WString, Some(quote)) = (ty, quote) {
+        let mut escaped = false;
+        let end = value[1..].find(|c: char| {
+            let is_end = c == quote && !escaped;
+            escaped = c == '\\' && !escaped;
+            is_end
+        });
+        if let Some(end) = end {
+            return value[..end + 2].to_owned();
+        }
+    }
+    value.split('#').next().unwrap_or_default().trim_end().to_owned()
+}
+
+/// A type as `.msg` files write it, for example `float64[9]` or `geometry_msgs/Point[]`.
+fn wire_type(package: &str, written: &str) -> Result<WireType, String> {
+    let Some((of, length)) = written.split_once('[') else { return element(package, written) };
+    let of = Box::new(element(package, of)?);
+    let length = length.strip_suffix(']').ok_or_else(|| format!("type `{written}` has no `]` at its end"))?;
+    let number = |length: &str| {
+        let number = length.parse().ok().filter(|&number: &u32| (1..=LONGEST_ARRAY).contains(&number));
+        number.ok_or_else(|| format!("`{length}` is no length of an array from 1 to {LONGEST_ARRAY}"))
+    };
+    match (length, length.strip_prefix("<=")) {
+        ("", _) => Ok(WireType::Sequence { of, bound: None }),
+        (_, Some(bound)) => Ok(WireType::Sequence { of, bound: Some(number(bound)?) }),
+        _ => Ok(WireType::Array { of, length: number(length)? }),
+    }
+}
+
+fn element(package: &str, written: &str) -> Result<WireType, String> {
+    // How long a text may be makes no difference on the wire.
+    let (name, bound) = written.split_once("<=").map_or((written, None), |(name, bound)| (name, Some(bound)));
+    if let Some(bound) = bound
+        && (!matches!(name, "string" | "wstring") || bound.parse::<u32>().is_err())
+    {
+        return Err(format!("`{written}` is no bounded text"));
+    }
+    if let Some(primitive) = primitive(name) {
+        return Ok(WireType::Primitive { primitive });
+    }
+    let name = match name {
+        "string" => return Ok(WireType::String),
+        "wstring" => return Ok(WireType::WString),
+        "time" | "duration" => {
+            return Err(format!("`{name}` is of ROS 1; in ROS 2 it is `builtin_interfaces/{}`", capital(name)));
+        }
+        "Header" => "std_msgs/msg/Header".to_owned(),
+        name => match *name.split('/').collect::<Vec<_>>() {
+            [name] => format!("{package}/msg/{name}"),
+            [package, name] | [package, "msg", name] => format!("{package}/msg/{name}"),
+            _ => name.to_owned(),
+        },
+    };
+    let is_interface = name.rsplit('/').next().is_some_and(|last| last.starts_with(|c: char| c.is_ascii_uppercase()));
+    if name.split('/').count() != 3 || !name.split('/').all(is_name) || !is_interface {
+        return Err(format!("`{written}` is no type"));
+    }
+    Ok(WireType::Interface { name })
+}
+
+fn capital(name: &str) -> &'static str {
+    if name == "time" { "Time" } else { "Duration" }
+}
+
+fn primitive(name: &str) -> Option<Primitive> {
+    Some(match name {
+        "bool" => Primitive::Bool,
+        "byte" | "char" | "uint8" => Primitive::Uint8,
+        "int8" => Primitive::Int8,
+        "int16" => Primitive::Int16,
+        "uint16" => Primitive::Uint16,
+        "int32" => Primitive::Int32,
+        "uint32" => Primitive::Uint32,
+        "int64" => Primitive::Int64,
+        "uint64" => Primitive::Uint64,
+        "float32" => Primitive::Float32,
+        "float64" => Primitive::Float64,
+        _ => return None,
+    })
+}

@@ -1,0 +1,173 @@
+//! A system of ROS 2 nodes: how a runner reaches it, and how its messages are laid out on the wire.
+
+use serde::{Deserialize, Serialize};
+
+use crate::NodeId;
+
+/// The nodes of a ROS 2 system, between which the runner stands as a node of its own.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Ros2 {
+    /// The domain (`ROS_DOMAIN_ID`) of the first worker; each further one has the next. The last one is at most 232.
+    pub domain: u16,
+    /// What simulation time is.
+    pub clock: Clock,
+    /// How the simulator is stepped; `None` for one that runs freely.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub step: Option<Stepping>,
+    /// The service that sets the simulator to time zero; `None` for one that is launched again for each test.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reset: Option<String>,
+    /// The layouts of all messages, each after those that it contains.
+    pub interfaces: Vec<Interface>,
+    /// How each topic of the plan is cut, in their order.
+    pub wiring: Vec<Wiring>,
+}
+
+/// What simulation time is.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Clock {
+    /// The latest `rosgraph_msgs/msg/Clock` of this topic.
+    Topic {
+        /// The topic's name.
+        path: String,
+    },
+    /// Wall time.
+    Wall,
+}
+
+/// How a simulator is stepped.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Stepping {
+    /// Simulation time of one step, in nanoseconds; positive.
+    pub step_ns: u64,
+    /// What takes a step.
+    pub by: StepBy,
+}
+
+/// What makes a simulator take one step.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum StepBy {
+    /// A call of a service of type `std_srvs/srv/Trigger` or `std_srvs/srv/Empty`, which answers after the step.
+    Service {
+        /// The service's name.
+        path: String,
+    },
+    /// A `std_msgs/msg/Empty` on a topic; the step has been taken when the clock shows its end.
+    Topic {
+        /// The topic's name.
+        path: String,
+    },
+}
+
+/// How a topic is cut, so that its messages pass through the relay. It follows from all operations of the space, so
+/// that its campaigns need the same remappings.
+///
+/// A topic that is not cut is only listened to. Of one that is cut, publishers are remapped to `TOPIC/undisturbed`, or
+/// to `TOPIC/from/NODE`; the relay publishes on `TOPIC`, and on `TOPIC/to/NODE` for each subscriber of its own.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Wiring {
+    /// Whether an operation may act on its messages.
+    pub cut: bool,
+    /// The publishers that operations distinguish (`from`).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub publishers: Vec<NodeId>,
+    /// The subscribers that operations distinguish (`to`).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub subscribers: Vec<NodeId>,
+}
+
+/// The layout of a message: an interface of ROS.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Interface {
+    /// Its name with package and kind, for example `sensor_msgs/msg/JointState`.
+    pub name: String,
+    /// Its fields, in the order of the wire.
+    pub fields: Vec<InterfaceField>,
+}
+
+/// A field of an interface.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct InterfaceField {
+    /// Its name.
+    pub name: String,
+    /// Its type.
+    #[serde(rename = "type")]
+    pub ty: WireType,
+}
+
+/// A type as it is on the wire.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum WireType {
+    /// A number or a truth value.
+    Primitive {
+        /// Which.
+        primitive: Primitive,
+    },
+    /// UTF-8 text.
+    String,
+    /// UTF-16 text.
+    WString,
+    /// Another message.
+    Interface {
+        /// Its name.
+        name: String,
+    },
+    /// A fixed number of values, at least one.
+    Array {
+        /// Of what type.
+        of: Box<WireType>,
+        /// How many.
+        length: u32,
+    },
+    /// Any number of values.
+    Sequence {
+        /// Of what type.
+        of: Box<WireType>,
+        /// At most how many; `None` for any number.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        bound: Option<u32>,
+    },
+}
+
+/// A number or a truth value on the wire, named as in `.msg` files. `byte` and `char` are `uint8` there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Primitive {
+    /// One byte: 0 or 1.
+    Bool,
+    /// 8 bits, signed.
+    Int8,
+    /// 8 bits, unsigned.
+    Uint8,
+    /// 16 bits, signed.
+    Int16,
+    /// 16 bits, unsigned.
+    Uint16,
+    /// 32 bits, signed.
+    Int32,
+    /// 32 bits, unsigned.
+    Uint32,
+    /// 64 bits, signed.
+    Int64,
+    /// 64 bits, unsigned.
+    Uint64,
+    /// IEEE 754 single precision.
+    Float32,
+    /// IEEE 754 double precision.
+    Float64,
+}
+
+impl Primitive {
+    /// How many bytes a value has. It is also its alignment in CDR, version 1.
+    pub const fn size(self) -> usize {
+        match self {
+            Primitive::Bool | Primitive::Int8 | Primitive::Uint8 => 1,
+            Primitive::Int16 | Primitive::Uint16 => 2,
+            Primitive::Int32 | Primitive::Uint32 | Primitive::Float32 => 4,
+            Primitive::Int64 | Primitive::Uint64 | Primitive::Float64 => 8,
+        }
+    }
+}

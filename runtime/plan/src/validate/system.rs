@@ -1,0 +1,111 @@
+//! Whether the system of a plan is sound: its simulator, its nodes, and what launches them.
+
+use std::collections::BTreeSet;
+
+use super::check::{Checked, at, each, id, name, positive, require};
+use crate::{
+    CampaignPlan, Clock, Interface, Launch, Lifecycle, Node, NodeId, ReadyWhen, Ros2, Transport, WireType, Wiring,
+};
+
+/// The highest domain of ROS whose ports exist on every system.
+const MOST_DOMAIN: u16 = 232;
+
+impl CampaignPlan {
+    pub(super) fn sound_simulator(&self) -> Checked {
+        let step_ns = match &self.simulator.transport {
+            Transport::InProcess { step_ns, .. } => Some(*step_ns),
+            Transport::Process { step_ns, .. } => *step_ns,
+            Transport::Ros2(ros2) => ros2.step.as_ref().map(|step| step.step_ns),
+        };
+        at("transport.step_ns", require(step_ns != Some(0), || "must be positive".to_owned()))?;
+        if let Transport::Ros2(ros2) = &self.simulator.transport {
+            at("transport", self.sound_ros2(ros2))?;
+        }
+        let Lifecycle { launch, terminate: _, relay_budget } = &self.simulator.lifecycle;
+        at("lifecycle.launch", launch.as_ref().map_or(Ok(()), |launch| self.sound_launch(launch)))?;
+        let Some(budget) = relay_budget else { return Ok(()) };
+        at("lifecycle.relay_budget.latency", budget.latency.map_or(Ok(()), positive))?;
+        at("lifecycle.relay_budget.jitter", budget.jitter.map_or(Ok(()), positive))
+    }
+
+    fn sound_ros2(&self, ros2: &Ros2) -> Checked {
+        at("domain", require(ros2.domain <= MOST_DOMAIN, || format!("is {}, more than {MOST_DOMAIN}", ros2.domain)))?;
+        let mut known: BTreeSet<&str> = BTreeSet::new();
+        each("interfaces", &ros2.interfaces, |interface| {
+            let contained = |ty: &WireType| match interface_of(ty) {
+                Some(inner) => require(known.contains(inner), || format!("`{inner}` is not before it")),
+                None => Ok(()),
+            };
+            at("name", name(&interface.name))?;
+            each("fields", &interface.fields, |field| {
+                at("name", name(&field.name))?;
+                at("type", contained(&field.ty))
+            })?;
+            let new = known.insert(&interface.name);
+            at("name", require(new, || format!("`{}` is there twice", interface.name)))
+        })?;
+        let (topics, wiring) = (self.topics.len(), ros2.wiring.len());
+        at("wiring", require(topics == wiring, || format!("there are {wiring} for {topics} topics")))?;
+        each("wiring", &ros2.wiring, |Wiring { cut, publishers, subscribers }| {
+            each("publishers", publishers, |&id| self.has_node(id))?;
+            each("subscribers", subscribers, |&id| self.has_node(id))?;
+            let distinguishes = !publishers.is_empty() || !subscribers.is_empty();
+            require(*cut || !distinguishes, || "distinguishes nodes of a topic that is not cut".to_owned())
+        })
+    }
+
+    pub(super) fn sound_node(&self, node: &Node) -> Checked {
+        at("name", name(&node.name))?;
+        each("publishes", &node.publishes, |&id| self.has_topic(id))?;
+        each("subscribes", &node.subscribes, |&id| self.has_topic(id))?;
+        at("named", node.named.as_ref().map_or(Ok(()), |it| name(it)))?;
+        at("launch", node.launch.as_ref().map_or(Ok(()), |launch| self.sound_launch(launch)))?;
+        each("every_step", &node.every_step, |&id| self.has_topic(id))?;
+        each("answers", &node.answers, |answer| {
+            at("to", self.has_topic(answer.to))?;
+            at("with", self.has_topic(answer.with))
+        })
+    }
+
+    fn sound_launch(&self, launch: &Launch) -> Checked {
+        let Some(ready) = &launch.ready else { return Ok(()) };
+        let when = match &ready.when {
+            ReadyWhen::Topic { topic } => self.has_topic(*topic),
+            ReadyWhen::Clock => require(self.has_a_clock(), || "the simulator has no clock".to_owned()),
+            ReadyWhen::Port { .. } | ReadyWhen::Line { .. } => Ok(()),
+        };
+        at("ready.when", when)?;
+        at("ready.within", positive(ready.within))
+    }
+
+    fn has_a_clock(&self) -> bool {
+        matches!(&self.simulator.transport, Transport::Ros2(ros2) if matches!(ros2.clock, Clock::Topic { .. }))
+    }
+
+    pub(super) fn has_node(&self, node: NodeId) -> Checked {
+        id("node", node.index(), self.nodes.len())
+    }
+
+    /// A topic of ROS has a layout, and others have none.
+    pub(super) fn has_interface(&self, interface: Option<&str>) -> Checked {
+        match (&self.simulator.transport, interface) {
+            (Transport::Ros2(_), None) => require(false, || "there is none".to_owned()),
+            (Transport::Ros2(ros2), Some(wanted)) => {
+                let known = ros2.interfaces.iter().any(|Interface { name, .. }| name == wanted);
+                require(known, || format!("there is no interface `{wanted}`"))
+            }
+            (Transport::InProcess { .. } | Transport::Process { .. }, interface) => {
+                require(interface.is_none(), || "the transport has none".to_owned())
+            }
+        }
+    }
+}
+
+/// The interface that values of a type are or hold.
+fn interface_of(ty: &WireType) -> Option<&str> {
+    match ty {
+        WireType::Interface { name } => Some(name),
+        WireType::Array { of, .. } | WireType::Sequence { of, .. } => interface_of(of),
+        WireType::Primitive { .. } | WireType::String | WireType::WString => None,
+    }
+}

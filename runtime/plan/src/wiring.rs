@@ -1,0 +1,206 @@
+//! Who is remapped, so that the messages of topics that are cut pass through the relay.
+
+use crate::{CampaignPlan, Channel, Node, NodeId, Topic, TopicId, Transport, Wiring};
+
+/// A name of a topic or service that a node knows under another name.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Remapping {
+    /// The name in the node.
+    pub from: String,
+    /// The name that it stands for.
+    pub to: String,
+}
+
+impl Remapping {
+    /// As a rule for `-r`: `/joints:=/joints/undisturbed`.
+    pub fn rule(&self) -> String {
+        format!("{}:={}", self.from, self.to)
+    }
+}
+
+impl CampaignPlan {
+    /// What a node is remapped to: what it publishes, and what it subscribes to where operations distinguish it. Of a
+    /// service that is cut, the server is remapped. Each name once; where a node both publishes a topic and
+    /// subscribes to it, that of a publisher counts.
+    pub fn remappings(&self, id: NodeId) -> Vec<Remapping> {
+        let node = &self.nodes[id.index()];
+        let mut remappings: Vec<Remapping> = Vec::new();
+        for (topic, declared, wiring) in self.cut() {
+            let Some(end) = end(node, id, topic, declared.channel, wiring) else { continue };
+            let ends = declared.paths.iter().map(|path| Remapping { from: path.clone(), to: format!("{path}/{end}") });
+            let new: Vec<Remapping> =
+                ends.filter(|new| remappings.iter().all(|known| known.from != new.from)).collect();
+            remappings.extend(new);
+        }
+        remappings
+    }
+
+    /// The arguments that remap a node, or for `None` all nodes of a program that starts several: none if nothing is
+    /// cut.
+    pub fn ros_args(&self, node: Option<NodeId>) -> Vec<String> {
+        let rules: Vec<String> = match node {
+            Some(node) => self.remappings(node).iter().map(Remapping::rule).collect(),
+            None => (0..)
+                .map(NodeId)
+                .zip(&self.nodes)
+                .flat_map(|(id, node)| {
+                    let name = node.name_in_ros();
+                    self.remappings(id).into_iter().map(move |remapping| format!("{name}:{}", remapping.rule()))
+                })
+                .collect(),
+        };
+        if rules.is_empty() {
+            return Vec::new();
+        }
+        let rules = rules.into_iter().flat_map(|rule| ["-r".to_owned(), rule]);
+        std::iter::once("--ros-args".to_owned()).chain(rules).collect()
+    }
+
+    /// What is to be remapped in programs that the plan does not know: topics that are cut, and which no node
+    /// publishes, and services that are cut, and which no node offers. Each name once.
+    pub fn unclaimed(&self) -> Vec<(Channel, Remapping)> {
+        let mut unclaimed: Vec<(Channel, Remapping)> = Vec::new();
+        for (topic, declared, _) in self.cut() {
+            let claimed = self.nodes.iter().any(|node| is_source(node, topic, declared.channel));
+            // The server may be known by the other direction of its service.
+            let served = declared.channel != Channel::Topic
+                && (0..).map(TopicId).zip(&self.topics).any(|(other, it)| {
+                    it.channel != Channel::Topic
+                        && it.paths == declared.paths
+                        && self.nodes.iter().any(|node| is_source(node, other, it.channel))
+                });
+            if claimed || served {
+                continue;
+            }
+            for path in &declared.paths {
+                let kind = if declared.channel == Channel::Topic { Channel::Topic } else { Channel::Request };
+                let new = (kind, Remapping { from: path.clone(), to: format!("{path}/undisturbed") });
+                if !unclaimed.contains(&new) {
+                    unclaimed.push(new);
+                }
+            }
+        }
+        unclaimed
+    }
+
+    /// The topics that are cut.
+    fn cut(&self) -> impl Iterator<Item = (TopicId, &Topic, &Wiring)> {
+        let wiring = match &self.simulator.transport {
+            Transport::Ros2(ros2) => &ros2.wiring[..],
+            Transport::InProcess { .. } | Transport::Process { .. } => &[],
+        };
+        let topics = (0..).map(TopicId).zip(&self.topics).zip(wiring);
+        topics.filter(|(_, wiring)| wiring.cut).map(|((id, topic), wiring)| (id, topic, wiring))
+    }
+}
+
+impl Node {
+    /// The name that rules of remapping know it by: that in the middleware, without its namespace.
+    pub fn name_in_ros(&self) -> &str {
+        let name = self.named.as_deref().unwrap_or(&self.name);
+        name.rsplit('/').next().unwrap_or(name)
+    }
+}
+
+/// What is written after a name for a node, if the node is remapped.
+fn end(node: &Node, id: NodeId, topic: TopicId, channel: Channel, wiring: &Wiring) -> Option<String> {
+    if is_source(node, topic, channel) {
+        let distinguished = channel == Channel::Topic && wiring.publishers.contains(&id);
+        return Some(if distinguished { format!("from/{}", node.name) } else { "undisturbed".to_owned() });
+    }
+    let distinguished = channel == Channel::Topic && wiring.subscribers.contains(&id);
+    (distinguished && node.subscribes.contains(&topic)).then(|| format!("to/{}", node.name))
+}
+
+/// Whether a node publishes a topic, or is the server of a service.
+fn is_source(node: &Node, topic: TopicId, channel: Channel) -> bool {
+    match channel {
+        Channel::Topic | Channel::Reply => node.publishes.contains(&topic),
+        Channel::Request => node.subscribes.contains(&topic),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{self, minimal, topic};
+    use crate::{Clock, Ros2, Type};
+
+    fn plan() -> CampaignPlan {
+        let mut plan = minimal();
+        let of = |name, paths: &[&str], channel| Topic { channel, ..topic(name, paths, Type::Bool) };
+        let node = |name, publishes: &[u32], subscribes: &[u32]| Node {
+            publishes: publishes.iter().copied().map(TopicId).collect(),
+            subscribes: subscribes.iter().copied().map(TopicId).collect(),
+            ..testing::node(name)
+        };
+        plan.topics = vec![
+            of("joints", &["/a/joints", "/b/joints"], Channel::Topic),
+            of("commands", &["/commands"], Channel::Topic),
+            of("free", &["/free"], Channel::Topic),
+            of("grip_request", &["/grip"], Channel::Request),
+            of("grip_reply", &["/grip"], Channel::Reply),
+        ];
+        plan.nodes = vec![
+            Node { named: Some("/ns/arm_ctrl".to_owned()), ..node("arm", &[1, 3], &[0, 4]) },
+            node("drive", &[0, 2], &[1]),
+            node("gripper", &[4], &[3]),
+        ];
+        let cut = |publishers: &[u32], subscribers: &[u32]| Wiring {
+            cut: true,
+            publishers: publishers.iter().copied().map(NodeId).collect(),
+            subscribers: subscribers.iter().copied().map(NodeId).collect(),
+        };
+        plan.simulator.transport = Transport::Ros2(Ros2 {
+            domain: 0,
+            clock: Clock::Wall,
+            step: None,
+            reset: None,
+            interfaces: Vec::new(),
+            wiring: vec![cut(&[], &[0]), cut(&[0], &[]), Wiring::default(), cut(&[], &[]), cut(&[], &[])],
+        });
+        plan
+    }
+
+    fn rules(plan: &CampaignPlan, node: u32) -> Vec<String> {
+        plan.remappings(NodeId(node)).iter().map(Remapping::rule).collect()
+    }
+
+    #[test]
+    fn publishers_distinguished_nodes_and_servers_are_remapped() {
+        let plan = plan();
+        assert_eq!(
+            rules(&plan, 0),
+            ["/a/joints:=/a/joints/to/arm", "/b/joints:=/b/joints/to/arm", "/commands:=/commands/from/arm"]
+        );
+        assert_eq!(rules(&plan, 1), ["/a/joints:=/a/joints/undisturbed", "/b/joints:=/b/joints/undisturbed"]);
+        assert_eq!(rules(&plan, 2), ["/grip:=/grip/undisturbed"], "once, although both directions are cut");
+    }
+
+    #[test]
+    fn a_program_with_several_nodes_gets_the_rules_of_each() {
+        let plan = plan();
+        let all = plan.ros_args(None);
+        assert_eq!(&all[..3], ["--ros-args", "-r", "arm_ctrl:/a/joints:=/a/joints/to/arm"]);
+        assert_eq!(all.len(), 1 + 2 * 6);
+        assert_eq!(plan.ros_args(Some(NodeId(2))), ["--ros-args", "-r", "/grip:=/grip/undisturbed"]);
+        assert!(minimal().ros_args(None).is_empty());
+    }
+
+    #[test]
+    fn what_no_node_publishes_is_said() {
+        let mut plan = plan();
+        assert_eq!(plan.unclaimed(), []);
+        plan.nodes.truncate(1);
+        let said: Vec<(Channel, String)> = plan.unclaimed().into_iter().map(|(kind, it)| (kind, it.rule())).collect();
+        let said: Vec<(Channel, &str)> = said.iter().map(|(kind, rule)| (*kind, rule.as_str())).collect();
+        assert_eq!(
+            said,
+            [
+                (Channel::Topic, "/a/joints:=/a/joints/undisturbed"),
+                (Channel::Topic, "/b/joints:=/b/joints/undisturbed"),
+                (Channel::Request, "/grip:=/grip/undisturbed"),
+            ]
+        );
+    }
+}

@@ -1,0 +1,406 @@
+//! The programs that a plan launches beside its simulator: what starts the system as a whole, and its nodes.
+//!
+//! A transport starts them with the seed of a run, asks [`poll_ready`](Launched::poll_ready) until all are ready, asks
+//! [`check`](Launched::check) while the run lasts, and ends them. Each is started without a shell, in the folder of the
+//! `.sesame` file, with an empty standard input; what it writes goes to the log of its worker. What starts the system
+//! is ready before any node is launched. Each program has a keeper of its own, so nothing outlives the worker.
+
+mod part;
+mod placeholders;
+mod port;
+mod signals;
+mod terminate;
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::thread;
+use std::time::Duration;
+
+use sesame_plan::{CampaignPlan, Command, Launch, NodeId, ReadyWhen, TopicId};
+
+use self::part::{Problem, Started};
+use self::placeholders::{Own, asks_for_port};
+use self::port::Port;
+use self::terminate::Terminate;
+use crate::lifecycle::limits::BACKGROUND_END_LIMIT;
+use crate::lifecycle::program::{Alarm, Program};
+use crate::transport::TransportError;
+
+pub(crate) use self::terminate::terminate_all;
+
+/// How often it is looked whether a program is ready.
+const PAUSE: Duration = Duration::from_millis(10);
+
+/// What is launched.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Part {
+    /// What starts the system as a whole.
+    System,
+    /// A node.
+    Node(NodeId),
+}
+
+/// What a launched program's transport is asked: only it knows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Probe {
+    /// Whether there was a message on a topic since the launch.
+    Topic(TopicId),
+    /// Whether the clock of the simulator has advanced since the launch.
+    Clock,
+}
+
+/// What programs are given of their worker and of their transport.
+#[derive(Debug, Clone)]
+pub struct Place {
+    /// The number of the worker.
+    pub worker: u32,
+    /// The worker's own folder.
+    pub folder: PathBuf,
+    /// The folder of the `.sesame` file, in which programs run.
+    pub space: PathBuf,
+    /// What `{domain}` stands for.
+    pub domain: u32,
+    /// What is in the environment of all programs beside `SESAME_WORKER`, `SESAME_WORKER_FOLDER` and `SESAME_SEED`.
+    pub environment: Vec<(String, String)>,
+    /// What an argument `{ros-args}` stands for; nothing for what is not in it.
+    pub ros_args: BTreeMap<Part, Vec<String>>,
+    /// Whether this process is a runner, whose executable can be the keeper of programs.
+    pub in_runner: bool,
+}
+
+impl Place {
+    /// That of the worker that this process is. The number of the worker is its domain.
+    pub fn of_worker(space: PathBuf) -> Self {
+        let worker = std::env::var("SESAME_WORKER").ok().and_then(|number| number.parse().ok()).unwrap_or(1);
+        Place {
+            worker,
+            folder: std::env::current_dir().unwrap_or_default(),
+            space,
+            domain: worker,
+            environment: Vec::new(),
+            ros_args: BTreeMap::new(),
+            in_runner: true,
+        }
+    }
+}
+
+/// How long the end of everything that a plan launches may take.
+pub fn end_limit(plan: &CampaignPlan) -> Duration {
+    let lifecycle = &plan.simulator.lifecycle;
+    if lifecycle.launch.is_none() && plan.nodes.iter().all(|node| node.launch.is_none()) {
+        return Duration::ZERO;
+    }
+    BACKGROUND_END_LIMIT + if lifecycle.terminate.is_some() { terminate::LIMIT } else { Duration::ZERO }
+}
+
+/// The programs that a plan launches. Dropping it ends them.
+pub struct Launched {
+    place: Place,
+    parts: Vec<(Part, Started)>,
+    terminate: Option<Command>,
+    seed: u64,
+    port: Option<Port>,
+    /// To be run at the end; `None` while nothing is launched.
+    pending: Option<Arc<Terminate>>,
+    /// Whether all were ready once since the last start.
+    ready: bool,
+    /// How many of the parts were started.
+    begun: usize,
+    alarm: Alarm,
+    killed: bool,
+    notes: Vec<String>,
+}
+
+impl Launched {
+    /// Those of this plan. Nothing is started yet.
+    pub fn new(plan: &CampaignPlan, place: Place) -> Self {
+        let awaited = |launch: &Launch| launch.ready.as_ref().map(|ready| phrase(plan, &ready.when));
+        let part = |part, launch: &Launch, of: &str| {
+            let shown = format!("the program `{}` of {of}", shown(&launch.command));
+            (part, Started::new(launch.clone(), shown, awaited(launch)))
+        };
+        let system = plan.simulator.lifecycle.launch.as_ref().map(|launch| part(Part::System, launch, "the system"));
+        let nodes = (0..).map(NodeId).zip(&plan.nodes).filter_map(|(id, node)| {
+            node.launch.as_ref().map(|launch| part(Part::Node(id), launch, &format!("node `{}`", node.name)))
+        });
+        Launched {
+            place,
+            parts: system.into_iter().chain(nodes).collect(),
+            terminate: plan.simulator.lifecycle.terminate.clone(),
+            seed: 0,
+            port: None,
+            pending: None,
+            ready: false,
+            begun: 0,
+            alarm: Alarm::default(),
+            killed: false,
+            notes: Vec::new(),
+        }
+    }
+
+    /// Whether the plan launches nothing.
+    pub fn is_empty(&self) -> bool {
+        self.parts.is_empty()
+    }
+
+    /// Whether programs were started and not ended.
+    pub fn is_started(&self) -> bool {
+        self.begun > 0
+    }
+
+    /// Ends what is running, and starts the programs for a run with this seed: what starts the system as a whole, or,
+    /// if there is no such program, all nodes. [`poll_ready`](Self::poll_ready) starts the others.
+    pub fn start(&mut self, seed: u64) -> Result<(), TransportError> {
+        self.end();
+        if self.parts.is_empty() {
+            self.ready = true;
+            return Ok(());
+        }
+        self.seed = seed;
+        self.alarm = Alarm::default();
+        self.killed = false;
+        if self.port.is_none() && self.asks_for_port() {
+            let reserved = Port::reserve(self.place.worker).map_err(|error| TransportError::LaunchFailed {
+                what: "`{port}`".to_owned(),
+                problem: format!("cannot be replaced: {error}"),
+                last_lines: String::new(),
+            });
+            self.port = Some(reserved?);
+        }
+        if let Some(command) = &self.terminate {
+            self.pending = Some(Terminate::pending(self.program(command, Part::System), shown(command)));
+        }
+        self.begin()
+    }
+
+    /// Whether all programs are ready; to be asked until they are. Starts programs whose turn has come. `asked` is
+    /// called for what only the transport knows. After an error, everything is ended.
+    pub fn poll_ready(&mut self, asked: &mut dyn FnMut(Probe) -> bool) -> Result<bool, TransportError> {
+        let mut ready = true;
+        for at in 0..self.begun {
+            let port = self.awaited_port(at)?;
+            match self.parts[at].1.poll(port, asked) {
+                Ok(is_ready) => ready &= is_ready,
+                Err(problem) => return Err(self.failed(at, problem)),
+            }
+        }
+        if ready && self.begun < self.parts.len() {
+            self.begin()?;
+            return self.poll_ready(asked);
+        }
+        self.ready |= ready;
+        Ok(ready)
+    }
+
+    /// Waits until all programs are ready.
+    pub fn await_ready(&mut self, asked: &mut dyn FnMut(Probe) -> bool) -> Result<(), TransportError> {
+        while !self.poll_ready(asked)? {
+            thread::sleep(PAUSE);
+        }
+        Ok(())
+    }
+
+    /// That no program has ended, apart from those that [`kill`](Self::kill) ended. After an error, everything is
+    /// ended.
+    pub fn check(&mut self) -> Result<(), TransportError> {
+        for at in 0..self.begun {
+            if let Err(problem) = self.parts[at].1.check() {
+                return Err(self.failed(at, problem));
+            }
+        }
+        Ok(())
+    }
+
+    /// Set as soon as a program of the current start has ended, until the next start: then [`check`](Self::check) says
+    /// which. For a transport that waits elsewhere; `None` if the plan launches nothing.
+    pub(crate) fn alarm(&self) -> Option<Alarm> {
+        (!self.is_empty()).then(|| Alarm::clone(&self.alarm))
+    }
+
+    /// Whether a program that has ended was killed (`SIGKILL`) by a user, or by the system when memory ran out.
+    pub fn was_killed(&self) -> bool {
+        self.killed
+    }
+
+    /// What went wrong and concerns no run, in words for the user; once each.
+    pub fn take_notes(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.notes)
+    }
+
+    /// The port that `{port}` stands for, once programs were started that ask for it.
+    pub fn port(&self) -> Option<u16> {
+        self.port.as_ref().map(Port::number)
+    }
+
+    /// Stops all processes of a node (`SIGSTOP`); false if it does not run, or the system has no way.
+    pub fn pause(&mut self, node: NodeId) -> bool {
+        self.node(node).is_some_and(Started::pause)
+    }
+
+    /// Lets all processes of a paused node go on; false if it was not paused.
+    pub fn resume(&mut self, node: NodeId) -> bool {
+        self.node(node).is_some_and(Started::resume)
+    }
+
+    /// Ends all processes of a node at once (`SIGKILL`); false if it does not run. From now on it may be off.
+    pub fn kill(&mut self, node: NodeId) -> bool {
+        self.node(node).is_some_and(Started::kill)
+    }
+
+    /// Kills a node if it runs, and starts it again. [`poll_ready`](Self::poll_ready) says when it is ready. False if
+    /// the plan does not launch it.
+    pub fn restart(&mut self, node: NodeId) -> Result<bool, TransportError> {
+        let Some(at) = self.parts[..self.begun].iter().position(|(part, _)| *part == Part::Node(node)) else {
+            return Ok(false);
+        };
+        self.parts[at].1.kill();
+        self.launch(at)?;
+        Ok(true)
+    }
+
+    /// Ends everything: runs the command that ends the system, then asks each program to end, then ends what is left.
+    pub fn end(&mut self) {
+        for (_, started) in &mut self.parts {
+            started.resume();
+        }
+        if let Some(terminate) = self.pending.take()
+            && let Some(note) = terminate.run()
+        {
+            self.notes.push(note);
+        }
+        // The last one first. All are asked before any is waited for.
+        for (_, started) in self.parts.iter_mut().rev() {
+            started.ask_to_end();
+        }
+        for (_, started) in self.parts.iter_mut().rev() {
+            started.end();
+        }
+        self.begun = 0;
+        self.ready = false;
+    }
+
+    /// Starts the programs whose turn it is: what starts the system, or all nodes.
+    fn begin(&mut self) -> Result<(), TransportError> {
+        let system = self.begun == 0 && self.parts.first().is_some_and(|(part, _)| *part == Part::System);
+        let until = if system { 1 } else { self.parts.len() };
+        for at in self.begun..until {
+            self.begun = at + 1;
+            self.launch(at)?;
+        }
+        Ok(())
+    }
+
+    fn launch(&mut self, at: usize) -> Result<(), TransportError> {
+        let (part, started) = &self.parts[at];
+        let program = self.program(&started.launch.command, *part);
+        let alarm = Alarm::clone(&self.alarm);
+        self.parts[at].1.start(&program, &alarm).map_err(|problem| self.failed(at, problem))
+    }
+
+    /// The error for a problem of a program; everything is ended.
+    fn failed(&mut self, at: usize, problem: Problem) -> TransportError {
+        let Problem { what: problem, last_lines, not_started, killed } = problem;
+        let what = self.parts[at].1.shown.clone();
+        let were_ready = self.ready;
+        self.killed |= killed;
+        self.end();
+        if were_ready && !not_started {
+            TransportError::Ended { what, how: problem, last_lines }
+        } else {
+            TransportError::LaunchFailed { what, problem, last_lines }
+        }
+    }
+
+    /// The program of a command for the current run.
+    fn program(&self, command: &Command, part: Part) -> Program {
+        let Place { worker, folder, space, environment, ros_args, in_runner, .. } = &self.place;
+        let own = self.own();
+        let list = ros_args.get(&part).map_or(&[][..], Vec::as_slice);
+        let of_worker = [
+            ("SESAME_WORKER".to_owned(), worker.to_string()),
+            ("SESAME_WORKER_FOLDER".to_owned(), folder.display().to_string()),
+            ("SESAME_SEED".to_owned(), self.seed.to_string()),
+        ];
+        Program {
+            name: command.program.clone(),
+            arguments: own.arguments(&command.arguments, list),
+            folder: space.clone(),
+            environment: of_worker.into_iter().chain(environment.iter().cloned()).collect(),
+            in_runner: *in_runner,
+        }
+    }
+
+    fn own(&self) -> Own {
+        Own {
+            worker: self.place.worker,
+            domain: self.place.domain,
+            port: self.port(),
+            folder: self.place.folder.display().to_string(),
+            seed: self.seed,
+        }
+    }
+
+    fn asks_for_port(&self) -> bool {
+        let ready = |launch: &Launch| match launch.ready.as_ref().map(|ready| &ready.when) {
+            Some(ReadyWhen::Port { port }) => asks_for_port(port),
+            _ => false,
+        };
+        let asks = |command: &Command| command.arguments.iter().any(|argument| asks_for_port(argument));
+        self.parts.iter().any(|(_, started)| asks(&started.launch.command) || ready(&started.launch))
+            || self.terminate.as_ref().is_some_and(asks)
+    }
+
+    /// The port on which a program is awaited, if one is.
+    fn awaited_port(&mut self, at: usize) -> Result<Option<u16>, TransportError> {
+        let started = &self.parts[at].1;
+        let Some(ReadyWhen::Port { port }) = started.launch.ready.as_ref().map(|ready| &ready.when) else {
+            return Ok(None);
+        };
+        if started.is_ready() {
+            return Ok(None);
+        }
+        let text = self.own().fill(port);
+        if let Ok(number) = text.trim().parse() {
+            return Ok(Some(number));
+        }
+        let what = format!("is awaited on port `{text}`, which is no number from 1 to 65535");
+        Err(self.failed(at, Problem { what, last_lines: String::new(), not_started: true, killed: false }))
+    }
+
+    fn node(&mut self, node: NodeId) -> Option<&mut Started> {
+        let (_, started) = self.parts.iter_mut().find(|(part, _)| *part == Part::Node(node))?;
+        started.is_on().then_some(started)
+    }
+}
+
+impl Drop for Launched {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+/// A command as it is written in the space: the same for each worker.
+fn shown(command: &Command) -> String {
+    Program {
+        name: command.program.clone(),
+        arguments: command.arguments.clone(),
+        folder: PathBuf::new(),
+        environment: Vec::new(),
+        in_runner: false,
+    }
+    .shown()
+}
+
+/// What is awaited, as a phrase.
+fn phrase(plan: &CampaignPlan, when: &ReadyWhen) -> String {
+    match when {
+        ReadyWhen::Topic { topic } => format!("the first message on topic `{}`", plan.topic(*topic).name),
+        ReadyWhen::Port { port } => format!("a connection to port {port}"),
+        ReadyWhen::Clock => "the clock of the simulator".to_owned(),
+        ReadyWhen::Line { text } => format!("a line with `{text}`"),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,263 @@
+//! The transport to a system of ROS 2 nodes.
+//!
+//! For each run the runner is a node between the others. A topic that is cut has its publishers on names of their own,
+//! and the relay publishes on the name that subscribers know. A run begins when every wire has somebody at both ends.
+
+mod added;
+mod assembly;
+mod domain;
+mod free_running;
+mod lock_stepped;
+mod orders;
+mod presence;
+mod served;
+mod service;
+mod session;
+mod traffic;
+mod wanted;
+mod watch;
+mod wires;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use sesame_base::time::SimTime;
+use sesame_plan::{CampaignPlan, NodeId, Ros2, TopicId};
+use sesame_relay::lifecycle::launch::{Launched, Part, Place};
+use sesame_relay::relay::{Delivery, Exchange};
+use sesame_relay::simulator::Progress;
+use sesame_relay::transport::{Capabilities, Connect, Incidents, Transport, TransportError};
+use sesame_relay::wire::WireTable;
+
+use self::domain::Domain;
+use self::orders::Change;
+use self::session::{Session, in_ros};
+
+/// How long a system may take until it is complete, where nothing else is declared.
+const COMPLETE_WITHIN: Duration = Duration::from_secs(30);
+
+/// The last domain whose ports exist.
+const LAST_DOMAIN: u16 = 232;
+
+/// How long nothing may come in while something must.
+const SILENCE: Duration = Duration::from_secs(10);
+
+/// Connects to a system of ROS 2 nodes; launched programs run in this folder.
+pub fn ros2(folder: PathBuf) -> Connect {
+    Connect::new(connect, folder)
+}
+
+fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
+    let sesame_plan::Transport::Ros2(ros2) = &plan.simulator.transport else {
+        unreachable!("the generator connects each kind of simulator by its own transport")
+    };
+    Box::new(System::new(plan.clone(), ros2.clone(), folder.to_owned()))
+}
+
+/// A system of ROS 2 nodes.
+struct System {
+    plan: CampaignPlan,
+    ros2: Ros2,
+    domain: u16,
+    // Ended before the session: what it launched may want to say goodbye.
+    launched: Launched,
+    session: Option<Session>,
+    reserved: Option<Domain>,
+    now: SimTime,
+    /// What the clock showed at time zero.
+    zero: Zero,
+    /// When the clock went on last.
+    ticked: Instant,
+    deliveries: Vec<Delivery>,
+    incidents: Incidents,
+    wires: WireTable,
+    /// What operations have changed and not yet restored.
+    changes: Vec<Change>,
+    /// Answers that nodes owe which are stopped: they come when the nodes go on.
+    postponed: BTreeMap<NodeId, BTreeMap<TopicId, i64>>,
+    /// Nodes that were killed and started again, and have forgotten what they owe.
+    restarted: BTreeSet<NodeId>,
+    /// Whether something could not be restored, so that the next run must start afresh.
+    spoilt: bool,
+}
+
+/// Where simulation time is counted from.
+#[derive(Debug, Clone, Copy)]
+enum Zero {
+    /// From this moment of wall time.
+    Wall(Instant),
+    /// From this time of the clock, in nanoseconds.
+    Clock(i64),
+    /// It is counted in steps.
+    Steps,
+}
+
+impl System {
+    fn new(plan: CampaignPlan, ros2: Ros2, folder: PathBuf) -> Self {
+        let place = Place::of_worker(folder);
+        // Workers are counted from 1.
+        let worker = u16::try_from(place.worker.saturating_sub(1)).unwrap_or(u16::MAX);
+        let domain = ros2.domain.saturating_add(worker);
+        let parts = (0u32..).map(NodeId).take(plan.nodes.len());
+        let ros_args = std::iter::once((Part::System, plan.ros_args(None)))
+            .chain(parts.map(|node| (Part::Node(node), plan.ros_args(Some(node)))));
+        let place = Place {
+            domain: domain.into(),
+            environment: vec![
+                ("ROS_DOMAIN_ID".to_owned(), domain.to_string()),
+                ("ROS_LOG_DIR".to_owned(), place.folder.join("ros").display().to_string()),
+                // Nothing beyond this machine is addressed.
+                ("ROS_AUTOMATIC_DISCOVERY_RANGE".to_owned(), "LOCALHOST".to_owned()),
+            ],
+            ros_args: ros_args.collect(),
+            ..place
+        };
+        System {
+            wires: WireTable::new(&plan),
+            changes: Vec::new(),
+            postponed: BTreeMap::new(),
+            spoilt: false,
+            restarted: BTreeSet::new(),
+            launched: Launched::new(&plan, place),
+            domain,
+            plan,
+            ros2,
+            session: None,
+            reserved: None,
+            now: SimTime::ZERO,
+            zero: Zero::Steps,
+            ticked: now(),
+            deliveries: Vec::new(),
+            incidents: Incidents::default(),
+        }
+    }
+
+    /// Connects to the system, which is started if the plan says how.
+    fn begin(&mut self, seed: u64, relay: &mut dyn Exchange) -> Result<(), TransportError> {
+        self.undo(None)?;
+        self.postponed.clear();
+        self.restarted.clear();
+        if self.session.is_none() || self.ros2.reset.is_none() || std::mem::take(&mut self.spoilt) {
+            self.launched.end();
+            self.session = None;
+            if self.domain > LAST_DOMAIN {
+                let problem =
+                    format!("domain {} is beyond the last one, {LAST_DOMAIN}; use fewer workers", self.domain);
+                return Err(TransportError::Wiring(problem));
+            }
+            if self.reserved.is_none() {
+                self.reserved = Some(Domain::take(self.domain)?);
+            }
+            let session = Session::join(&self.plan, &self.ros2, relay.wires(), self.domain)?;
+            let session = self.session.insert(session);
+            self.launched.start(seed)?;
+            session.assemble(&self.plan, relay.wires(), &mut self.launched, COMPLETE_WITHIN)?;
+        }
+        let Some(session) = &mut self.session else { return Ok(()) };
+        session.call_reset(&mut self.launched, now() + SILENCE)?;
+        session.begin(&self.plan);
+        session.tell_subscribers(relay);
+        self.zero = match (&self.ros2.clock, &self.ros2.step) {
+            (_, Some(_)) => Zero::Steps,
+            (sesame_plan::Clock::Wall, None) => Zero::Wall(now()),
+            (sesame_plan::Clock::Topic { .. }, None) => Zero::Clock(session.tick(&mut self.launched, now() + SILENCE)?),
+        };
+        self.ticked = now();
+        Ok(())
+    }
+
+    fn fail(&mut self, error: TransportError) -> TransportError {
+        // The outcome of a run that was stopped says for how long nothing came, and has no room for what it was.
+        if matches!(error, TransportError::Silent { .. }) {
+            self.incidents.notes.push(error.to_string());
+        }
+        self.incidents.killed |= self.launched.was_killed();
+        self.close();
+        error
+    }
+}
+
+impl Transport for System {
+    fn capabilities(&self) -> Capabilities {
+        Capabilities { lock_stepped: self.ros2.step.is_some(), resets: self.ros2.reset.is_some() }
+    }
+
+    fn reset(&mut self, seed: u64, relay: &mut dyn Exchange) -> Result<(), TransportError> {
+        self.now = SimTime::ZERO;
+        self.deliveries.clear();
+        let begun = self.begin(seed, relay);
+        self.collect_notes();
+        begun.map_err(|error| self.fail(error))
+    }
+
+    fn advance(&mut self, until: SimTime, relay: &mut dyn Exchange) -> Result<Progress, TransportError> {
+        let advanced = match self.ros2.step.as_ref().map(|step| step.step_ns) {
+            Some(step) => self.take_step(SimTime::from_nanos(i64::try_from(step).unwrap_or(i64::MAX)), until, relay),
+            None => self.run_freely(until, relay),
+        };
+        let advanced = match advanced {
+            Ok(Progress::Ended) => self.undo(None).map(|()| Progress::Ended),
+            other => other,
+        };
+        self.look_around();
+        self.collect_notes();
+        advanced.map_err(|error| self.fail(error))
+    }
+
+    fn now(&self) -> SimTime {
+        self.now
+    }
+
+    fn close(&mut self) {
+        self.changes.clear();
+        self.judge_budget();
+        self.launched.end();
+        self.collect_notes();
+        self.session = None;
+    }
+
+    fn incidents(&mut self) -> Incidents {
+        self.judge_budget();
+        std::mem::take(&mut self.incidents)
+    }
+}
+
+impl System {
+    /// Notes who has come and gone, if it is time to look.
+    fn look_around(&mut self) {
+        let now = now();
+        if self.session.as_ref().is_none_or(|session| !session.watch.is_due(now)) {
+            return;
+        }
+        let nodes = (0u32..).map(NodeId).take(self.plan.nodes.len());
+        let absent = nodes.filter(|&node| self.is_absent(node)).map(|node| in_ros(&self.plan, node)).collect();
+        if let Some(session) = &mut self.session {
+            session.look_around(&self.plan, now, &absent);
+        }
+    }
+
+    /// Notes what the relay has added, if that is more than its budget.
+    fn judge_budget(&mut self) {
+        if let Some(added) = self.session.as_mut().and_then(|session| session.added.as_mut()) {
+            self.incidents.notes.append(&mut added.judge());
+        }
+    }
+
+    fn collect_notes(&mut self) {
+        if let Some(session) = &mut self.session {
+            self.incidents.notes.append(&mut session.notes);
+        }
+        self.incidents.notes.append(&mut self.launched.take_notes());
+    }
+}
+
+/// That nothing was heard for too long.
+fn silent(awaited: String) -> TransportError {
+    TransportError::Silent { awaited, limit: SILENCE.as_secs_f64() }
+}
+
+#[expect(clippy::disallowed_methods, reason = "an adapter: it waits for other processes")]
+fn now() -> Instant {
+    Instant::now()
+}

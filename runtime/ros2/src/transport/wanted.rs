@@ -1,0 +1,59 @@
+//! What of each message somebody reads: only that is decoded.
+
+use sesame_plan::{CampaignPlan, FieldRef, Input, MetricSource, OperationKind, Place, Step, TopicId};
+
+use crate::cdr::Wanted;
+
+/// The fields of a topic's messages that metrics of the plan read and that its operations change. All of them where the
+/// user's code sees the message, or where traces are recorded.
+pub(super) fn wanted(plan: &CampaignPlan, topic: TopicId) -> Wanted {
+    let seen_whole = plan.campaign.record.is_some()
+        || plan
+            .metrics
+            .iter()
+            .any(|metric| matches!(&metric.source, MetricSource::Hook { topics } if topics.contains(&topic)))
+        || plan
+            .operations
+            .iter()
+            .any(|operation| operation.topic == Some(topic) && matches!(operation.kind, OperationKind::Custom { .. }));
+    if seen_whole {
+        return Wanted::All;
+    }
+    let mut wanted = Wanted::nothing();
+    let mut read = |field: &FieldRef| {
+        if field.topic == topic {
+            wanted.add(field.path.iter().map(String::as_str));
+        }
+    };
+    for metric in &plan.metrics {
+        let inputs: &[Input] = match &metric.source {
+            MetricSource::Last { input } => {
+                read(input);
+                &[]
+            }
+            MetricSource::Formula { formula } => {
+                formula.per.iter().for_each(&mut read);
+                &formula.inputs
+            }
+            MetricSource::Robustness { robustness } => &robustness.inputs,
+            MetricSource::Hook { .. } | MetricSource::FuzzingTime => &[],
+        };
+        for input in inputs {
+            read(&input.field);
+        }
+    }
+    for operation in plan.operations.iter().filter(|operation| operation.topic == Some(topic)) {
+        for place in &operation.places {
+            wanted.add(fields(place));
+        }
+    }
+    wanted
+}
+
+/// The fields up to the first list of a place.
+fn fields(place: &Place) -> impl Iterator<Item = &str> {
+    place.iter().map_while(|step| match step {
+        Step::Field(name) => Some(name.as_str()),
+        Step::Element(_) | Step::Each => None,
+    })
+}

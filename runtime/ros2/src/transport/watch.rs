@@ -1,0 +1,252 @@
+//! Who comes and goes while a run goes on, in words for its notes.
+//!
+//! Nothing here changes what a run does: it looks at what DDS has announced, and never more often than twice a second
+//! of wall time.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::{Duration, Instant};
+
+use rustdds::GUID;
+
+/// How often it is looked who is there while a run goes on.
+pub(super) const LOOK: Duration = Duration::from_millis(500);
+
+/// How long the name of somebody who has appeared is awaited.
+const NAME: Duration = Duration::from_secs(1);
+
+/// What a node does on a topic or with a service.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Role {
+    Publishes,
+    Subscribes,
+    Serves,
+}
+
+/// A place at a wire: what is done there, and where.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Place {
+    pub(super) role: Role,
+    /// The name in ROS that the space has for the topic or service.
+    pub(super) path: String,
+    /// The topic of DDS where this takes place: a topic that is cut has several.
+    pub(super) topic: String,
+    /// How many the space declares; `None` for as many as there are.
+    pub(super) most: Option<usize>,
+}
+
+/// Somebody at a place.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Present {
+    pub(super) guid: GUID,
+    pub(super) place: Place,
+    /// Of its node, as far as its participant has said.
+    pub(super) name: Option<String>,
+    /// Whether the name is yet to come.
+    pub(super) will_be_named: bool,
+}
+
+/// Somebody by what people know of them, who stay the same if they are started again.
+type Known = (Role, String, String);
+
+/// What is remembered from one look to the next.
+#[derive(Debug, Default)]
+pub(super) struct Watch {
+    looked: Option<Instant>,
+    there: BTreeMap<GUID, Present>,
+    /// Who has appeared, and when; until it has a name, or long enough.
+    fresh: BTreeMap<GUID, Instant>,
+    /// Who has gone and not come back.
+    gone: BTreeSet<Known>,
+    /// Who is beyond those declared, in a sentence.
+    beyond: BTreeMap<GUID, String>,
+    /// What was said in this run.
+    said: BTreeSet<String>,
+}
+
+impl Watch {
+    /// A run begins. Who is there at the beginning of the first one was judged when the system was assembled.
+    pub(super) fn begin(&mut self, present: impl FnOnce() -> Vec<Present>) {
+        self.said.clear();
+        if self.looked.is_none() {
+            self.there = present().into_iter().map(|it| (it.guid, it)).collect();
+        }
+    }
+
+    /// Whether it is time to look.
+    pub(super) fn is_due(&self, now: Instant) -> bool {
+        self.looked.is_none_or(|looked| now.duration_since(looked) >= LOOK)
+    }
+
+    /// Forgets whom an operation has taken away.
+    pub(super) fn forget(&mut self, gone: impl Fn(GUID) -> bool) {
+        self.there.retain(|&guid, _| !gone(guid));
+    }
+
+    /// Compares who is there with who was, and gives what is new, each in a sentence and once a run. Of nodes that
+    /// operations have stopped or killed it is not said that they have gone.
+    pub(super) fn look(&mut self, now: Instant, present: Vec<Present>, absent: &BTreeSet<String>) -> Vec<String> {
+        self.looked = Some(now);
+        let present: BTreeMap<GUID, Present> = present.into_iter().map(|it| (it.guid, it)).collect();
+        let mut notes = Vec::new();
+        for it in std::mem::take(&mut self.there).into_values() {
+            if let Some(now) = present.get(&it.guid) {
+                // A node that ends takes its name back before its publishers.
+                self.there.insert(it.guid, Present { name: it.name.or_else(|| now.name.clone()), ..now.clone() });
+                continue;
+            }
+            let stays = present.values().any(|other| known(other) == known(&it));
+            if !stays && it.name.as_ref().is_none_or(|name| !absent.contains(name)) {
+                self.gone.insert(known(&it));
+            }
+        }
+        self.fresh.retain(|guid, _| present.contains_key(guid));
+        self.beyond.retain(|guid, _| present.contains_key(guid));
+        for (&guid, it) in &present {
+            if self.there.contains_key(&guid) {
+                continue;
+            }
+            let since = *self.fresh.entry(guid).or_insert(now);
+            if it.will_be_named && now.duration_since(since) < NAME {
+                continue;
+            }
+            self.fresh.remove(&guid);
+            let there = present.values().filter(|other| other.place == it.place).count();
+            if self.gone.remove(&known(it)) {
+                notes.push(came_back(&known(it)));
+            } else if let Some(most) = it.place.most.filter(|&most| there > most) {
+                self.beyond.insert(guid, too_many(it, there, most));
+            }
+            self.there.insert(guid, it.clone());
+        }
+        notes.extend(self.gone.iter().map(has_gone));
+        notes.extend(self.beyond.values().cloned());
+        notes.retain(|note| self.said.insert(note.clone()));
+        notes
+    }
+}
+
+fn known(Present { guid, place, name, .. }: &Present) -> Known {
+    (place.role, place.path.clone(), name.clone().unwrap_or_else(|| format!("participant {:?}", guid.prefix)))
+}
+
+fn came_back((role, path, name): &Known) -> String {
+    match role {
+        Role::Publishes => format!("`{name}` publishes on `{path}` again"),
+        Role::Subscribes => format!("`{name}` subscribes to `{path}` again"),
+        Role::Serves => format!("`{name}` serves `{path}` again"),
+    }
+}
+
+fn has_gone((role, path, name): &Known) -> String {
+    match role {
+        Role::Publishes => format!("`{name}` no longer publishes on `{path}`"),
+        Role::Subscribes => format!("`{name}` no longer subscribes to `{path}`"),
+        Role::Serves => format!("`{name}` no longer serves `{path}`"),
+    }
+}
+
+fn too_many(it: &Present, there: usize, most: usize) -> String {
+    let (_, _, name) = known(it);
+    let path = it.place.topic.strip_prefix("rt").unwrap_or(&it.place.topic);
+    match most {
+        0 => format!("`{name}` publishes on `{path}` past the relay since the run began"),
+        1 => format!("`{name}` publishes on `{path}` since the run began: {there} publish there, and 1 is declared"),
+        _ => format!(
+            "`{name}` publishes on `{path}` since the run began: {there} publish there, and {most} are declared"
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn present(participant: u8, role: Role, name: Option<&str>) -> Present {
+        let guid = GUID::from_bytes(std::array::from_fn(|at| if at < 12 { participant } else { role as u8 }));
+        let most = (role == Role::Publishes).then_some(1);
+        let topic = if role == Role::Publishes { "rt/arm/undisturbed" } else { "rt/arm" };
+        let place = Place { role, path: "/arm".to_owned(), topic: topic.to_owned(), most };
+        Present { guid, place, name: name.map(str::to_owned), will_be_named: name.is_none() }
+    }
+
+    /// What each look says, one every half a second.
+    fn said(first: &[Present], looks: &[(&[Present], &[&str])]) -> Vec<Vec<String>> {
+        let (mut watch, mut now) = (Watch::default(), super::super::now());
+        watch.begin(|| first.to_vec());
+        let look = |(present, absent): &(&[Present], &[&str])| {
+            assert!(watch.is_due(now));
+            let absent = absent.iter().map(|&name| name.to_owned()).collect();
+            let notes = watch.look(now, present.to_vec(), &absent);
+            assert!(!watch.is_due(now));
+            now += LOOK;
+            notes
+        };
+        looks.iter().map(look).collect()
+    }
+
+    #[test]
+    fn who_leaves_and_who_returns_is_said_once_by_name_even_if_everything_of_it_is_new() {
+        let (arm, ear) = (present(1, Role::Publishes, Some("/arm")), present(2, Role::Subscribes, Some("/ear")));
+        let again = present(3, Role::Publishes, Some("/arm"));
+        let nameless = present(1, Role::Publishes, None);
+        let both = [arm.clone(), ear.clone()];
+        let seen =
+            said(&both, &[(&both, &[]), (&[nameless, ear.clone()], &[]), (&[ear], &[]), (&[again], &[]), (&[], &[])]);
+        let gone = "`/arm` no longer publishes on `/arm`";
+        let [none, still, left, returned, last] = &seen[..] else { panic!("{seen:?}") };
+        assert_eq!((none.len(), still.len()), (0, 0), "{seen:?}");
+        assert_eq!(*left, [gone]);
+        assert_eq!(*returned, ["`/arm` publishes on `/arm` again", "`/ear` no longer subscribes to `/arm`"]);
+        assert_eq!(last.len(), 0, "it was said: {last:?}");
+    }
+
+    #[test]
+    fn who_is_replaced_at_once_has_not_left() {
+        let first = present(1, Role::Serves, Some("/grip"));
+        let next = present(2, Role::Serves, Some("/grip"));
+        assert_eq!(said(&[first], &[(&[next], &[])]), [[""; 0]]);
+    }
+
+    #[test]
+    fn what_an_operation_stops_or_kills_has_not_left() {
+        let arm = present(1, Role::Publishes, Some("/arm"));
+        let stopped: &[&str] = &["/arm"];
+        let seen = said(std::slice::from_ref(&arm), &[(&[], stopped), (&[], &[]), (std::slice::from_ref(&arm), &[])]);
+        assert_eq!(seen, [[""; 0]; 3]);
+
+        let mut watch = Watch::default();
+        watch.begin(|| vec![arm.clone()]);
+        watch.forget(|guid| guid == arm.guid);
+        let restarted = present(2, Role::Publishes, Some("/arm"));
+        let now = super::super::now();
+        assert_eq!(watch.look(now, Vec::new(), &BTreeSet::new()), [""; 0]);
+        assert_eq!(watch.look(now, vec![restarted], &BTreeSet::new()), [""; 0]);
+    }
+
+    #[test]
+    fn who_publishes_beside_those_declared_is_said_as_soon_as_it_has_a_name_or_will_have_none() {
+        let arm = present(1, Role::Publishes, Some("/arm"));
+        let (fresh, stray) = (present(2, Role::Publishes, None), present(2, Role::Publishes, Some("/stray")));
+        let named: Vec<Present> = vec![arm.clone(), stray];
+        let nameless: Vec<Present> = vec![arm.clone(), fresh];
+        let seen = said(std::slice::from_ref(&arm), &[(&nameless, &[]), (&named, &[]), (&named, &[])]);
+        let sentence =
+            "`/stray` publishes on `/arm/undisturbed` since the run began: 2 publish there, and 1 is declared";
+        assert_eq!(seen, [vec![], vec![sentence.to_owned()], vec![]]);
+
+        let seen = said(&[arm], &[(&nameless, &[]), (&nameless, &[]), (&nameless, &[])]);
+        assert_eq!(seen.iter().map(Vec::len).collect::<Vec<_>>(), [0, 0, 1], "{seen:?}");
+        assert!(seen[2][0].starts_with("`participant 0202"), "{seen:?}");
+    }
+
+    #[test]
+    fn what_lasts_is_said_again_in_the_next_run() {
+        let arm = present(1, Role::Publishes, Some("/arm"));
+        let (mut watch, now) = (Watch::default(), super::super::now());
+        watch.begin(|| vec![arm]);
+        let first = watch.look(now, Vec::new(), &BTreeSet::new());
+        watch.begin(|| panic!("who was there is known"));
+        assert_eq!(first, ["`/arm` no longer publishes on `/arm`"]);
+        assert_eq!(watch.look(now + LOOK, Vec::new(), &BTreeSet::new()), first);
+    }
+}

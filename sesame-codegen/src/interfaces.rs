@@ -1,0 +1,317 @@
+//! Definitions of ROS messages and services in folders: which file defines what, read when it is asked for, and in the
+//! order in which one contains another.
+//!
+//! A folder holds packages, as `share` of a distribution and the folder of a workspace's sources do:
+//! `PACKAGE/msg/NAME.msg`, `PACKAGE/srv/NAME.srv`, or `.idl` in their place. Nothing else in it is looked at.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use sesame_dsl::interfaces::{Folders, Interfaces, known};
+use sesame_plan::{Interface, InterfaceField, WireType};
+
+use crate::input::{self, Unreadable};
+
+/// The most files that are read for one space.
+const MOST_FILES: usize = 2000;
+
+/// The longest chain of messages that contain each other.
+const DEEPEST: usize = 64;
+
+/// A file that defines a message or a service.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Definition {
+    /// Where it is.
+    pub file: PathBuf,
+    /// How it is written.
+    pub format: Format,
+    /// What it says.
+    pub text: String,
+}
+
+/// How a definition is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// A message.
+    Msg,
+    /// A service.
+    Srv,
+    /// Either, in the notation of DDS.
+    Idl,
+}
+
+/// What a definition is of: of the interface `PACKAGE/msg/NAME` one layout, of `PACKAGE/srv/NAME` those of
+/// `PACKAGE/srv/NAME_Request` and `PACKAGE/srv/NAME_Response`. What they contain is named in full.
+pub type Parse = fn(name: &str, definition: &Definition) -> Result<Vec<Interface>, String>;
+
+/// The layouts of a definition; `None` where no folder has one.
+type Read = Result<Option<Vec<Interface>>, String>;
+
+/// Layouts from files.
+pub struct Files {
+    parse: Parse,
+    /// By the name of the message or service.
+    read: RefCell<BTreeMap<String, Read>>,
+}
+
+impl Default for Files {
+    fn default() -> Self {
+        Files::new(parse)
+    }
+}
+
+/// The layouts of a definition of ROS.
+fn parse(name: &str, definition: &Definition) -> Result<Vec<Interface>, String> {
+    let package = name.split('/').next().unwrap_or_default();
+    let last = name.rsplit('/').next().unwrap_or_default();
+    let text = definition.text.as_str();
+    let definitions = match definition.format {
+        Format::Msg => sesame_interfaces::msg(package, last, text).map(|one| vec![one]),
+        Format::Srv => sesame_interfaces::srv(package, last, text).map(Vec::from),
+        Format::Idl => sesame_interfaces::idl(text),
+    };
+    let layout = |definition: sesame_interfaces::Definition| Interface {
+        name: definition.name,
+        fields: definition.fields.into_iter().map(|it| InterfaceField { name: it.name, ty: it.ty }).collect(),
+    };
+    let definitions = definitions.map_err(|error| error.to_string())?;
+    Ok(definitions.into_iter().map(layout).collect())
+}
+
+impl Files {
+    /// No file is read yet.
+    pub fn new(parse: Parse) -> Self {
+        Files { parse, read: RefCell::new(BTreeMap::new()) }
+    }
+
+    /// The layout of an interface itself.
+    fn layout(&self, folders: Folders<'_>, name: &str) -> Result<Option<Interface>, String> {
+        let defined = defined_as(name);
+        if !self.read.borrow().contains_key(defined) {
+            let read = self.read.borrow().len();
+            let found = if read < MOST_FILES {
+                self.definition(folders, defined)
+            } else {
+                Err(format!("it needs more than {MOST_FILES} files, which is the limit for a space"))
+            };
+            self.read.borrow_mut().insert(defined.to_owned(), found);
+        }
+        let read = self.read.borrow();
+        let found = read[defined].clone()?;
+        Ok(found.and_then(|found| found.into_iter().find(|interface| interface.name == name)))
+    }
+
+    fn definition(&self, folders: Folders<'_>, name: &str) -> Read {
+        let Some((file, format)) = find(folders, name) else { return Ok(None) };
+        let text = input::text(&file).map_err(|unreadable| match unreadable {
+            Unreadable::System(error) => format!("{} cannot be read: {error}", file.display()),
+            other => format!("{}: {other}", file.display()),
+        })?;
+        let definition = Definition { file, format, text };
+        (self.parse)(name, &definition).map(Some).map_err(|why| format!("{}: {why}", definition.file.display()))
+    }
+
+    /// Adds an interface to those that are found, after those that it contains. `open` are those that contain it.
+    fn add(
+        &self,
+        folders: Folders<'_>,
+        name: &str,
+        open: &mut Vec<String>,
+        found: &mut Vec<Interface>,
+    ) -> Result<bool, String> {
+        if found.iter().any(|interface| interface.name == name) {
+            return Ok(true);
+        }
+        if open.iter().any(|outer| outer == name) {
+            return Err(format!("`{name}` contains itself"));
+        }
+        if open.len() >= DEEPEST {
+            return Err(format!("messages are nested more than {DEEPEST} levels deep"));
+        }
+        let Some(layout) = self.layout(folders, name)? else {
+            // Some need no file.
+            let known = known(name).unwrap_or_default();
+            let there = !known.is_empty();
+            for interface in known {
+                if found.iter().all(|it| it.name != interface.name) {
+                    found.push(interface);
+                }
+            }
+            return Ok(there);
+        };
+        open.push(name.to_owned());
+        for field in &layout.fields {
+            let Some(inner) = contained(&field.ty) else { continue };
+            if !self.add(folders, inner, open, found)? {
+                return Err(format!("it contains `{inner}`, of which no folder has a definition"));
+            }
+        }
+        open.pop();
+        found.push(layout);
+        Ok(true)
+    }
+}
+
+impl Interfaces for Files {
+    fn find(&self, folders: Folders<'_>, name: &str) -> Read {
+        let mut found = Vec::new();
+        let there = self.add(folders, name, &mut Vec::new(), &mut found)?;
+        Ok(there.then_some(found))
+    }
+}
+
+/// The message or service whose definition has an interface.
+fn defined_as(name: &str) -> &str {
+    let ends = ["_Request", "_Response"];
+    let of_service = name.contains("/srv/").then(|| ends.iter().find_map(|end| name.strip_suffix(end)));
+    of_service.flatten().unwrap_or(name)
+}
+
+/// The first file of the folders that may define an interface.
+fn find(folders: Folders<'_>, name: &str) -> Option<(PathBuf, Format)> {
+    let mut parts = name.split('/');
+    let (package, kind, last) = (parts.next()?, parts.next()?, parts.next()?);
+    let plain = |part: &str| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
+    if !plain(package) || !plain(last) || parts.next().is_some() {
+        return None;
+    }
+    let formats = match kind {
+        "msg" => [("msg", Format::Msg), ("idl", Format::Idl)],
+        "srv" => [("srv", Format::Srv), ("idl", Format::Idl)],
+        _ => return None,
+    };
+    let beside = Path::new(folders.file).parent().unwrap_or(Path::new(""));
+    folders.written.iter().find_map(|folder| {
+        let folder = beside.join(folder).join(package).join(kind);
+        formats.iter().find_map(|&(extension, format)| {
+            let file = folder.join(format!("{last}.{extension}"));
+            file.exists().then_some((file, format))
+        })
+    })
+}
+
+/// The interface that values of a type are or hold.
+fn contained(ty: &WireType) -> Option<&str> {
+    match ty {
+        WireType::Interface { name } => Some(name),
+        WireType::Array { of, .. } | WireType::Sequence { of, .. } => contained(of),
+        WireType::Primitive { .. } | WireType::String | WireType::WString => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    /// Each word of a text is a field with a message of that type; `---` is between requests and replies.
+    fn words(name: &str, definition: &Definition) -> Result<Vec<Interface>, String> {
+        if definition.text.contains('!') {
+            return Err("its line 1 is no field".to_owned());
+        }
+        let field = |(at, name): (usize, &str)| InterfaceField {
+            name: format!("f{at}"),
+            ty: WireType::Sequence { of: Box::new(WireType::Interface { name: name.to_owned() }), bound: None },
+        };
+        let of = |name: String, text: &str| Interface {
+            name,
+            fields: text.split_whitespace().enumerate().map(field).collect(),
+        };
+        Ok(match definition.text.split_once("---") {
+            Some((request, reply)) => {
+                vec![of(format!("{name}_Request"), request), of(format!("{name}_Response"), reply)]
+            }
+            None => vec![of(name.to_owned(), &definition.text)],
+        })
+    }
+
+    fn found(files: &[(&str, &str)], name: &str) -> Result<Option<Vec<String>>, String> {
+        let folder = tempfile::tempdir().unwrap();
+        for (path, text) in files {
+            let path = folder.path().join(path);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, text).unwrap();
+        }
+        let file = folder.path().join("cell.sesame");
+        let written = ["first".to_owned(), "second".to_owned()];
+        let folders = Folders { written: &written, file: file.to_str().unwrap() };
+        let found = Files::new(words).find(folders, name);
+        let names = |found: Vec<Interface>| found.into_iter().map(|interface| interface.name).collect();
+        found
+            .map(|found| found.map(names))
+            .map_err(|why| why.replace(folder.path().to_str().unwrap(), "").replace(std::path::MAIN_SEPARATOR, "/"))
+    }
+
+    #[test]
+    fn what_a_message_contains_comes_before_it_and_once() {
+        let files = [
+            ("second/a/msg/Outer.msg", "a/msg/Inner b/msg/Leaf a/msg/Inner"),
+            ("first/a/msg/Inner.idl", "b/msg/Leaf"),
+            ("second/b/msg/Leaf.msg", ""),
+            ("first/c/msg/Broken.msg", "!"),
+        ];
+        assert_eq!(
+            found(&files, "a/msg/Outer").unwrap().unwrap(),
+            ["b/msg/Leaf", "a/msg/Inner", "a/msg/Outer"],
+            "what is not needed is not read"
+        );
+        assert_eq!(found(&files, "a/msg/Other").unwrap(), None);
+        assert_eq!(found(&files, "a/../b/msg/Leaf").unwrap(), None);
+        assert_eq!(found(&files, "c/msg/Broken").unwrap_err(), "/first/c/msg/Broken.msg: its line 1 is no field");
+    }
+
+    #[test]
+    fn files_of_ros_are_read_in_all_three_notations() {
+        let folder = tempfile::tempdir().unwrap();
+        let header = "module std_msgs { module msg { struct Level { double data; }; }; };";
+        for (path, text) in [
+            ("a/msg/Joint.msg", "std_msgs/Level[] levels # of each\nuint8 COUNT=3\nfloat32[3] axes\n"),
+            ("a/srv/Move.srv", "Joint to\nstd_msgs/Header header\n---\n"),
+            ("std_msgs/msg/Level.idl", header),
+        ] {
+            let path = folder.path().join(path);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, text).unwrap();
+        }
+        let file = folder.path().join("cell.sesame");
+        let written = [".".to_owned()];
+        let folders = Folders { written: &written, file: file.to_str().unwrap() };
+        let files = Files::default();
+        let names = |name| {
+            let found = files.find(folders, name).unwrap().unwrap();
+            found.into_iter().map(|interface| interface.name).collect::<Vec<_>>()
+        };
+        let header = ["builtin_interfaces/msg/Time", "std_msgs/msg/Header"];
+        let expected = ["std_msgs/msg/Level", "a/msg/Joint", header[0], header[1], "a/srv/Move_Request"];
+        assert_eq!(names("a/srv/Move_Request"), expected, "headers are known without a file");
+        assert_eq!(names("a/srv/Move_Response"), ["a/srv/Move_Response"]);
+    }
+
+    #[test]
+    fn a_service_has_two_layouts() {
+        let files = [("first/a/srv/Move.srv", "a/msg/Leaf --- "), ("first/a/msg/Leaf.msg", "")];
+        assert_eq!(found(&files, "a/srv/Move_Request").unwrap().unwrap(), ["a/msg/Leaf", "a/srv/Move_Request"]);
+        assert_eq!(found(&files, "a/srv/Move_Response").unwrap().unwrap(), ["a/srv/Move_Response"]);
+    }
+
+    #[test]
+    fn circles_gaps_and_endless_chains_are_refused() {
+        let circle = [("first/a/msg/A.msg", "a/msg/B"), ("first/a/msg/B.msg", "a/msg/A")];
+        assert_eq!(found(&circle, "a/msg/A").unwrap_err(), "`a/msg/A` contains itself");
+        let gap = [("first/a/msg/A.msg", "a/msg/B")];
+        let why = "it contains `a/msg/B`, of which no folder has a definition";
+        assert_eq!(found(&gap, "a/msg/A").unwrap_err(), why);
+        let chain: Vec<(String, String)> =
+            (0..70).map(|n| (format!("first/a/msg/M{n}.msg"), format!("a/msg/M{}", n + 1))).collect();
+        let chain: Vec<(&str, &str)> = chain.iter().map(|(path, text)| (path.as_str(), text.as_str())).collect();
+        assert_eq!(found(&chain, "a/msg/M0").unwrap_err(), "messages are nested more than 64 levels deep");
+    }
+
+    #[test]
+    fn only_regular_files_are_read() {
+        let folder = [("first/a/msg/A.msg/file", "")];
+        assert_eq!(found(&folder, "a/msg/A").unwrap_err(), "/first/a/msg/A.msg: it is a folder, not a regular file");
+    }
+}

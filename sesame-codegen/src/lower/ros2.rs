@@ -1,0 +1,75 @@
+//! A ROS 2 system, from the model to the plan: its layouts, and how its topics are cut.
+
+use std::collections::BTreeSet;
+
+use sesame_dsl::model::{self, NodeId, Space, TopicId};
+use sesame_plan as plan;
+use sesame_plan::WireType;
+
+use super::id::node_id;
+
+/// What a plan says of a space whose simulator is one of ROS 2.
+pub(super) fn ros2(space: &Space) -> plan::Ros2 {
+    let model::Transport::Ros2 { domain, clock, step, reset } = &space.simulator.transport else {
+        unreachable!("the simulator is one of ROS 2")
+    };
+    plan::Ros2 {
+        domain: *domain,
+        clock: clock.clone(),
+        step: step.clone(),
+        reset: reset.clone(),
+        interfaces: interfaces(space),
+        wiring: space.topics.iter().map(|(topic, _)| wiring(space, topic, step.is_some())).collect(),
+    }
+}
+
+/// The layouts of all topics and what these contain, each after those it contains.
+fn interfaces(space: &Space) -> Vec<plan::Interface> {
+    let mut used: BTreeSet<&str> = BTreeSet::new();
+    for topic in space.topics.values() {
+        if let model::Type::Message(id) = topic.ty {
+            used.extend(space.messages[id].interface.as_deref());
+        }
+    }
+    // What contains others comes after them, so going backwards each has been mentioned by all that contain it.
+    let mut kept: Vec<plan::Interface> = Vec::new();
+    for interface in space.interfaces.iter().rev() {
+        if !used.contains(interface.name.as_str()) {
+            continue;
+        }
+        used.extend(interface.fields.iter().filter_map(|field| contained(&field.ty)));
+        kept.push(interface.clone());
+    }
+    kept.reverse();
+    kept
+}
+
+/// The interface that values of a type are or hold.
+fn contained(ty: &WireType) -> Option<&str> {
+    match ty {
+        WireType::Interface { name } => Some(name),
+        WireType::Array { of, .. } | WireType::Sequence { of, .. } => contained(of),
+        WireType::Primitive { .. } | WireType::String | WireType::WString => None,
+    }
+}
+
+/// How a topic is cut: by all operations of the space, so that its campaigns need the same remappings.
+///
+/// In lock-step, what a node answers to, whatever else it hears, and its answers pass through the relay too: only then
+/// does the relay decide in which order a node hears its messages, and that an answer has arrived before the next step.
+fn wiring(space: &Space, topic: TopicId, stepped: bool) -> plan::Wiring {
+    let on_it = || space.operations.values().filter(|operation| operation.topic() == Some(topic));
+    let distinguished = |nodes: fn(&model::Operation) -> &Vec<NodeId>| {
+        let nodes: BTreeSet<NodeId> = on_it().flat_map(nodes).copied().collect();
+        nodes.into_iter().map(node_id).collect()
+    };
+    let in_step = |node: &model::Node| {
+        let answers = node.answers.iter().any(|&(_, with)| with == topic);
+        answers || !node.answers.is_empty() && node.subscribes.contains(&topic)
+    };
+    plan::Wiring {
+        cut: on_it().next().is_some() || stepped && space.nodes.values().any(in_step),
+        publishers: distinguished(|operation| &operation.from),
+        subscribers: distinguished(|operation| &operation.to),
+    }
+}

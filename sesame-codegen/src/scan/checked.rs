@@ -1,0 +1,47 @@
+//! What is written passes its check.
+
+use sesame_ros2::scan::Facts;
+
+use super::text::{Origin, space};
+use super::types::Types;
+use crate::frontend::{Language, Look};
+
+/// What the space is called while it is checked: a file in the current folder, to which its folders are relative.
+pub(crate) const FILE: &str = "scan.sesame";
+
+/// The space, formatted, which passes its check: types that do not are left out. An error is a mistake of this program.
+pub(crate) fn checked_space(
+    language: &Language,
+    facts: &Facts,
+    types: &mut Types,
+    origin: Origin<'_>,
+) -> Result<String, String> {
+    let check = |text: &str| (language.check)(FILE, text, Look::Short);
+    let text = space(facts, types, origin);
+    if check(&text).errors > 0 {
+        // Some layouts are too large for the language, or wrong in a way that only the language knows.
+        for ty in types.facts() {
+            let topics: Vec<_> = facts.topics.iter().filter(|topic| topic.ty == ty.name).take(1).cloned().collect();
+            let alone = Facts { topics, nodes: Vec::new(), services: Vec::new(), actions: Vec::new(), ..facts.clone() };
+            let checked = check(&space(&alone, types, origin));
+            if checked.errors > 0 {
+                types.refuse(&ty.name, first_error(&checked.diagnostics));
+            }
+        }
+    }
+    let text = space(facts, types, origin);
+    let checked = check(&text);
+    let mistake = |diagnostics: &str| {
+        format!("what was found could not be written as a space, which is a mistake in sesamec: {diagnostics}")
+    };
+    if checked.errors > 0 {
+        return Err(mistake(&checked.diagnostics));
+    }
+    (language.format)(FILE, &text, Look::Short).map_err(|found| mistake(&found.diagnostics))
+}
+
+/// What the first error says, without its place.
+fn first_error(diagnostics: &str) -> String {
+    let mut errors = diagnostics.lines().filter_map(|line| line.split_once(": error[").map(|(_, error)| error));
+    errors.next().and_then(|error| error.split_once("]: ")).map_or("it has errors", |(_, title)| title).to_owned()
+}

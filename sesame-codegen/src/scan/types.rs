@@ -1,0 +1,206 @@
+//! The types of what was found: where each has its layout from.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use sesame_dsl::interfaces::{self, Folders, Interfaces};
+use sesame_plan::{Interface, InterfaceField, WireType};
+use sesame_ros2::scan::{Facts, FoundField, FoundType, TypeSource};
+
+/// The most types that nodes may describe.
+const MOST: usize = 2000;
+
+/// The longest chain of types that contain each other.
+const DEEPEST: usize = 50;
+
+/// Types by their names.
+#[derive(Debug, Default)]
+pub(crate) struct Types {
+    by_name: BTreeMap<String, Type>,
+}
+
+#[derive(Debug)]
+struct Type {
+    source: TypeSource,
+    fields: Vec<InterfaceField>,
+    problem: Option<String>,
+}
+
+impl Types {
+    /// The types of all topics, as far as they are known or folders have them.
+    pub(crate) fn of_topics(facts: &Facts, files: &dyn Interfaces, folders: Folders<'_>) -> Self {
+        let mut types = Types::default();
+        for topic in &facts.topics {
+            types.look_up(&topic.ty, files, folders);
+        }
+        types
+    }
+
+    fn look_up(&mut self, name: &str, files: &dyn Interfaces, folders: Folders<'_>) {
+        if self.by_name.contains_key(name) {
+            return;
+        }
+        let unknown = |problem: Option<String>| Type { source: TypeSource::Unknown, fields: Vec::new(), problem };
+        let of = |source, found: Vec<Interface>| match found.into_iter().next_back() {
+            Some(last) => Type { source, fields: last.fields, problem: None },
+            None => unknown(None),
+        };
+        let found = if interfaces::full_name(name, "msg").as_deref() != Some(name) {
+            unknown(Some("this is no type of messages in ROS".to_owned()))
+        } else if let Some(known) = interfaces::known(name) {
+            of(TypeSource::Known, known)
+        } else {
+            match files.find(folders, name) {
+                Ok(Some(found)) => of(TypeSource::Folder, found),
+                Ok(None) => unknown(None),
+                Err(why) => unknown(Some(why)),
+            }
+        };
+        self.by_name.insert(name.to_owned(), found);
+    }
+
+    /// Types of which no folder has a definition, and nothing else is wrong.
+    pub(crate) fn missing(&self) -> Vec<String> {
+        let missing = self.by_name.iter();
+        let missing = missing.filter(|(_, ty)| ty.source == TypeSource::Unknown && ty.problem.is_none());
+        missing.map(|(name, _)| name.clone()).collect()
+    }
+
+    /// Adds layouts as nodes describe them, by the type for which they were asked.
+    pub(crate) fn add_described(
+        &mut self,
+        described: &BTreeMap<String, Vec<Interface>>,
+        files: &dyn Interfaces,
+        folders: Folders<'_>,
+    ) {
+        for interface in described.values().flatten().take(MOST) {
+            self.look_up(&interface.name, files, folders);
+            let Some(ty) = self.by_name.get_mut(&interface.name) else { continue };
+            if ty.source == TypeSource::Unknown && ty.problem.is_none() {
+                *ty = match wrong_field(&interface.fields) {
+                    Some(problem) => Type { source: TypeSource::Unknown, fields: Vec::new(), problem: Some(problem) },
+                    None => Type { source: TypeSource::Node, fields: interface.fields.clone(), problem: None },
+                };
+            }
+        }
+        let of_nodes = self.by_name.values().filter(|ty| ty.source == TypeSource::Node).flat_map(|ty| &ty.fields);
+        let inner: BTreeSet<String> = of_nodes.filter_map(|field| contained(&field.ty)).map(str::to_owned).collect();
+        for name in inner {
+            self.look_up(&name, files, folders);
+        }
+        let names: Vec<String> = self.by_name.keys().cloned().collect();
+        let mut whole = BTreeSet::new();
+        for name in names {
+            if let Some(problem) = self.gap(&name, &mut Vec::new(), &mut whole) {
+                self.refuse(&name, problem);
+            }
+        }
+    }
+
+    /// Why what a node described does not make a layout; `open` are the types that contain it, and `whole` those that
+    /// are known to have none of these mistakes.
+    fn gap(&self, name: &str, open: &mut Vec<String>, whole: &mut BTreeSet<String>) -> Option<String> {
+        let Some(ty) = self.by_name.get(name).filter(|ty| ty.source != TypeSource::Unknown) else {
+            return (!open.is_empty()).then(|| format!("it contains `{name}`, which is unknown"));
+        };
+        if ty.source != TypeSource::Node || whole.contains(name) {
+            return None;
+        }
+        if open.len() >= DEEPEST || open.iter().any(|outer| outer == name) {
+            return Some("it contains itself, or too many in each other".to_owned());
+        }
+        open.push(name.to_owned());
+        let mut inner = ty.fields.iter().filter_map(|field| contained(&field.ty));
+        let gap = inner.find_map(|inner| self.gap(inner, open, whole));
+        open.pop();
+        if gap.is_none() {
+            whole.insert(name.to_owned());
+        }
+        gap
+    }
+
+    /// A type turned out to be of no use.
+    pub(crate) fn refuse(&mut self, name: &str, problem: String) {
+        if let Some(ty) = self.by_name.get_mut(name) {
+            *ty = Type { source: TypeSource::Unknown, fields: Vec::new(), problem: Some(problem) };
+        }
+    }
+
+    /// Where the layout of a type comes from.
+    pub(crate) fn source(&self, name: &str) -> TypeSource {
+        self.by_name.get(name).map_or(TypeSource::Unknown, |ty| ty.source)
+    }
+
+    /// The fields that a type has for people.
+    pub(crate) fn fields(&self, name: &str) -> impl Iterator<Item = &InterfaceField> {
+        let fields = self.by_name.get(name).map(|ty| ty.fields.as_slice()).unwrap_or_default();
+        fields.iter().filter(|field| field.name != interfaces::NO_FIELDS)
+    }
+
+    /// Why a type cannot be used, in a clause.
+    pub(crate) fn problem(&self, name: &str) -> Option<&str> {
+        self.by_name.get(name)?.problem.as_deref()
+    }
+
+    /// What messages of a type are in the language where that is no message: times, and points that need no block.
+    pub(crate) fn plain(&self, name: &str) -> Option<&'static str> {
+        if interfaces::is_time(name) {
+            return Some("real[s]");
+        }
+        let ty = self.by_name.get(name).filter(|ty| ty.source != TypeSource::Node)?;
+        let layout = Interface { name: name.to_owned(), fields: ty.fields.clone() };
+        interfaces::is_point(&layout).then_some("point")
+    }
+
+    /// The types of these names that can be used, and those that the blocks of described types need, each once.
+    pub(crate) fn needed<'a>(&'a self, of_topics: impl IntoIterator<Item = &'a str>) -> Vec<&'a str> {
+        let mut needed: Vec<&str> = Vec::new();
+        for name in of_topics {
+            if self.source(name) != TypeSource::Unknown && !needed.contains(&name) {
+                needed.push(name);
+            }
+        }
+        let mut at = 0;
+        while let Some(&name) = needed.get(at) {
+            at += 1;
+            if self.source(name) != TypeSource::Node {
+                continue;
+            }
+            for inner in self.fields(name).filter_map(|field| contained(&field.ty)) {
+                if self.plain(inner).is_none() && !needed.contains(&inner) {
+                    needed.push(inner);
+                }
+            }
+        }
+        needed
+    }
+
+    /// All of them as facts.
+    pub(crate) fn facts(&self) -> Vec<FoundType> {
+        let field =
+            |field: &InterfaceField| FoundField { name: field.name.clone(), ty: interfaces::in_words(&field.ty) };
+        let of = |(name, ty): (&String, &Type)| FoundType {
+            name: name.clone(),
+            source: ty.source,
+            fields: self.fields(name).map(field).collect(),
+            problem: ty.problem.clone(),
+        };
+        self.by_name.iter().map(of).collect()
+    }
+}
+
+/// What is wrong with the fields that a node described.
+fn wrong_field(fields: &[InterfaceField]) -> Option<String> {
+    let is_name = |field: &InterfaceField| field.name.len() <= 100 && sesame_notation::is_name(&field.name);
+    if fields.iter().any(|field| !is_name(field)) {
+        return Some("one of its fields has no name of ROS".to_owned());
+    }
+    let known = |field: &InterfaceField| {
+        contained(&field.ty).is_none_or(|name| interfaces::full_name(name, "msg").as_deref() == Some(name))
+    };
+    (!fields.iter().all(known)).then(|| "one of its fields has no type of ROS".to_owned())
+}
+
+/// The type of messages that values of a type are or hold.
+fn contained(ty: &WireType) -> Option<&str> {
+    if let WireType::Interface { name } = interfaces::innermost(ty) { Some(name) } else { None }
+}

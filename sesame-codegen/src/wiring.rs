@@ -1,0 +1,67 @@
+//! How the nodes of a ROS 2 system are remapped, so that the topics that operations act on pass through the relay: for
+//! people who start these nodes themselves.
+
+use std::fmt::Write as _;
+
+use sesame_plan::{CampaignPlan, Channel, NodeId, Transport};
+
+/// A line to paste for each node, and for each program that the plan does not know.
+pub fn text(plan: &CampaignPlan) -> String {
+    const STRING: &str = "a string takes all text";
+    if !matches!(plan.simulator.transport, Transport::Ros2(_)) {
+        return format!("`{}` is not a system of ROS 2: nothing is remapped\n", plan.simulator.name);
+    }
+    let mut out = String::new();
+    for (id, node) in (0..).map(NodeId).zip(&plan.nodes) {
+        let arguments = plan.ros_args(Some(id));
+        if arguments.is_empty() {
+            continue;
+        }
+        writeln!(out, "# node {}", node.name).expect(STRING);
+        writeln!(out, "ros2 run … {}", arguments.join(" ")).expect(STRING);
+    }
+    for (channel, remapping) in plan.unclaimed() {
+        let programs = match channel {
+            Channel::Topic => "every program that publishes",
+            Channel::Request | Channel::Reply => "the program that offers",
+        };
+        writeln!(out, "# {programs} {}", remapping.from).expect(STRING);
+        writeln!(out, "ros2 run … --ros-args -r {}", remapping.rule()).expect(STRING);
+    }
+    if out.is_empty() {
+        out.push_str("# no operation acts on a topic: nothing is remapped\n");
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use sesame_dsl::source::SourceMap;
+
+    use super::*;
+
+    const ARMS: &str = include_str!("../../sesame-dsl/tests/good/ros2.sesame");
+
+    fn plan(text: &str) -> CampaignPlan {
+        let mut sources = SourceMap::new();
+        let file = sources.add("arms.sesame", text);
+        let analysis = sesame_dsl::analyse(&sources, file);
+        let space = analysis.model.unwrap_or_else(|| panic!("{:#?}", analysis.diagnostics));
+        let plan = crate::lower::lower(&space, space.campaign("delays").unwrap(), "arms.sesame", "sesamec 0.0.0").plan;
+        plan.validate().unwrap();
+        plan
+    }
+
+    #[test]
+    fn each_node_gets_a_line_to_paste() {
+        insta::assert_snapshot!(text(&plan(ARMS)));
+    }
+
+    #[test]
+    fn the_plan_of_a_system_of_ros_is_as_blessed() {
+        let plan = plan(ARMS);
+        insta::assert_snapshot!(serde_json::to_string_pretty(&plan).unwrap());
+        let read: CampaignPlan = serde_json::from_str(&serde_json::to_string(&plan).unwrap()).unwrap();
+        assert_eq!(read, plan);
+    }
+}

@@ -1,0 +1,116 @@
+//! `sesamec scan`, with real nodes if there are some.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn sesamec(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sesamec"));
+    command.current_dir(folder).args(arguments).env_remove("AMENT_PREFIX_PATH");
+    command.output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> &str {
+    std::str::from_utf8(bytes).unwrap()
+}
+
+#[cfg(not(feature = "ros2"))]
+#[test]
+fn without_ros_2_it_says_how_to_get_a_sesamec_with_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let scanned = sesamec(folder.path(), &["scan", "ros2"]);
+    assert_eq!((scanned.status.code(), text(&scanned.stdout)), (Some(1), ""));
+    assert!(text(&scanned.stderr).contains("--features ros2"), "{}", text(&scanned.stderr));
+}
+
+#[cfg(feature = "ros2")]
+mod real {
+    use std::fs;
+    use std::path::PathBuf;
+    use std::process::{Child, Stdio};
+
+    use super::*;
+
+    /// Python with what the nodes of `examples/iiwa_cell` need.
+    const PYTHON: &str = "SESAME_ROS2_KILTED";
+
+    /// Programs that end with the test.
+    struct Programs(Vec<Child>);
+
+    impl Drop for Programs {
+        fn drop(&mut self) {
+            for program in &mut self.0 {
+                let _ = program.kill();
+                let _ = program.wait();
+            }
+        }
+    }
+
+    #[test]
+    fn a_wrong_domain_folder_or_time_is_said_before_anything_is_listened_to() {
+        let folder = tempfile::tempdir().unwrap();
+        let code = |arguments: &[&str]| sesamec(folder.path(), &[&["scan", "ros2"], arguments].concat()).status.code();
+        assert_eq!(code(&["--types", "nowhere"]), Some(1));
+        assert_eq!(code(&["--domain", "233"]), Some(2));
+        assert_eq!(code(&["--seconds", "0"]), Some(2));
+    }
+
+    #[test]
+    fn the_space_of_a_running_cell_passes_its_check() {
+        let Some(python) = std::env::var_os(PYTHON).map(PathBuf::from) else {
+            let ci = std::env::var_os("CI").is_some_and(|ci| ci == "true");
+            assert!(!ci, "{PYTHON} names the Python of examples/iiwa_cell/venv");
+            eprintln!("skipped: {PYTHON} does not name the Python of examples/iiwa_cell/venv");
+            return;
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let domain = (120 + std::process::id() % 20).to_string();
+        let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/iiwa_cell");
+        let start = |arguments: &[&str]| {
+            let mut command = Command::new(&python);
+            command.current_dir(&example).args(arguments).env("ROS_DOMAIN_ID", &domain);
+            command.env("ROS_LOG_DIR", folder.path().join("log")).stdout(Stdio::null()).stderr(Stdio::null());
+            command.spawn().unwrap()
+        };
+        let _programs = Programs(vec![
+            start(&["cell.py"]),
+            start(&["controller.py", "--arm", "left"]),
+            start(&["controller.py", "--arm", "right"]),
+        ]);
+        // They may take long to start, so it is listened until all are there.
+        let mut space = String::new();
+        for _ in 0..10 {
+            let scanned = sesamec(folder.path(), &["scan", "ros2", "--domain", &domain]);
+            assert!(scanned.status.success(), "{}", text(&scanned.stderr));
+            text(&scanned.stdout).clone_into(&mut space);
+            if ["/cell\"", "/left_controller\"", "/right_controller\"", " Hz"].iter().all(|it| space.contains(it)) {
+                break;
+            }
+        }
+        for line in [
+            "clock  \"/clock\"",
+            "message Float64 = \"std_msgs/msg/Float64\"",
+            "message JointState = \"sensor_msgs/msg/JointState\" {",
+            "    position: list of real\n",
+            "topic workers_distance = \"/workers/{a,b}/distance\" : Float64",
+            "topic left_joint_states = \"/left/joint_states\" : JointState",
+            "service cell_reset = \"/cell/reset\" : \"std_srvs/srv/Trigger\"",
+            "node left_controller \"/left_controller\" {",
+            "// decide: `reset by service \"/cell/reset\"`",
+        ] {
+            assert!(space.contains(line), "{line}\n{space}");
+        }
+        fs::write(folder.path().join("cell.sesame"), &space).unwrap();
+        for arguments in [&["check", "cell.sesame"][..], &["fmt", "--check", "cell.sesame"]] {
+            let checked = sesamec(folder.path(), arguments);
+            assert!(checked.status.success(), "{}\n{space}", text(&checked.stderr));
+        }
+        let json = sesamec(folder.path(), &["scan", "ros2", "--domain", &domain, "--format", "json"]);
+        let json: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
+        assert_eq!(json["nodes"][0]["name"], "/cell");
+        let states =
+            json["topics"].as_array().unwrap().iter().find(|topic| topic["path"] == "/left/joint_states").unwrap();
+        assert_eq!(states["type"], "sensor_msgs/msg/JointState");
+        assert_eq!(states["publishers"], serde_json::json!(["/cell"]));
+        assert!(states["rate"].as_f64().unwrap() > 1.0, "{states}");
+    }
+}

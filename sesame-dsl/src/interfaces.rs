@@ -1,0 +1,237 @@
+//! Interfaces of ROS: where their layouts come from, their names, and those that need no file.
+//!
+//! This crate reads no files, so whoever calls it hands over [`Interfaces`].
+
+use sesame_plan::{Interface, InterfaceField, Primitive, WireType};
+
+/// Where the layouts of ROS interfaces come from.
+pub trait Interfaces {
+    /// The layout of an interface such as `sensor_msgs/msg/JointState`, or `std_srvs/srv/SetBool_Request` and
+    /// `std_srvs/srv/SetBool_Response` for the two directions of a service: last in a list in which each comes after
+    /// those that it contains. `None` if no folder has it; an error is a clause such as "it cannot be read".
+    fn find(&self, folders: Folders<'_>, name: &str) -> Result<Option<Vec<Interface>>, String>;
+}
+
+/// Folders that hold packages.
+#[derive(Debug, Clone, Copy)]
+pub struct Folders<'a> {
+    /// As written, in the order in which they are searched.
+    pub written: &'a [String],
+    /// The name of the file that names them; they are relative to its folder.
+    pub file: &'a str,
+}
+
+/// No files: only interfaces that need none are known.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct NoInterfaces;
+
+impl Interfaces for NoInterfaces {
+    fn find(&self, _: Folders<'_>, _: &str) -> Result<Option<Vec<Interface>>, String> {
+        Ok(None)
+    }
+}
+
+/// The full name of an interface of a kind, `msg` or `srv`: `sensor_msgs/JointState` is short for
+/// `sensor_msgs/msg/JointState`. `None` if it is none.
+pub fn full_name(written: &str, kind: &str) -> Option<String> {
+    let parts: Vec<&str> = written.split('/').collect();
+    let (package, name) = match parts[..] {
+        [package, name] => (package, name),
+        [package, of, name] if of == kind => (package, name),
+        _ => return None,
+    };
+    let package_fits = package.starts_with(|first: char| first.is_ascii_lowercase())
+        && package.bytes().all(|byte| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'_');
+    let name_fits = name.starts_with(|first: char| first.is_ascii_uppercase())
+        && name.bytes().all(|byte| byte.is_ascii_alphanumeric());
+    (package_fits && name_fits).then(|| format!("{package}/{kind}/{name}"))
+}
+
+/// Interfaces that are the same in every distribution of ROS, with their fields as in a `.msg` file.
+const KNOWN: &[(&str, &[(&str, &str)])] = &[
+    ("builtin_interfaces/msg/Time", &[("int32", "sec"), ("uint32", "nanosec")]),
+    ("builtin_interfaces/msg/Duration", &[("int32", "sec"), ("uint32", "nanosec")]),
+    ("geometry_msgs/msg/Point", &[("float64", "x"), ("float64", "y"), ("float64", "z")]),
+    ("geometry_msgs/msg/Point32", &[("float32", "x"), ("float32", "y"), ("float32", "z")]),
+    ("geometry_msgs/msg/Vector3", &[("float64", "x"), ("float64", "y"), ("float64", "z")]),
+    ("std_msgs/msg/Bool", &[("bool", "data")]),
+    ("std_msgs/msg/Float32", &[("float32", "data")]),
+    ("std_msgs/msg/Float64", &[("float64", "data")]),
+    ("std_msgs/msg/Header", &[("builtin_interfaces/msg/Time", "stamp"), ("string", "frame_id")]),
+    ("std_msgs/msg/Int32", &[("int32", "data")]),
+    ("std_msgs/msg/Int64", &[("int64", "data")]),
+    ("std_msgs/msg/String", &[("string", "data")]),
+    ("std_srvs/srv/Empty_Request", &[]),
+    ("std_srvs/srv/Empty_Response", &[]),
+    ("std_srvs/srv/SetBool_Request", &[("bool", "data")]),
+    ("std_srvs/srv/SetBool_Response", &[("bool", "success"), ("string", "message")]),
+    ("std_srvs/srv/Trigger_Request", &[]),
+    ("std_srvs/srv/Trigger_Response", &[("bool", "success"), ("string", "message")]),
+];
+
+/// An interface that needs no file, after those that it contains.
+pub fn known(name: &str) -> Option<Vec<Interface>> {
+    let (_, fields) = KNOWN.iter().find(|(known, _)| *known == name)?;
+    let mut found = Vec::new();
+    let mut of = Vec::new();
+    for (ty, field) in *fields {
+        let ty = wire_type(ty).expect("the table has types");
+        if let WireType::Interface { name } = &ty {
+            found.extend(known(name).expect("the table has what its interfaces contain"));
+        }
+        of.push(InterfaceField { name: (*field).to_owned(), ty });
+    }
+    found.push(interface(name.to_owned(), of));
+    Some(found)
+}
+
+/// What is on the wire of an interface without fields. It means nothing, so the language does not show it.
+pub const NO_FIELDS: &str = "structure_needs_at_least_one_member";
+
+/// An interface of these fields; without any, it has the one that is on the wire in their place.
+pub(crate) fn interface(name: String, mut fields: Vec<InterfaceField>) -> Interface {
+    if fields.is_empty() {
+        let ty = WireType::Primitive { primitive: Primitive::Uint8 };
+        fields.push(InterfaceField { name: NO_FIELDS.to_owned(), ty });
+    }
+    Interface { name, fields }
+}
+
+/// A type as it is written in a `.msg` file, such as `uint8`, `float64[36]`, `string<=10` or `geometry_msgs/Point[]`.
+pub fn wire_type(written: &str) -> Option<WireType> {
+    let (base, array) = match written.split_once('[') {
+        Some((base, rest)) => (base, Some(rest.strip_suffix(']')?)),
+        None => (written, None),
+    };
+    let number = |digits: &str| digits.parse::<u32>().ok().filter(|_| digits.bytes().all(|it| it.is_ascii_digit()));
+    let of = match base.split_once("<=") {
+        Some(("string", bound)) if number(bound).is_some() => WireType::String,
+        Some(("wstring", bound)) if number(bound).is_some() => WireType::WString,
+        Some(_) => return None,
+        None => scalar(base)?,
+    };
+    let Some(array) = array else { return Some(of) };
+    let of = Box::new(of);
+    if array.is_empty() {
+        return Some(WireType::Sequence { of, bound: None });
+    }
+    match array.strip_prefix("<=") {
+        Some(bound) => Some(WireType::Sequence { of, bound: Some(number(bound)?) }),
+        None => Some(WireType::Array { of, length: number(array)? }),
+    }
+}
+
+fn scalar(name: &str) -> Option<WireType> {
+    let primitive = match name {
+        "bool" => Primitive::Bool,
+        "int8" => Primitive::Int8,
+        "uint8" | "byte" | "char" => Primitive::Uint8,
+        "int16" => Primitive::Int16,
+        "uint16" => Primitive::Uint16,
+        "int32" => Primitive::Int32,
+        "uint32" => Primitive::Uint32,
+        "int64" => Primitive::Int64,
+        "uint64" => Primitive::Uint64,
+        "float32" => Primitive::Float32,
+        "float64" => Primitive::Float64,
+        "string" => return Some(WireType::String),
+        "wstring" => return Some(WireType::WString),
+        _ => return full_name(name, "msg").map(|name| WireType::Interface { name }),
+    };
+    Some(WireType::Primitive { primitive })
+}
+
+/// The names of types that are no interfaces, for suggestions.
+pub(crate) const SCALARS: [&str; 15] = [
+    "bool", "int8", "uint8", "byte", "char", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32",
+    "float64", "string", "wstring",
+];
+
+/// Whether messages of this layout are points: exactly x, y and z, all in one precision.
+pub fn is_point(interface: &Interface) -> bool {
+    let [x, y, z] = &interface.fields[..] else { return false };
+    let named = [x, y, z].iter().map(|field| field.name.as_str()).eq(["x", "y", "z"]);
+    let real = [Primitive::Float32, Primitive::Float64]
+        .iter()
+        .any(|&primitive| [x, y, z].iter().all(|field| field.ty == WireType::Primitive { primitive }));
+    named && real
+}
+
+/// Whether it is a time or a duration in seconds and nanoseconds.
+pub fn is_time(name: &str) -> bool {
+    matches!(name, "builtin_interfaces/msg/Time" | "builtin_interfaces/msg/Duration")
+}
+
+/// What a message of a layout contains, lists and arrays aside.
+pub fn innermost(ty: &WireType) -> &WireType {
+    match ty {
+        WireType::Array { of, .. } | WireType::Sequence { of, .. } => innermost(of),
+        _ => ty,
+    }
+}
+
+/// A type as a `.msg` file has it.
+pub fn in_words(ty: &WireType) -> String {
+    match ty {
+        WireType::Primitive { primitive } => {
+            let word = match primitive {
+                Primitive::Bool => "bool",
+                Primitive::Int8 => "int8",
+                Primitive::Uint8 => "uint8",
+                Primitive::Int16 => "int16",
+                Primitive::Uint16 => "uint16",
+                Primitive::Int32 => "int32",
+                Primitive::Uint32 => "uint32",
+                Primitive::Int64 => "int64",
+                Primitive::Uint64 => "uint64",
+                Primitive::Float32 => "float32",
+                Primitive::Float64 => "float64",
+            };
+            word.to_owned()
+        }
+        WireType::String => "string".to_owned(),
+        WireType::WString => "wstring".to_owned(),
+        WireType::Interface { name } => name.clone(),
+        WireType::Array { of, length } => format!("{}[{length}]", in_words(of)),
+        WireType::Sequence { of, bound: None } => format!("{}[]", in_words(of)),
+        WireType::Sequence { of, bound: Some(bound) } => format!("{}[<={bound}]", in_words(of)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_types_are_completed_and_checked() {
+        assert_eq!(full_name("sensor_msgs/JointState", "msg").as_deref(), Some("sensor_msgs/msg/JointState"));
+        assert_eq!(full_name("std_srvs/srv/SetBool", "srv").as_deref(), Some("std_srvs/srv/SetBool"));
+        for wrong in ["JointState", "a/srv/B", "A/B", "a/b", "a//B", "a/msg/b/C", "a/msg/B_C", "", "1a/B", "a/B "] {
+            assert_eq!(full_name(wrong, "msg"), None, "{wrong}");
+        }
+    }
+
+    #[test]
+    fn types_on_the_wire_are_those_of_msg_files() {
+        for text in ["uint8", "float64[36]", "string[]", "int8[<=5]", "wstring", "geometry_msgs/msg/Point[2]"] {
+            assert_eq!(in_words(&wire_type(text).unwrap()), text);
+        }
+        assert_eq!(wire_type("byte"), wire_type("uint8"));
+        assert_eq!(wire_type("string<=10"), Some(WireType::String));
+        for wrong in ["uint", "float64[", "float64[-1]", "float64[<]", "int8<=5", "float64[+3]", "float64[3][3]", ""] {
+            assert_eq!(wire_type(wrong), None, "{wrong}");
+        }
+    }
+
+    #[test]
+    fn what_is_known_comes_after_what_it_contains() {
+        let header = known("std_msgs/msg/Header").unwrap();
+        let names: Vec<&str> = header.iter().map(|interface| interface.name.as_str()).collect();
+        assert_eq!(names, ["builtin_interfaces/msg/Time", "std_msgs/msg/Header"]);
+        for (name, fields) in KNOWN {
+            assert_eq!(known(name).unwrap().last().unwrap().fields.len(), fields.len().max(1));
+        }
+        assert!(is_point(known("geometry_msgs/msg/Point32").unwrap().last().unwrap()));
+        assert!(!is_point(header.last().unwrap()));
+    }
+}

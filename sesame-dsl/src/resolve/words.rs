@@ -1,0 +1,31 @@
+//! Names and types in the sentences of diagnostics.
+
+use crate::model::Type;
+use crate::units::{Dimension, Unit, dimension};
+
+/// Names in backquotes, joined for a sentence.
+pub(super) fn list(names: &[&str]) -> String {
+    let quoted: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+    match quoted.split_last() {
+        Some((last, [])) => last.clone(),
+        Some((last, others)) => format!("{} and {last}", others.join(", ")),
+        None => String::new(),
+    }
+}
+
+/// A type with its article.
+pub(super) fn type_in_words(ty: &Type) -> String {
+    let unit = |unit: &Option<Unit>| match unit {
+        Some(it) if dimension(Some(it)) != Dimension::NONE => format!(" in `{}`", it.text()),
+        _ => String::new(),
+    };
+    match ty {
+        Type::Bool => "a `bool`".to_owned(),
+        Type::Int(it) => format!("an integer{}", unit(it)),
+        Type::Real(it) => format!("a number{}", unit(it)),
+        Type::Text => "a `text`".to_owned(),
+        Type::Point(it) => format!("a point{}", unit(it)),
+        Type::List(_) => "a list".to_owned(),
+        Type::Message(_) => "a message".to_owned(),
+    }
+}

@@ -1,0 +1,74 @@
+//! The Pythons of the peers, and domains in which tests do not hear each other.
+
+use std::net::{Ipv4Addr, UdpSocket};
+use std::path::{Path, PathBuf};
+
+/// An environment with a middleware.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Vendor {
+    /// ROS 2 Kilted with a simulator of physics: `examples/iiwa_cell`.
+    Kilted,
+    /// ROS 2 Jazzy.
+    Jazzy,
+    /// Cyclone DDS without ROS, and rosbags.
+    Cyclone,
+    /// ROS 2 Kilted with a simulator of mobile robots: `examples/fleet`.
+    Fleet,
+}
+
+impl Vendor {
+    fn variable(self) -> &'static str {
+        match self {
+            Vendor::Kilted => "SESAME_ROS2_KILTED",
+            Vendor::Jazzy => "SESAME_ROS2_JAZZY",
+            Vendor::Cyclone => "SESAME_ROS2_CYCLONE",
+            Vendor::Fleet => "SESAME_ROS2_FLEET",
+        }
+    }
+
+    /// Its Python. Without one the test is to be skipped, which is said here; with `CI=true` that is an error.
+    pub(crate) fn python(self) -> Option<PathBuf> {
+        let python = std::env::var_os(self.variable()).map(PathBuf::from).filter(|python| python.is_file());
+        let insists = std::env::var("CI").is_ok_and(|ci| ci == "true");
+        assert!(python.is_some() || !insists, "{} names no Python: `./test` makes its environment", self.variable());
+        if python.is_none() {
+            eprintln!("skipped: {} names no Python; `./test` makes its environment", self.variable());
+        }
+        python
+    }
+
+    /// The definitions of its messages.
+    pub(crate) fn share(python: &Path) -> PathBuf {
+        Vendor::environment(python).join("share")
+    }
+
+    /// The folder of the environment that a Python belongs to.
+    pub(crate) fn environment(python: &Path) -> &Path {
+        python.ancestors().nth(2).expect("a Python lies in `bin` of its environment")
+    }
+}
+
+/// A domain, and maybe the ones after it, that no other test on this machine uses meanwhile.
+#[derive(Debug)]
+pub(crate) struct Domain {
+    pub(crate) number: u16,
+    /// Held for as long as the domains are used: a port of each that no participant reaches.
+    _held: Vec<UdpSocket>,
+}
+
+impl Domain {
+    pub(crate) fn free() -> Self {
+        Domain::first_of(1)
+    }
+
+    /// The first of as many domains, as a runner with so many workers needs them.
+    pub(crate) fn first_of(count: u16) -> Self {
+        let mut all = 140..180;
+        let free = all.find_map(|number| {
+            let ports = (number..number + count).map(|number| 7400 + 250 * number + 249);
+            let held = ports.map(|port| UdpSocket::bind((Ipv4Addr::LOCALHOST, port)));
+            Some(Domain { number, _held: held.collect::<Result<_, _>>().ok()? })
+        });
+        free.expect("forty domains are enough for the tests of one machine")
+    }
+}

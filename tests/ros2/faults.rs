@@ -1,0 +1,234 @@
+//! What other nodes do wrong is said with their names, and the next run of the same campaign completes.
+
+use std::thread;
+use std::time::{Duration, Instant};
+
+use sesame_plan::Test;
+
+use crate::environment::{Domain, Vendor};
+use crate::peer::Peer;
+use crate::relaying::{System, plan, space};
+
+/// A system with something wrong in it.
+struct Fault {
+    name: &'static str,
+    /// Declarations of the space.
+    nodes: &'static str,
+    /// How long a run lasts, in seconds.
+    seconds: u32,
+    kind: &'static str,
+    /// The programs with their arguments.
+    peers: &'static [(&'static str, &'static str)],
+    /// The outcome of a run, and what is noted.
+    expected: &'static str,
+}
+
+const POINT: &str = "geometry_msgs/msg/PointStamped";
+const LISTENER: &str = "node listener { subscribes peer }";
+
+/// Runs a test without operations in the system, then another one in which nothing is wrong. What the first one comes
+/// to, and how long it takes.
+fn observed(fault: &Fault) -> Option<(String, Duration)> {
+    let python = Vendor::Kilted.python()?;
+    let domain = Domain::free();
+    let start = |&(program, arguments): &(&str, &str)| {
+        let mut arguments: Vec<&str> = arguments.split(' ').collect();
+        if !arguments.contains(&"--type") && !arguments[0].starts_with("clock") {
+            arguments.extend(["--type", fault.kind]);
+        }
+        Peer::start(&python, &domain, program, &arguments)
+    };
+    let peers: Vec<Peer> = fault.peers.iter().map(start).collect();
+    let mut system = System::new(plan(&space(&domain, fault.kind, fault.nodes, "", fault.seconds)));
+    let begin = Instant::now();
+    let (observation, notes) = system.run(&Test::default());
+    let taken = begin.elapsed();
+    let mut said = vec![match observation.outcome.detail() {
+        Some(detail) => format!("{}: {detail}", observation.outcome.word()),
+        None => observation.outcome.word().to_owned(),
+    }];
+    said.extend(notes);
+    drop(peers);
+
+    let mut healthy =
+        vec![("publisher.py", "--topic /peer/undisturbed --rate 50 --count 2000"), ("subscriber.py", "--count 2000")];
+    healthy.extend(fault.nodes.contains("clock").then_some(("faulty.py", "clock-stops --after 60")));
+    let _peers: Vec<Peer> = healthy.iter().map(start).collect();
+    let (observation, notes) = system.run(&Test::default());
+    assert_eq!((observation.outcome.word(), notes), ("completed", Vec::new()), "after: {}", fault.name);
+    assert!(observation.messages > 0, "after: {}", fault.name);
+    Some((said.join("\n"), taken))
+}
+
+/// Whether a text is the expected one, in which `…` stands for what differs from run to run.
+fn is_like(seen: &str, expected: &str) -> bool {
+    let mut parts = expected.split('…');
+    let Some(mut rest) = parts.next().and_then(|first| seen.strip_prefix(first)) else { return false };
+    for part in parts {
+        // Up to the end of the line, where nothing follows.
+        let line = rest.find('\n').unwrap_or(rest.len());
+        let Some(at) = (if part.is_empty() { Some(line) } else { rest.find(part) }) else { return false };
+        rest = &rest[at + part.len()..];
+    }
+    rest.is_empty()
+}
+
+/// How long the longest of the runs took, without those after them in which nothing is wrong.
+fn check(faults: &[Fault]) -> Duration {
+    let mut longest = Duration::ZERO;
+    let seen: Vec<_> = thread::scope(|scope| {
+        let running: Vec<_> = faults.iter().map(|fault| scope.spawn(move || observed(fault))).collect();
+        running.into_iter().map(|thread| thread.join().expect("no run panics")).collect()
+    });
+    for (fault, seen) in faults.iter().zip(seen) {
+        let Some((seen, taken)) = seen else { return longest };
+        assert!(is_like(&seen, fault.expected), "{}:\n{seen}\nis not:\n{}", fault.name, fault.expected);
+        longest = longest.max(taken);
+    }
+    longest
+}
+
+#[test]
+fn a_system_that_never_becomes_complete_says_what_is_missing() {
+    let nobody = Fault {
+        name: "nobody is there",
+        nodes: LISTENER,
+        seconds: 2,
+        kind: POINT,
+        peers: &[],
+        expected: "launch_failed: the launch failed: the system is not complete after 30 s: nobody \
+                   publishes on `/peer/undisturbed`; 0 of 1 subscribe to `/peer`: listener",
+    };
+    check(&[nobody]);
+}
+
+#[test]
+fn a_node_that_is_wrong_is_named_as_soon_as_it_is_clear_that_nothing_will_mend_it() {
+    let longest = check(&[
+        Fault {
+            name: "another type",
+            nodes: "",
+            seconds: 2,
+            kind: POINT,
+            peers: &[("faulty.py", "wrong-type --topic /peer/undisturbed --count 4000")],
+            expected: "launch_failed: the launch failed: the system cannot become complete: `/peer_faulty` \
+                       publishes `std_msgs/msg/String` on `/peer/undisturbed`; expected \
+                       `geometry_msgs/msg/PointStamped`",
+        },
+        Fault {
+            name: "a publisher that is not remapped",
+            nodes: LISTENER,
+            seconds: 2,
+            kind: POINT,
+            peers: &[("publisher.py", "--rate 50 --count 2000"), ("subscriber.py", "--count 3000 --timeout 60")],
+            expected: "crash: topic `/peer` is not cut: `/peer_publisher` publishes on it directly, heard \
+                       by `/peer_subscriber`; start the publisher with `--ros-args -r \
+                       /peer:=/peer/undisturbed` (`sesamec explain wiring` lists all remappings)",
+        },
+    ]);
+    assert!(longest < Duration::from_secs(20), "{longest:?}");
+}
+
+#[test]
+fn samples_that_cannot_be_read_are_passed_on_and_noted_once() {
+    check(&[
+        Fault {
+            name: "truncated samples",
+            nodes: "",
+            seconds: 2,
+            kind: POINT,
+            peers: &[("faulty.py", "truncated --topic /peer/undisturbed --count 300")],
+            expected: "completed\na message on `/peer` cannot be decoded and is passed on as it came: …",
+        },
+        Fault {
+            name: "garbage",
+            nodes: "",
+            seconds: 2,
+            kind: "sensor_msgs/msg/JointState",
+            peers: &[("faulty.py", "garbage --topic /peer/undisturbed --count 300")],
+            expected: "completed\na message on `/peer` cannot be decoded and is passed on as it came: field \
+                       `header.frame_id`: it ends after 76 bytes, where 2147483583 more are needed",
+        },
+        Fault {
+            name: "samples of 60 MB",
+            nodes: "",
+            seconds: 8,
+            kind: "std_msgs/msg/String",
+            peers: &[("faulty.py", "gigantic --topic /peer/undisturbed --count 3 --rate 1 --linger 20")],
+            expected: "completed",
+        },
+    ]);
+}
+
+#[test]
+fn publishers_and_subscribers_that_do_not_fit_do_not_end_a_run() {
+    check(&[
+        Fault {
+            name: "unmatched qualities of service",
+            nodes: LISTENER,
+            seconds: 2,
+            kind: POINT,
+            peers: &[
+                ("publisher.py", "--topic /peer/undisturbed --best-effort --rate 50 --count 2000"),
+                ("subscriber.py", "--count 2000"),
+            ],
+            expected: "completed\n`/peer_subscriber` hears nothing on `/peer`: it asks for another \
+                       Reliability than the publishers offer",
+        },
+        Fault {
+            name: "a node that dies",
+            nodes: "",
+            seconds: 3,
+            kind: POINT,
+            peers: &[("faulty.py", "dies --topic /peer/undisturbed --count 3000")],
+            expected: "completed",
+        },
+        Fault {
+            name: "two publishers on one topic",
+            nodes: "",
+            seconds: 2,
+            kind: POINT,
+            peers: &[("faulty.py", "two --topic /peer/undisturbed --count 500")],
+            // On a machine that is busy the names of their nodes may come too late.
+            expected: "completed\n2 publish on `/peer/undisturbed`: …",
+        },
+        Fault {
+            name: "a slow subscriber",
+            nodes: LISTENER,
+            seconds: 5,
+            kind: POINT,
+            peers: &[
+                ("publisher.py", "--topic /peer/undisturbed --rate 2000 --count 20000"),
+                ("subscriber.py", "--count 20000 --slow 0.1 --depth 10"),
+            ],
+            expected: "completed",
+        },
+    ]);
+}
+
+#[test]
+fn a_clock_that_goes_wrong_ends_a_run() {
+    const CLOCKED: &str = "node clock { publishes peer }";
+    const GOOD: (&str, &str) = ("publisher.py", "--topic /peer/undisturbed --rate 50 --count 2000");
+    let longest = check(&[
+        Fault {
+            name: "a clock that stands still",
+            nodes: CLOCKED,
+            seconds: 5,
+            kind: POINT,
+            peers: &[GOOD, ("faulty.py", "clock-stops --after 3 --linger 30")],
+            expected: "timeout: stopped after 10 s of wall time\na tick of the clock of the simulator, on `/clock`, was \
+                       awaited for 10 s of wall time",
+        },
+        Fault {
+            name: "a clock that jumps back",
+            nodes: CLOCKED,
+            seconds: 5,
+            kind: POINT,
+            peers: &[GOOD, ("faulty.py", "clock-back --after 3 --linger 30")],
+            expected: "wrong_clock: the clock of the simulator went back, from … s to … s",
+        },
+    ]);
+    // The clock is published for half a minute more.
+    assert!(longest < Duration::from_secs(28), "{longest:?}");
+}

@@ -1,0 +1,54 @@
+"""What the peers that use rclpy share: their options, qualities of service, and how they wait for each other."""
+
+import argparse
+import importlib
+import json
+import sys
+import time
+
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+
+def add_topic(parser: argparse.ArgumentParser) -> None:
+    """Options of a topic."""
+    parser.add_argument("--topic", default="/peer", help="the topic (default: /peer)")
+    parser.add_argument("--type", default="sensor_msgs/msg/JointState", help="its type, as in PACKAGE/msg/NAME")
+    parser.add_argument("--best-effort", action="store_true", help="best effort instead of reliable")
+    parser.add_argument("--transient-local", action="store_true", help="transient local instead of volatile")
+    parser.add_argument("--depth", type=int, default=1000, help="how many samples are kept (default: 1000)")
+    parser.add_argument("--timeout", type=float, default=30.0, help="seconds after which to give up (default: 30)")
+
+
+def quality(options: argparse.Namespace) -> QoSProfile:
+    """The quality of service that the options ask for."""
+    return QoSProfile(
+        depth=options.depth,
+        reliability=ReliabilityPolicy.BEST_EFFORT if options.best_effort else ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if options.transient_local else DurabilityPolicy.VOLATILE,
+    )
+
+
+def message_type(name: str) -> type:
+    """The class of a type."""
+    package, _, kind = name.split("/")
+    return getattr(importlib.import_module(f"{package}.msg"), kind)
+
+
+def fill(message, values: dict):
+    """Sets the fields of a message from nested values and returns it."""
+    for name, value in values.items():
+        if isinstance(value, dict):
+            fill(getattr(message, name), value)
+        else:
+            setattr(message, name, value)
+    return message
+
+
+def wait_until(what: str, seconds: float, holds) -> None:
+    """Waits for a condition; exits with code 2 if it does not come to hold."""
+    end = time.monotonic() + seconds
+    while not holds():
+        if time.monotonic() > end:
+            print(json.dumps({"error": f"timeout: {what}"}))
+            sys.exit(2)
+        time.sleep(0.005)

@@ -1,0 +1,94 @@
+"""Random samples for the peers, the same for all of them: plain Python values of a few types of different shapes.
+
+A sample is a function of its type, the seed and its number alone, so a subscriber can tell which samples it should get.
+"""
+
+import random
+import struct
+
+TYPES = ("std_msgs/msg/String", "std_msgs/msg/Float64", "geometry_msgs/msg/PointStamped", "sensor_msgs/msg/JointState")
+
+
+def text(luck: random.Random) -> str:
+    """A text of up to 12 characters, some of more than one byte; its length shifts the alignment of what follows."""
+    return "".join(luck.choice("abcxyz_/0129 äß€𝄞") for _ in range(luck.randrange(13)))
+
+
+def number(luck: random.Random) -> float:
+    """Any finite or infinite number."""
+    return luck.choice([luck.uniform(-1e3, 1e3), luck.gauss(0, 1), 0.0, -0.0, 1e300, 5e-324, float("inf")])
+
+
+def sample(kind: str, seed: int, count: int) -> dict:
+    """The fields of a sample, nested as in its `.msg` file."""
+    luck = random.Random(f"{kind} {seed} {count}")
+    header = {
+        "stamp": {"sec": luck.randrange(-(2**31), 2**31), "nanosec": luck.randrange(10**9)},
+        "frame_id": text(luck),
+    }
+    if kind == "std_msgs/msg/String":
+        return {"data": text(luck)}
+    if kind == "std_msgs/msg/Float64":
+        return {"data": number(luck)}
+    if kind == "geometry_msgs/msg/PointStamped":
+        return {"header": header, "point": {axis: number(luck) for axis in "xyz"}}
+    joints = luck.randrange(8)
+    return {
+        "header": header,
+        "name": [text(luck) for _ in range(joints)],
+        "position": [number(luck) for _ in range(joints)],
+        "velocity": [number(luck) for _ in range(luck.randrange(8))],
+        "effort": [number(luck) for _ in range(luck.randrange(3))],
+    }
+
+
+def canonical(kind: str, raw: bytes) -> bytes:
+    """The content of a sample in CDR without what may differ between vendors: padding, and its bytes' values.
+
+    It reads little-endian CDR of version 1, as all peers write it.
+    """
+    if raw[:2] != b"\x00\x01":
+        raise ValueError(f"not little-endian CDR: {raw[:4].hex()}")
+    body, at, out = raw[4:], 0, bytearray()
+
+    def take(size: int) -> bytes:
+        """Takes an aligned number."""
+        nonlocal at
+        at += -at % size
+        taken = body[at : at + size]
+        if len(taken) < size:
+            raise ValueError("truncated")
+        at += size
+        return taken
+
+    def take_text() -> None:
+        """Takes a text with its length."""
+        nonlocal at
+        length = struct.unpack("<I", take(4))[0]
+        out.extend(struct.pack("<I", length) + body[at : at + length])
+        at += length
+
+    def take_numbers() -> None:
+        """Takes a sequence of float64."""
+        length = struct.unpack("<I", take(4))[0]
+        out.extend(struct.pack("<I", length))
+        for _ in range(length):
+            out.extend(take(8))
+
+    if kind == "std_msgs/msg/String":
+        take_text()
+    elif kind == "std_msgs/msg/Float64":
+        out.extend(take(8))
+    else:
+        out.extend(take(4) + take(4))
+        take_text()
+        if kind == "geometry_msgs/msg/PointStamped":
+            out.extend(take(8) + take(8) + take(8))
+        else:
+            names = struct.unpack("<I", take(4))[0]
+            out.extend(struct.pack("<I", names))
+            for _ in range(names):
+                take_text()
+            for _ in range(3):
+                take_numbers()
+    return bytes(out)

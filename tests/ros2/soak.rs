@@ -1,0 +1,140 @@
+//! Many messages through one relay: all of them arrive, and its memory does not grow.
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use sesame_plan::Test;
+use sesame_tests::dds::{JOINTS, Reader, Writer, joints, number, participant};
+
+use crate::environment::{Domain, Vendor};
+use crate::peer::Peer;
+use crate::relaying::{System, plan, space};
+
+const KIND: &str = "std_msgs/msg/Float64";
+
+/// Resident memory of this process, in kB.
+fn memory() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").expect("this is Linux");
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).expect("it has memory");
+    line.trim().trim_end_matches(" kB").parse().expect("it is a number")
+}
+
+/// Messages at a rate; the memory after a tenth of them, and at the end.
+fn soaked(count: u64, rate: u64, limit: Duration) -> Option<(u64, u64)> {
+    let python = Vendor::Kilted.python()?;
+    let domain = Domain::free();
+    let (timeout, count_text, rate) = (limit.as_secs().to_string(), count.to_string(), rate.to_string());
+    let arguments = ["--type", KIND, "--depth", "20000", "--count", &count_text, "--timeout", &timeout];
+    let mut subscriber = Peer::start(&python, &domain, "subscriber.py", &arguments);
+    let speaking = ["--topic", "/peer/undisturbed", "--rate", &rate, "--hold"];
+    let mut publisher = Peer::start(&python, &domain, "publisher.py", &[&arguments[..], &speaking].concat());
+    let mut system = System::new(plan(&space(&domain, KIND, "node hearing { subscribes peer }", "", 1000)));
+    let begin = Instant::now();
+    // Nine tenths of the samples come in at least this time.
+    let warm = Duration::from_secs_f64(count as f64 / rate.parse::<f64>().expect("it is a number") / 10.0);
+    let mut after_warm_up = None;
+    let relayed = system.relay_until(
+        &Test::default(),
+        || publisher.go(),
+        || {
+            if after_warm_up.is_none() && begin.elapsed() >= warm + Duration::from_secs(3) {
+                after_warm_up = Some(memory());
+            }
+            subscriber.has_ended() || begin.elapsed() > limit
+        },
+    );
+    let at_end = memory();
+    println!("{} relayed in {:.0} s", relayed.messages, begin.elapsed().as_secs_f64());
+    let sent = publisher.expect();
+    let heard = subscriber.expect();
+    assert_eq!((relayed.messages, &heard["digest"]), (count, &sent["digest"]), "{heard} {sent}");
+    assert_eq!(system.notes(), [""; 0]);
+    Some((after_warm_up.unwrap_or(at_end), at_end))
+}
+
+/// What memory may differ by, in kB: what an allocator keeps for later.
+const SLACK: u64 = 4_000;
+
+/// The same with the caches of quick peers, which fill slowly in the end. It is two bytes for each of ten million
+/// messages.
+const SLACK_OF_CACHES: u64 = 20_000;
+
+#[test]
+fn twenty_thousand_messages_of_ros_pass_and_memory_stays() {
+    let Some((warm, end)) = soaked(20_000, 1000, Duration::from_secs(60)) else { return };
+    assert!(end < warm + SLACK, "{warm} kB after a tenth, {end} kB at the end");
+}
+
+/// How many messages of the quick peers are under way.
+const WINDOW: u64 = 100;
+
+/// After so many messages the caches of DDS are full: a thousand messages for each reader and writer, each with the
+/// datagram that it came in.
+const WARM: u64 = 300_000;
+
+/// As many messages as pass, in order, with quick peers; the memory once caches are full, and at the end.
+fn rushed(count: u64, limit: Duration) -> (u64, u64) {
+    const KIND: &str = "sensor_msgs/msg/JointState";
+    let domain = Domain::free();
+    let (publisher, subscriber) = (participant(domain.number), participant(domain.number));
+    let writer = Writer::new(&publisher, "rt/peer/undisturbed", JOINTS);
+    let mut reader = Reader::new(&subscriber, "rt/peer", JOINTS);
+    let mut system = System::new(plan(&space(&domain, KIND, "node hearing { subscribes peer }", "", 100_000)));
+    let (go, heard) = (AtomicBool::new(false), AtomicU64::new(0));
+    let begin = Instant::now();
+    let mut after_warm_up = None;
+    let relayed = thread::scope(|scope| {
+        scope.spawn(|| {
+            while !go.load(Ordering::Acquire) {
+                thread::yield_now();
+            }
+            for sent in 0..count {
+                while sent - heard.load(Ordering::Acquire) >= WINDOW && begin.elapsed() < limit {
+                    thread::yield_now();
+                }
+                writer.write(joints(sent));
+            }
+        });
+        scope.spawn(|| {
+            let mut expected = 0;
+            while expected < count && begin.elapsed() < limit {
+                reader.take(|message| {
+                    assert_eq!(number(&message), expected, "every message comes once, in its order");
+                    expected += 1;
+                    heard.store(expected, Ordering::Release);
+                });
+            }
+        });
+        system.relay_until(
+            &Test::default(),
+            || go.store(true, Ordering::Release),
+            || {
+                let heard = heard.load(Ordering::Acquire);
+                if after_warm_up.is_none() && heard >= WARM {
+                    after_warm_up = Some(memory());
+                }
+                heard >= count || begin.elapsed() > limit
+            },
+        )
+    });
+    let at_end = memory();
+    println!("{} relayed in {:.0} s", relayed.messages, begin.elapsed().as_secs_f64());
+    assert_eq!((relayed.messages, heard.into_inner()), (count, count));
+    assert_eq!(system.notes(), [""; 0]);
+    (after_warm_up.expect("so many have come"), at_end)
+}
+
+#[test]
+fn two_hundred_thousand_messages_pass_after_caches_are_full_and_memory_stays() {
+    let (warm, end) = rushed(WARM + 200_000, Duration::from_secs(300));
+    assert!(end < warm + SLACK_OF_CACHES, "{warm} kB with full caches, {end} kB at the end");
+}
+
+#[test]
+#[ignore = "long: ten million messages"]
+fn ten_million_messages_pass_and_memory_stays() {
+    let (warm, end) = rushed(10_000_000, Duration::from_secs(6000));
+    println!("{warm} kB with full caches, {end} kB at the end");
+    assert!(end < warm + SLACK_OF_CACHES, "{warm} kB with full caches, {end} kB at the end");
+}
