@@ -19,8 +19,8 @@ struct Fault {
     kind: &'static str,
     /// The programs with their arguments.
     peers: &'static [(&'static str, &'static str)],
-    /// The outcome of a run, and what is noted.
-    expected: &'static str,
+    /// The outcome of a run, and what is noted: one of these, where a busy machine decides.
+    expected: &'static [&'static str],
 }
 
 const POINT: &str = "geometry_msgs/msg/PointStamped";
@@ -82,7 +82,8 @@ fn check(faults: &[Fault]) -> Duration {
     });
     for (fault, seen) in faults.iter().zip(seen) {
         let Some((seen, taken)) = seen else { return longest };
-        assert!(is_like(&seen, fault.expected), "{}:\n{seen}\nis not:\n{}", fault.name, fault.expected);
+        let is_expected = fault.expected.iter().any(|expected| is_like(&seen, expected));
+        assert!(is_expected, "{}:\n{seen}\nis none of:\n{}", fault.name, fault.expected.join("\nor:\n"));
         longest = longest.max(taken);
     }
     longest
@@ -96,8 +97,8 @@ fn a_system_that_never_becomes_complete_says_what_is_missing() {
         seconds: 2,
         kind: POINT,
         peers: &[],
-        expected: "launch_failed: the launch failed: the system is not complete after 30 s: nobody \
-                   publishes on `/peer/undisturbed`; 0 of 1 subscribe to `/peer`: listener",
+        expected: &["launch_failed: the launch failed: the system is not complete after 30 s: nobody \
+                   publishes on `/peer/undisturbed`; 0 of 1 subscribe to `/peer`: listener"],
     };
     check(&[nobody]);
 }
@@ -111,9 +112,9 @@ fn a_node_that_is_wrong_is_named_as_soon_as_it_is_clear_that_nothing_will_mend_i
             seconds: 2,
             kind: POINT,
             peers: &[("faulty.py", "wrong-type --topic /peer/undisturbed --count 4000")],
-            expected: "launch_failed: the launch failed: the system cannot become complete: `/peer_faulty` \
+            expected: &["launch_failed: the launch failed: the system cannot become complete: `/peer_faulty` \
                        publishes `std_msgs/msg/String` on `/peer/undisturbed`; expected \
-                       `geometry_msgs/msg/PointStamped`",
+                       `geometry_msgs/msg/PointStamped`"],
         },
         Fault {
             name: "a publisher that is not remapped",
@@ -121,9 +122,9 @@ fn a_node_that_is_wrong_is_named_as_soon_as_it_is_clear_that_nothing_will_mend_i
             seconds: 2,
             kind: POINT,
             peers: &[("publisher.py", "--rate 50 --count 2000"), ("subscriber.py", "--count 3000 --timeout 60")],
-            expected: "crash: topic `/peer` is not cut: `/peer_publisher` publishes on it directly, heard \
+            expected: &["crash: topic `/peer` is not cut: `/peer_publisher` publishes on it directly, heard \
                        by `/peer_subscriber`; start the publisher with `--ros-args -r \
-                       /peer:=/peer/undisturbed` (`sesamec explain wiring` lists all remappings)",
+                       /peer:=/peer/undisturbed` (`sesamec explain wiring` lists all remappings)"],
         },
     ]);
     assert!(longest < Duration::from_secs(20), "{longest:?}");
@@ -138,7 +139,7 @@ fn samples_that_cannot_be_read_are_passed_on_and_noted_once() {
             seconds: 2,
             kind: POINT,
             peers: &[("faulty.py", "truncated --topic /peer/undisturbed --count 300")],
-            expected: "completed\na message on `/peer` cannot be decoded and is passed on as it came: …",
+            expected: &["completed\na message on `/peer` cannot be decoded and is passed on as it came: …"],
         },
         Fault {
             name: "garbage",
@@ -146,8 +147,8 @@ fn samples_that_cannot_be_read_are_passed_on_and_noted_once() {
             seconds: 2,
             kind: "sensor_msgs/msg/JointState",
             peers: &[("faulty.py", "garbage --topic /peer/undisturbed --count 300")],
-            expected: "completed\na message on `/peer` cannot be decoded and is passed on as it came: field \
-                       `header.frame_id`: it ends after 76 bytes, where 2147483583 more are needed",
+            expected: &["completed\na message on `/peer` cannot be decoded and is passed on as it came: field \
+                       `header.frame_id`: it ends after 76 bytes, where 2147483583 more are needed"],
         },
         Fault {
             name: "samples of 60 MB",
@@ -155,7 +156,7 @@ fn samples_that_cannot_be_read_are_passed_on_and_noted_once() {
             seconds: 8,
             kind: "std_msgs/msg/String",
             peers: &[("faulty.py", "gigantic --topic /peer/undisturbed --count 3 --rate 1 --linger 20")],
-            expected: "completed",
+            expected: &["completed"],
         },
     ]);
 }
@@ -172,8 +173,8 @@ fn publishers_and_subscribers_that_do_not_fit_do_not_end_a_run() {
                 ("publisher.py", "--topic /peer/undisturbed --best-effort --rate 50 --count 2000"),
                 ("subscriber.py", "--count 2000"),
             ],
-            expected: "completed\n`/peer_subscriber` hears nothing on `/peer`: it asks for another \
-                       Reliability than the publishers offer",
+            expected: &["completed\n`/peer_subscriber` hears nothing on `/peer`: it asks for another \
+                       Reliability than the publishers offer"],
         },
         Fault {
             name: "a node that dies",
@@ -181,7 +182,7 @@ fn publishers_and_subscribers_that_do_not_fit_do_not_end_a_run() {
             seconds: 3,
             kind: POINT,
             peers: &[("faulty.py", "dies --topic /peer/undisturbed --count 3000")],
-            expected: "completed",
+            expected: &["completed"],
         },
         Fault {
             name: "two publishers on one topic",
@@ -189,8 +190,12 @@ fn publishers_and_subscribers_that_do_not_fit_do_not_end_a_run() {
             seconds: 2,
             kind: POINT,
             peers: &[("faulty.py", "two --topic /peer/undisturbed --count 500")],
-            // On a machine that is busy the names of their nodes may come too late.
-            expected: "completed\n2 publish on `/peer/undisturbed`: …",
+            // The names of their nodes may come too late, and so may the second of them.
+            expected: &[
+                "completed\n2 publish on `/peer/undisturbed`: …",
+                "completed\n`/peer_faulty…` publishes on `/peer/undisturbed` since the run began: 2 publish there, and 1 \
+                 is declared",
+            ],
         },
         Fault {
             name: "a slow subscriber",
@@ -201,7 +206,11 @@ fn publishers_and_subscribers_that_do_not_fit_do_not_end_a_run() {
                 ("publisher.py", "--topic /peer/undisturbed --rate 2000 --count 20000"),
                 ("subscriber.py", "--count 20000 --slow 0.1 --depth 10"),
             ],
-            expected: "completed",
+            // Its middleware takes what it does not; that may be late too.
+            expected: &[
+                "completed",
+                "completed\na subscriber of `/peer` does not keep up: messages to it were given up",
+            ],
         },
     ]);
 }
@@ -217,8 +226,10 @@ fn a_clock_that_goes_wrong_ends_a_run() {
             seconds: 5,
             kind: POINT,
             peers: &[GOOD, ("faulty.py", "clock-stops --after 3 --linger 30")],
-            expected: "timeout: stopped after 10 s of wall time\na tick of the clock of the simulator, on `/clock`, was \
+            expected: &[
+                "timeout: stopped after 10 s of wall time\na tick of the clock of the simulator, on `/clock`, was \
                        awaited for 10 s of wall time",
+            ],
         },
         Fault {
             name: "a clock that jumps back",
@@ -226,7 +237,7 @@ fn a_clock_that_goes_wrong_ends_a_run() {
             seconds: 5,
             kind: POINT,
             peers: &[GOOD, ("faulty.py", "clock-back --after 3 --linger 30")],
-            expected: "wrong_clock: the clock of the simulator went back, from … s to … s",
+            expected: &["wrong_clock: the clock of the simulator went back, from … s to … s"],
         },
     ]);
     // The clock is published for half a minute more.

@@ -18,7 +18,7 @@ use crate::graph::DISCOVERY_TOPIC;
 use crate::names;
 
 /// How long names of nodes are awaited that are to be said: they come later than publishers and subscribers.
-const NAMES: Duration = Duration::from_secs(1);
+const NAMES: Duration = Duration::from_secs(3);
 
 /// How often it is looked for names meanwhile.
 const LOOK: Duration = Duration::from_millis(20);
