@@ -10,6 +10,7 @@
 mod campaign;
 mod check;
 mod formula;
+mod lab;
 mod system;
 
 use serde::de::Error as _;
@@ -92,7 +93,9 @@ impl CampaignPlan {
         at("operations", distinct(self.operations.iter().map(|operation| &operation.name)))?;
         each("operations", &self.operations, |operation| self.sound_operation(operation))?;
         each("tests", &self.tests, |test| self.sound_known_test(test))?;
-        at("campaign", self.sound_campaign(&self.campaign))
+        at("campaign", self.sound_campaign(&self.campaign))?;
+        at("labs", distinct(self.labs.iter().map(|lab| &lab.name)))?;
+        each("labs", &self.labs, |lab| self.sound_lab(lab))
     }
 
     /// Makes sure that a test is one of this plan: its operations are there, each with a choice for every parameter,
