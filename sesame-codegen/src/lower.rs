@@ -6,8 +6,8 @@
 //! - operations: those its tests may hold, or those of the test it repeats;
 //! - known tests: one without operations for a campaign that only observes; else those whose operations are all in the
 //!   plan and begin before the campaign's end;
-//! - metrics: its objectives, those it observes, its condition variables, and those of all requirements, of the labs, and
-//!   of the conditions and expectations of these tests;
+//! - metrics: its objectives, those it observes, its condition variables, and those of all requirements, of the labs,
+//!   and of the conditions and expectations of these tests;
 //! - all labs of the space.
 
 mod condition;

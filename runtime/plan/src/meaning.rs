@@ -4,8 +4,8 @@ use crate::{Campaign, CampaignPlan, Field, KnownTest, MessageType, Metric, Node,
 
 impl CampaignPlan {
     /// The plan without what it says to people only: doc comments, the sentences of requirements, where things are
-    /// declared, and by which generator; and without labs, which change nothing of what a campaign does. These parts are
-    /// empty in what is returned.
+    /// declared, and by which generator; and without labs, which change nothing of what a campaign does. These parts
+    /// are empty in what is returned.
     ///
     /// Two plans with equal meanings are the same campaign: digests are over meanings, and
     /// [same models](CampaignPlan::same_model) are told by them.
