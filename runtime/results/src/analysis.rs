@@ -3,6 +3,7 @@
 //! They read any results file, of any campaign, finished or not. Each analysis reads the file
 //! once from beginning to end, and gives a [`Table`], which prints as a table, as CSV and as JSON.
 
+mod candidates;
 mod compare;
 pub(crate) mod confirmed;
 mod distances;
@@ -26,6 +27,7 @@ use crate::analysis::statistics::Sample;
 use crate::record::{Origin, RecordError, Repository, ScannedTest};
 
 pub use crate::present::table::{Datum, Table, TextOptions};
+pub use candidates::{Candidate, Candidates, LeftOut, Terms, candidates};
 pub use compare::{CompareError, Comparison, Run, compare};
 pub use distances::{FrontDistance, GivenFront, GivenFrontError, distance_table, distances};
 pub use indicators::{Indicator, IndicatorAnalysis, indicators};
