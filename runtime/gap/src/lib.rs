@@ -5,7 +5,7 @@
 //! - [`equivalence`]: whether a difference is within a tolerance; [`power`]: how likely that can be shown at all.
 //! - [`holm`]: p values of many questions at once.
 //! - [`violations`]: false alarms and misses of a simulation; [`proportion`]: shares, and whether two differ.
-//! - [`traces`]: two time series: RMS, correlation, lag, gain and offset; [`warping`]: their DTW distance.
+//! - [`traces`]: two time series compared, by [`series`] (RMS, correlation, gain and offset), [`lag`] and [`warping`] (DTW).
 //! - [`localise`]: whether a gap is everywhere or in a part of the tests; [`next`]: which test tells more about it.
 //! - [`fit`]: parameters of a simulation under which it is closer to the lab.
 //! - [`distribution`]: the distributions that all this needs.
@@ -19,5 +19,11 @@ pub mod bootstrap;
 pub mod distribution;
 pub mod equivalence;
 pub mod holm;
+pub mod lag;
 pub mod power;
+pub mod proportion;
 pub mod samples;
+pub mod series;
+pub mod traces;
+pub mod violations;
+pub mod warping;
