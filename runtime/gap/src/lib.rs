@@ -6,7 +6,8 @@
 //! - [`holm`]: p values of many questions at once.
 //! - [`violations`]: false alarms and misses of a simulation; [`proportion`]: shares, and whether two differ.
 //! - [`traces`]: two time series compared, by [`series`] (RMS, correlation, gain and offset), [`lag`] and [`warping`] (DTW).
-//! - [`localise`]: whether a gap is everywhere or in a part of the tests; [`next`]: which test tells more about it.
+//! - [`localise`]: whether a gap is everywhere or in a part of the tests, by what estimates say together ([`pooled`]) and
+//!   where they change ([`split`]); [`next`]: which test tells more about it.
 //! - [`fit`]: parameters of a simulation under which it is closer to the lab.
 //! - [`distribution`]: the distributions that all this needs.
 //!
@@ -18,12 +19,17 @@
 pub mod bootstrap;
 pub mod distribution;
 pub mod equivalence;
+pub mod fit;
 pub mod holm;
 pub mod lag;
+pub mod localise;
+pub mod next;
+pub mod pooled;
 pub mod power;
 pub mod proportion;
 pub mod samples;
 pub mod series;
+pub mod split;
 pub mod traces;
 pub mod violations;
 pub mod warping;
