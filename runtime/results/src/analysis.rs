@@ -7,6 +7,7 @@ mod candidates;
 mod compare;
 pub(crate) mod confirmed;
 mod distances;
+pub mod gap;
 mod indicators;
 mod rank_sum;
 pub mod regions;
