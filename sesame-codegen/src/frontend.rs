@@ -12,7 +12,7 @@ use sesame_dsl::span::Span;
 
 use crate::input::{self, Unreadable};
 use crate::interfaces::Files;
-use crate::lower::lower;
+use crate::lower::{lab_simulator, lower};
 use crate::plan::RunnerPlan;
 use crate::uses;
 
@@ -149,8 +149,11 @@ fn not_used(space: &Space, sources: &SourceMap) -> Vec<String> {
     }));
     notes.extend(space.physicals.values().filter_map(|lab| {
         let Declaration { name, span, .. } = &lab.declaration;
-        let unused =
-            [("simulator", lab.simulator.is_some()), ("shape", !lab.shapes.is_empty()), ("fit", !lab.fits.is_empty())];
+        let unused = [
+            ("simulator", lab.simulator.is_some() && lab_simulator(space, lab).is_none()),
+            ("shape", !lab.shapes.is_empty()),
+            ("fit", !lab.fits.is_empty()),
+        ];
         let unused: Vec<&str> = unused.into_iter().filter_map(|(what, is_there)| is_there.then_some(what)).collect();
         let (last, others) = unused.split_last()?;
         let (list, are) = match others {

@@ -24,6 +24,7 @@ use sesame_dsl::model::{self, CampaignId, Space};
 use sesame_plan as plan;
 
 use self::id::topic_id;
+pub(crate) use self::lab::lab_simulator;
 use self::operation::custom_operations;
 use self::ros2::ros2;
 use self::selection::{Selection, without_operations};
@@ -74,7 +75,7 @@ pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str)
             tests.map(|&id| selection.test(space, &space.tests[id], declared.end_after)).collect()
         },
         campaign: selection.campaign(space, declared),
-        labs: space.physicals.values().map(|lab| selection.lab(lab)).collect(),
+        labs: space.physicals.values().map(|lab| selection.lab(space, lab)).collect(),
     };
     RunnerPlan { plan, hooks: hooks(space), operations: custom_operations(space), simulator_crate, system_file }
 }

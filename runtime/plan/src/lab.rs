@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Bound, Dimension, MetricId};
+use crate::{Bound, Dimension, MetricId, Simulator};
 
 /// A lab in which chosen tests are run on real robots.
 ///
@@ -14,6 +14,9 @@ pub struct Lab {
     pub name: String,
     /// Its doc comment.
     pub doc: String,
+    /// How the robots are reached; `None` if results are entered by hand.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub simulator: Option<Simulator>,
     /// How often each chosen test is run there; at least 1.
     pub repeats: u32,
     /// What running a test costs.

@@ -106,6 +106,7 @@ pub fn lab(name: &str) -> Lab {
     Lab {
         name: name.to_owned(),
         doc: String::new(),
+        simulator: None,
         repeats: 1,
         cost: LabCost::default(),
         exclude: Vec::new(),

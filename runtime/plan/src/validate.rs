@@ -18,9 +18,9 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::condition::{Condition, Constraint, Operand};
 use crate::{
-    Activation, Bound, CampaignPlan, Choice, Domain, Failing, FieldRef, KnownTest, KnownTestId, MessageId, Metric,
-    MetricId, MetricSource, Operation, OperationId, OperationKind, RequirementId, SCHEMA, Shrinking, Span, Task, Test,
-    TopicId, Type,
+    Activation, Bound, CampaignPlan, Choice, Domain, Failing, FieldRef, KnownTest, KnownTestId, LabTask, MessageId,
+    Metric, MetricId, MetricSource, Operation, OperationId, OperationKind, RequirementId, SCHEMA, Shrinking, Span,
+    Task, Test, TopicId, Type,
 };
 
 use check::{
@@ -65,8 +65,7 @@ impl CampaignPlan {
     pub fn validate(&self) -> Result<(), PlanError> {
         at("schema", known_schema(self.schema))?;
         at("space", name(&self.space))?;
-        at("simulator.name", name(&self.simulator.name))?;
-        at("simulator", self.sound_simulator())?;
+        at("simulator", self.sound_simulator(&self.simulator))?;
         self.messages.iter().enumerate().try_for_each(|(index, message)| {
             let field = |field: &crate::Field| {
                 at("name", name(&field.name))?;
@@ -250,6 +249,17 @@ impl CampaignPlan {
                     each("failing.requirements", requirements, |&id| self.has_requirement(id))?;
                 }
                 at("runs", at_least_one(*runs))
+            }
+            Task::Lab(LabTask { lab, results: _, tests, repeats }) => {
+                at("lab", name(lab))?;
+                at("tests", filled(tests))?;
+                at("tests", distinct(tests.iter().map(|test| test.number)))?;
+                each("tests", tests, |test| at("test", self.validate_test(&test.test)))?;
+                let repeated = |at: &usize| tests[..*at].iter().any(|before| before.test == tests[*at].test);
+                if let Some(twice) = (1..tests.len()).find(repeated) {
+                    return at(&format!("tests[{twice}].test"), wrong("is there twice"));
+                }
+                at("repeats", at_least_one(*repeats))
             }
         }
     }

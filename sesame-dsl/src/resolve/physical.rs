@@ -23,6 +23,9 @@ enum Takes {
     Text,
 }
 
+/// The highest domain of ROS whose ports exist on every system: domains are the only settings that count.
+const MOST_DOMAIN: f64 = 232.0;
+
 /// What a transport takes.
 struct LabTransport {
     word: &'static str,
@@ -179,7 +182,7 @@ impl<'a> Resolver<'a> {
                 if !self.whole(value, number.span, &what) {
                     return None;
                 }
-                if (0.0..=f64::from(u32::MAX)).contains(&value) {
+                if (0.0..=MOST_DOMAIN).contains(&value) {
                     #[expect(
                         clippy::cast_possible_truncation,
                         clippy::cast_sign_loss,
@@ -187,7 +190,7 @@ impl<'a> Resolver<'a> {
                     )]
                     return Some(LabSetting::Count(value as u32));
                 }
-                "a whole number from 0 to 4294967295"
+                "a whole number from 0 to 232"
             }
             (Takes::Nothing, Some(_)) => "no value",
             (Takes::Text, _) => "a text",

@@ -13,6 +13,7 @@ fn not_negative(number: f64) -> Checked {
 impl CampaignPlan {
     pub(super) fn sound_lab(&self, lab: &Lab) -> Checked {
         at("name", name(&lab.name))?;
+        at("simulator", lab.simulator.as_ref().map_or(Ok(()), |simulator| self.sound_simulator(simulator)))?;
         at("repeats", at_least_one(lab.repeats))?;
         let LabCost { base, per_operation } = lab.cost;
         at("cost.base", not_negative(base))?;
