@@ -79,8 +79,8 @@ pub enum Question {
 #[derive(Debug, Clone, Deserialize)]
 pub struct Answer(pub Vec<f64>);
 
-/// The answers to questions, in their order; `None` where nobody named a Python that has the packages. One that is named
-/// has to work.
+/// The answers to questions, in their order; `None` where nobody named a Python that has the packages. One that is
+/// named has to work.
 pub fn ask(questions: &[Question]) -> Option<Vec<Answer>> {
     let mut lines = Vec::new();
     for question in questions {

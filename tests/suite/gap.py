@@ -21,7 +21,7 @@ def samples(simulation, lab, tolerance, alpha):
     # The lab first, so that its greater values are positive differences.
     means = CompareMeans(DescrStatsW(lab), DescrStatsW(simulation))
     low, high = means.tconfint_diff(alpha=2 * alpha, usevar="unequal")
-    _, above, below = means.ttost_ind(-tolerance, tolerance, usevar="unequal")
+    _, (above, below) = means.ttost_ind(-tolerance, tolerance, usevar="unequal")
     welch = stats.ttest_ind(lab, simulation, equal_var=False)
     degrees = len(simulation) + len(lab) - 2
     d = stats.ttest_ind(lab, simulation).statistic * np.sqrt(1 / len(lab) + 1 / len(simulation))
