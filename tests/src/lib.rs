@@ -4,6 +4,7 @@
 //! what cargo knows a crate by, and all runners in one target folder, so that the runtime is compiled once.
 
 pub mod dds;
+pub mod gap;
 pub mod models;
 pub mod optimisers;
 mod python;

@@ -16,6 +16,7 @@ mod falsification;
 mod faults;
 mod first_front;
 mod free_running;
+mod gap;
 mod hostile;
 mod import;
 #[cfg(unix)]

@@ -1,5 +1,5 @@
-//! Whether a simulation and a lab agree within a tolerance: two one-sided tests [Schuirmann 1987], with Welch's standard
-//! error.
+//! Whether a simulation and a lab agree within a tolerance: two one-sided tests [Schuirmann 1987], with Welch's
+//! standard error.
 
 use crate::power::{Design, TARGET, lab_runs_for, tost_power};
 use crate::samples::{Moments, Samples, Undefined, Welch, moments};
@@ -42,8 +42,8 @@ pub struct Tests {
     pub p_below: f64,
     /// The p value of the ordinary, two-sided test against no difference.
     pub p_different: f64,
-    /// The p value of the test against a difference of at most the tolerance in either direction: where it is small, the
-    /// true difference exceeds the tolerance, which is more than [`Verdict::Different`] says.
+    /// The p value of the test against a difference of at most the tolerance in either direction: where it is small,
+    /// the true difference exceeds the tolerance, which is more than [`Verdict::Different`] says.
     pub p_beyond: f64,
     /// The interval of the difference at 1 − 2α: the means are equivalent if it is within the tolerance.
     pub interval: [f64; 2],

@@ -1,7 +1,7 @@
 //! Parameters of a simulation under which it is closer to the lab (system identification).
 //!
-//! [`identify`] reads delay, gain, offset and noise off pairs of traces, without running anything. [`minimise`] looks for
-//! the few parameters of a model whose effect only a run of it shows.
+//! [`identify`] reads delay, gain, offset and noise off pairs of traces, without running anything. [`minimise`] looks
+//! for the few parameters of a model whose effect only a run of it shows.
 
 use sesame_optimise::sobol::SobolPoints;
 

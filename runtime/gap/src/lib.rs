@@ -5,9 +5,10 @@
 //! - [`equivalence`]: whether a difference is within a tolerance; [`power`]: how likely that can be shown at all.
 //! - [`holm`]: p values of many questions at once.
 //! - [`violations`]: false alarms and misses of a simulation; [`proportion`]: shares, and whether two differ.
-//! - [`traces`]: two time series compared, by [`series`] (RMS, correlation, gain and offset), [`lag`] and [`warping`] (DTW).
-//! - [`localise`]: whether a gap is everywhere or in a part of the tests, by what estimates say together ([`pooled`]) and
-//!   where they change ([`split`]); [`next`]: which test tells more about it.
+//! - [`traces`]: two time series compared, by [`series`] (RMS, correlation, gain and offset), [`lag`] and [`warping`]
+//!   (DTW).
+//! - [`localise`]: whether a gap is everywhere or in a part of the tests, by what estimates say together ([`pooled`])
+//!   and where they change ([`split`]); [`next`]: which test tells more about it.
 //! - [`fit`]: parameters of a simulation under which it is closer to the lab.
 //! - [`distribution`]: the distributions that all this needs.
 //!

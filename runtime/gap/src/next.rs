@@ -37,12 +37,12 @@ pub enum Why {
 
 /// The candidate that tells most; `None` without an untried one.
 ///
-/// An edge is looked for between a test with a gap and one without, with no decided test between them. With a dimension,
-/// such as that of the range in which a gap was found, a place is between two if its coordinate is, and the pair that is
-/// widest apart comes first. Without one, it is between if it is nearer to both than they are to each other, and the
-/// pair that is nearest comes first. Of several candidates the nearest to the middle of both is taken, so edges are
-/// halved. If nothing is between, the candidate that is farthest from all tests is taken (maximin). A candidate where a
-/// test was tried is never taken: to repeat it is another question.
+/// An edge is looked for between a test with a gap and one without, with no decided test between them. With a
+/// dimension, such as that of the range in which a gap was found, a place is between two if its coordinate is, and the
+/// pair that is widest apart comes first. Without one, it is between if it is nearer to both than they are to each
+/// other, and the pair that is nearest comes first. Of several candidates the nearest to the middle of both is taken,
+/// so edges are halved. If nothing is between, the candidate that is farthest from all tests is taken (maximin). A
+/// candidate where a test was tried is never taken: to repeat it is another question.
 pub fn next(tried: &[Tried], candidates: &[Vec<Option<f64>>], along: Option<usize>) -> Option<Next> {
     let between = pairs(tried, along).into_iter().find_map(|(gap, none)| {
         let (a, b) = (&tried[gap].at, &tried[none].at);

@@ -43,9 +43,9 @@ impl Share {
     }
 }
 
-/// The p value of Fisher's exact test, two-sided, that `a.0` of `a.1` trials and `b.0` of `b.1` have one probability: of
-/// all tables with the same margins, those that are at most as likely as the observed one [Fisher 1935]. 1 if a side has
-/// no trials.
+/// The p value of Fisher's exact test, two-sided, that `a.0` of `a.1` trials and `b.0` of `b.1` have one probability:
+/// of all tables with the same margins, those that are at most as likely as the observed one [Fisher 1935]. 1 if a side
+/// has no trials.
 pub fn fisher(a: (usize, usize), b: (usize, usize)) -> f64 {
     assert!(a.0 <= a.1 && b.0 <= b.1, "a share is at most the whole");
     let seen = a.0 + b.0;

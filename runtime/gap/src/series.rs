@@ -94,22 +94,35 @@ impl<'a> Series<'a> {
     /// The value at a time; before the first sample the first value, after the last one the last. A sample up to a
     /// nanosecond later counts, since that is the resolution of simulation time, and sums of steps are rounded.
     pub fn at(&self, time: f64) -> f64 {
-        let after = self.times.partition_point(|&other| other <= time + NANOSECOND);
-        if after == 0 {
+        self.after(time, self.times.partition_point(|&other| other <= time + NANOSECOND))
+    }
+
+    /// The values at `count` times from `start` on, one every `step` seconds, from 0 on.
+    pub fn resampled(&self, start: f64, step: f64, count: usize) -> Vec<f64> {
+        // Times only grow, so the sample before them is found once and then followed.
+        let mut next = self.times.partition_point(|&other| other <= start + NANOSECOND);
+        let value = |i: usize| {
+            let time = start + step * i as f64;
+            while self.times.get(next).is_some_and(|&other| other <= time + NANOSECOND) {
+                next += 1;
+            }
+            self.after(time, next)
+        };
+        (0..count).map(value).collect()
+    }
+
+    /// The value at a time that the sample of index `next` and no earlier one comes after.
+    fn after(&self, time: f64, next: usize) -> f64 {
+        if next == 0 {
             return self.values[0];
         }
-        let (before, value) = (self.times[after - 1], self.values[after - 1]);
+        let (before, value) = (self.times[next - 1], self.values[next - 1]);
         match self.between {
-            Between::Linear if after < self.times.len() => {
-                value + (self.values[after] - value) * ((time - before) / (self.times[after] - before))
+            Between::Linear if next < self.times.len() => {
+                value + (self.values[next] - value) * ((time - before) / (self.times[next] - before))
             }
             _ => value,
         }
-    }
-
-    /// The values at `count` times from `start` on, one every `step` seconds.
-    pub fn resampled(&self, start: f64, step: f64, count: usize) -> Vec<f64> {
-        (0..count).map(|i| self.at(start + step * i as f64)).collect()
     }
 }
 
@@ -259,6 +272,20 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn a_row_is_the_value_at_each_time(
+            steps in prop::collection::vec(0.0..2.0f64, 1..20), start in -3.0..3.0f64, step in 0.0..2.0f64,
+            linear in any::<bool>(),
+        ) {
+            let mut at = 0.0;
+            let times: Vec<f64> = steps.iter().map(|step| { at += step; at }).collect();
+            let between = if linear { Between::Linear } else { Between::Held };
+            let series = Series::new(&times, &steps, between).unwrap();
+            let row = series.resampled(start, step, 30);
+            let one_by_one: Vec<f64> = (0..30).map(|i| series.at(start + step * f64::from(i))).collect();
+            prop_assert_eq!(row, one_by_one);
+        }
+
         #[test]
         fn swapped_and_scaled_rows_have_the_same_correlation(
             rows in prop::collection::vec((-5.0..5.0f64, -5.0..5.0f64), 3..30), gain in 0.1..10.0f64,

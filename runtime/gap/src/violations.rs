@@ -13,8 +13,8 @@ pub enum Occurrence {
     Seen,
     /// It did not.
     Absent,
-    /// Nobody can say.
-    Unknown,
+    /// The run, or every run, is inconclusive.
+    Inconclusive,
 }
 
 /// In how many runs of one test, on one side, an event occurred.
@@ -24,8 +24,8 @@ pub struct Occurrences {
     pub seen: usize,
     /// Runs in which it did not.
     pub absent: usize,
-    /// Runs of which nobody can say.
-    pub unknown: usize,
+    /// Inconclusive runs.
+    pub inconclusive: usize,
 }
 
 impl Occurrences {
@@ -36,7 +36,7 @@ impl Occurrences {
             match run {
                 Occurrence::Seen => counts.seen += 1,
                 Occurrence::Absent => counts.absent += 1,
-                Occurrence::Unknown => counts.unknown += 1,
+                Occurrence::Inconclusive => counts.inconclusive += 1,
             }
         }
         counts
@@ -48,7 +48,7 @@ impl Occurrences {
         match self {
             Occurrences { seen: 1.., .. } => Occurrence::Seen,
             Occurrences { absent: 1.., .. } => Occurrence::Absent,
-            _ => Occurrence::Unknown,
+            _ => Occurrence::Inconclusive,
         }
     }
 
@@ -87,8 +87,8 @@ pub struct Confusion {
     pub misses: usize,
     /// Tests in which it occurs on neither side (true negatives).
     pub neither: usize,
-    /// Tests of which one side is unknown: they are in none of the above.
-    pub unknown: usize,
+    /// Tests of which one side is inconclusive: these are in none of the above.
+    pub inconclusive: usize,
 }
 
 impl Confusion {
@@ -97,7 +97,7 @@ impl Confusion {
         let mut counts = Confusion::default();
         for (simulation, lab) in tests {
             let count = match (simulation.occurrence(), lab.occurrence()) {
-                (Occurrence::Unknown, _) | (_, Occurrence::Unknown) => &mut counts.unknown,
+                (Occurrence::Inconclusive, _) | (_, Occurrence::Inconclusive) => &mut counts.inconclusive,
                 (Occurrence::Seen, Occurrence::Seen) => &mut counts.both,
                 (Occurrence::Seen, Occurrence::Absent) => &mut counts.false_alarms,
                 (Occurrence::Absent, Occurrence::Seen) => &mut counts.misses,
@@ -118,7 +118,7 @@ impl Confusion {
         Share::new(self.both, self.both + self.misses)
     }
 
-    /// Of the known tests, those of which both sides say the same.
+    /// Of the conclusive tests, those of which both sides say the same.
     pub fn agreement(self) -> Option<Share> {
         let same = self.both + self.neither;
         Share::new(same, same + self.false_alarms + self.misses)
@@ -131,8 +131,8 @@ mod tests {
 
     use super::*;
 
-    fn counts(seen: usize, absent: usize, unknown: usize) -> Occurrences {
-        Occurrences { seen, absent, unknown }
+    fn counts(seen: usize, absent: usize, inconclusive: usize) -> Occurrences {
+        Occurrences { seen, absent, inconclusive }
     }
 
     #[test]
@@ -147,7 +147,7 @@ mod tests {
             (counts(1, 0, 0), counts(0, 0, 0)),
         ];
         let confusion = Confusion::of(tests);
-        assert_eq!(confusion, Confusion { both: 2, false_alarms: 1, misses: 1, neither: 1, unknown: 2 });
+        assert_eq!(confusion, Confusion { both: 2, false_alarms: 1, misses: 1, neither: 1, inconclusive: 2 });
         let [precision, recall] = [confusion.precision(), confusion.recall()].map(Option::unwrap);
         assert_eq!((precision.count, precision.of, recall.count, recall.of), (2, 3, 2, 3));
         assert_eq!(confusion.agreement().unwrap().value(), 0.6);
@@ -158,7 +158,7 @@ mod tests {
 
     #[test]
     fn inconclusive_runs_are_no_part_of_a_frequency() {
-        let runs = [Occurrence::Seen, Occurrence::Unknown, Occurrence::Absent, Occurrence::Absent];
+        let runs = [Occurrence::Seen, Occurrence::Inconclusive, Occurrence::Absent, Occurrence::Absent];
         let of = frequencies(Occurrences::of(runs), counts(0, 0, 4));
         assert_eq!((of.simulation.unwrap().count, of.simulation.unwrap().of), (1, 3));
         assert_eq!((of.lab, of.p), (None, None));
