@@ -28,6 +28,7 @@ mod kuka_cell;
 mod large_results;
 mod latest;
 mod optimisers;
+mod physical;
 mod random_models;
 mod regeneration;
 mod search;

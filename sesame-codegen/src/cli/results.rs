@@ -166,8 +166,15 @@ pub(super) struct Output {
     format: Format,
 }
 
+impl Output {
+    /// For whom.
+    pub(super) fn format(&self) -> Format {
+        self.format
+    }
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-enum Format {
+pub(super) enum Format {
     #[default]
     Table,
     Csv,
@@ -398,7 +405,7 @@ fn gather(path: &Path, found: &mut Vec<PathBuf>) -> anyhow::Result<()> {
 }
 
 /// Prints for people or programs.
-fn print(table: &Table, output: &Output) -> anyhow::Result<ExitCode> {
+pub(super) fn print(table: &Table, output: &Output) -> anyhow::Result<ExitCode> {
     let terminal = std::io::stdout().is_terminal();
     let colour = terminal && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
     let text = match output.format {

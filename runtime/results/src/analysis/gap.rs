@@ -4,7 +4,8 @@
 //! Both sides are independent samples of a test's two distributions; the tests are the pairs. Of the simulation, fresh
 //! runs are the sample, where there are any: the run for which a test was chosen shows more than a test usually does.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
 
 use sesame_base::test_number::TestNumber;
 use sesame_gap::bootstrap::{Resampling, intervals};
@@ -40,12 +41,70 @@ pub struct LabRun {
     pub row: TestRow,
 }
 
+/// Why results cannot be compared as those of a campaign and of its lab.
+#[derive(Debug, thiserror::Error)]
+pub enum GapError {
+    /// They cannot be read.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// They are no results of a lab.
+    #[error("{} has no results of a lab: `physical` runs tests in one", path.display())]
+    NotOfALab {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The lab ran tests of another run.
+    #[error(
+        "{} has results of other tests: its {test} is not that of {}; give the run whose tests were taken to the lab",
+        lab.display(), campaign.display()
+    )]
+    OtherTests {
+        /// The lab's file.
+        lab: PathBuf,
+        /// The campaign's file.
+        campaign: PathBuf,
+        /// The test.
+        test: TestNumber,
+    },
+    /// What was measured or disturbed there is something else.
+    #[error("{} was recorded with another model ({difference}), so its values cannot be compared", lab.display())]
+    OtherModel {
+        /// The lab's file.
+        lab: PathBuf,
+        /// In what they differ.
+        difference: String,
+    },
+}
+
+/// The runs in the results of a lab, without its runs without disturbance. They must be of tests of these results of a
+/// campaign.
+pub fn lab_runs(campaign: &Repository, lab: &Repository) -> Result<Vec<LabRun>, GapError> {
+    let paths = || (lab.path().to_owned(), campaign.path().to_owned());
+    let Some(task) = lab.task().in_lab() else { return Err(GapError::NotOfALab { path: paths().0 }) };
+    // Only the robots may be others.
+    let simulator = campaign.plan().simulator.clone();
+    let reached = CampaignPlan { simulator, ..lab.plan().clone() };
+    if let Some(difference) = campaign.plan().model_difference(&reached) {
+        return Err(GapError::OtherModel { lab: paths().0, difference });
+    }
+    let known: BTreeSet<u32> = campaign.numbers()?.into_iter().collect();
+    for it in &task.tests {
+        if !known.contains(&it.number) || campaign.row(it.number)?.test != it.test {
+            let (lab, campaign) = paths();
+            return Err(GapError::OtherTests { lab, campaign, test: TestNumber(it.number) });
+        }
+    }
+    let rows = lab.tests()?.into_iter().filter(|row| row.origin != Origin::Reference);
+    Ok(rows.filter_map(|row| Some(LabRun { of: task.of(&row.test)?, row })).collect())
+}
+
 /// How a simulation and a lab differ.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gap {
     /// The tests that were run in the lab, by number.
     pub tests: Vec<u32>,
-    /// Every metric with a value on both sides in some test, in the plan's order, except interlocked ones.
+    /// The objectives, the metrics of requirements and those with a tolerance, in the plan's order, if they have a
+    /// value on both sides in some test; without interlocked ones.
     pub metrics: Vec<MetricGap>,
     /// Every requirement, and every interlocked metric.
     pub events: Vec<EventGap>,
@@ -135,8 +194,13 @@ pub fn gap(campaign: &Repository, runs: &[LabRun], lab: Option<&Lab>) -> Result<
     let interlocked = lab.map_or(&[][..], |lab| &lab.interlock);
     let ids = (0u32..).map(MetricId).take(plan.metrics.len());
     let mut metrics = Vec::new();
-    for metric in ids.filter(|metric| !interlocked.contains(metric)) {
-        let tolerances = lab.map_or(&[][..], |lab| &lab.tolerances);
+    let tolerances = lab.map_or(&[][..], |lab| &lab.tolerances);
+    let matters = |metric: &MetricId| {
+        plan.campaign.objectives.contains(metric)
+            || plan.requirements.iter().any(|requirement| requirement.metric == *metric)
+            || tolerances.iter().any(|tolerance| tolerance.metric == *metric)
+    };
+    for metric in ids.filter(|metric| matters(metric) && !interlocked.contains(metric)) {
         let tolerance = tolerances.iter().find(|it| it.metric == metric).map_or(0.0, |it| it.value);
         let tests: Vec<Compared> = sides.iter().filter_map(|sides| sides.compared(metric, tolerance)).collect();
         if !tests.is_empty() {
@@ -151,7 +215,7 @@ pub fn gap(campaign: &Repository, runs: &[LabRun], lab: Option<&Lab>) -> Result<
         let occurrence = |said: Verdict| match said {
             Verdict::Violated => Occurrence::Seen,
             Verdict::Satisfied => Occurrence::Absent,
-            Verdict::Inconclusive => Occurrence::Unknown,
+            Verdict::Inconclusive => Occurrence::Inconclusive,
         };
         event(&requirement.name, &sides, |sides| {
             let simulation = match sides.fresh {
@@ -167,7 +231,7 @@ pub fn gap(campaign: &Repository, runs: &[LabRun], lab: Option<&Lab>) -> Result<
         let usual = reference.as_ref().and_then(|values| values.get(metric.index())).and_then(|value| value.value);
         // Without a requirement, an interlock has acted where the metric is not as it is without disturbance.
         let occurrence = |value: Option<f64>| match value {
-            None => Occurrence::Unknown,
+            None => Occurrence::Inconclusive,
             Some(_) if value == usual => Occurrence::Absent,
             Some(_) => Occurrence::Seen,
         };
@@ -357,8 +421,17 @@ impl Gap {
     /// Each requirement and interlocked metric: how many tests violate it on both sides, in the simulation only (false
     /// alarms), in the lab only (misses), or nowhere.
     pub fn events(&self) -> Table {
-        let columns =
-            ["event", "both", "false_alarms", "misses", "neither", "unknown", "precision", "recall", "missed_tests"];
+        let columns = [
+            "event",
+            "both",
+            "false_alarms",
+            "misses",
+            "neither",
+            "inconclusive",
+            "precision",
+            "recall",
+            "missed_tests",
+        ];
         let mut table = Table::new(columns.map(str::to_owned));
         for EventGap { name, confusion, tests } in &self.events {
             let missed = tests.iter().filter(|(_, found)| {
@@ -371,7 +444,7 @@ impl Gap {
                 Datum::count(confusion.false_alarms),
                 Datum::count(confusion.misses),
                 Datum::count(confusion.neither),
-                Datum::count(confusion.unknown),
+                Datum::count(confusion.inconclusive),
                 Datum::lone(confusion.precision().map(sesame_gap::proportion::Share::value)),
                 Datum::lone(confusion.recall().map(sesame_gap::proportion::Share::value)),
                 if missed.is_empty() { Datum::Missing } else { Datum::Text(missed.join(" ")) },
@@ -408,10 +481,36 @@ impl Gap {
                 coordinate: &|_, value| fixed(value, 2),
                 test: &|at| TestNumber(gap.located[at]).to_string(),
             };
-            sentences.push(localise::sentence(&gap.extent, gap.located.len(), &words));
+            sentences.push(match gap.without_spread() {
+                Some([low, high]) => constant(words.metric, [low, high], gap.tests.len(), words.value),
+                None => localise::sentence(&gap.extent, gap.located.len(), &words),
+            });
         }
         sentences
     }
+}
+
+impl MetricGap {
+    /// The smallest and the largest difference, where all runs of each test are equal on each side, so that there is no
+    /// chance to speak of; `None` elsewhere.
+    fn without_spread(&self) -> Option<[f64; 2]> {
+        let no_spread = |test: &Compared| test.equivalence.tests == Err(Undefined::NoSpread);
+        if !self.tests.iter().all(no_spread) {
+            return None;
+        }
+        let differences = self.tests.iter().map(|test| test.lab[0] - test.simulation[0]);
+        Some(differences.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)]))
+    }
+}
+
+/// A sentence on a metric whose runs are all equal on each side.
+fn constant(metric: &str, [low, high]: [f64; 2], tests: usize, value: &dyn Fn(f64) -> String) -> String {
+    let tests = plural(tests, "test", "tests");
+    if low == 0.0 && high == 0.0 {
+        return format!("There is no gap: {metric} is the same in every run of {tests}.");
+    }
+    let by = if low == high { format!("by {}", value(low)) } else { format!("by {} to {}", value(low), value(high)) };
+    format!("{metric} does not vary from run to run, and differs {by} in the lab over {tests}.")
 }
 
 /// One word for tables.
@@ -430,6 +529,9 @@ impl Compared {
             Equal::Equivalent | Equal::Different => return self.selected.then(|| SELECTED.to_owned()),
             Equal::Undecided(Reason::Undefined(Undefined::OneRun(Side::Simulation))) if self.selected => {
                 return Some(SELECTED.to_owned());
+            }
+            Equal::Undecided(Reason::Undefined(Undefined::NoSpread)) if self.lab[0] == self.simulation[0] => {
+                "the same in every run".to_owned()
             }
             Equal::Undecided(Reason::Undefined(why)) => why.to_string(),
             Equal::Undecided(Reason::NoTolerance) => "no difference is tolerated, and none is shown".to_owned(),
@@ -565,8 +667,8 @@ mod tests {
         assert_eq!(event.confusion.misses, misses);
         assert!(event.confusion.both >= both);
         assert_eq!(event.confusion.false_alarms, 0);
-        let Confusion { both, neither, unknown, .. } = event.confusion;
-        assert_eq!(both + neither + unknown + misses, 24);
+        let Confusion { both, neither, inconclusive, .. } = event.confusion;
+        assert_eq!(both + neither + inconclusive + misses, 24);
     }
 
     #[test]
