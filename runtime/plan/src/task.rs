@@ -55,7 +55,7 @@ pub struct LabTest {
 }
 
 impl LabTask {
-    /// The number in the campaign's results of a test that was run in the lab.
+    /// The number in the campaign's results of a test that was run in the lab; `None` of another test.
     pub fn of(&self, test: &Test) -> Option<u32> {
         self.tests.iter().find(|it| it.test == *test).map(|it| it.number)
     }

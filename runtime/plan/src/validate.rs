@@ -308,3 +308,28 @@ fn fits(choice: &Choice, domain: &Domain) -> Checked {
         _ => wrong("is of another kind than its parameter"),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::LabTest;
+    use crate::testing::{operation, plan, test_of, use_of};
+
+    #[test]
+    fn a_task_in_a_lab_has_different_tests_of_the_plan() {
+        let plan = plan(vec![operation(0, OperationKind::Blackhole), operation(1, OperationKind::Blackhole)]);
+        let of =
+            |number, operation| LabTest { number, test: test_of(vec![use_of(operation, 1.0, 2.0, Vec::new(), 0)]) };
+        let refused = |tests: Vec<LabTest>, repeats| {
+            let task = Task::Lab(LabTask { lab: "hall".to_owned(), results: String::new(), tests, repeats });
+            plan.validate_task(&task).map_err(|error| error.to_string())
+        };
+        assert_eq!(refused(vec![of(3, 0), of(4, 1)], 1), Ok(()));
+        let said = |tests, repeats| refused(tests, repeats).unwrap_err();
+        assert_eq!(said(vec![], 1), "tests: there is none");
+        assert_eq!(said(vec![of(3, 0), of(3, 1)], 1), "tests: 3 is there twice");
+        assert_eq!(said(vec![of(3, 0), of(4, 0)], 1), "tests[1].test: is there twice");
+        assert_eq!(said(vec![of(3, 0)], 0), "repeats: must be at least 1");
+        assert!(said(vec![of(3, 9)], 1).starts_with("tests[0].test.operations[0].operation: there is no operation 9"));
+    }
+}

@@ -8,8 +8,8 @@ use sesame_plan::condition::ConditionEnd;
 use sesame_plan::testing::lab;
 use sesame_plan::{
     BoostedChildren, CampaignPlan, Confirmation, CoverageGoal, Dimension, Expectation, Exploration, Failing, GridAxis,
-    Lab, LabBudget, LabExclusion, LabTolerance, MetricId, RankKey, RankOrder, RequirementId, Shrinking, Statistic,
-    StopRule, Task,
+    Lab, LabBudget, LabExclusion, LabTask, LabTest, LabTolerance, MetricId, RankKey, RankOrder, RequirementId,
+    Shrinking, Statistic, StopRule, Task,
 };
 use sesame_results::record::{DATABASE, GenerationCoverage, Origin, Recorder, Repetition, sample};
 use sesame_search as search;
@@ -147,6 +147,24 @@ pub(super) fn wholes() -> Vec<Whole> {
         }
         recorder.finish("nothing more to try").unwrap();
         wholes.push(taken("shrunk", folder.path()));
+    }
+    {
+        let folder = tempfile::tempdir().unwrap();
+        let plan = rich();
+        let test = plan.tests[0].test.clone();
+        let mut other = test.clone();
+        other.operations[0].operation_seed += 1;
+        let tests = vec![LabTest { number: 7, test }, LabTest { number: 12, test: other }];
+        let task = Task::Lab(LabTask { lab: "lab".to_owned(), results: "0".repeat(64), tests, repeats: 3 });
+        let plan = task.plan(&plan);
+        let mut recorder = Recorder::create_for(folder.path(), &plan, &task, 1, 1).unwrap();
+        let candidates = search::strategy_of_task(&plan, &task, 1).unwrap().ask();
+        assert_eq!(candidates.len(), 6);
+        for (number, candidate) in (1..).zip(candidates) {
+            recorder.commit(&sample::record(&plan, number, Origin::Search, candidate.test)).unwrap();
+        }
+        recorder.finish("all tests are done").unwrap();
+        wholes.push(taken("lab", folder.path()));
     }
     wholes
 }
