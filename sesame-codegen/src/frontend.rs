@@ -6,7 +6,6 @@ use sesame_dsl::Analysis;
 use sesame_dsl::diagnostic::{Diagnostic, MEANINGS, Severity, page, render};
 use sesame_dsl::index::Kind;
 use sesame_dsl::model::eddi::Eddi;
-use sesame_dsl::model::physical::LabCost;
 use sesame_dsl::model::{Declaration, Space, Transport};
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::span::Span;
@@ -151,9 +150,6 @@ fn not_used(space: &Space, sources: &SourceMap) -> Vec<String> {
     notes.extend(space.physicals.values().filter_map(|lab| {
         let Declaration { name, span, .. } = &lab.declaration;
         let unused = [
-            ("cost", lab.cost != LabCost::default()),
-            ("exclude", !lab.exclude.is_empty()),
-            ("rank", !lab.rank.is_empty()),
             ("simulator", lab.simulator.is_some() && lab_simulator(space, lab).is_none()),
             ("shape", !lab.shapes.is_empty()),
             ("fit", !lab.fits.is_empty()),
@@ -294,9 +290,7 @@ mod tests {
                  through the relay",
                 "monitor `transport` (blocks.sesame:32) is checked, but not used by runners yet",
                 "monitor `conveyor` (blocks.sesame:41) is checked, but not used by runners yet",
-                "`cost`, `exclude`, `rank`, `simulator`, `shape` and `fit` of lab `lab` (blocks.sesame:47) are checked, but \
-                 not used yet",
-                "`rank` of lab `by_hand` (blocks.sesame:62) is checked, but not used yet",
+                "`simulator`, `shape` and `fit` of lab `lab` (blocks.sesame:47) are checked, but not used yet",
             ]
         );
     }

@@ -3,6 +3,7 @@
 
 mod architecture;
 mod building;
+mod choice;
 mod commands;
 mod conditions;
 mod confirm;

@@ -4,6 +4,7 @@
 //! once from beginning to end, and gives a [`Table`], which prints as a table, as CSV and as JSON.
 
 mod candidates;
+pub mod choice;
 mod compare;
 pub(crate) mod confirmed;
 mod distances;
@@ -28,7 +29,7 @@ use crate::analysis::statistics::Sample;
 use crate::record::{Origin, RecordError, Repository, ScannedTest};
 
 pub use crate::present::table::{Datum, Table, TextOptions};
-pub use candidates::{Candidate, Candidates, LeftOut, Terms, candidates};
+pub use candidates::{Candidate, Candidates, LeftOut, Terms, candidates, qualities};
 pub use compare::{CompareError, Comparison, Run, compare};
 pub use distances::{FrontDistance, GivenFront, GivenFrontError, distance_table, distances};
 pub use indicators::{Indicator, IndicatorAnalysis, indicators};

@@ -11,7 +11,7 @@ pub struct Test {
     /// Where it is in the reduced space of tests; finite. Distances are Euclidean, so the caller normalises the
     /// dimensions.
     pub point: Vec<f64>,
-    /// The metric ranking `MR`, from 0 (worst) to 1 (best); see [`crate::ranking`].
+    /// The metric ranking `MR`, from 0 (worst) to 1 (best).
     pub quality: f64,
     /// What the test costs, in the unit of the budget; at least 0. A test that costs more than the budget is never
     /// chosen.

@@ -194,7 +194,7 @@ pub(super) enum Compat {
 }
 
 impl Compat {
-    fn convention(self) -> Convention {
+    pub(super) fn convention(self) -> Convention {
         match self {
             Compat::Ours => Convention::Ours,
             Compat::Original => Convention::Original,
@@ -203,7 +203,7 @@ impl Compat {
     }
 }
 
-fn dimension(name: &str) -> Result<Dimension, String> {
+pub(super) fn dimension(name: &str) -> Result<Dimension, String> {
     Dimension::named(name).ok_or_else(|| "expected one of T1, T2, T3, P1, P2, O0, O1, O2 and O3".to_owned())
 }
 

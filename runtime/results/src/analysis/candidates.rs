@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use sesame_base::observation::Outcome;
 use sesame_base::test_number::TestNumber;
+use sesame_optimise::dominance::lexicographic;
 use sesame_plan::{CampaignPlan, Dimension, Direction, LabCost, LabExclusion, MetricId, RankKey, RankOrder};
 use sesame_search::sspr::{Convention, Point};
 use sesame_search::test_key::TestKey;
@@ -143,6 +144,31 @@ pub fn candidates(repository: &Repository, selection: &Selection, terms: &Terms)
     }
     found.left_out.sort_by_key(|(number, _)| *number);
     Ok(found)
+}
+
+/// How interesting each measured test is, from 0 to 1: its rank among all of them, `(average rank − 1) / (n − 1)`, the
+/// best one last and equal ones with their mean. By the paper's convention it is their position from 0 on, over `n`,
+/// and of equal tests the earlier one comes first [SESAME 2023, §4.4.2].
+pub fn qualities(measured: &BTreeMap<u32, Vec<f64>>, convention: Convention) -> BTreeMap<u32, f64> {
+    let mut worst_first: Vec<(&u32, &Vec<f64>)> = measured.iter().collect();
+    // Small keys come early. The sort keeps the order of numbers.
+    worst_first.sort_by(|(_, a), (_, b)| lexicographic(b, a));
+    let count = worst_first.len() as f64;
+    let mut qualities = BTreeMap::new();
+    let mut position = 0.0;
+    for equal in worst_first.chunk_by(|(_, a), (_, b)| lexicographic(a, b).is_eq()) {
+        let mean = position + (equal.len() as f64 - 1.0) / 2.0;
+        for (at, (number, _)) in equal.iter().enumerate() {
+            let quality = match convention {
+                Convention::Paper => (position + at as f64) / count,
+                _ if measured.len() == 1 => 1.0,
+                _ => mean / (count - 1.0),
+            };
+            qualities.insert(**number, quality);
+        }
+        position += equal.len() as f64;
+    }
+    qualities
 }
 
 /// The tests of which fresh runs have confirmed a finding.
@@ -319,6 +345,18 @@ mod tests {
         let found = candidates(&repository, &Selection::default(), &Terms { confirmed: true, ..terms() }).unwrap();
         assert_eq!(found.tests, []);
         assert!(reasons(&found).iter().any(|(_, reason)| reason == "no confirmed finding"));
+    }
+
+    #[test]
+    fn the_best_test_has_quality_1_and_equal_ones_share_theirs() {
+        let measured: BTreeMap<u32, Vec<f64>> = [(1, [-3.0, 1.0]), (2, [0.0, 1.0]), (3, [-3.0, 1.0]), (4, [-3.0, 0.5])]
+            .map(|(n, k)| (n, k.to_vec()))
+            .into();
+        let ours = qualities(&measured, Convention::Ours);
+        assert_eq!(ours, BTreeMap::from([(2, 0.0), (1, 0.5), (3, 0.5), (4, 1.0)]));
+        let paper = qualities(&measured, Convention::Paper);
+        assert_eq!(paper, BTreeMap::from([(2, 0.0), (1, 0.25), (3, 0.5), (4, 0.75)]));
+        assert_eq!(qualities(&BTreeMap::from([(9, vec![1.0])]), Convention::Ours), BTreeMap::from([(9, 1.0)]));
     }
 
     #[test]
