@@ -58,6 +58,11 @@ fn recorded_tests_are_run_in_a_lab_and_a_gap_shows_where_one_was_built_in() {
     let of: Vec<u32> = runs.iter().map(|run| run.of).collect();
     assert_eq!(of, [1, 2, 3, 1, 2, 3, 1, 2, 3], "all are run once before any is run again");
     assert!(recorded.tests().unwrap().iter().any(|row| row.origin == Origin::Reference));
+    let mut tests = command(sesamec());
+    let tests = done(tests.args(["results", "tests", "--format", "csv"]).arg(&twin)).expect(0).out;
+    let mut lines = tests.lines();
+    assert!(lines.next().unwrap().starts_with("test,run_of,origin"), "{tests}");
+    assert!(lines.nth(3).unwrap().starts_with("T4,T1,search"), "{tests}");
     // The lab as modelled differs by its noise only: no run is one of the simulation, and no metric is different.
     for run in &runs {
         assert!(campaign.judge().unwrap().runs(run.of).iter().all(|fresh| fresh.values != run.row.values));
