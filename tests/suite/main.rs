@@ -30,6 +30,7 @@ mod optimisers;
 mod random_models;
 mod regeneration;
 mod search;
+mod select;
 mod shrink;
 mod stl;
 mod strategies;

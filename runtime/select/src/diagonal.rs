@@ -1,13 +1,13 @@
 //! The diagonal that makes the relaxation tight.
 //!
 //! For 0-1 vectors `x² = x`, so a diagonal `u` of the matrix can be paid for by the linear part. Between 0 and 1 the
-//! objective becomes smaller by `½ Σ u y (1 − y)`, and so do the bounds, as long as it remains concave on vectors of one
-//! sum (Billionnet and Elloumi 2007). The best `u` for the fractions at hand is that of a semidefinite program:
+//! objective becomes smaller by `½ Σ u y (1 − y)`, and so do the bounds, as long as it remains concave on vectors of
+//! one sum [Billionnet and Elloumi 2007]. The best `u` for the fractions at hand is that of a semidefinite program:
 //! maximise `Σ w u` with `w = y (1 − y)`, where `P = ρ11' − A − diag u` is positive semidefinite. It is solved by
 //! coordinate ascent with a barrier: with `S = P⁻¹`, the maximum of `Σ w u + ε log det P` along one coordinate is at
-//! `1 / Sᵢᵢ − ε / wᵢ`, and each step changes `S` by a matrix of rank one. `u` is kept from becoming negative, so that no
-//! other fractions have a worse bound than without it. Whatever comes out is checked by a
-//! factorisation before it is used, so rounding cannot make a bound wrong.
+//! `1 / Sᵢᵢ − ε / wᵢ`, and each step changes `S` by a matrix of rank one. `u` is kept from becoming negative, so that
+//! no other fractions have a worse bound than without it. Whatever comes out is checked by a factorisation before it
+//! is used, so rounding cannot make a bound wrong.
 
 use crate::instance::Instance;
 use crate::node::Node;
