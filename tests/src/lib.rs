@@ -10,6 +10,7 @@ pub mod optimisers;
 mod python;
 pub mod python_mcap;
 pub mod rtamt;
+pub mod selecting;
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -33,6 +33,7 @@ mod physical;
 mod random_models;
 mod regeneration;
 mod search;
+mod select;
 mod shrink;
 mod stl;
 mod strategies;

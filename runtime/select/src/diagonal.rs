@@ -6,14 +6,18 @@
 //! maximise `Σ w u` with `w = y (1 − y)`, where `P = ρ11' − A − diag u` is positive semidefinite. It is solved by
 //! coordinate ascent with a barrier: with `S = P⁻¹`, the maximum of `Σ w u + ε log det P` along one coordinate is at
 //! `1 / Sᵢᵢ − ε / wᵢ`, and each step changes `S` by a matrix of rank one. `u` is kept from becoming negative, so that
-//! no other fractions have a worse bound than without it. Whatever comes out is checked by a factorisation before it is
-//! used, so rounding cannot make a bound wrong.
+//! no other fractions have a worse bound than without it. Whatever comes out is checked by a factorisation before it
+//! is used, so rounding cannot make a bound wrong.
 
 use crate::instance::Instance;
 use crate::node::Node;
 
 /// With more free tests, the work grows beyond what the bounds gain.
 const MOST: usize = 240;
+/// The least number of parts before that.
+const PARTS: usize = 16;
+/// The work for one part, as a share of the cubed number of tests that the diagonal costs.
+const COST: usize = 2_000;
 /// Passes over all coordinates; the barrier becomes smaller with each.
 const PASSES: i32 = 8;
 /// By how much.
@@ -21,26 +25,28 @@ const SHRINK: f64 = 0.35;
 /// The least weight of a test, as a share of the greatest possible one: fractions change from part to part.
 const LEAST: f64 = 0.01;
 
-/// Chooses the diagonal of an instance that has only these tests of a part.
-pub(crate) fn tighten(instance: &mut Instance, part: &Node, these: &[usize]) {
-    let free: Vec<usize> = (0..these.len()).filter(|&at| part.free.binary_search(&these[at]).is_ok()).collect();
+/// After this many parts of a search, a better diagonal is worth its work: about as much was done for the parts.
+pub(crate) fn patience(free: usize) -> usize {
+    PARTS.max(free.pow(3) / COST)
+}
+
+/// Chooses the diagonal of an instance for a part of it that contains all others which are looked at from now on: what
+/// is not free in it is free in none. Returns whether the diagonal changed.
+pub(crate) fn tighten(instance: &mut Instance, part: &Node, free: &[usize]) -> bool {
     if free.len() < 3 || free.len() > MOST || part.left(instance) < 2 {
-        return;
+        return false;
     }
-    let fractions = free.iter().map(|&at| part.fraction[these[at]]);
-    let weights: Vec<f64> = fractions.map(|y| LEAST + y * (1.0 - y)).collect();
-    let distances: Vec<f64> = free
-        .iter()
-        .flat_map(|&one| free.iter().map(move |&other| (one, other)))
-        .map(|(one, other)| instance.pair(one, other))
-        .collect();
-    if let Some(diagonal) = best(&distances, &weights) {
-        let mut all = vec![0.0; these.len()];
-        for (&at, value) in free.iter().zip(diagonal) {
-            all[at] = value;
-        }
-        instance.set_diagonal(all);
+    let weights: Vec<f64> = free.iter().map(|&at| part.fraction[at]).map(|y| LEAST + y * (1.0 - y)).collect();
+    let pairs = free.iter().flat_map(|&one| free.iter().map(move |&other| (one, other)));
+    let distances: Vec<f64> =
+        pairs.map(|(one, other)| if one == other { 0.0 } else { instance.pair(one, other) }).collect();
+    let Some(diagonal) = best(&distances, &weights) else { return false };
+    let mut all = vec![0.0; instance.len()];
+    for (&at, value) in free.iter().zip(diagonal) {
+        all[at] = value;
     }
+    instance.set_diagonal(all);
+    true
 }
 
 /// The diagonal for these distances, if there is one that helps.

@@ -1,7 +1,7 @@
 //! The problem for one number of tests: maximise `linear·x + ½ x'Ax` over 0-1 vectors with `Σ x = size` and
 //! `cost·x ≤ limit`, where `A` holds the weighted distances.
 //!
-//! `A` is conditionally negative semidefinite, so the objective is concave on vectors of one sum [Spiers et al. 2024].
+//! `A` is conditionally negative semidefinite, so the objective is concave on vectors of one sum [Spiers et al. 2023].
 //! Its diagonal may be anything, if the linear part makes up for it: `x² = x`. A great diagonal makes the objective
 //! smaller between the 0-1 vectors, and so the bounds better; [`crate::diagonal`] chooses it.
 //!

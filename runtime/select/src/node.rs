@@ -1,6 +1,6 @@
 //! A part of the search: some tests are in, some are out, and the others are free. Its relaxation lets free tests be
 //! chosen in fractions and charges a price for cost beyond the limit; the maximum is approached by moving fractions
-//! from one test to another, each time by the exact best amount (as SMO does for support vector machines).
+//! from one test to another, each time by the exact best amount (as SMO does for support vector machines [Platt 1998]).
 //!
 //! Since the objective is concave, its tangent plane at any point is above it. So every step of the ascent gives a
 //! valid bound of all choices in the part: the sum of the best scores of the plane. It also bounds the choices that

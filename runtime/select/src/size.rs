@@ -1,6 +1,5 @@
 //! One number of tests, from all candidates to those that matter.
 
-use crate::diagonal;
 use crate::instance::Instance;
 use crate::node::{Fate, Node};
 use crate::problem::Problem;
@@ -42,7 +41,6 @@ impl Size {
     pub(crate) fn reduce(&mut self, search: &mut Search<'_>) -> bool {
         let Some(mut root) = self.root.take() else { return true };
         root.bound = root.bound.min(self.bound);
-        let mut first = true;
         loop {
             if search.stopped() {
                 self.root = Some(root);
@@ -57,10 +55,8 @@ impl Size {
                 return true;
             }
             let these: Vec<usize> = (0..self.instance.len()).filter(|&at| root.fate[at] != Fate::Out).collect();
-            if these.len() < self.instance.len() || first {
-                first = false;
+            if these.len() < self.instance.len() {
                 let mut smaller = self.instance.among(&these);
-                diagonal::tighten(&mut smaller, &root, &these);
                 root = root.among(&mut smaller, &these);
                 self.instance = smaller;
                 self.round(&root, search);

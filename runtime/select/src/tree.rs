@@ -1,5 +1,6 @@
 //! Branch and bound for one number of tests.
 
+use crate::diagonal;
 use crate::incumbent::Incumbent;
 use crate::instance::Instance;
 use crate::node::Node;
@@ -52,6 +53,7 @@ impl<'a> Search<'a> {
     /// Looks at all choices in a part that may be worth it. Returns the bound of those that were not looked at because
     /// the search was stopped, negative infinity without any.
     pub(crate) fn explore(&mut self, instance: &mut Instance, root: Node) -> f64 {
+        let (mut here, free) = (0, root.free.clone());
         let mut parts = vec![root];
         let mut open = f64::NEG_INFINITY;
         while let Some(mut part) = parts.pop() {
@@ -65,6 +67,12 @@ impl<'a> Search<'a> {
                 return parts.iter().map(|part| part.bound).fold(open.max(part.bound), f64::max);
             }
             self.parts += 1;
+            here += 1;
+            if here == diagonal::patience(free.len()) && diagonal::tighten(instance, &part, &free) {
+                for part in parts.iter_mut().chain([&mut part]) {
+                    part.refresh(instance);
+                }
+            }
             if !part.settle(instance, self.threshold(), 12) {
                 continue;
             }
@@ -93,7 +101,6 @@ impl<'a> Search<'a> {
                 let mut these: Vec<usize> = part.free.iter().chain(&part.inside).copied().collect();
                 these.sort_unstable();
                 let mut smaller = instance.among(&these);
-                crate::diagonal::tighten(&mut smaller, &part, &these);
                 let part = part.among(&mut smaller, &these);
                 open = open.max(self.explore(&mut smaller, part));
                 continue;
