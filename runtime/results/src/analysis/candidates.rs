@@ -5,10 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use sesame_base::observation::Outcome;
 use sesame_base::test_number::TestNumber;
-use sesame_optimise::dominance::lexicographic;
 use sesame_plan::{CampaignPlan, Dimension, Direction, LabCost, LabExclusion, MetricId, RankKey, RankOrder};
 use sesame_search::sspr::{Convention, Point};
 use sesame_search::test_key::TestKey;
+use sesame_select::ranking::{self, Better, Key, Scale};
 
 use crate::analysis::Selection;
 use crate::analysis::confirmed::confirmed_tests;
@@ -146,29 +146,15 @@ pub fn candidates(repository: &Repository, selection: &Selection, terms: &Terms)
     Ok(found)
 }
 
-/// How interesting each measured test is, from 0 to 1: its rank among all of them, `(average rank − 1) / (n − 1)`, the
-/// best one last and equal ones with their mean. By the paper's convention it is their position from 0 on, over `n`,
-/// and of equal tests the earlier one comes first [SESAME 2023, §4.4.2].
+/// How interesting each measured test is, from 0 to 1: its [rank](sesame_select::ranking) among all of them, by the keys
+/// of [`Candidates::measured`]. Of none, if tests are ranked by nothing.
 pub fn qualities(measured: &BTreeMap<u32, Vec<f64>>, convention: Convention) -> BTreeMap<u32, f64> {
-    let mut worst_first: Vec<(&u32, &Vec<f64>)> = measured.iter().collect();
-    // Small keys come early. The sort keeps the order of numbers.
-    worst_first.sort_by(|(_, a), (_, b)| lexicographic(b, a));
-    let count = worst_first.len() as f64;
-    let mut qualities = BTreeMap::new();
-    let mut position = 0.0;
-    for equal in worst_first.chunk_by(|(_, a), (_, b)| lexicographic(a, b).is_eq()) {
-        let mean = position + (equal.len() as f64 - 1.0) / 2.0;
-        for (at, (number, _)) in equal.iter().enumerate() {
-            let quality = match convention {
-                Convention::Paper => (position + at as f64) / count,
-                _ if measured.len() == 1 => 1.0,
-                _ => mean / (count - 1.0),
-            };
-            qualities.insert(**number, quality);
-        }
-        position += equal.len() as f64;
-    }
-    qualities
+    let count = measured.values().next().map_or(0, Vec::len);
+    let columns: Vec<Vec<f64>> = (0..count).map(|key| measured.values().map(|keys| keys[key]).collect()).collect();
+    let keys: Vec<Key<'_>> = columns.iter().map(|values| Key { values, better: Better::Lower }).collect();
+    let scale = if convention == Convention::Paper { Scale::Paper } else { Scale::Average };
+    let qualities = ranking::qualities(&keys, scale).unwrap_or_default();
+    measured.keys().copied().zip(qualities).collect()
 }
 
 /// The tests of which fresh runs have confirmed a finding.
