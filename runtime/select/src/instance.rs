@@ -14,6 +14,9 @@ use crate::problem::Problem;
 /// Numbers that kept rows may hold together: 64 MB.
 const ROOM: usize = 8_000_000;
 
+/// Tests are near to each other if their distance is at most this share of the greatest one.
+const NEAR: f64 = 0.06;
+
 /// A problem of one size, over some of the tests.
 #[derive(Debug, Clone)]
 pub(crate) struct Instance {
@@ -29,6 +32,9 @@ pub(crate) struct Instance {
     pub(crate) forced: Vec<bool>,
     /// Whether costs differ from test to test, so that the limit is more than a number of tests.
     pub(crate) uneven: bool,
+    /// Tests that are near to each other have one number, from 0 to below [`Instance::groups`].
+    pub(crate) group: Vec<usize>,
+    pub(crate) groups: usize,
     axes: Vec<Vec<f64>>,
     weight: f64,
     diagonal: Vec<f64>,
@@ -51,6 +57,8 @@ impl Instance {
             uneven: costliest(&cost, size) > problem.limit(),
             cost,
             axes: (0..dimensions).map(|axis| names.iter().map(|at| of(at).point[axis]).collect()).collect(),
+            group: vec![0; names.len()],
+            groups: 1,
             weight: problem.distance_weight(),
             diagonal: vec![0.0; names.len()],
             rows: vec![Vec::new(); names.len()],
@@ -77,6 +85,8 @@ impl Instance {
             uneven: costliest(&cost, self.size) > self.limit,
             cost,
             axes: self.axes.iter().map(|axis| pick(axis)).collect(),
+            group: these.iter().map(|&at| self.group[at]).collect(),
+            groups: self.groups,
             weight: self.weight,
             diagonal: vec![0.0; these.len()],
             rows: vec![Vec::new(); these.len()],
@@ -105,6 +115,28 @@ impl Instance {
             }
         }
         self.diagonal = diagonal;
+    }
+
+    /// Puts tests that are near to each other into groups: each goes to the first group whose first test is near
+    /// enough.
+    pub(crate) fn gather(&mut self) {
+        let side = |axis: &Vec<f64>| {
+            axis.iter().copied().fold(f64::NEG_INFINITY, f64::max) - axis.iter().copied().fold(f64::INFINITY, f64::min)
+        };
+        let far: f64 = self.axes.iter().map(side).map(|side| side * side).sum();
+        let near = NEAR * NEAR * far;
+        let mut firsts: Vec<usize> = Vec::new();
+        for at in 0..self.len() {
+            let square = |first: usize| -> f64 {
+                self.axes.iter().map(|axis| axis[at] - axis[first]).map(|side| side * side).sum()
+            };
+            let group = firsts.iter().position(|&first| square(first) <= near);
+            self.group[at] = group.unwrap_or(firsts.len());
+            if group.is_none() {
+                firsts.push(at);
+            }
+        }
+        self.groups = firsts.len();
     }
 
     /// A row of `A`.

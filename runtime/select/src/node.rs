@@ -5,11 +5,21 @@
 //! Since the objective is concave, its tangent plane at any point is above it. So every step of the ascent gives a
 //! valid bound of all choices in the part: the sum of the best scores of the plane. It also bounds the choices that
 //! contain one test, or do not, which decides about tests without branching.
+//!
+//! A part may also say how many tests of a group of near-duplicates are chosen. Without the one that it branches on,
+//! the relaxation would choose its neighbours to the same amount, and the bound would hardly fall; without its group it
+//! falls at once. The best tests that the numbers of all groups permit are found by going through them by score, as in
+//! every matroid, and what takes the place of one test is one other test.
 
 use crate::instance::Instance;
 
 /// Fractions closer than this to 0 and 1 are whole.
 const WHOLE: f64 = 1e-13;
+
+/// A group of which this little more can be chosen, or less, is left alone.
+const SLACK: f64 = 1e-9;
+/// A group whose number is this far from a whole one is decided before its tests.
+const APART: f64 = 0.1;
 
 /// What is decided about a test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,19 +43,30 @@ pub(crate) struct Node {
     slope: Vec<f64>,
     /// What a unit of cost is charged.
     price: f64,
+    /// How many tests of each group are chosen at least, and at most.
+    pub(crate) least: Vec<usize>,
+    pub(crate) most: Vec<usize>,
     /// What is left for free tests.
     pub(crate) money: f64,
     /// No choice in this part has a greater value.
     pub(crate) bound: f64,
 }
 
-/// A tangent plane, summed over the best free tests.
+/// A tangent plane, summed over the best free tests that the groups permit.
 struct Tangent {
     price: f64,
     bound: f64,
-    /// The worst score among the best, and the best among the others.
-    last: f64,
-    next: f64,
+    /// Whether each free test is among them.
+    taken: Vec<bool>,
+    /// What those of each group score at least, and those in groups that can do without one.
+    last: Vec<f64>,
+    last_of_any: f64,
+    /// What the others of each group score at most, and the others in groups with room.
+    next: Vec<f64>,
+    next_of_any: f64,
+    /// Whether a group has room for another test, and whether it can do without one.
+    room: Vec<bool>,
+    spare: Vec<bool>,
 }
 
 /// A price, and how much more than the money is spent at it.
@@ -62,6 +83,8 @@ impl Node {
             fraction: vec![0.0; count],
             slope: Vec::new(),
             price: 0.0,
+            least: vec![0; instance.groups],
+            most: vec![instance.size; instance.groups],
             money: instance.limit,
             bound: f64::INFINITY,
         };
@@ -85,6 +108,8 @@ impl Node {
             fraction: these.iter().map(|&at| self.fraction[at]).collect(),
             slope: Vec::new(),
             price: self.price,
+            least: self.least.clone(),
+            most: self.most.clone(),
             money: self.money,
             bound: self.bound,
         };
@@ -127,22 +152,95 @@ impl Node {
         }
     }
 
-    /// Takes the best of these steps up to this number of times. Returns whether there is none left that is worth it.
-    fn ascend(&mut self, instance: &mut Instance, steps: usize) -> bool {
-        for _ in 0..steps {
-            let mut best = (f64::NEG_INFINITY, usize::MAX);
-            for &at in &self.free {
-                if self.fraction[at] < 1.0 {
-                    let score = self.score(instance, at);
-                    if score > best.0 {
-                        best = (score, at);
+    /// How much of each group is chosen.
+    fn sums(&self, instance: &Instance) -> Vec<f64> {
+        let mut sums = vec![0.0; instance.groups];
+        for &at in self.inside.iter().chain(&self.free) {
+            sums[instance.group[at]] += self.fraction[at];
+        }
+        sums
+    }
+
+    /// Moves what a group has too much of to others, and to a group what it lacks.
+    fn repair(&mut self, instance: &mut Instance, sums: &mut [f64]) {
+        for group in 0..instance.groups {
+            loop {
+                let over = sums[group] - self.most[group] as f64;
+                let under = self.least[group] as f64 - sums[group];
+                if over.max(under) <= WHOLE {
+                    break;
+                }
+                // Of this group and of the others one gives and one takes.
+                let (mut to, mut from) = ((f64::NEG_INFINITY, usize::MAX), (f64::INFINITY, usize::MAX));
+                for &at in &self.free {
+                    let (score, its) = (self.score(instance, at), instance.group[at]);
+                    let takes = if its == group { under > 0.0 } else { over > 0.0 && self.room(its, sums) > WHOLE };
+                    let gives = if its == group { over > 0.0 } else { under > 0.0 && self.spare(its, sums) > WHOLE };
+                    if takes && self.fraction[at] < 1.0 && score > to.0 {
+                        to = (score, at);
+                    }
+                    if gives && self.fraction[at] > 0.0 && score < from.0 {
+                        from = (score, at);
                     }
                 }
+                let (to, from) = (to.1, from.1);
+                if to == usize::MAX || from == usize::MAX {
+                    break;
+                }
+                let (taking, giving) = (instance.group[to], instance.group[from]);
+                let others = if taking == group { self.spare(giving, sums) } else { self.room(taking, sums) };
+                let amount = over.max(under).min(others).min(1.0 - self.fraction[to]).min(self.fraction[from]);
+                sums[taking] += amount;
+                sums[giving] -= amount;
+                self.transfer(instance, from, to, amount);
             }
-            let (high, to) = best;
-            if to == usize::MAX {
-                return true;
+        }
+    }
+
+    /// How much more of a group may be chosen.
+    fn room(&self, group: usize, sums: &[f64]) -> f64 {
+        self.most[group] as f64 - sums[group]
+    }
+
+    /// How much less of a group may be chosen.
+    fn spare(&self, group: usize, sums: &[f64]) -> f64 {
+        sums[group] - self.least[group] as f64
+    }
+
+    /// The test to which the steepest permitted step leads.
+    fn steepest(&self, instance: &Instance, sums: &[f64]) -> Option<usize> {
+        let mut best = vec![(f64::NEG_INFINITY, usize::MAX); instance.groups];
+        let mut worst = vec![f64::INFINITY; instance.groups];
+        for &at in &self.free {
+            let (score, group, fraction) = (self.score(instance, at), instance.group[at], self.fraction[at]);
+            if fraction < 1.0 && score > best[group].0 {
+                best[group] = (score, at);
             }
+            if fraction > 0.0 && score < worst[group] {
+                worst[group] = score;
+            }
+        }
+        let can_lose = |group: &usize| self.spare(*group, sums) > SLACK;
+        let worst_of_any =
+            (0..instance.groups).filter(can_lose).map(|group| worst[group]).fold(f64::INFINITY, f64::min);
+        let rise = |group: usize| {
+            let others = if self.room(group, sums) > SLACK { worst_of_any } else { f64::INFINITY };
+            best[group].0 - worst[group].min(others)
+        };
+        let steepest = (0..instance.groups).max_by(|&a, &b| rise(a).total_cmp(&rise(b)).then(b.cmp(&a)))?;
+        (best[steepest].1 != usize::MAX).then_some(best[steepest].1)
+    }
+
+    /// Takes the best of these steps up to this number of times. Returns whether there is none left that is worth it.
+    fn ascend(&mut self, instance: &mut Instance, steps: usize) -> bool {
+        let mut sums = self.sums(instance);
+        if instance.groups > 1 {
+            self.repair(instance, &mut sums);
+        }
+        for _ in 0..steps {
+            let Some(to) = self.steepest(instance, &sums) else { return true };
+            let high = self.score(instance, to);
+            let own = instance.group[to];
             instance.row(to);
             let mut chosen = (0.0, usize::MAX, 0.0);
             let least = 1e-11 * (high.abs() + 1e-300);
@@ -152,9 +250,13 @@ impl Node {
                     if rise > least {
                         let bend = instance.pair(to, at) - 0.5 * (instance.diagonal(to) + instance.diagonal(at));
                         let amount = if bend > 0.0 { (0.5 * rise / bend).min(1.0) } else { 1.0 };
-                        let amount = amount.min(1.0 - self.fraction[to]).min(self.fraction[at]);
+                        let mut amount = amount.min(1.0 - self.fraction[to]).min(self.fraction[at]);
+                        let group = instance.group[at];
+                        if group != own {
+                            amount = amount.min(self.spare(group, &sums)).min(self.room(own, &sums));
+                        }
                         let gain = amount * (rise - amount * bend);
-                        if gain > chosen.0 {
+                        if amount > 0.0 && gain > chosen.0 {
                             chosen = (gain, at, amount);
                         }
                     }
@@ -164,39 +266,90 @@ impl Node {
             if from == usize::MAX {
                 return true;
             }
+            sums[instance.group[from]] -= amount;
+            sums[own] += amount;
             self.transfer(instance, from, to, amount);
         }
         false
     }
 
     /// The tangent plane at the fractions, with a price of cost.
-    fn tangent(&self, instance: &Instance, price: f64, scores: &mut Vec<f64>) -> Tangent {
+    fn tangent(&self, instance: &Instance, price: f64, order: &mut Vec<(f64, usize)>) -> Tangent {
         let left = self.left(instance);
         let mut bound = price * self.money;
         for &at in self.inside.iter().chain(&self.free) {
             bound -= 0.5 * self.fraction[at] * (self.slope[at] - instance.linear(at));
         }
         bound += self.inside.iter().map(|&at| self.slope[at]).sum::<f64>();
-        scores.clear();
-        scores.extend(self.free.iter().map(|&at| self.slope[at] - price * instance.cost[at]));
-        let (mut last, mut next) = (f64::INFINITY, f64::NEG_INFINITY);
-        if left > scores.len() {
-            bound = f64::NEG_INFINITY;
-        } else if left == 0 {
-            next = scores.iter().copied().fold(next, f64::max);
+        order.clear();
+        let score = |at: usize| self.slope[at] - price * instance.cost[at];
+        order.extend(self.free.iter().enumerate().map(|(place, &at)| (score(at), place)));
+        let better = |a: &(f64, usize), b: &(f64, usize)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
+        if instance.groups == 1 && left < order.len() && left > 0 {
+            order.select_nth_unstable_by(left - 1, better);
+            order[..left].sort_unstable_by(better);
         } else {
-            let (better, at, worse) = scores.select_nth_unstable_by(left - 1, |a, b| b.total_cmp(a));
-            last = *at;
-            // Sorted, so that the sum does not depend on how the selection leaves them.
-            better.sort_unstable_by(|a, b| b.total_cmp(a));
-            bound += better.iter().sum::<f64>() + last;
-            next = worse.iter().copied().fold(next, f64::max);
+            order.sort_unstable_by(better);
         }
-        Tangent { price, bound, last, next }
+        let (mut need, mut room) = (self.least.clone(), self.most.clone());
+        for &at in &self.inside {
+            let group = instance.group[at];
+            need[group] = need[group].saturating_sub(1);
+            room[group] = room[group].saturating_sub(1);
+        }
+        let count = instance.groups;
+        let mut plane = Tangent {
+            price,
+            bound,
+            taken: vec![false; order.len()],
+            last: vec![f64::INFINITY; count],
+            last_of_any: f64::INFINITY,
+            next: vec![f64::NEG_INFINITY; count],
+            next_of_any: f64::NEG_INFINITY,
+            room: Vec::new(),
+            spare: vec![false; count],
+        };
+        // What the groups need comes from them; the others are the best of what they have room for.
+        let needed: usize = need.iter().sum();
+        let mut others = left.saturating_sub(needed);
+        for &(score, place) in order.iter() {
+            let group = instance.group[self.free[place]];
+            let take = if need[group] > 0 {
+                need[group] -= 1;
+                true
+            } else if others > 0 && room[group] > 0 {
+                others -= 1;
+                plane.spare[group] = true;
+                true
+            } else {
+                false
+            };
+            if take {
+                room[group] = room[group].saturating_sub(1);
+                plane.bound += score;
+                plane.taken[place] = true;
+                plane.last[group] = score;
+            } else {
+                plane.next[group] = plane.next[group].max(score);
+            }
+        }
+        if needed > left || others > 0 || need.iter().any(|&need| need > 0) {
+            plane.bound = f64::NEG_INFINITY;
+        }
+        plane.room = room.iter().map(|&room| room > 0).collect();
+        for group in 0..count {
+            if plane.spare[group] {
+                plane.last_of_any = plane.last_of_any.min(plane.last[group]);
+            }
+            if plane.room[group] {
+                plane.next_of_any = plane.next_of_any.max(plane.next[group]);
+            }
+        }
+        plane
     }
 
     /// The price at which the tangent plane gives the best bound, found by bisection: the bound is convex in it.
-    fn best_tangent(&self, instance: &Instance, scores: &mut Vec<f64>) -> Tangent {
+    fn best_tangent(&self, instance: &Instance, scores: &mut Vec<(f64, usize)>) -> Tangent {
         let mut best = self.tangent(instance, self.price, scores);
         if !instance.uneven {
             return best;
@@ -309,12 +462,23 @@ impl Node {
     fn decide(&mut self, instance: &mut Instance, threshold: f64, plane: &Tangent) -> bool {
         let (mut out, mut inside) = (Vec::new(), Vec::new());
         let fits = self.most_for_one(instance);
-        for &at in &self.free {
+        for (place, &at) in self.free.iter().enumerate() {
             let score = self.slope[at] - plane.price * instance.cost[at];
-            if instance.cost[at] > fits || (score < plane.last && plane.bound - plane.last + score < threshold) {
+            let group = instance.group[at];
+            if instance.cost[at] > fits {
                 out.push(at);
-            } else if score >= plane.last && plane.bound - score + plane.next < threshold {
-                inside.push(at);
+            } else if plane.taken[place] {
+                // One other test takes its place: one of its group, or any if the group can do without it.
+                let any = if plane.spare[group] { plane.next_of_any } else { f64::NEG_INFINITY };
+                if plane.bound - score + plane.next[group].max(any) < threshold {
+                    inside.push(at);
+                }
+            } else {
+                // It takes the place of one other test: of its group, or of any if the group has room.
+                let any = if plane.room[group] { plane.last_of_any } else { f64::INFINITY };
+                if plane.bound - plane.last[group].min(any) + score < threshold {
+                    out.push(at);
+                }
             }
         }
         if out.is_empty() && inside.is_empty() {
@@ -392,6 +556,21 @@ impl Node {
             let worst = whole.min_by(|&a, &b| self.score(instance, a).total_cmp(&self.score(instance, b)));
             worst.unwrap_or(self.free[0])
         })
+    }
+
+    /// The group to branch on, with the number of its tests rounded down: the one whose number is the least whole.
+    pub(crate) fn branch_group(&self, instance: &Instance) -> Option<(usize, usize)> {
+        if instance.groups == 1 {
+            return None;
+        }
+        let sums = self.sums(instance);
+        let apart = |group: usize| (sums[group] - sums[group].round()).abs();
+        let group = (0..instance.groups).max_by(|&a, &b| apart(a).total_cmp(&apart(b)).then(b.cmp(&a)))?;
+        if apart(group) < APART {
+            return None;
+        }
+        let below = (0..instance.size).take_while(|&number| number as f64 + 1.0 <= sums[group]).count();
+        (self.least[group] <= below && below < self.most[group]).then_some((group, below))
     }
 
     /// The choice that the fractions are, if they are whole and it costs no more than the limit.

@@ -62,6 +62,9 @@ impl Size {
                 self.round(&root, search);
             }
             if root.free.len() as f64 > SHARE * before as f64 || root.free.len() <= root.left(&self.instance) {
+                self.instance.gather();
+                root.least = vec![0; self.instance.groups];
+                root.most = vec![self.instance.size; self.instance.groups];
                 self.root = Some(root);
                 return true;
             }

@@ -105,6 +105,14 @@ impl<'a> Search<'a> {
                 open = open.max(self.explore(&mut smaller, part));
                 continue;
             }
+            if let Some((group, below)) = part.branch_group(instance) {
+                let mut fewer = part.clone();
+                fewer.most[group] = below;
+                part.least[group] = below + 1;
+                parts.push(fewer);
+                parts.push(part);
+                continue;
+            }
             let at = part.branch(instance);
             let mut without = part.clone();
             if without.put_out(instance, at) {

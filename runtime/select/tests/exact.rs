@@ -17,6 +17,21 @@ fn any_test() -> impl Strategy<Value = Test> {
     prop_oneof![coarse, fine, even].prop_map(|(point, quality, cost)| Test { point, quality, cost, forced: false })
 }
 
+/// Tests near a few centres, as fronts have them: near-duplicates of which several may be chosen.
+fn clustered() -> impl Strategy<Value = Vec<Test>> {
+    let centres = prop::collection::vec((0.0..1.0, 0.0..1.0, 0.1..0.9), 4);
+    let near = (0..4_usize, -0.01..0.01, -0.01..0.01, -0.05..0.05, 1..3_u8);
+    (centres, prop::collection::vec(near, 4..=15)).prop_map(|(centres, near)| {
+        let test = |(at, x, y, quality, cost): (usize, f64, f64, f64, u8)| Test {
+            point: vec![centres[at].0 + x, centres[at].1 + y],
+            quality: centres[at].2 + quality,
+            cost: f64::from(cost),
+            forced: false,
+        };
+        near.into_iter().map(test).collect()
+    })
+}
+
 fn any_problem() -> impl Strategy<Value = Problem> {
     let coarse = prop::collection::vec((0..4_u8, 0..2_u8, 0..3_u8), 0..=12).prop_map(|rows| {
         let test = |(x, y, quality): (u8, u8, u8)| Test {
@@ -27,7 +42,7 @@ fn any_problem() -> impl Strategy<Value = Problem> {
         };
         rows.into_iter().map(test).collect::<Vec<_>>()
     });
-    let tests = prop_oneof![coarse, prop::collection::vec(any_test(), 0..=14)];
+    let tests = prop_oneof![coarse, prop::collection::vec(any_test(), 0..=14), clustered()];
     let lambda = prop_oneof![Just(0.0), Just(0.25), Just(0.5), Just(0.75), Just(1.0), 0.0..=1.0];
     let pairs = prop_oneof![Just(Pairs::Unordered), Just(Pairs::Ordered)];
     let forced = prop::collection::btree_set(0..30_usize, 0..=3);
