@@ -16,6 +16,7 @@ mod error;
 mod files;
 mod folder;
 mod fresh;
+mod lab_runs;
 mod quarantine;
 mod read_tests;
 mod recognise;
@@ -35,7 +36,7 @@ mod write_tests;
 
 use serde::Serialize;
 
-use sesame_base::observation::{Observation, Outcome};
+use sesame_base::observation::Observation;
 use sesame_plan::{KnownTestId, Requirement, Test};
 
 pub use difference::{Difference, differences};
@@ -43,13 +44,14 @@ pub use error::RecordError;
 pub use files::{DATABASE, LOCK, TRACES, trace_file};
 pub use folder::{Claim, claim_folder, latest_folder, latest_unfinished};
 pub use fresh::{Standing, Tally};
+pub use lab_runs::{ENTERED_OUTCOMES, Entered, EnteredRun, Provenance, entered_outcome};
 pub use quarantine::{QUARANTINE, is_quarantined, may_be_quarantined};
 pub use recorder::Recorder;
 pub use repetitions::{Judge, confirmed_fitness, confirming_runs};
 pub use repository::{CampaignFacts, Repository, digest};
 pub use scan::{ScannedOperation, ScannedTest};
 pub use schema::SCHEMA;
-pub use sesame_base::observation::MetricValue;
+pub use sesame_base::observation::{MetricValue, Outcome};
 pub use sesame_base::verdict::{Verdict, fails, verdict, violation_spans};
 pub use split_operations::SplitOperation;
 

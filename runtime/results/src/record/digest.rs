@@ -8,7 +8,7 @@ use sesame_plan::CampaignPlan;
 use sha2::{Digest as _, Sha256};
 
 use crate::record::schema::{self, MEANING_SINCE, PIECES_SINCE, STANDARD_WORDS_SINCE};
-use crate::record::split_operations;
+use crate::record::{lab_runs, split_operations};
 
 /// What is hashed, in this order: a name, and a query whose order of rows depends on nothing but the content. The
 /// meaning of the plan is `?1`.
@@ -118,7 +118,8 @@ const PORTION: usize = 1 << 16;
 ///
 /// The task of a run that is not the campaign is hashed with the plan, which it follows.
 ///
-/// Operations that were one operation in an imported file are hashed last, if there are any.
+/// Operations that were one operation in an imported file are hashed last, if there are any, and so are runs of a lab
+/// that were entered by hand: of which test each is a run, but not who made it.
 ///
 /// Results of an earlier schema have the digest that their release computed, over all of the plan's JSON, the sentences
 /// of requirements, and the name of the `.sesame` file. Names of columns and verdicts are not hashed.
@@ -130,7 +131,9 @@ pub(super) fn of_connection(connection: &Connection, version: i64, plan: &Campai
     let mut portion = Vec::with_capacity(2 * PORTION);
     let split = version >= STANDARD_WORDS_SINCE && split_operations::are_in(&transaction)?;
     let split = split.then_some((split_operations::TABLE, split_operations::QUERY));
-    for content in CONTENT.iter().copied().chain(split) {
+    let entered = version >= STANDARD_WORDS_SINCE && lab_runs::are_in(&transaction)?;
+    let entered = entered.then_some((lab_runs::TABLE, lab_runs::QUERY));
+    for content in CONTENT.iter().copied().chain(split).chain(entered) {
         let earlier = EARLIER.iter().find(|(since, name, _)| version < *since && *name == content.0);
         let (name, sql) = earlier.map_or(content, |&(.., earlier)| earlier);
         feed(&mut portion, ValueRef::Text(name.as_bytes()));

@@ -14,7 +14,7 @@ use rusqlite::Connection;
 use sesame_plan::CampaignPlan;
 
 use crate::record::schema::{DDL, PIECES_SINCE, ROBUSTNESS, STANDARD_WORDS_SINCE, has_robustness, wide_views};
-use crate::record::{RecordError, series_views, split_operations};
+use crate::record::{RecordError, lab_runs, series_views, split_operations};
 
 /// The objects of a schema by name: the kind of each, and the words of the statement that creates it.
 type Objects = BTreeMap<String, (String, String)>;
@@ -70,9 +70,17 @@ pub(super) fn tables(connection: &Connection, path: &Path, schema: i64) -> Resul
         return Err(RecordError::damaged(path, format!("there is a trigger `{name}`, which no run makes")));
     }
     same(ours, &found, path)?;
-    if schema >= STANDARD_WORDS_SINCE && found.contains_key(split_operations::TABLE) {
-        let ours = sound(made_by(&["CREATE TABLE tests (number INTEGER PRIMARY KEY)", split_operations::DDL]));
-        same(&ours.into_iter().filter(|(name, _)| name == split_operations::TABLE).collect(), &found, path)?;
+    // Tables that are only there if something is in them, each with those that are made together with it.
+    let optional: [(&[&str], &str); 2] = [
+        (&[split_operations::TABLE], split_operations::DDL),
+        (&[lab_runs::TABLE, lab_runs::PROVENANCE], lab_runs::DDL),
+    ];
+    for (names, ddl) in optional {
+        if schema >= STANDARD_WORDS_SINCE && names.iter().any(|name| found.contains_key(*name)) {
+            let mut ours = sound(made_by(&["CREATE TABLE tests (number INTEGER PRIMARY KEY)", ddl]));
+            ours.retain(|name, _| names.contains(&name.as_str()));
+            same(&ours, &found, path)?;
+        }
     }
     Ok(())
 }

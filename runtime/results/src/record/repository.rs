@@ -130,7 +130,8 @@ impl Repository {
     /// out, and so is what a plan says to people only: of the plan, its [meaning](CampaignPlan::meaning) is hashed.
     /// Everything is read from the file each time: no stored hash is used.
     ///
-    /// Operations that were one operation in an imported file are hashed last, if there are any.
+    /// Operations that were one operation in an imported file are hashed last, if there are any, and so are runs of a
+    /// lab that were entered by hand: of which test each is a run, but not who made it.
     ///
     /// Results of an earlier schema have the digest that their release computed.
     pub fn digest(&self) -> Result<String, RecordError> {

@@ -4,7 +4,7 @@ use sesame_plan::{Search, Task};
 
 use crate::present::markup::Markup;
 use crate::present::number::{self, plural};
-use crate::record::{RecordError, Repository};
+use crate::record::{Provenance, RecordError, Repository};
 use crate::report::facts::repetition::repeated_words;
 use crate::report::facts::summary::Summary;
 use crate::report::sentences::{counts_sentence, headline};
@@ -48,7 +48,7 @@ pub(super) fn header(
     let wall: f64 = sessions.iter().filter_map(|session| Some(session.ended_at? - session.started_at)).sum();
     let workers = sessions.last().map_or(0, |session| session.workers);
     let workers = plural(usize::try_from(workers).unwrap_or(usize::MAX), "worker", "workers");
-    let rows = [
+    let mut rows = vec![
         ("Search", search),
         ("Seed", facts.seed.to_string()),
         ("One test", format!("{} of simulation", number::quantity(plan.campaign.end_after, Some("s")))),
@@ -56,8 +56,9 @@ pub(super) fn header(
         ("Made by", format!("{}, sesame-runtime {}", plan.generator, facts.runtime)),
         ("Source", plan.source.clone()),
         ("Ended", facts.stop.clone().unwrap_or_else(|| "unfinished".to_owned())),
-        ("Digest", digest.to_owned()),
     ];
+    rows.extend(entered(repository)?);
+    rows.push(("Digest", digest.to_owned()));
     body.open("dl", &[]);
     for (name, value) in &rows {
         body.open("div", &[("class", if *name == "Digest" { "digest" } else { "fact" })]);
@@ -73,4 +74,25 @@ pub(super) fn header(
     }
     body.close();
     Ok(())
+}
+
+/// Who made runs that were entered by hand, and with what: what was said, once each.
+fn entered(repository: &Repository) -> Result<Vec<(&'static str, String)>, RecordError> {
+    let entries = repository.lab_provenance()?;
+    let fields: [(&str, fn(&Provenance) -> &Option<String>); 4] = [
+        ("Operator", |it| &it.operator),
+        ("Hardware", |it| &it.hardware),
+        ("Software", |it| &it.software),
+        ("Date", |it| &it.date),
+    ];
+    let said = fields.into_iter().map(|(name, field)| {
+        let mut texts: Vec<&str> = Vec::new();
+        for text in entries.values().filter_map(|entry| field(entry).as_deref()) {
+            if !texts.contains(&text) {
+                texts.push(text);
+            }
+        }
+        (name, texts.join(", "))
+    });
+    Ok(said.filter(|(_, texts)| !texts.is_empty()).collect())
 }

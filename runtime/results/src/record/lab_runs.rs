@@ -1,0 +1,370 @@
+//! Runs that people made in a lab and entered by hand: of which test of the campaign each is, and who made them with
+//! what.
+//!
+//! Each run is a test of the lab's results. The tables are only there if runs were entered: results of a campaign, and
+//! those that a runner made in a lab, have none. Who made the runs with what is no part of the digest.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use rusqlite::{Connection, params};
+
+use sesame_base::observation::{MetricObservation, Observation, OperationEffect, Outcome, Reach};
+use sesame_base::test_number::TestNumber;
+use sesame_plan::{Activation, CampaignPlan, LabTask, Metric, Span, Task, Test, TestOperation};
+
+use crate::record::write_tests::write_test;
+use crate::record::{Origin, RecordError, Recorder, Repository, TestRecord};
+
+pub(super) const TABLE: &str = "lab_runs";
+pub(super) const PROVENANCE: &str = "lab_provenance";
+
+pub(super) const DDL: &str = "
+-- Runs in a lab that were entered by hand; each is a test.
+CREATE TABLE lab_runs (
+    test            INTEGER PRIMARY KEY REFERENCES tests,
+    of              INTEGER NOT NULL, -- number of the test in the results of the campaign
+    run             INTEGER NOT NULL  -- which run of that test in the lab, from 1
+) STRICT;
+-- Who made the runs in the lab, and with what; as far as they said it. No part of the digest.
+CREATE TABLE lab_provenance (
+    first_test      INTEGER PRIMARY KEY REFERENCES tests, -- of those that were entered together; the next row ends them
+    operator        TEXT,
+    hardware        TEXT,
+    software        TEXT,
+    date            TEXT
+) STRICT;
+";
+
+/// What is read and hashed of the runs.
+pub(super) const QUERY: &str = "SELECT test, of, run FROM lab_runs ORDER BY test";
+
+/// The words for how a run can have ended, as people enter it.
+pub const ENTERED_OUTCOMES: [&str; 8] =
+    ["completed", "no_effect", "unknown", "crash", "timeout", "launch_failed", "disconnect", "wrong_clock"];
+
+/// How a run ended, from one of [`ENTERED_OUTCOMES`]; `None` for any other word.
+///
+/// Of a run that broke off no cause is entered. A lab runs in wall time, so the limit of a timeout is the length of a
+/// test.
+pub fn entered_outcome(word: &str, plan: &CampaignPlan) -> Option<Outcome> {
+    let message = "entered by hand, without a cause".to_owned();
+    Some(match word {
+        "completed" => Outcome::Completed,
+        "no_effect" => Outcome::NoEffect,
+        "unknown" => Outcome::Unknown,
+        "crash" => Outcome::Crash { message },
+        "timeout" => Outcome::Timeout { limit: plan.campaign.end_after },
+        "launch_failed" => Outcome::LaunchFailed { message },
+        "disconnect" => Outcome::Disconnect { message },
+        "wrong_clock" => Outcome::WrongClock { message },
+        _ => return None,
+    })
+}
+
+/// A run in a lab as people enter it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Entered {
+    /// The number of the test of the campaign that was run.
+    pub of: u32,
+    /// Which run of that test in the lab, from 1.
+    pub run: u32,
+    /// How it ended.
+    pub outcome: Outcome,
+    /// Per metric of the plan, in its order and unit; `None` where it was not measured. Finite.
+    pub values: Vec<Option<f64>>,
+}
+
+/// A run in a lab that was entered by hand, as it is recorded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct EnteredRun {
+    /// The number of the test that it is in the lab's results.
+    pub test: u32,
+    /// The number of the test of the campaign that was run.
+    pub of: u32,
+    /// Which run of that test in the lab, from 1.
+    pub run: u32,
+}
+
+/// Who made runs in a lab, and with what, as far as they said it.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Provenance {
+    /// Who ran the tests.
+    pub operator: Option<String>,
+    /// The robots and what is around them.
+    pub hardware: Option<String>,
+    /// What ran on them.
+    pub software: Option<String>,
+    /// When the tests were run, in any notation.
+    pub date: Option<String>,
+}
+
+/// Whether results have the tables, which were [recognised](super::recognise).
+pub(super) fn are_in(connection: &Connection) -> rusqlite::Result<bool> {
+    connection.query_row(
+        "SELECT EXISTS (SELECT 1 FROM sqlite_schema WHERE type = 'table' AND name = ?1)",
+        [TABLE],
+        |row| row.get(0),
+    )
+}
+
+/// A run as a test of the lab's results.
+///
+/// Nobody counted what operations did. Of an outcome that says so, the times at which they were to be active stand for
+/// those at which they were, as in an imported test.
+fn record(plan: &CampaignPlan, test: &Test, number: u32, entered: &Entered) -> TestRecord {
+    let Entered { of: _, run: _, outcome, values } = entered;
+    let over = plan.campaign.end_after;
+    let metric = |(metric, value): (&Metric, &Option<f64>)| {
+        let mut shown = MetricObservation::whole(*value, value.is_some(), Vec::new());
+        if !outcome.is_whole() {
+            shown.reach = Reach::onwards(metric.trend, *value);
+        }
+        shown
+    };
+    let effect = |used: &TestOperation| {
+        let planned = match used.activation {
+            Activation::Time { start, end } => Some(Span { start: start.max(0.0), end: end.min(over) }),
+            Activation::Condition { .. } | Activation::ConditionFor { .. } | Activation::Offline => None,
+        };
+        let intervals = planned.filter(|span| span.start <= span.end).into_iter().collect();
+        OperationEffect { intervals, ..OperationEffect::default() }
+    };
+    let operations = match outcome {
+        Outcome::Unknown => test.operations.iter().map(effect).collect(),
+        _ => Vec::new(),
+    };
+    TestRecord {
+        number,
+        origin: Origin::Search,
+        generation: None,
+        parents: Vec::new(),
+        test: test.clone(),
+        simulator_seed: 0,
+        duplicate_of: None,
+        observation: Observation {
+            end: over,
+            operations,
+            metrics: plan.metrics.iter().zip(values).map(metric).collect(),
+            ..Observation::without_run(outcome.clone())
+        },
+    }
+}
+
+impl Recorder {
+    /// Records runs that were entered by hand, together with the task of all runs that are then recorded: all of it in
+    /// one transaction, or nothing. The task must have the tests of all of them.
+    pub fn put_entered_runs(
+        &mut self,
+        task: LabTask,
+        provenance: &Provenance,
+        runs: &[Entered],
+    ) -> Result<(), RecordError> {
+        self.check_lock()?;
+        let path = self.repository().path().to_owned();
+        let plan = self.repository().plan().clone();
+        let first = self.repository().numbers()?.last().map_or(1, |last| last + 1);
+        let tests: BTreeMap<u32, &Test> = task.tests.iter().map(|it| (it.number, &it.test)).collect();
+        let mut records = Vec::with_capacity(runs.len());
+        for (number, entered) in (first..).zip(runs) {
+            let test = tests.get(&entered.of).expect("a task has the tests of its runs");
+            let record = record(&plan, test, number, entered);
+            self.recordable(&record)?;
+            records.push(record);
+        }
+        let task = Task::Lab(task);
+        let json = serde_json::to_string(&task).expect("a task is plain data with text keys");
+        let written = self.connection().transaction().and_then(|transaction| {
+            if !are_in(&transaction)? {
+                transaction.execute_batch(DDL)?;
+            }
+            for (record, Entered { of, run, .. }) in records.iter().zip(runs) {
+                write_test(&transaction, &plan, record)?;
+                transaction
+                    .prepare_cached("INSERT INTO lab_runs (test, of, run) VALUES (?1, ?2, ?3)")?
+                    .execute(params![record.number, of, run])?;
+            }
+            if *provenance != Provenance::default() {
+                let Provenance { operator, hardware, software, date } = provenance;
+                transaction.execute(
+                    "INSERT INTO lab_provenance (first_test, operator, hardware, software, date) \
+                     VALUES (?1, ?2, ?3, ?4, ?5)",
+                    params![first, operator, hardware, software, date],
+                )?;
+            }
+            transaction
+                .execute("UPDATE campaign SET task = ?1, evaluations = ?2", params![json, task.evaluations(&plan)])?;
+            transaction.commit()
+        });
+        written.map_err(|source| RecordError::database("record the runs of the lab", &path, source))?;
+        self.now_has(task);
+        Ok(())
+    }
+}
+
+impl Repository {
+    /// The runs in a lab that were entered by hand, by the number of the test that each is; empty where a runner made
+    /// all tests.
+    ///
+    /// Each is a recorded test and a run of a test of the task, and no run of a test is there twice.
+    pub fn lab_runs(&self) -> Result<Vec<EnteredRun>, RecordError> {
+        if !self.has_entered_runs()? {
+            return Ok(Vec::new());
+        }
+        let damaged = |problem: String| RecordError::damaged(&self.path, problem);
+        let runs =
+            self.read(QUERY, [], |row| Ok(EnteredRun { test: row.get(0)?, of: row.get(1)?, run: row.get(2)? }))?;
+        let Some(task) = self.task().in_lab() else {
+            return Err(damaged("there are runs of a lab in results of no lab".to_owned()));
+        };
+        let recorded: BTreeMap<u32, _> = self.tests()?.into_iter().map(|row| (row.number, row.test)).collect();
+        let mut seen = BTreeSet::new();
+        for &EnteredRun { test, of, run } in &runs {
+            let (number, of_number) = (TestNumber(test), TestNumber(of));
+            let Some(recorded) = recorded.get(&test) else {
+                return Err(damaged(format!("{number} is a run of a lab and no test")));
+            };
+            if task.of(recorded) != Some(of) {
+                return Err(damaged(format!("{number} is not the test of which it is a run, {of_number}")));
+            }
+            if run == 0 || !seen.insert((of, run)) {
+                return Err(damaged(format!("run {run} of {of_number} in the lab is there twice, or has no number")));
+            }
+        }
+        Ok(runs)
+    }
+
+    /// Who made the runs that were entered together, and with what: by the number of the first test of each entry.
+    /// Entries of which nothing was said are not there.
+    pub fn lab_provenance(&self) -> Result<BTreeMap<u32, Provenance>, RecordError> {
+        if !self.has_entered_runs()? {
+            return Ok(BTreeMap::new());
+        }
+        let rows = self.read(
+            "SELECT first_test, operator, hardware, software, date FROM lab_provenance ORDER BY first_test",
+            [],
+            |row| {
+                let [operator, hardware, software, date] = [row.get(1)?, row.get(2)?, row.get(3)?, row.get(4)?];
+                Ok((row.get(0)?, Provenance { operator, hardware, software, date }))
+            },
+        )?;
+        Ok(rows.into_iter().collect())
+    }
+
+    fn has_entered_runs(&self) -> Result<bool, RecordError> {
+        are_in(&self.connection).map_err(|error| RecordError::database("read the results", &self.path, error))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use sesame_plan::LabTest;
+
+    use super::*;
+    use crate::record::{DATABASE, sample};
+
+    const NOBODY: Provenance = Provenance { operator: None, hardware: None, software: None, date: None };
+
+    fn entered(of: u32, run: u32, word: &str, collisions: Option<f64>) -> Entered {
+        let outcome = entered_outcome(word, &sample::plan()).unwrap();
+        Entered { of, run, outcome, values: vec![collisions, Some(1.5), None, None, Some(-0.25)] }
+    }
+
+    /// The task of so many tests, each of which was run so often.
+    fn task(tests: u32, repeats: u32) -> LabTask {
+        let numbered = |number: u32| {
+            let mut test = sample::plan().tests[0].test.clone();
+            test.operations[0].operation_seed = u64::from(number);
+            LabTest { number, test }
+        };
+        LabTask { lab: "hall".to_owned(), results: "0".repeat(64), tests: (1..=tests).map(numbered).collect(), repeats }
+    }
+
+    /// Results of these runs, entered one after the other.
+    fn lab(folder: &std::path::Path, entries: &[(LabTask, Provenance, &[Entered])]) -> Repository {
+        let plan = sample::plan();
+        for (at, (task, provenance, runs)) in entries.iter().enumerate() {
+            let mut recorder = if at == 0 {
+                Recorder::create_for(folder, &plan, &Task::Lab(task.clone()), 1, 0).unwrap()
+            } else {
+                Recorder::reopen(folder, 0).unwrap()
+            };
+            recorder.put_entered_runs(task.clone(), provenance, runs).unwrap();
+            recorder.finish("entered by hand").unwrap();
+        }
+        Repository::open(folder).unwrap()
+    }
+
+    #[test]
+    fn runs_are_read_as_they_were_entered_at_once_or_one_after_the_other() {
+        let runs =
+            [entered(1, 1, "completed", Some(2.0)), entered(2, 1, "crash", Some(1.0)), entered(1, 2, "unknown", None)];
+        let ada = Provenance { operator: Some("Ada".to_owned()), ..NOBODY };
+        let (apart, together) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let apart = lab(apart.path(), &[(task(2, 1), ada.clone(), &runs[..2]), (task(2, 2), NOBODY, &runs[2..])]);
+        let together = lab(together.path(), &[(task(2, 2), NOBODY, &runs)]);
+        let expected = [(1, 1, 1), (2, 2, 1), (3, 1, 2)].map(|(test, of, run)| EnteredRun { test, of, run });
+        for repository in [&apart, &together] {
+            assert_eq!(repository.lab_runs().unwrap(), expected);
+            assert_eq!(repository.task(), &Task::Lab(task(2, 2)));
+            for (number, run) in (1..).zip(&runs) {
+                let recorded = repository.test(number).unwrap().observation;
+                assert_eq!(recorded.outcome, run.outcome);
+                let values: Vec<Option<f64>> = recorded.metrics.iter().map(|metric| metric.value).collect();
+                assert_eq!(values, run.values);
+            }
+        }
+        assert_eq!(apart.digest().unwrap(), together.digest().unwrap(), "who made the runs is no part of it");
+        assert_eq!(apart.lab_provenance().unwrap(), BTreeMap::from([(1, ada)]));
+        assert_eq!(together.lab_provenance().unwrap(), BTreeMap::new());
+    }
+
+    #[test]
+    fn the_digest_says_which_run_of_which_test_it_was() {
+        let digest = |of: u32, run: u32| {
+            let folder = tempfile::tempdir().unwrap();
+            lab(folder.path(), &[(task(2, 1), NOBODY, &[entered(of, run, "completed", None)])]).digest().unwrap()
+        };
+        assert_eq!(digest(1, 1), digest(1, 1));
+        assert_ne!(digest(1, 1), digest(1, 2));
+        assert_ne!(digest(1, 1), digest(2, 1));
+    }
+
+    #[test]
+    fn what_a_run_that_broke_off_might_still_have_shown_is_open() {
+        let folder = tempfile::tempdir().unwrap();
+        let runs = [entered(1, 1, "completed", Some(0.0)), entered(1, 2, "timeout", Some(0.0))];
+        let repository = lab(folder.path(), &[(task(1, 2), NOBODY, &runs)]);
+        let verdicts: Vec<&str> = [1, 2]
+            .map(|number| repository.row(number).unwrap().verdict(&repository.plan().requirements[0]).word())
+            .to_vec();
+        assert_eq!(verdicts, ["satisfied", "inconclusive"]);
+    }
+
+    #[test]
+    fn each_word_for_an_outcome_is_that_of_the_outcome() {
+        for word in ENTERED_OUTCOMES {
+            assert_eq!(entered_outcome(word, &sample::plan()).unwrap().word(), word);
+        }
+        assert_eq!(entered_outcome("Completed", &sample::plan()), None);
+    }
+
+    #[test]
+    fn runs_that_contradict_the_tests_are_damaged() {
+        let said = |sql: &str| {
+            let folder = tempfile::tempdir().unwrap();
+            let runs = [entered(1, 1, "completed", None), entered(2, 1, "completed", None)];
+            drop(lab(folder.path(), &[(task(2, 1), NOBODY, &runs)]));
+            let connection = Connection::open(folder.path().join(DATABASE)).unwrap();
+            connection.execute_batch(&format!("PRAGMA foreign_keys = OFF; {sql}")).unwrap();
+            drop(connection);
+            Repository::open(folder.path()).and_then(|it| it.lab_runs()).unwrap_err().to_string()
+        };
+        assert!(said("UPDATE lab_runs SET of = 2").contains("T1 is not the test of which it is a run, T2"));
+        assert!(said("UPDATE lab_runs SET test = 9 WHERE test = 2").contains("T9 is a run of a lab and no test"));
+        assert!(said("UPDATE lab_runs SET run = 0").contains("run 0 of T1"));
+        assert!(said("UPDATE campaign SET task = NULL").contains("runs of a lab in results of no lab"));
+        assert!(said("DROP TABLE lab_provenance").contains("the table `lab_provenance` is missing"));
+        let view = "DROP TABLE lab_runs; CREATE VIEW lab_runs AS SELECT 1 AS test";
+        assert!(said(view).contains("`lab_runs` is not a table, but a view"));
+    }
+}

@@ -1,0 +1,1 @@
+//! Forms are printed, filled in, and taken or refused.
