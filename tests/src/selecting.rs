@@ -1,5 +1,5 @@
 //! Choices of tests for a laboratory with fixed seeds, for benchmarks, and Python's solvers on the same ones: CP-SAT of
-//! `ortools`, and outer approximation over HiGHS, by `tests/suite/selecting.py`.
+//! `ortools`, and outer approximation over `HiGHS`, by `tests/suite/selecting.py`.
 
 use serde::{Deserialize, Serialize};
 

@@ -77,7 +77,7 @@ pub fn choose(problem: &Problem, stop: &mut dyn FnMut() -> bool) -> Selection {
     let mut bound = f64::NEG_INFINITY;
     for size in (least..=most).rev() {
         let size = Size::new(problem, &usable, size, &mut search);
-        if size.bound < search.threshold() {
+        if size.bound < search.incumbent.equal() {
             // A smaller size is bounded by less.
             break;
         }
@@ -85,13 +85,19 @@ pub fn choose(problem: &Problem, stop: &mut dyn FnMut() -> bool) -> Selection {
     }
     let mut stopped = false;
     for size in &mut sizes {
-        if !stopped {
-            stopped = !size.reduce(&mut search);
-        }
+        stopped = stopped || !size.reduce(&mut search);
     }
+    // Also if that was before the first size was reduced.
+    stopped |= search.was_stopped();
     for size in &mut sizes {
-        let Some(root) = size.root.clone().filter(|_| size.bound >= search.threshold()) else { continue };
-        bound = bound.max(if stopped { size.bound } else { search.explore(&mut size.instance, root) });
+        if size.bound < search.threshold() {
+            continue;
+        }
+        if stopped {
+            bound = bound.max(size.bound);
+        } else if let Some(root) = size.root.clone() {
+            bound = bound.max(search.explore(&mut size.instance, root));
+        }
     }
     let value = search.incumbent.value;
     let chosen = search.incumbent.choice().expect("greedy choices exist where two tests are cheap enough").clone();

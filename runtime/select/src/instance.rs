@@ -168,6 +168,13 @@ impl Instance {
         &self.rows[at]
     }
 
+    /// Gives back the memory of all rows.
+    pub(crate) fn forget(&mut self) {
+        for at in self.kept.drain(..) {
+            self.rows[at] = Vec::new();
+        }
+    }
+
     /// One entry of `A`.
     pub(crate) fn pair(&self, one: usize, other: usize) -> f64 {
         if one == other {

@@ -14,7 +14,8 @@ const SHARE: f64 = 0.9;
 /// The choices of one number of tests.
 pub(crate) struct Size {
     pub(crate) instance: Instance,
-    /// All choices; empty once it is proved that none is good enough.
+    /// All choices; `None` once it is proved that none is good enough, and if the search was stopped before they were
+    /// looked at.
     pub(crate) root: Option<Node>,
     /// No choice of this size has a greater value.
     pub(crate) bound: f64,
@@ -24,7 +25,9 @@ impl Size {
     /// Finds good choices of this size, and bounds all of them roughly.
     pub(crate) fn new(problem: &Problem, usable: &[usize], size: usize, search: &mut Search<'_>) -> Self {
         let mut instance = Instance::new(problem, usable.to_vec(), size);
-        let starts = start::choices(&mut instance);
+        // Once the search was stopped, one good choice of any size is enough.
+        let enough = search.stopped() && search.incumbent.choice().is_some();
+        let starts = if enough { Vec::new() } else { start::choices(&mut instance) };
         for choice in &starts {
             search.offer(&instance, choice);
         }
@@ -33,6 +36,8 @@ impl Size {
         own.sort_by(|a, b| b.total_cmp(a));
         let pairs = (size * (size - 1) / 2) as f64;
         let bound = own.iter().take(size).sum::<f64>() + pairs * problem.distance_weight() * problem.diameter();
+        // There may be many sizes, each with rows of its own.
+        instance.forget();
         Size { instance, root, bound }
     }
 
@@ -52,6 +57,7 @@ impl Size {
             let alive = root.settle(&mut self.instance, threshold, ROUNDS);
             self.bound = self.bound.min(root.bound);
             if !alive {
+                self.instance.forget();
                 return true;
             }
             let these: Vec<usize> = (0..self.instance.len()).filter(|&at| root.fate[at] != Fate::Out).collect();

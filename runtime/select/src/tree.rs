@@ -32,6 +32,11 @@ impl<'a> Search<'a> {
         self.stopped
     }
 
+    /// Whether the search was stopped, without asking.
+    pub(crate) fn was_stopped(&self) -> bool {
+        self.stopped
+    }
+
     pub(crate) fn threshold(&self) -> f64 {
         self.goal.unwrap_or_else(|| self.incumbent.threshold())
     }

@@ -126,3 +126,34 @@ fn budgets_for_one_test_and_none_have_their_choices() {
         0.0
     );
 }
+
+/// Two thousand tests in thirty clusters: far too many for anything but the bounds.
+#[test]
+fn near_duplicates_and_many_sizes_are_proved_after_few_questions() {
+    let mut state = 1_u64;
+    let mut unit = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f64 / (1_u64 << 24) as f64
+    };
+    let centres: Vec<[f64; 3]> = (0..30).map(|_| [unit(), unit(), unit()]).collect();
+    let mut near = |at: usize| {
+        let [x, y, quality] = centres[at % 30];
+        let point = vec![x + 0.02 * unit(), y + 0.02 * unit()];
+        Test {
+            point,
+            quality: 0.9 * quality + 0.1 * unit(),
+            cost: 1.0 + f64::from(u8::from(at.is_multiple_of(3))),
+            forced: false,
+        }
+    };
+    let tests: Vec<Test> = (0..2_000).map(&mut near).collect();
+    for lambda in [0.25, 0.75, 1.0] {
+        let mut asked = 0;
+        let problem = Problem::new(tests.clone(), lambda, 8.0, Pairs::Unordered).expect("it is valid");
+        let selection = choose(&problem, &mut || {
+            asked += 1;
+            asked > 20_000
+        });
+        assert_eq!(selection.state, State::Proved, "λ = {lambda}");
+    }
+}

@@ -1,5 +1,5 @@
 //! How long it takes to choose tests for a laboratory and to prove the choice; and beside that, where
-//! `SESAME_SOLVERS_PYTHON` names a Python with them, CP-SAT and outer approximation over HiGHS with a minute each.
+//! `SESAME_SOLVERS_PYTHON` names a Python with them, CP-SAT and outer approximation over `HiGHS` with a minute each.
 
 use std::hint::black_box;
 use std::time::Instant;

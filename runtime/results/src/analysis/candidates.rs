@@ -146,8 +146,8 @@ pub fn candidates(repository: &Repository, selection: &Selection, terms: &Terms)
     Ok(found)
 }
 
-/// How interesting each measured test is, from 0 to 1: its [rank](sesame_select::ranking) among all of them, by the keys
-/// of [`Candidates::measured`]. Of none, if tests are ranked by nothing.
+/// How interesting each measured test is, from 0 to 1: its [rank](sesame_select::ranking) among all of them, by the
+/// keys of [`Candidates::measured`]. Of none, if tests are ranked by nothing.
 pub fn qualities(measured: &BTreeMap<u32, Vec<f64>>, convention: Convention) -> BTreeMap<u32, f64> {
     let count = measured.values().next().map_or(0, Vec::len);
     let columns: Vec<Vec<f64>> = (0..count).map(|key| measured.values().map(|keys| keys[key]).collect()).collect();
