@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Campaign, KnownTest, KnownTestId, Lab, MessageId, MessageType, Metric, MetricId, Node, NodeId, Operation,
+    Campaign, Compensation, KnownTest, KnownTestId, Lab, MessageId, MessageType, Metric, MetricId, Node, NodeId, Operation,
     OperationId, Requirement, RequirementId, Simulator, Topic, TopicId,
 };
 
@@ -44,6 +44,9 @@ pub struct CampaignPlan {
     /// All labs of the space, in declaration order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub labs: Vec<Lab>,
+    /// What brings the simulation closer to a lab; `None` for the simulation as it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub compensation: Option<Compensation>,
 }
 
 impl CampaignPlan {

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{CampaignPlan, KnownTestId, RequirementId, Search, Test};
+use crate::{CampaignPlan, KnownTestId, Recorded, RequirementId, Search, Test};
 
 /// What one run of a runner does.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -29,9 +29,12 @@ pub enum Task {
     Shrink(Shrinking),
     /// It runs chosen tests of a campaign in a lab: `physical`; or somebody ran them there by hand.
     Lab(LabTask),
+    /// It simulates the tests that a lab ran, with what [compensates](crate::Compensation) for the reality gap:
+    /// `compensate`.
+    Compensated(LabTask),
 }
 
-/// Tests of a campaign that are run in a lab.
+/// Tests of a campaign that are run in a lab, or once more in simulation to compare them with a lab.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LabTask {
     /// The lab's name.
@@ -113,7 +116,7 @@ impl Task {
             Task::Known { tests } => u32::try_from(tests.len()).unwrap_or(u32::MAX),
             Task::Repeat { times, .. } => *times,
             Task::Shrink(shrinking) => shrinking.evaluations,
-            Task::Lab(LabTask { tests, repeats, .. }) => {
+            Task::Lab(LabTask { tests, repeats, .. }) | Task::Compensated(LabTask { tests, repeats, .. }) => {
                 u32::try_from(tests.len()).unwrap_or(u32::MAX).saturating_mul(*repeats)
             }
         }
@@ -131,6 +134,10 @@ impl Task {
             campaign.confirm = None;
             campaign.neighbours = None;
             campaign.stop.clear();
+            // What is compared with a simulation is compared in its traces too.
+            if self.of_lab().is_some() {
+                campaign.record = Some(Recorded::All);
+            }
         }
         plan
     }
@@ -157,6 +164,16 @@ impl Task {
         if let Task::Lab(lab) = self { Some(lab) } else { None }
     }
 
+    /// Which tests are simulated once more with what compensates for a reality gap; `None` if none are.
+    pub fn compensated(&self) -> Option<&LabTask> {
+        if let Task::Compensated(lab) = self { Some(lab) } else { None }
+    }
+
+    /// The tests of a lab that are run, in the lab or in simulation; `None` if none are.
+    pub fn of_lab(&self) -> Option<&LabTask> {
+        self.in_lab().or(self.compensated())
+    }
+
     /// Whether it searches for tests: only a campaign does, unless it repeats a test.
     pub fn searches(&self, plan: &CampaignPlan) -> bool {
         *self == Task::Campaign && plan.campaign.search.strategy().is_some()
@@ -170,6 +187,7 @@ impl Task {
             Task::Repeat { .. } => "repeat",
             Task::Shrink(_) => "shrink",
             Task::Lab(_) => "lab",
+            Task::Compensated(_) => "compensated",
         }
     }
 }

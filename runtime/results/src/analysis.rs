@@ -140,7 +140,7 @@ pub fn tests(repository: &Repository, selection: &Selection) -> Result<Table, Re
 
 /// Of the results of a lab, the test of the campaign that each test is a run of, by number; of others nothing.
 fn runs_in_a_lab(repository: &Repository) -> Result<BTreeMap<u32, u32>, RecordError> {
-    let Some(task) = repository.task().in_lab() else { return Ok(BTreeMap::new()) };
+    let Some(task) = repository.task().of_lab() else { return Ok(BTreeMap::new()) };
     let rows = repository.tests()?;
     Ok(rows.iter().filter_map(|row| Some((row.number, task.of(&row.test)?))).collect())
 }

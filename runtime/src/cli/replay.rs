@@ -50,8 +50,13 @@ pub(super) fn replay(session: &Session, options: &Options) -> Result<ExitCode, F
         directory: folder.0.clone(),
         timeout: options.timeout.unwrap_or_else(|| limit(&record)),
     };
-    let job =
-        Job { number: record.number, test: record.test.clone(), simulator_seed: record.simulator_seed, trace: None };
+    let job = Job {
+        number: record.number,
+        test: record.test.clone(),
+        simulator_seed: record.simulator_seed,
+        trace: None,
+        compensation: repository.plan().compensation.clone(),
+    };
     let ended = run_single(job, &settings, &interrupted);
     files.finish()?;
     let Some(JobResult { observation: again, notes, lock_stepped, .. }) = ended? else {

@@ -67,7 +67,7 @@ fn json(value: &Value) -> serde_json::Value {
 
 #[test]
 fn as_modelled_it_has_the_runs_of_the_noisy_cell_to_the_last_bit() {
-    let mut bench = Bench::<NoisyCell>::start(&Setup { seed: 7, step: STEP }).expect("the cell starts");
+    let mut bench = Bench::<NoisyCell>::start(&Setup::new(7, STEP)).expect("the cell starts");
     bench.run_until(SimTime::from_nanos(STEP.nanos() * i64::from(STEPS))).expect("the cell runs");
     let inside: Published = bench
         .topics()
