@@ -7,9 +7,9 @@ use sesame_base::observation::{OperationEffect, Outcome};
 use sesame_plan::condition::ConditionEnd;
 use sesame_plan::testing::lab;
 use sesame_plan::{
-    Adjustment, BoostedChildren, CampaignPlan, Compensation, Confirmation, CoverageGoal, Dimension, Expectation, Exploration, Failing, Fit, Fitted, GridAxis,
-    Lab, LabBudget, LabExclusion, LabTask, LabTest, LabTolerance, MetricId, RankKey, RankOrder, RequirementId,
-    Shrinking, Statistic, StopRule, Task, TopicId,
+    Adjustment, BoostedChildren, CampaignPlan, Compensation, Confirmation, CoverageGoal, Dimension, Expectation,
+    Exploration, Failing, Fit, Fitted, GridAxis, Lab, LabBudget, LabExclusion, LabTask, LabTest, LabTolerance,
+    MetricId, RankKey, RankOrder, RequirementId, Shrinking, Statistic, StopRule, Task, TopicId,
 };
 use sesame_results::record::{
     DATABASE, Entered, GenerationCoverage, Origin, Provenance, Recorder, Repetition, entered_outcome, sample,
@@ -189,10 +189,10 @@ pub(super) fn wholes() -> Vec<Whole> {
             run,
             outcome: entered_outcome(word, &plan).unwrap(),
             values: (0..).take(plan.metrics.len()).map(|at: u32| (at != 2).then(|| f64::from(at))).collect(),
+            provenance: Provenance { operator: Some("Ada".to_owned()), ..Provenance::default() },
         };
         let runs: Vec<Entered> = (1..).zip(["completed", "unknown", "timeout"]).map(run).collect();
-        let said = Provenance { operator: Some("Ada".to_owned()), ..Provenance::default() };
-        recorder.put_entered_runs(task, &said, &runs).unwrap();
+        recorder.put_entered_runs(task, &runs).unwrap();
         recorder.finish("entered by hand").unwrap();
         wholes.push(taken("entered", folder.path()));
     }

@@ -21,18 +21,20 @@ use clap::{Args, Subcommand, ValueEnum};
 
 use sesame_dsl::similar::most_similar;
 use sesame_plan::{CampaignPlan, LabTask, LabTest, Task};
+use sesame_results::analysis::gap::lab_runs;
 use sesame_results::record::{DATABASE, Entered, EnteredRun, Provenance, Recorder, Repository};
 use sesame_runtime::cli::Caller;
 
 use self::campaign::Campaign;
-use self::check::{Recorded, Taken};
+use self::check::Taken;
+use self::form::Wanted;
 use super::commands::all;
 use super::shell::{self, Shell};
 use crate::input;
 use crate::output::FreshFolder;
 
-/// The folder in that of a run for results of a lab that are entered by hand.
-const FOLDER: &str = "lab";
+/// The lab of a space that declares none.
+const ONLY: &str = "lab";
 
 /// Why results that were entered have ended.
 const ENDED: &str = "entered by hand";
@@ -58,10 +60,10 @@ pub(super) struct Form {
     #[arg(long, value_name = "NAME")]
     lab: Option<String>,
     /// How often each test is run; if omitted, as often as the lab's `physical` block says, or else once.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
-    repeats: Option<u32>,
+    #[arg(short = 'n', long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    times: Option<u32>,
     /// Write the form into this file, which must not exist; if omitted, it is printed.
-    #[arg(long, short = 'o', value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// How the form is written: for a spreadsheet, or for a program.
     #[arg(long, value_enum, default_value_t)]
@@ -87,21 +89,21 @@ pub(super) struct Add {
     /// The lab; the only one of the space if omitted.
     #[arg(long, value_name = "NAME")]
     lab: Option<String>,
-    /// Who ran the tests.
+    /// Who ran the tests, unless the forms say it.
     #[arg(long, value_name = "TEXT")]
     operator: Option<String>,
-    /// On which robots.
+    /// On which robots, unless the forms say it.
     #[arg(long, value_name = "TEXT")]
     hardware: Option<String>,
-    /// With which software.
+    /// With which software, unless the forms say it.
     #[arg(long, value_name = "TEXT")]
     software: Option<String>,
-    /// When, in any notation.
+    /// When, in any notation, unless the forms say it.
     #[arg(long, value_name = "TEXT")]
     date: Option<String>,
-    /// The folder for the results; runs of the same lab that are there already are added to. If omitted, the next free
-    /// one of `lab/1`, `lab/2`, … in the folder of the run.
-    #[arg(long, value_name = "DIR")]
+    /// The folder of the lab's results; runs that were added to it before stay. If omitted, it is beside the run, and
+    /// named after the run and the lab.
+    #[arg(long, value_name = "FOLDER")]
     output: Option<PathBuf>,
 }
 
@@ -116,20 +118,14 @@ pub(super) fn lab(shell: Shell, asked: &Lab) -> anyhow::Result<ExitCode> {
 
 fn print_form(shell: Shell, asked: &Form) -> anyhow::Result<()> {
     let campaign = Campaign::open(&asked.results)?;
-    let repeats = match asked.repeats {
-        Some(repeats) => repeats,
-        None => {
-            let name = lab_name(campaign.plan(), asked.lab.as_deref())?;
-            campaign.plan().labs.iter().find(|lab| lab.name == name).map_or(1, |lab| lab.repeats)
-        }
-    };
-    if asked.repeats.is_some() && asked.lab.is_some() {
-        lab_name(campaign.plan(), asked.lab.as_deref())?;
-    }
+    let name = lab_name(campaign.plan(), asked.lab.as_deref())?;
+    let repeats = || campaign.plan().labs.iter().find(|lab| lab.name == name).map_or(1, |lab| lab.repeats);
+    let times = asked.times.unwrap_or_else(repeats);
     let tests = campaign.to_run(&asked.tests)?;
+    let wanted = Wanted { lab: &name, tests: &tests, times };
     let text = match asked.format {
-        Written::Csv => form::csv(&campaign, &tests, repeats),
-        Written::Json => form::json(&campaign, &tests, repeats),
+        Written::Csv => form::csv(&campaign, &wanted),
+        Written::Json => form::json(&campaign, &wanted),
     };
     let Some(file) = &asked.out else { return shell::asked_for(&text) };
     let written = OpenOptions::new().write(true).create_new(true).open(file);
@@ -140,87 +136,93 @@ fn print_form(shell: Shell, asked: &Form) -> anyhow::Result<()> {
         _ => anyhow!("cannot write {}: {error}", file.display()),
     })?;
     written.write_all(text.as_bytes()).with_context(|| format!("cannot write {}", file.display()))?;
-    let rows = tests.len() * repeats as usize;
+    let rows = tests.len() * times as usize;
     shell.did("Written", format!("{}: a form for {}", file.display(), counted(rows, "run")));
-    shell.text(&format!(
-        "\nNext:\n\n  fill in the form, then    {}\n",
-        command("lab add", &[&campaign.folder().display().to_string(), &file.display().to_string()])
-    ));
+    let [results, file] = [&asked.results, file].map(|path| path.display().to_string());
+    let mut arguments = vec![results.as_str(), &file];
+    if asked.lab.is_some() {
+        arguments.extend(["--lab", &name]);
+    }
+    shell.text(&format!("\nNext:\n\n  fill in the form, then    {}\n", command("lab add", &arguments)));
     Ok(())
 }
 
 fn add(shell: Shell, asked: &Add) -> anyhow::Result<()> {
     let campaign = Campaign::open(&asked.results)?;
+    let name = lab_name(campaign.plan(), asked.lab.as_deref())?;
     let provenance = Provenance {
         operator: said("--operator", asked.operator.as_ref())?,
         hardware: said("--hardware", asked.hardware.as_ref())?,
         software: said("--software", asked.software.as_ref())?,
         date: said("--date", asked.date.as_ref())?,
     };
-    let earlier = match &asked.output {
-        Some(folder) if folder.join(DATABASE).exists() => Some(Repository::open(folder)?),
-        _ => None,
-    };
-    let earlier_lab = earlier.as_ref().and_then(|it| it.task().in_lab()).map(|task| task.lab.as_str());
-    let name = lab_name(campaign.plan(), asked.lab.as_deref().or(earlier_lab))?;
-    let before = earlier.as_ref().map_or_else(|| Ok(Vec::new()), |it| runs_of(it, &campaign, &name))?;
+    let folder = asked.output.clone().map_or_else(|| beside(campaign.folder(), &name), Ok)?;
+    let earlier = if folder.join(DATABASE).exists() { Some(Repository::open(&folder)?) } else { None };
+    let before = earlier.as_ref().map_or_else(|| Ok(Vec::new()), |it| recorded(it, &campaign, &name))?;
 
-    let recorded = earlier.as_ref().map(|it| Recorded { folder: it.folder().to_owned(), runs: &before });
-    let mut taken = Taken::new(&campaign, recorded);
+    let mut taken = Taken::new(&campaign, &name, &provenance, &folder, &before);
     for file in &asked.files {
-        let bytes = input::bytes(file, input::MOST_OF_A_TEXT);
-        let bytes = bytes.map_err(|error| anyhow!("{}: cannot be read: {error}", file.display()));
-        match bytes {
+        match input::bytes(file, input::MOST_OF_A_TEXT) {
             Ok(bytes) => taken.take(file, &bytes),
-            Err(error) => taken.refuse(error.to_string()),
+            Err(error) => taken.refuse(format!("{}: cannot be read: {error}", file.display())),
         }
     }
-    let runs = match taken.finish() {
-        Ok(runs) => runs,
-        Err(mut mistakes) => {
-            mistakes.push("nothing was recorded; correct this and add the files again".to_owned());
-            return Err(all(&mistakes));
-        }
-    };
+    let (runs, blank) = taken.finish().map_err(|mut mistakes| {
+        mistakes.push("nothing was recorded; correct this and add the files again".to_owned());
+        all(&mistakes)
+    })?;
 
-    let task = task(&campaign, &name, earlier.as_ref(), &before, &runs);
-    let folder = match (asked.output.clone(), earlier) {
-        (Some(folder), Some(earlier)) => {
-            drop(earlier);
-            append(&folder, task, &provenance, &before, &runs)?;
-            folder
-        }
-        (Some(folder), None) => create(&campaign, folder, task, &provenance, &runs)?,
-        (None, _) => create(&campaign, next_free(&campaign.folder().join(FOLDER)), task, &provenance, &runs)?,
-    };
+    let task = task(&campaign, &name, earlier.as_ref(), &before, &runs)?;
+    if let Some(earlier) = earlier {
+        drop(earlier);
+        append(&folder, task, &before, &runs)?;
+    } else {
+        create(&campaign, &folder, task, &runs)?;
+    }
     let tests: BTreeSet<u32> = runs.iter().map(|run| run.of).collect();
-    shell.did(
-        "Recorded",
-        format!(
-            "{}: {} of {} in lab `{name}`",
-            folder.display(),
-            counted(runs.len(), "run"),
-            counted(tests.len(), "test")
-        ),
-    );
-    let look = command("results", &["tests", &folder.display().to_string()]);
-    shell.text(&format!("\nNext:\n\n  look at the runs    {look}\n"));
+    let (runs, tests) = (counted(runs.len(), "run"), counted(tests.len(), "test"));
+    shell.did("Recorded", format!("{}: {runs} of {tests} in lab `{name}`", folder.display()));
+    if blank > 0 {
+        let rows = if blank == 1 { "1 row is".to_owned() } else { format!("{blank} rows are") };
+        shell.note(format!("{rows} not filled in, so these runs are not recorded"));
+    }
+    let [results, folder] = [&asked.results, &folder].map(|path| path.display().to_string());
+    shell.text(&format!(
+        "\nNext:\n\n  look at the runs                 {}\n  compare them with the campaign    {}\n",
+        command("results", &["tests", &folder]),
+        command("gap", &[&results, &folder]),
+    ));
     Ok(())
 }
 
-/// The lab of this name; without one the only lab of the space, or `lab` if the space has none.
+/// The folder for the results of a lab, where a runner would put them: beside the run, named after both.
+fn beside(run: &Path, lab: &str) -> anyhow::Result<PathBuf> {
+    let whole = std::path::absolute(run)?;
+    let Some(name) = whole.file_name() else {
+        bail!("{} has no folder beside it; name one for the results of the lab with `--output`", run.display())
+    };
+    let mut named = name.to_owned();
+    named.push(format!("-{lab}"));
+    Ok(if run.file_name().is_some() { run.with_file_name(named) } else { whole.with_file_name(named) })
+}
+
+/// The lab of this name; without one the only lab of the space, or [`ONLY`] if the space has none.
 fn lab_name(plan: &CampaignPlan, asked: Option<&str>) -> anyhow::Result<String> {
     let names = || plan.labs.iter().map(|lab| lab.name.as_str());
     let known = || names().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
     match (asked, &plan.labs[..]) {
-        (None, []) => Ok(FOLDER.to_owned()),
+        (None, []) => Ok(ONLY.to_owned()),
         (None, [lab]) => Ok(lab.name.clone()),
         (None, _) => bail!("the space has several labs; name one with `--lab`: {}", known()),
-        (Some(name), []) => Ok(said("--lab", Some(&name.to_owned()))?.unwrap_or_default()),
+        (Some(name), []) => {
+            let plain = name.chars().all(|c| c.is_ascii_alphanumeric() || "_-".contains(c)) && !name.is_empty();
+            ensure!(plain, "`--lab` names a lab as a space would: with letters, digits, `_` and `-`");
+            Ok(name.to_owned())
+        }
         (Some(name), _) if names().any(|known| known == name) => Ok(name.to_owned()),
         (Some(name), _) => match most_similar(name, names()) {
             Some(meant) => bail!("there is no lab `{name}`; did you mean `{meant}`?"),
-            None => bail!("there is no lab `{name}`; there is {}", known()),
+            None => bail!("there is no lab `{name}`, there is {}", known()),
         },
     }
 }
@@ -233,23 +235,16 @@ fn said(option: &str, text: Option<&String>) -> anyhow::Result<Option<String>> {
     Ok(Some(text.trim().to_owned()))
 }
 
-/// The runs that a folder holds, which must be of this lab and of tests of these results.
-fn runs_of(earlier: &Repository, campaign: &Campaign, lab: &str) -> anyhow::Result<Vec<EnteredRun>> {
+/// The runs that a folder holds, which must be of this lab and of tests of this campaign.
+fn recorded(earlier: &Repository, campaign: &Campaign, lab: &str) -> anyhow::Result<Vec<EnteredRun>> {
+    const OTHER: &str = "choose another folder with `--output`";
     let folder = earlier.folder().display();
-    let runs = earlier.lab_runs()?;
+    let runs = earlier.entered_runs()?;
     let Some(task) = earlier.task().in_lab().filter(|_| !runs.is_empty()) else {
-        bail!("{folder} holds results that were not entered by hand; choose another folder with `--output`");
+        bail!("{folder} holds results that were not entered by hand; {OTHER}");
     };
-    ensure!(
-        task.lab == lab,
-        "{folder} holds runs of lab `{}`, not of `{lab}`; choose another folder with `--output`",
-        task.lab
-    );
-    ensure!(
-        task.results == campaign.digest(),
-        "{folder} holds runs of tests of other results, or was written before tests were run again there; choose \
-         another folder with `--output`"
-    );
+    ensure!(task.lab == lab, "{folder} holds runs of lab `{}`, not of `{lab}`; {OTHER}", task.lab);
+    lab_runs(campaign.repository(), earlier).map_err(|error| anyhow!("{error}; or {OTHER}"))?;
     Ok(runs)
 }
 
@@ -260,66 +255,50 @@ fn task(
     earlier: Option<&Repository>,
     before: &[EnteredRun],
     runs: &[Entered],
-) -> LabTask {
-    let mut tests: BTreeMap<u32, LabTest> = BTreeMap::new();
-    if let Some(task) = earlier.and_then(|it| it.task().in_lab()) {
-        tests.extend(task.tests.iter().map(|it| (it.number, it.clone())));
-    }
+) -> anyhow::Result<LabTask> {
+    let earlier = earlier.and_then(|it| it.task().in_lab());
+    let tests = earlier.map_or(&[][..], |task| &task.tests);
+    let mut tests: BTreeMap<u32, LabTest> = tests.iter().map(|it| (it.number, it.clone())).collect();
     let mut times: BTreeMap<u32, u32> = BTreeMap::new();
     for of in before.iter().map(|run| run.of).chain(runs.iter().map(|run| run.of)) {
         *times.entry(of).or_default() += 1;
         tests.entry(of).or_insert_with(|| LabTest { number: of, test: campaign.test(of).clone() });
     }
-    LabTask {
+    Ok(LabTask {
         lab: lab.to_owned(),
-        results: campaign.digest().to_owned(),
+        results: earlier.map_or_else(|| campaign.repository().digest(), |task| Ok(task.results.clone()))?,
         tests: tests.into_values().collect(),
         repeats: times.into_values().max().unwrap_or(1),
-    }
+    })
 }
 
-/// Records runs in a folder of their own, which is not there until all are recorded. Gives the folder.
-fn create(
-    campaign: &Campaign,
-    folder: PathBuf,
-    task: LabTask,
-    provenance: &Provenance,
-    runs: &[Entered],
-) -> anyhow::Result<PathBuf> {
-    let fresh = FreshFolder::begin(&folder)?;
+/// Records runs in a folder of their own, which is not there until all are recorded.
+fn create(campaign: &Campaign, folder: &Path, task: LabTask, runs: &[Entered]) -> anyhow::Result<()> {
+    let fresh = FreshFolder::begin(folder)?;
     let whole = Task::Lab(task.clone());
-    let plan = whole.plan(campaign.plan());
-    let mut recorder = Recorder::create_for(fresh.path(), &plan, &whole, campaign.seed(), 0)?;
-    recorder.put_entered_runs(task, provenance, runs)?;
+    let mut plan = whole.plan(campaign.plan());
+    // Nobody recorded messages.
+    plan.campaign.record = None;
+    let seed = campaign.repository().campaign().seed;
+    let mut recorder = Recorder::create_for(fresh.path(), &plan, &whole, seed, 0)?;
+    recorder.put_entered_runs(task, runs)?;
     drop(recorder.finish(ENDED)?);
     fresh.settle()?;
-    Ok(folder)
-}
-
-/// Records runs beside those that are in a folder.
-fn append(
-    folder: &Path,
-    task: LabTask,
-    provenance: &Provenance,
-    before: &[EnteredRun],
-    runs: &[Entered],
-) -> anyhow::Result<()> {
-    let mut recorder = Recorder::reopen(folder, 0)?;
-    // Only now nobody else writes there.
-    ensure!(
-        recorder.repository().lab_runs()? == before,
-        "runs were added to {} at the same time; add the files again",
-        folder.display()
-    );
-    recorder.put_entered_runs(task, provenance, runs)?;
-    recorder.finish(ENDED)?;
     Ok(())
 }
 
-/// The first of `1`, `2`, … that is not there.
-fn next_free(parent: &Path) -> PathBuf {
-    let mut numbered = (1u32..).map(|n| parent.join(n.to_string()));
-    numbered.find(|folder| !folder.exists() && !folder.is_symlink()).expect("a folder holds fewer than 2^32 others")
+/// Records runs beside those that are in a folder.
+fn append(folder: &Path, task: LabTask, before: &[EnteredRun], runs: &[Entered]) -> anyhow::Result<()> {
+    let mut recorder = Recorder::reopen(folder, 0)?;
+    // Only now nobody else writes there.
+    ensure!(
+        recorder.repository().entered_runs()? == before,
+        "runs were added to {} at the same time; add the files again",
+        folder.display()
+    );
+    recorder.put_entered_runs(task, runs)?;
+    recorder.finish(ENDED)?;
+    Ok(())
 }
 
 /// A command that can be pasted into a shell.

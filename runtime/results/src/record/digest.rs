@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use rusqlite::Connection;
 use rusqlite::types::ValueRef;
-use sesame_plan::CampaignPlan;
+use sesame_plan::{CampaignPlan, Test};
 use sha2::{Digest as _, Sha256};
 
 use crate::record::schema::{self, MEANING_SINCE, PIECES_SINCE, STANDARD_WORDS_SINCE};
@@ -119,7 +119,7 @@ const PORTION: usize = 1 << 16;
 /// The task of a run that is not the campaign is hashed with the plan, which it follows.
 ///
 /// Operations that were one operation in an imported file are hashed last, if there are any, and so are runs of a lab
-/// that were entered by hand: of which test each is a run, but not who made it.
+/// that were entered by hand: which run of its test each is, but not who made it.
 ///
 /// Results of an earlier schema have the digest that their release computed, over all of the plan's JSON, the sentences
 /// of requirements, and the name of the `.sesame` file. Names of columns and verdicts are not hashed.
@@ -154,11 +154,27 @@ pub(super) fn of_connection(connection: &Connection, version: i64, plan: &Campai
         portion.push(b';');
     }
     hash.update(&portion);
+    Ok(digits(hash))
+}
+
+/// SHA-256 over which tests results have, as 64 hexadecimal digits: over the names of the space and the campaign, the
+/// seed, and each test with its number, as JSON.
+pub(super) fn of_tests<'t>(plan: &CampaignPlan, seed: u64, tests: impl IntoIterator<Item = (u32, &'t Test)>) -> String {
+    let mut hash = Sha256::new();
+    let mut feed = |json: serde_json::Result<Vec<u8>>| hash.update(json.expect("a test is plain data with text keys"));
+    feed(serde_json::to_vec(&(&plan.space, &plan.campaign.name, seed)));
+    for numbered in tests {
+        feed(serde_json::to_vec(&numbered));
+    }
+    digits(hash)
+}
+
+fn digits(hash: Sha256) -> String {
     let mut digits = String::with_capacity(64);
     for byte in hash.finalize() {
         write!(digits, "{byte:02x}").expect("a string takes all that is written");
     }
-    Ok(digits)
+    digits
 }
 
 fn feed(portion: &mut Vec<u8>, value: ValueRef<'_>) {

@@ -1,8 +1,7 @@
-//! Runs that people made in a lab and entered by hand: of which test of the campaign each is, and who made them with
-//! what.
+//! Runs that people made in a lab and entered by hand: which run of its test each is, and who made it with what.
 //!
-//! Each run is a test of the lab's results. The tables are only there if runs were entered: results of a campaign, and
-//! those that a runner made in a lab, have none. Who made the runs with what is no part of the digest.
+//! Each run is a test of the lab's results; [`LabTask::of`] says of which test of the campaign it is a run. The table is
+//! only there if runs were entered: results of a campaign, and those that a runner made in a lab, have none.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,18 +15,13 @@ use crate::record::write_tests::write_test;
 use crate::record::{Origin, RecordError, Recorder, Repository, TestRecord};
 
 pub(super) const TABLE: &str = "lab_runs";
-pub(super) const PROVENANCE: &str = "lab_provenance";
 
 pub(super) const DDL: &str = "
 -- Runs in a lab that were entered by hand; each is a test.
 CREATE TABLE lab_runs (
     test            INTEGER PRIMARY KEY REFERENCES tests,
-    of              INTEGER NOT NULL, -- number of the test in the results of the campaign
-    run             INTEGER NOT NULL  -- which run of that test in the lab, from 1
-) STRICT;
--- Who made the runs in the lab, and with what; as far as they said it. No part of the digest.
-CREATE TABLE lab_provenance (
-    first_test      INTEGER PRIMARY KEY REFERENCES tests, -- of those that were entered together; the next row ends them
+    run             INTEGER NOT NULL, -- which run of the same test in the lab, from 1
+    -- Where the run comes from, as far as people said it; no part of the digest.
     operator        TEXT,
     hardware        TEXT,
     software        TEXT,
@@ -36,7 +30,7 @@ CREATE TABLE lab_provenance (
 ";
 
 /// What is read and hashed of the runs.
-pub(super) const QUERY: &str = "SELECT test, of, run FROM lab_runs ORDER BY test";
+pub(super) const QUERY: &str = "SELECT test, run FROM lab_runs ORDER BY test";
 
 /// The words for how a run can have ended, as people enter it.
 pub const ENTERED_OUTCOMES: [&str; 8] =
@@ -72,10 +66,12 @@ pub struct Entered {
     pub outcome: Outcome,
     /// Per metric of the plan, in its order and unit; `None` where it was not measured. Finite.
     pub values: Vec<Option<f64>>,
+    /// Where the run comes from.
+    pub provenance: Provenance,
 }
 
 /// A run in a lab that was entered by hand, as it is recorded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct EnteredRun {
     /// The number of the test that it is in the lab's results.
     pub test: u32,
@@ -83,22 +79,40 @@ pub struct EnteredRun {
     pub of: u32,
     /// Which run of that test in the lab, from 1.
     pub run: u32,
+    /// Where the run comes from.
+    pub provenance: Provenance,
 }
 
-/// Who made runs in a lab, and with what, as far as they said it.
+/// Who made a run in a lab, with what and when: one line of text each, as far as people said it.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Provenance {
-    /// Who ran the tests.
+    /// Who ran the test.
     pub operator: Option<String>,
     /// The robots and what is around them.
     pub hardware: Option<String>,
     /// What ran on them.
     pub software: Option<String>,
-    /// When the tests were run, in any notation.
+    /// When the test was run, in any notation.
     pub date: Option<String>,
 }
 
-/// Whether results have the tables, which were [recognised](super::recognise).
+impl Provenance {
+    /// The names of what it says, in this order everywhere.
+    pub const NAMES: [&str; 4] = ["operator", "hardware", "software", "date"];
+
+    /// What was said under each name.
+    pub fn texts(&self) -> [Option<&str>; 4] {
+        [&self.operator, &self.hardware, &self.software, &self.date].map(Option::as_deref)
+    }
+}
+
+impl From<[Option<String>; 4]> for Provenance {
+    fn from([operator, hardware, software, date]: [Option<String>; 4]) -> Self {
+        Provenance { operator, hardware, software, date }
+    }
+}
+
+/// Whether results have the table, which was [recognised](super::recognise).
 pub(super) fn are_in(connection: &Connection) -> rusqlite::Result<bool> {
     connection.query_row(
         "SELECT EXISTS (SELECT 1 FROM sqlite_schema WHERE type = 'table' AND name = ?1)",
@@ -112,7 +126,7 @@ pub(super) fn are_in(connection: &Connection) -> rusqlite::Result<bool> {
 /// Nobody counted what operations did. Of an outcome that says so, the times at which they were to be active stand for
 /// those at which they were, as in an imported test.
 fn record(plan: &CampaignPlan, test: &Test, number: u32, entered: &Entered) -> TestRecord {
-    let Entered { of: _, run: _, outcome, values } = entered;
+    let Entered { outcome, values, .. } = entered;
     let over = plan.campaign.end_after;
     let metric = |(metric, value): (&Metric, &Option<f64>)| {
         let mut shown = MetricObservation::whole(*value, value.is_some(), Vec::new());
@@ -153,12 +167,7 @@ fn record(plan: &CampaignPlan, test: &Test, number: u32, entered: &Entered) -> T
 impl Recorder {
     /// Records runs that were entered by hand, together with the task of all runs that are then recorded: all of it in
     /// one transaction, or nothing. The task must have the tests of all of them.
-    pub fn put_entered_runs(
-        &mut self,
-        task: LabTask,
-        provenance: &Provenance,
-        runs: &[Entered],
-    ) -> Result<(), RecordError> {
+    pub fn put_entered_runs(&mut self, task: LabTask, runs: &[Entered]) -> Result<(), RecordError> {
         self.check_lock()?;
         let path = self.repository().path().to_owned();
         let plan = self.repository().plan().clone();
@@ -177,19 +186,15 @@ impl Recorder {
             if !are_in(&transaction)? {
                 transaction.execute_batch(DDL)?;
             }
-            for (record, Entered { of, run, .. }) in records.iter().zip(runs) {
+            for (record, Entered { run, provenance, .. }) in records.iter().zip(runs) {
                 write_test(&transaction, &plan, record)?;
+                let [operator, hardware, software, date] = provenance.texts();
                 transaction
-                    .prepare_cached("INSERT INTO lab_runs (test, of, run) VALUES (?1, ?2, ?3)")?
-                    .execute(params![record.number, of, run])?;
-            }
-            if *provenance != Provenance::default() {
-                let Provenance { operator, hardware, software, date } = provenance;
-                transaction.execute(
-                    "INSERT INTO lab_provenance (first_test, operator, hardware, software, date) \
-                     VALUES (?1, ?2, ?3, ?4, ?5)",
-                    params![first, operator, hardware, software, date],
-                )?;
+                    .prepare_cached(
+                        "INSERT INTO lab_runs (test, run, operator, hardware, software, date) \
+                         VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
+                    )?
+                    .execute(params![record.number, run, operator, hardware, software, date])?;
             }
             transaction
                 .execute("UPDATE campaign SET task = ?1, evaluations = ?2", params![json, task.evaluations(&plan)])?;
@@ -206,52 +211,34 @@ impl Repository {
     /// all tests.
     ///
     /// Each is a recorded test and a run of a test of the task, and no run of a test is there twice.
-    pub fn lab_runs(&self) -> Result<Vec<EnteredRun>, RecordError> {
-        if !self.has_entered_runs()? {
+    pub fn entered_runs(&self) -> Result<Vec<EnteredRun>, RecordError> {
+        if !are_in(&self.connection).map_err(|error| RecordError::database("read the results", &self.path, error))? {
             return Ok(Vec::new());
         }
         let damaged = |problem: String| RecordError::damaged(&self.path, problem);
-        let runs =
-            self.read(QUERY, [], |row| Ok(EnteredRun { test: row.get(0)?, of: row.get(1)?, run: row.get(2)? }))?;
+        let sql = "SELECT test, run, operator, hardware, software, date FROM lab_runs ORDER BY test";
+        let rows: Vec<(u32, u32, Provenance)> = self.read(sql, [], |row| {
+            let texts = [row.get(2)?, row.get(3)?, row.get(4)?, row.get(5)?];
+            Ok((row.get(0)?, row.get(1)?, Provenance::from(texts)))
+        })?;
         let Some(task) = self.task().in_lab() else {
             return Err(damaged("there are runs of a lab in results of no lab".to_owned()));
         };
         let recorded: BTreeMap<u32, _> = self.tests()?.into_iter().map(|row| (row.number, row.test)).collect();
         let mut seen = BTreeSet::new();
-        for &EnteredRun { test, of, run } in &runs {
-            let (number, of_number) = (TestNumber(test), TestNumber(of));
-            let Some(recorded) = recorded.get(&test) else {
-                return Err(damaged(format!("{number} is a run of a lab and no test")));
+        let mut runs = Vec::with_capacity(rows.len());
+        for (test, run, provenance) in rows {
+            let number = TestNumber(test);
+            let Some(of) = recorded.get(&test).and_then(|recorded| task.of(recorded)) else {
+                return Err(damaged(format!("{number} is a run of a lab, but of no test that was run there")));
             };
-            if task.of(recorded) != Some(of) {
-                return Err(damaged(format!("{number} is not the test of which it is a run, {of_number}")));
-            }
             if run == 0 || !seen.insert((of, run)) {
-                return Err(damaged(format!("run {run} of {of_number} in the lab is there twice, or has no number")));
+                let of = TestNumber(of);
+                return Err(damaged(format!("run {run} of {of} in the lab is there twice, or has no number")));
             }
+            runs.push(EnteredRun { test, of, run, provenance });
         }
         Ok(runs)
-    }
-
-    /// Who made the runs that were entered together, and with what: by the number of the first test of each entry.
-    /// Entries of which nothing was said are not there.
-    pub fn lab_provenance(&self) -> Result<BTreeMap<u32, Provenance>, RecordError> {
-        if !self.has_entered_runs()? {
-            return Ok(BTreeMap::new());
-        }
-        let rows = self.read(
-            "SELECT first_test, operator, hardware, software, date FROM lab_provenance ORDER BY first_test",
-            [],
-            |row| {
-                let [operator, hardware, software, date] = [row.get(1)?, row.get(2)?, row.get(3)?, row.get(4)?];
-                Ok((row.get(0)?, Provenance { operator, hardware, software, date }))
-            },
-        )?;
-        Ok(rows.into_iter().collect())
-    }
-
-    fn has_entered_runs(&self) -> Result<bool, RecordError> {
-        are_in(&self.connection).map_err(|error| RecordError::database("read the results", &self.path, error))
     }
 }
 
@@ -262,11 +249,10 @@ mod tests {
     use super::*;
     use crate::record::{DATABASE, sample};
 
-    const NOBODY: Provenance = Provenance { operator: None, hardware: None, software: None, date: None };
-
     fn entered(of: u32, run: u32, word: &str, collisions: Option<f64>) -> Entered {
         let outcome = entered_outcome(word, &sample::plan()).unwrap();
-        Entered { of, run, outcome, values: vec![collisions, Some(1.5), None, None, Some(-0.25)] }
+        let values = vec![collisions, Some(1.5), None, None, Some(-0.25)];
+        Entered { of, run, outcome, values, provenance: Provenance::default() }
     }
 
     /// The task of so many tests, each of which was run so often.
@@ -280,15 +266,15 @@ mod tests {
     }
 
     /// Results of these runs, entered one after the other.
-    fn lab(folder: &std::path::Path, entries: &[(LabTask, Provenance, &[Entered])]) -> Repository {
+    fn lab(folder: &std::path::Path, entries: &[(LabTask, &[Entered])]) -> Repository {
         let plan = sample::plan();
-        for (at, (task, provenance, runs)) in entries.iter().enumerate() {
+        for (at, (task, runs)) in entries.iter().enumerate() {
             let mut recorder = if at == 0 {
                 Recorder::create_for(folder, &plan, &Task::Lab(task.clone()), 1, 0).unwrap()
             } else {
                 Recorder::reopen(folder, 0).unwrap()
             };
-            recorder.put_entered_runs(task.clone(), provenance, runs).unwrap();
+            recorder.put_entered_runs(task.clone(), runs).unwrap();
             recorder.finish("entered by hand").unwrap();
         }
         Repository::open(folder).unwrap()
@@ -296,15 +282,13 @@ mod tests {
 
     #[test]
     fn runs_are_read_as_they_were_entered_at_once_or_one_after_the_other() {
-        let runs =
+        let mut runs =
             [entered(1, 1, "completed", Some(2.0)), entered(2, 1, "crash", Some(1.0)), entered(1, 2, "unknown", None)];
-        let ada = Provenance { operator: Some("Ada".to_owned()), ..NOBODY };
         let (apart, together) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-        let apart = lab(apart.path(), &[(task(2, 1), ada.clone(), &runs[..2]), (task(2, 2), NOBODY, &runs[2..])]);
-        let together = lab(together.path(), &[(task(2, 2), NOBODY, &runs)]);
-        let expected = [(1, 1, 1), (2, 2, 1), (3, 1, 2)].map(|(test, of, run)| EnteredRun { test, of, run });
+        let together = lab(together.path(), &[(task(2, 2), &runs)]);
+        runs[1].provenance.operator = Some("Ada".to_owned());
+        let apart = lab(apart.path(), &[(task(2, 1), &runs[..2]), (task(2, 2), &runs[2..])]);
         for repository in [&apart, &together] {
-            assert_eq!(repository.lab_runs().unwrap(), expected);
             assert_eq!(repository.task(), &Task::Lab(task(2, 2)));
             for (number, run) in (1..).zip(&runs) {
                 let recorded = repository.test(number).unwrap().observation;
@@ -313,16 +297,17 @@ mod tests {
                 assert_eq!(values, run.values);
             }
         }
+        let read = apart.entered_runs().unwrap();
+        let read: Vec<_> = read.iter().map(|it| (it.test, it.of, it.run, it.provenance.operator.as_deref())).collect();
+        assert_eq!(read, [(1, 1, 1, None), (2, 2, 1, Some("Ada")), (3, 1, 2, None)]);
         assert_eq!(apart.digest().unwrap(), together.digest().unwrap(), "who made the runs is no part of it");
-        assert_eq!(apart.lab_provenance().unwrap(), BTreeMap::from([(1, ada)]));
-        assert_eq!(together.lab_provenance().unwrap(), BTreeMap::new());
     }
 
     #[test]
     fn the_digest_says_which_run_of_which_test_it_was() {
         let digest = |of: u32, run: u32| {
             let folder = tempfile::tempdir().unwrap();
-            lab(folder.path(), &[(task(2, 1), NOBODY, &[entered(of, run, "completed", None)])]).digest().unwrap()
+            lab(folder.path(), &[(task(2, 1), &[entered(of, run, "completed", None)])]).digest().unwrap()
         };
         assert_eq!(digest(1, 1), digest(1, 1));
         assert_ne!(digest(1, 1), digest(1, 2));
@@ -333,7 +318,7 @@ mod tests {
     fn what_a_run_that_broke_off_might_still_have_shown_is_open() {
         let folder = tempfile::tempdir().unwrap();
         let runs = [entered(1, 1, "completed", Some(0.0)), entered(1, 2, "timeout", Some(0.0))];
-        let repository = lab(folder.path(), &[(task(1, 2), NOBODY, &runs)]);
+        let repository = lab(folder.path(), &[(task(1, 2), &runs)]);
         let verdicts: Vec<&str> = [1, 2]
             .map(|number| repository.row(number).unwrap().verdict(&repository.plan().requirements[0]).word())
             .to_vec();
@@ -352,18 +337,20 @@ mod tests {
     fn runs_that_contradict_the_tests_are_damaged() {
         let said = |sql: &str| {
             let folder = tempfile::tempdir().unwrap();
-            let runs = [entered(1, 1, "completed", None), entered(2, 1, "completed", None)];
-            drop(lab(folder.path(), &[(task(2, 1), NOBODY, &runs)]));
+            let runs = [entered(1, 1, "completed", None), entered(1, 2, "completed", None)];
+            drop(lab(folder.path(), &[(task(1, 2), &runs)]));
             let connection = Connection::open(folder.path().join(DATABASE)).unwrap();
             connection.execute_batch(&format!("PRAGMA foreign_keys = OFF; {sql}")).unwrap();
             drop(connection);
-            Repository::open(folder.path()).and_then(|it| it.lab_runs()).unwrap_err().to_string()
+            Repository::open(folder.path()).and_then(|it| it.entered_runs()).unwrap_err().to_string()
         };
-        assert!(said("UPDATE lab_runs SET of = 2").contains("T1 is not the test of which it is a run, T2"));
-        assert!(said("UPDATE lab_runs SET test = 9 WHERE test = 2").contains("T9 is a run of a lab and no test"));
+        assert!(said("UPDATE lab_runs SET test = 9 WHERE test = 2").contains("T9 is a run of a lab, but of no test"));
+        assert!(
+            said("UPDATE operations SET operation_seed = '5' WHERE test = 2").contains("T2 is a run of a lab, but")
+        );
         assert!(said("UPDATE lab_runs SET run = 0").contains("run 0 of T1"));
+        assert!(said("UPDATE lab_runs SET run = 1").contains("run 1 of T1 in the lab is there twice"));
         assert!(said("UPDATE campaign SET task = NULL").contains("runs of a lab in results of no lab"));
-        assert!(said("DROP TABLE lab_provenance").contains("the table `lab_provenance` is missing"));
         let view = "DROP TABLE lab_runs; CREATE VIEW lab_runs AS SELECT 1 AS test";
         assert!(said(view).contains("`lab_runs` is not a table, but a view"));
     }

@@ -9,6 +9,8 @@ use sesame_dsl::similar::most_similar;
 use sesame_plan::{CampaignPlan, Test};
 use sesame_results::record::{Origin, Repository};
 
+use super::sheet::quoted;
+
 /// A test of the campaign.
 struct Known {
     test: Test,
@@ -19,22 +21,22 @@ struct Known {
 /// The results of a campaign that has ended.
 pub(super) struct Campaign {
     repository: Repository,
-    digest: String,
+    tests_digest: String,
     tests: BTreeMap<u32, Known>,
     /// Names of tests beside `T1`, `T2`, …: those of regression tests, and those before an import.
     names: BTreeMap<String, u32>,
 }
 
 impl Campaign {
-    /// Reads results of a campaign. They must be finished, because their digest says whose tests a form is about.
+    /// Reads results of a campaign. They must be finished, because a form is about tests that do not change.
     pub(super) fn open(path: &Path) -> anyhow::Result<Campaign> {
         let repository = Repository::open(path)?;
         let at = repository.path().display();
-        if repository.task().in_lab().is_some() {
+        if repository.task().of_lab().is_some() {
             bail!("{at} has results of a lab; give the results of the campaign whose tests were run there");
         }
         if repository.campaign().stop.is_none() {
-            bail!("{at} is unfinished, and a form is about results that do not change; `resume` continues the run");
+            bail!("{at} is unfinished, and a form is about tests that do not change; `resume` continues the run");
         }
         let (mut tests, mut names, mut firsts) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
         for row in repository.tests()? {
@@ -51,24 +53,25 @@ impl Campaign {
         for (number, name) in repository.original_names()? {
             names.entry(name).or_insert(number);
         }
-        let digest = repository.digest()?;
-        Ok(Campaign { repository, digest, tests, names })
+        let tests_digest = repository.tests_digest()?;
+        Ok(Campaign { repository, tests_digest, tests, names })
     }
 
     pub(super) fn plan(&self) -> &CampaignPlan {
         self.repository.plan()
     }
 
-    pub(super) fn digest(&self) -> &str {
-        &self.digest
+    pub(super) fn repository(&self) -> &Repository {
+        &self.repository
+    }
+
+    /// What a form says to be of these tests.
+    pub(super) fn tests_digest(&self) -> &str {
+        &self.tests_digest
     }
 
     pub(super) fn folder(&self) -> &Path {
         self.repository.folder()
-    }
-
-    pub(super) fn seed(&self) -> u64 {
-        self.repository.campaign().seed
     }
 
     /// A test by its number, which must be one of the campaign.
@@ -82,11 +85,11 @@ impl Campaign {
         let number = match (name.strip_prefix(['T', 't']).unwrap_or(name).parse::<u32>(), self.names.get(name)) {
             (_, Some(number)) => *number,
             (Ok(number), None) if self.tests.contains_key(&number) => number,
-            (Ok(_), None) => return Err(format!("the campaign has no test `{name}`; {}", self.range())),
+            (Ok(_), None) => return Err(format!("the campaign has no test {}; {}", quoted(name), self.range())),
             (Err(_), None) => {
                 return Err(match most_similar(name, self.names.keys().map(String::as_str)) {
-                    Some(meant) => format!("the campaign has no test `{name}`; did you mean `{meant}`?"),
-                    None => format!("`{name}` is not a test such as `T1`; {}", self.range()),
+                    Some(meant) => format!("the campaign has no test {}; did you mean `{meant}`?", quoted(name)),
+                    None => format!("{} is not a test such as `T1`; {}", quoted(name), self.range()),
                 });
             }
         };

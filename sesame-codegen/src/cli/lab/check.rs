@@ -2,39 +2,41 @@
 //! mistakes of all files are found before anything is recorded.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use sesame_dsl::similar::most_similar;
-use sesame_results::record::{ENTERED_OUTCOMES, Entered, EnteredRun, Outcome, entered_outcome};
+use sesame_results::record::{ENTERED_OUTCOMES, Entered, EnteredRun, Outcome, Provenance, entered_outcome};
 
 use super::campaign::Campaign;
 use super::mistakes::Mistakes;
-use super::sheet::{At, Given, RESULTS, Row, Sheet, UNMEASURED, column};
+use super::sheet::{At, Given, HEAD, Row, Sheet, UNMEASURED, column, quoted};
 use super::{read_csv, read_json};
-
-/// Runs that are recorded already, and where.
-pub(super) struct Recorded<'r> {
-    pub(super) folder: PathBuf,
-    pub(super) runs: &'r [EnteredRun],
-}
 
 /// What was taken from files so far.
 pub(super) struct Taken<'c> {
     campaign: &'c Campaign,
+    lab: &'c str,
+    /// What the command line says of all files.
+    provenance: &'c Provenance,
     /// Where each run of a test is, by the numbers of both.
     places: BTreeMap<(u32, u32), String>,
     runs: Vec<Entered>,
+    blank: usize,
     mistakes: Vec<String>,
 }
 
 impl<'c> Taken<'c> {
-    pub(super) fn new(campaign: &'c Campaign, recorded: Option<Recorded<'_>>) -> Self {
-        let mut places = BTreeMap::new();
-        if let Some(Recorded { folder, runs }) = recorded {
-            let place = |test: u32| format!("in {}, as T{test}", folder.display());
-            places.extend(runs.iter().map(|run| ((run.of, run.run), place(run.test))));
-        }
-        Taken { campaign, places, runs: Vec::new(), mistakes: Vec::new() }
+    /// Begins to take runs in a lab, beside those that are recorded in a folder already.
+    pub(super) fn new(
+        campaign: &'c Campaign,
+        lab: &'c str,
+        provenance: &'c Provenance,
+        folder: &Path,
+        recorded: &[EnteredRun],
+    ) -> Self {
+        let place = |test: u32| format!("in {}, as T{test}", folder.display());
+        let places = recorded.iter().map(|run| ((run.of, run.run), place(run.test))).collect();
+        Taken { campaign, lab, provenance, places, runs: Vec::new(), blank: 0, mistakes: Vec::new() }
     }
 
     /// Takes note that a file cannot be read.
@@ -60,48 +62,75 @@ impl<'c> Taken<'c> {
         } else {
             read_csv::read(text, plan, &mut mistakes)
         };
-        self.of_these_results(&sheet, &mut mistakes);
-        if sheet.rows.is_empty() && mistakes.are_none() {
-            mistakes.say(text.len(), || "there are no runs; fill in a row for each".to_owned());
+        self.of_these_tests(&sheet, &mut mistakes);
+        let provenance = self.provenance(&sheet, &mut mistakes);
+        let (blank, rows): (Vec<Row>, Vec<Row>) = sheet.rows.into_iter().partition(Row::is_blank);
+        self.blank += blank.len();
+        if rows.is_empty() && mistakes.are_none() {
+            mistakes.say(text.len(), || "no run is filled in; write an outcome and the values of each".to_owned());
         }
-        for row in sheet.rows {
+        for row in rows {
             let run = self.run(row, &mut mistakes);
-            self.runs.extend(run);
+            self.runs.extend(run.map(|run| Entered { provenance: provenance.clone(), ..run }));
         }
         self.mistakes.extend(mistakes.listed());
     }
 
-    /// All runs, or all that is wrong.
-    pub(super) fn finish(self) -> Result<Vec<Entered>, Vec<String>> {
-        if self.mistakes.is_empty() { Ok(self.runs) } else { Err(self.mistakes) }
+    /// All runs and the number of rows that nobody filled in, or all that is wrong.
+    pub(super) fn finish(self) -> Result<(Vec<Entered>, usize), Vec<String>> {
+        if self.mistakes.is_empty() { Ok((self.runs, self.blank)) } else { Err(self.mistakes) }
     }
 
-    /// Tells if the file is a form of other results.
-    fn of_these_results(&self, sheet: &Sheet, mistakes: &mut Mistakes<'_>) {
-        let digest = self.campaign.digest();
-        match &sheet.results {
+    /// Tells if the file is a form for other tests, or for another lab.
+    fn of_these_tests(&self, sheet: &Sheet, mistakes: &mut Mistakes<'_>) {
+        let digest = self.campaign.tests_digest();
+        let [tests, campaign, lab, ..] = HEAD;
+        match sheet.head.get(tests) {
             None => mistakes.say(0, || {
                 format!(
-                    "it does not say whose tests were run; begin with `# {RESULTS} {digest}`, or `\"results\"` in JSON"
+                    "it does not say of which campaign the tests are; begin with `# {tests}: {digest}` in CSV, or \
+                     `\"{tests}\": \"{digest}\"` in JSON"
                 )
             }),
             Some(At { it, .. }) if it == digest => {}
-            Some(At { at, it }) => mistakes.say(*at, || {
+            Some(At { at, .. }) => mistakes.say(*at, || {
+                let of = sheet.head.get(campaign).map_or_else(String::new, |it| format!(" ({})", quoted(&it.it)));
                 format!(
-                    "the form is of other results ({}…), not of {} ({}…); if only tests were run again there since it \
-                     was printed, as `confirm` does, write `{digest}`",
-                    short(it),
-                    self.campaign.folder().display(),
-                    short(digest)
+                    "the form is for tests of another run{of}, not for those of {}; give the results that it was \
+                     printed for",
+                    self.campaign.folder().display()
                 )
             }),
         }
+        if let Some(At { at, it }) = sheet.head.get(lab).filter(|it| it.it != self.lab) {
+            mistakes.say(*at, || {
+                format!("the form is for lab {}, not for `{}`; give the lab with `--lab`", quoted(it), self.lab)
+            });
+        }
+    }
+
+    /// Where the runs of a file come from: what it says and what the command line says.
+    fn provenance(&self, sheet: &Sheet, mistakes: &mut Mistakes<'_>) -> Provenance {
+        let mut texts = self.provenance.texts().map(|text| text.map(str::to_owned));
+        for (name, text) in Provenance::NAMES.into_iter().zip(&mut texts) {
+            let Some(At { at, it }) = sheet.head.get(name) else { continue };
+            if it.chars().any(char::is_control) {
+                mistakes.say(*at, || format!("`{name}` contains control characters; write one line of text"));
+            }
+            match text {
+                Some(text) if text != it => mistakes.say(*at, || {
+                    format!("`{name}` is {} here, and `--{name}` says {}; leave out one", quoted(it), quoted(text))
+                }),
+                _ => *text = Some(it.clone()),
+            }
+        }
+        Provenance::from(texts)
     }
 
     fn run(&mut self, row: Row, mistakes: &mut Mistakes<'_>) -> Option<Entered> {
         let Row { test, run, outcome, values } = row;
         let of = self.test(&test, mistakes);
-        let number = self.number(&run, mistakes);
+        let number = number_of(&run, mistakes);
         let outcome = self.outcome(&outcome, mistakes);
         let values = values.and_then(|values| self.values(values, outcome.as_ref(), mistakes));
         let (of, number) = (of?, number?);
@@ -119,7 +148,8 @@ impl<'c> Taken<'c> {
             return None;
         }
         self.places.insert((of, number), format!("in {}", mistakes.line(run.at)));
-        Some(Entered { of, run: number, outcome: outcome?, values: values? })
+        let provenance = Provenance::default();
+        Some(Entered { of, run: number, outcome: outcome?, values: values?, provenance })
     }
 
     fn test(&self, test: &At<String>, mistakes: &mut Mistakes<'_>) -> Option<u32> {
@@ -140,26 +170,15 @@ impl<'c> Taken<'c> {
         Some(number)
     }
 
-    fn number(&self, run: &At<String>, mistakes: &mut Mistakes<'_>) -> Option<u32> {
-        let number = run.it.parse::<u32>().ok().filter(|&number| number > 0);
-        if number.is_none() {
-            mistakes
-                .say(run.at, || format!("`{}` is not the number of a run; number the runs of a test 1, 2, …", run.it));
-        }
-        number
-    }
-
     fn outcome(&self, word: &At<String>, mistakes: &mut Mistakes<'_>) -> Option<Outcome> {
         let outcome = entered_outcome(&word.it, self.campaign.plan());
         if outcome.is_none() {
             mistakes.say(word.at, || {
                 let words = ENTERED_OUTCOMES.map(|word| format!("`{word}`")).join(", ");
                 match (word.it.as_str(), most_similar(&word.it, ENTERED_OUTCOMES)) {
-                    ("", _) => format!(
-                        "it is not said how this run ended; write one of {words}, or remove the row if the run was not made"
-                    ),
-                    (it, Some(meant)) => format!("`{it}` is not how a run ends; did you mean `{meant}`?"),
-                    (it, None) => format!("`{it}` is not how a run ends; write one of {words}"),
+                    ("", _) => format!("it is not said how this run ended; write one of {words}"),
+                    (it, Some(meant)) => format!("{} is not how a run ends; did you mean `{meant}`?", quoted(it)),
+                    (it, None) => format!("{} is not how a run ends; write one of {words}", quoted(it)),
                 }
             });
         }
@@ -209,7 +228,12 @@ fn is_json(file: &Path, text: &str) -> bool {
     }
 }
 
-/// The beginning of a digest.
-fn short(digest: &str) -> String {
-    digest.chars().take(12).collect()
+/// Which run of its test a run is.
+fn number_of(run: &At<String>, mistakes: &mut Mistakes<'_>) -> Option<u32> {
+    let number = run.it.parse::<u32>().ok().filter(|&number| number > 0);
+    if number.is_none() {
+        let what = || format!("{} is not the number of a run; number the runs of a test 1, 2, …", quoted(&run.it));
+        mistakes.say(run.at, what);
+    }
+    number
 }

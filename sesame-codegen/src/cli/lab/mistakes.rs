@@ -9,13 +9,16 @@ const MOST: usize = 100;
 pub(super) struct Mistakes<'f> {
     file: &'f Path,
     text: &'f str,
+    /// Where each line begins.
+    lines: Vec<usize>,
     found: Vec<(usize, String)>,
     more: usize,
 }
 
 impl<'f> Mistakes<'f> {
     pub(super) fn new(file: &'f Path, text: &'f str) -> Self {
-        Mistakes { file, text, found: Vec::new(), more: 0 }
+        let lines = std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
+        Mistakes { file, text, lines, found: Vec::new(), more: 0 }
     }
 
     /// Adds a mistake. What is said of it is only made up if it is listed.
@@ -31,39 +34,34 @@ impl<'f> Mistakes<'f> {
         self.found.is_empty()
     }
 
-    /// A line of the file, as terminals and editors name it.
-    pub(super) fn line(&self, at: usize) -> String {
-        format!("{}:{}", self.file.display(), position(self.text, at).0)
+    /// The number of the line that holds an offset, from 1.
+    fn number(&self, at: usize) -> usize {
+        self.lines.partition_point(|&begin| begin <= at)
     }
 
-    /// All mistakes in the order of the file, each with its place.
+    /// The line that holds an offset, as terminals and editors name it.
+    pub(super) fn line(&self, at: usize) -> String {
+        format!("{}:{}", self.file.display(), self.number(at))
+    }
+
+    /// The offset of a line and a column in bytes, both from 1.
+    pub(super) fn offset(&self, line: usize, column: usize) -> usize {
+        let begin = self.lines.get(line.saturating_sub(1)).copied().unwrap_or(self.text.len());
+        (begin + column.saturating_sub(1)).min(self.text.len())
+    }
+
+    /// All mistakes in the order of the file, each with its line and its column in characters.
     pub(super) fn listed(mut self) -> Vec<String> {
         self.found.sort_by_key(|&(at, _)| at);
-        let file = self.file.display();
         let said = |(at, what): &(usize, String)| {
-            let (line, column) = position(self.text, *at);
-            format!("{file}:{line}:{column}: {what}")
+            let begin = self.lines[self.number(*at) - 1];
+            let column = self.text[begin..].char_indices().take_while(|(before, _)| begin + before < *at).count() + 1;
+            format!("{}:{column}: {what}", self.line(*at))
         };
         let mut listed: Vec<String> = self.found.iter().map(said).collect();
         if self.more > 0 {
-            listed.push(format!("{file}: {} more mistakes", self.more));
+            listed.push(format!("{}: {} more mistakes; correct these first", self.file.display(), self.more));
         }
         listed
     }
-}
-
-/// The line and the column, in characters, of an offset; both from 1.
-pub(super) fn position(text: &str, at: usize) -> (usize, usize) {
-    let before = &text.as_bytes()[..at.min(text.len())];
-    let line = before.iter().filter(|&&byte| byte == b'\n').count() + 1;
-    let start = before.iter().rposition(|&byte| byte == b'\n').map_or(0, |at| at + 1);
-    // Each character has one byte that does not continue another.
-    let column = before[start..].iter().filter(|&&byte| byte & 0xC0 != 0x80).count() + 1;
-    (line, column)
-}
-
-/// The offset of a line and a column in bytes, both from 1.
-pub(super) fn offset(text: &str, line: usize, column: usize) -> usize {
-    let lines: usize = text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum();
-    (lines + column.saturating_sub(1)).min(text.len())
 }

@@ -10,8 +10,8 @@ use serde_json::value::RawValue;
 use sesame_dsl::similar::most_similar;
 use sesame_plan::CampaignPlan;
 
-use super::mistakes::{Mistakes, offset};
-use super::sheet::{At, Given, Row, Sheet, UNMEASURED, conversion, given, metric};
+use super::mistakes::Mistakes;
+use super::sheet::{At, Given, HEAD, Row, Sheet, UNMEASURED, conversion, given, metric, quoted};
 
 /// The members of an object, in the order of the file.
 struct Members<'t>(Vec<(String, &'t RawValue)>);
@@ -50,15 +50,20 @@ pub(super) fn read(text: &str, plan: &CampaignPlan, mistakes: &mut Mistakes<'_>)
     let whole: &RawValue = match serde_json::from_str(text) {
         Ok(whole) => whole,
         Err(error) => {
-            let at = offset(text, error.line(), error.column());
-            mistakes.say(at, || format!("this is not JSON ({error}); write an object with `results` and `runs`"));
+            let at = mistakes.offset(error.line(), error.column());
+            mistakes.say(at, || format!("this is not JSON ({error}); write an object with `tests` and `runs`"));
             return Sheet::default();
         }
     };
     let mut reader = Reader { text, plan, mistakes };
     let mut sheet = Sheet::default();
-    let [results, _, runs] = reader.members(whole, "the file", ["results", "campaign", "runs"], &["results", "runs"]);
-    sheet.results = results.and_then(|it| reader.text(it, "results"));
+    let [tests, campaign, lab, operator, hardware, software, date] = HEAD;
+    let names = [tests, campaign, lab, operator, hardware, software, date, "runs"];
+    let [head @ .., runs] = reader.members(whole, "the file", names, &["runs"]);
+    for (name, text) in HEAD.into_iter().zip(head) {
+        let text = text.and_then(|text| reader.text(text, name));
+        sheet.head.extend(text.filter(|text| !text.it.is_empty()).map(|text| (name, text)));
+    }
     let Some(runs) = runs else { return sheet };
     match serde_json::from_str::<Vec<&RawValue>>(runs.get()) {
         Ok(runs) => sheet.rows.extend(runs.into_iter().filter_map(|run| reader.run(run))),
@@ -97,8 +102,8 @@ impl<'t> Reader<'_, 't, '_> {
                 Some(at) if found[at].is_none() => found[at] = Some(member),
                 Some(_) => self.say(member, || format!("`{name}` is there twice; remove one")),
                 None => self.say(member, || match most_similar(&name, names) {
-                    Some(meant) => format!("{what} has no `{name}`; did you mean `{meant}`?"),
-                    None => format!("{what} has no `{name}`; remove it"),
+                    Some(meant) => format!("{what} has no {}; did you mean `{meant}`?", quoted(&name)),
+                    None => format!("{what} has no {}; remove it", quoted(&name)),
                 }),
             }
         }
@@ -112,13 +117,11 @@ impl<'t> Reader<'_, 't, '_> {
 
     /// A text; `null` is none.
     fn text(&mut self, value: &RawValue, what: &str) -> Option<At<String>> {
-        match serde_json::from_str::<Option<String>>(value.get()) {
-            Ok(text) => Some(At { at: self.at(value), it: text.unwrap_or_default() }),
-            Err(_) => {
-                self.say(value, || format!("`{what}` is {}; write a text", kind(value)));
-                None
-            }
-        }
+        let Ok(text) = serde_json::from_str::<Option<String>>(value.get()) else {
+            self.say(value, || format!("`{what}` is {}; write a text", kind(value)));
+            return None;
+        };
+        Some(At { at: self.at(value), it: text.unwrap_or_default().trim().to_owned() })
     }
 
     fn run(&mut self, value: &'t RawValue) -> Option<Row> {

@@ -4,7 +4,7 @@ use sesame_plan::{Search, Task};
 
 use crate::present::markup::Markup;
 use crate::present::number::{self, plural};
-use crate::record::{Provenance, RecordError, Repository};
+use crate::record::{RecordError, Repository};
 use crate::report::facts::repetition::repeated_words;
 use crate::report::facts::summary::Summary;
 use crate::report::sentences::{counts_sentence, headline};
@@ -77,23 +77,17 @@ pub(super) fn header(
     Ok(())
 }
 
-/// Who made runs that were entered by hand, and with what: what was said, once each.
+/// Who made runs that were entered by hand, with what and when: what was said, once each.
 fn entered(repository: &Repository) -> Result<Vec<(&'static str, String)>, RecordError> {
-    let entries = repository.lab_provenance()?;
-    let fields: [(&str, fn(&Provenance) -> &Option<String>); 4] = [
-        ("Operator", |it| &it.operator),
-        ("Hardware", |it| &it.hardware),
-        ("Software", |it| &it.software),
-        ("Date", |it| &it.date),
-    ];
-    let said = fields.into_iter().map(|(name, field)| {
+    let runs = repository.entered_runs()?;
+    let rows = ["Operator", "Hardware", "Software", "Date"].into_iter().enumerate().map(|(at, name)| {
         let mut texts: Vec<&str> = Vec::new();
-        for text in entries.values().filter_map(|entry| field(entry).as_deref()) {
+        for text in runs.iter().filter_map(|run| run.provenance.texts()[at]) {
             if !texts.contains(&text) {
                 texts.push(text);
             }
         }
         (name, texts.join(", "))
     });
-    Ok(said.filter(|(_, texts)| !texts.is_empty()).collect())
+    Ok(rows.filter(|(_, texts)| !texts.is_empty()).collect())
 }
