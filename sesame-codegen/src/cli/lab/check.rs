@@ -62,6 +62,7 @@ impl<'c> Taken<'c> {
         } else {
             read_csv::read(text, plan, &mut mistakes)
         };
+        let Some(sheet) = sheet else { return self.mistakes.extend(mistakes.listed()) };
         self.of_these_tests(&sheet, &mut mistakes);
         let provenance = self.provenance(&sheet, &mut mistakes);
         let (blank, rows): (Vec<Row>, Vec<Row>) = sheet.rows.into_iter().partition(Row::is_blank);
@@ -176,9 +177,9 @@ impl<'c> Taken<'c> {
             mistakes.say(word.at, || {
                 let words = ENTERED_OUTCOMES.map(|word| format!("`{word}`")).join(", ");
                 match (word.it.as_str(), most_similar(&word.it, ENTERED_OUTCOMES)) {
-                    ("", _) => format!("it is not said how this run ended; write one of {words}"),
-                    (it, Some(meant)) => format!("{} is not how a run ends; did you mean `{meant}`?", quoted(it)),
-                    (it, None) => format!("{} is not how a run ends; write one of {words}", quoted(it)),
+                    ("", _) => format!("the outcome is missing; write one of {words}"),
+                    (it, Some(meant)) => format!("{} is not an outcome; did you mean `{meant}`?", quoted(it)),
+                    (it, None) => format!("{} is not an outcome; write one of {words}", quoted(it)),
                 }
             });
         }
@@ -202,7 +203,7 @@ impl<'c> Taken<'c> {
                 Given::Empty => {
                     mistakes.say(at, || {
                         format!(
-                            "there is no value of `{}`, and the run came to its end; write it, or `{UNMEASURED}`",
+                            "there is no value of `{}`, and the run was not broken off; write it, or `{UNMEASURED}`",
                             column(metric)
                         )
                     });

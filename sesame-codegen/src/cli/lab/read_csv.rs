@@ -13,21 +13,21 @@ struct Cells(Vec<At<String>>);
 /// to be a mistake.
 type Column = Option<(usize, Conversion)>;
 
-/// Reads the text of a file, and tells all that is wrong with it as a form.
-pub(super) fn read(text: &str, plan: &CampaignPlan, mistakes: &mut Mistakes<'_>) -> Sheet {
+/// Reads the text of a file, and tells all that is wrong with it as a form; `None` if it is none at all.
+pub(super) fn read(text: &str, plan: &CampaignPlan, mistakes: &mut Mistakes<'_>) -> Option<Sheet> {
     let mut sheet = Sheet::default();
     let mut rows = rows(text, &mut sheet, mistakes).into_iter();
     let Some(header) = rows.next() else {
         mistakes.say(0, || {
             format!("there is no header; begin with `{}` and the metrics, as `lab form` does", FIRST_COLUMNS.join(","))
         });
-        return sheet;
+        return None;
     };
-    let Some(columns) = columns(&header, plan, mistakes) else { return sheet };
+    let Some(columns) = columns(&header, plan, mistakes) else { return Some(sheet) };
     for cells in rows {
         sheet.rows.extend(row(cells, header.0.len(), &columns, plan, mistakes));
     }
-    sheet
+    Some(sheet)
 }
 
 /// All rows but comments and empty ones. What comments say is put into the sheet.

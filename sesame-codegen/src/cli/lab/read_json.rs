@@ -45,31 +45,35 @@ struct Reader<'r, 't, 'f> {
     mistakes: &'r mut Mistakes<'f>,
 }
 
-/// Reads the text of a file, and tells all that is wrong with it as a form.
-pub(super) fn read(text: &str, plan: &CampaignPlan, mistakes: &mut Mistakes<'_>) -> Sheet {
+/// Reads the text of a file, and tells all that is wrong with it as a form; `None` if it is none at all.
+pub(super) fn read(text: &str, plan: &CampaignPlan, mistakes: &mut Mistakes<'_>) -> Option<Sheet> {
     let whole: &RawValue = match serde_json::from_str(text) {
         Ok(whole) => whole,
         Err(error) => {
             let at = mistakes.offset(error.line(), error.column());
             mistakes.say(at, || format!("this is not JSON ({error}); write an object with `tests` and `runs`"));
-            return Sheet::default();
+            return None;
         }
     };
     let mut reader = Reader { text, plan, mistakes };
+    if !whole.get().starts_with('{') {
+        reader.say(whole, || format!("the file is {}; write an object with `tests` and `runs`", kind(whole)));
+        return None;
+    }
     let mut sheet = Sheet::default();
     let [tests, campaign, lab, operator, hardware, software, date] = HEAD;
     let names = [tests, campaign, lab, operator, hardware, software, date, "runs"];
-    let [head @ .., runs] = reader.members(whole, "the file", names, &["runs"]);
+    let [head @ .., runs] = reader.members(whole, "the form", names, &["runs"]);
     for (name, text) in HEAD.into_iter().zip(head) {
         let text = text.and_then(|text| reader.text(text, name));
         sheet.head.extend(text.filter(|text| !text.it.is_empty()).map(|text| (name, text)));
     }
-    let Some(runs) = runs else { return sheet };
+    let Some(runs) = runs else { return Some(sheet) };
     match serde_json::from_str::<Vec<&RawValue>>(runs.get()) {
         Ok(runs) => sheet.rows.extend(runs.into_iter().filter_map(|run| reader.run(run))),
         Err(_) => reader.say(runs, || format!("`runs` is {}; write an array of runs", kind(runs))),
     }
-    sheet
+    Some(sheet)
 }
 
 impl<'t> Reader<'_, 't, '_> {
@@ -102,8 +106,8 @@ impl<'t> Reader<'_, 't, '_> {
                 Some(at) if found[at].is_none() => found[at] = Some(member),
                 Some(_) => self.say(member, || format!("`{name}` is there twice; remove one")),
                 None => self.say(member, || match most_similar(&name, names) {
-                    Some(meant) => format!("{what} has no {}; did you mean `{meant}`?", quoted(&name)),
-                    None => format!("{what} has no {}; remove it", quoted(&name)),
+                    Some(meant) => format!("{} is unknown; did you mean `{meant}`?", quoted(&name)),
+                    None => format!("{} is unknown; remove it", quoted(&name)),
                 }),
             }
         }
