@@ -126,7 +126,7 @@ enum Command {
     /// Compare the results of a lab with those of the campaign that its tests come from: where simulation and reality
     /// differ, and by how much.
     Gap(gap::Compared),
-    /// Record what people saw who ran tests in a lab by hand.
+    /// Print forms for tests that people run in a lab, and record what they filled in.
     #[command(subcommand)]
     Lab(lab::Lab),
     /// Import a testing space of the original SESAME platform (an EMF file, `.model`), with the tests that it

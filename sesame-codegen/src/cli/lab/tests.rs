@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use sesame_plan::testing;
 use sesame_results::analysis::gap::{gap, lab_runs};
 use sesame_results::analysis::{Selection, tests as tests_table};
-use sesame_results::record::{EnteredRun, Origin, Repository, sample};
+use sesame_results::record::{EnteredRun, Origin, Repetition, Repository, sample};
 
 use super::*;
 
@@ -144,16 +144,25 @@ fn runs_are_recorded_appended_and_compared_with_the_campaign() {
     assert_eq!(recorded.iter().map(|it| it.run).collect::<Vec<_>>(), [1, 1], "a blank row is no run");
     assert_eq!(recorded[0].provenance.texts(), [Some("Ada, Ben"), Some("cell 2"), None, None]);
 
+    // Tests that are run again in simulation leave forms and the folder valid.
+    let number: u32 = first[1..].parse().unwrap();
+    let digest_of = |name: &str| Repository::open(&bench.path(name)).unwrap().digest().unwrap();
+    let unconfirmed = digest_of("42");
+    let mut recorder = Recorder::reopen(&bench.path("42"), 1).unwrap();
+    let observation = recorder.repository().test(number).unwrap().observation;
+    recorder.put_repetition(&Repetition::of(number, 1, 7, &observation), &[]).unwrap();
+    drop(recorder.finish("confirmed").unwrap());
+    assert_ne!(digest_of("42"), unconfirmed);
+
     // The same again is refused; the next runs go into the same folder.
     let again = bench.lab(&["add", "@42", "@monday.csv"]).unwrap_err();
     insta::assert_snapshot!("added_again", again);
-    let digest = || Repository::open(&bench.path("42-hall")).unwrap().digest().unwrap();
-    let before = digest();
+    let before = digest_of("42-hall");
     let crash = format!("{second},2,crash,,,,,");
     bench.write("tuesday.csv", filled(&form, &[&run(&first, 2, "4"), &crash]));
     bench.lab(&["add", "@42", "@tuesday.csv"]).unwrap();
     assert_eq!(bench.recorded().len(), 4);
-    assert_ne!(digest(), before);
+    assert_ne!(digest_of("42-hall"), before);
 
     let (campaign, lab) =
         (Repository::open(&bench.path("42")).unwrap(), Repository::open(&bench.path("42-hall")).unwrap());
@@ -166,7 +175,7 @@ fn runs_are_recorded_appended_and_compared_with_the_campaign() {
     let table = tests_table(&lab, &Selection::default()).unwrap().csv();
     insta::assert_snapshot!("tests_of_the_lab", table);
 
-    // Tests that are run again in simulation leave forms and folders valid; other campaigns' folders are refused.
+    // Results that are not of these tests, or not of a lab, are refused.
     let mut other = sample::plan();
     other.campaign.seed = 7;
     sample::campaign(&bench.path("other"), &other, 30);
@@ -343,7 +352,7 @@ proptest! {
         let bench = Bench::new();
         let tests = two_tests(&bench);
         let times = runs.len().div_ceil(2).to_string();
-        let operator = operator.trim().trim_end_matches(',').trim_end();
+        let operator = operator.trim().trim_end_matches([',', ' ']);
         let name = if json { "form.json" } else { "form.csv" };
         let word = |at: usize| ENTERED[at];
         if json {
