@@ -54,8 +54,8 @@ fn rows(text: &str, sheet: &mut Sheet, mistakes: &mut Mistakes<'_>) -> Vec<Cells
     rows
 }
 
-/// The cells of the row that begins here, without blanks around them, and where the next row begins. Each cell is at its
-/// first character, behind its quote.
+/// The cells of the row that begins here, without blanks around them, and where the next row begins. Each cell is at
+/// its first character, behind its quote.
 fn cells(text: &str, begin: usize, mistakes: &mut Mistakes<'_>) -> (Cells, usize) {
     let bytes = text.as_bytes();
     let until = |from: usize, ends: &[u8]| {

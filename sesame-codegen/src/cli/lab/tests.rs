@@ -194,8 +194,8 @@ fn all_mistakes_of_all_files_are_told_at_once_and_nothing_is_recorded() {
     bench.write("good.csv", filled(&form, &[&good]));
     let rows = [
         format!("{first},1,completed,3,5,1,60,200"),
-        format!("T99,1,completed,3,5,1,60,200"),
-        format!("known_jiter,1,completed,3,5,1,60,200"),
+        "T99,1,completed,3,5,1,60,200".to_owned(),
+        "known_jiter,1,completed,3,5,1,60,200".to_owned(),
         format!("{second},0,completed,3,5,1,60,200"),
         format!("{second},1,complete,3,5,1,60,200"),
         format!("{second},2,well,3,5,1,60,200"),
