@@ -5,6 +5,8 @@
 
 mod caller;
 mod commands;
+#[cfg(all(feature = "process", feature = "mcap"))]
+mod compensate;
 mod confirm;
 mod execution;
 mod export;
@@ -21,6 +23,7 @@ mod replay_recording;
 mod report;
 mod results_folder;
 mod run;
+mod scratch;
 mod session;
 mod shrink;
 mod terminal;

@@ -6,6 +6,7 @@
 mod candidates;
 pub mod choice;
 mod compare;
+pub mod compensation;
 pub(crate) mod confirmed;
 mod distances;
 pub mod gap;

@@ -9,6 +9,8 @@ use sesame_plan::CampaignPlan;
 
 use crate::campaign;
 use crate::cli::failure::Failure;
+#[cfg(all(feature = "process", feature = "mcap"))]
+use crate::cli::compensate;
 #[cfg(feature = "process")]
 use crate::cli::physical;
 use crate::cli::session::Session;
@@ -30,6 +32,9 @@ pub enum Running {
     /// Run recorded tests in a lab, and record what they show there as results of their own
     #[cfg(feature = "process")]
     Physical(physical::Options),
+    /// Fit the simulation to what a lab recorded, and say how much smaller the reality gap is then
+    #[cfg(all(feature = "process", feature = "mcap"))]
+    Compensate(compensate::Options),
     /// Run a recorded test again just as it was and say whether it is the same, bit for bit
     Replay(replay::Options),
     /// Make a failing test smaller for as long as it fails as it did: fewer operations, shorter, milder
@@ -116,6 +121,8 @@ impl Running {
             Running::Confirm(options) => confirm::confirm(session, options),
             #[cfg(feature = "process")]
             Running::Physical(options) => physical::physical(session, options),
+            #[cfg(all(feature = "process", feature = "mcap"))]
+            Running::Compensate(options) => compensate::compensate(session, options),
             Running::Replay(options) => replay::replay(session, options),
             Running::Shrink(options) => shrink::shrink(session, options),
             Running::ReplayRecording(options) => replay_recording::replay_recording(session, options),

@@ -1,11 +1,7 @@
 //! `replay`: a recorded test once more, just as it was.
 
-use std::fs::DirBuilder;
-#[cfg(unix)]
-use std::os::unix::fs::DirBuilderExt as _;
-use std::path::PathBuf;
 use std::process::ExitCode;
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 use clap::Args;
 
@@ -18,6 +14,7 @@ use crate::campaign::{Job, JobResult, SingleSettings, default_timeout, run_singl
 use crate::cli::execution::{claim_files, interruptible, refuse_unfilled, seconds};
 use crate::cli::failure::{Failure, NOT_AS_REQUIRED, STOPPED};
 use crate::cli::results_folder::{open, refuse_changed};
+use crate::cli::scratch::Scratch;
 use crate::cli::session::Session;
 use crate::cli::terminal::Format;
 use crate::cli::terminal::{print, print_json, say, text_options};
@@ -44,10 +41,10 @@ pub(super) fn replay(session: &Session, options: &Options) -> Result<ExitCode, F
     let files = claim_files(&session.runner, plan)?;
     refuse_unfilled(&session.runner, plan, true)?;
     let interrupted = interruptible()?;
-    let folder = Scratch::new()?;
+    let folder = Scratch::new("replay")?;
     let settings = SingleSettings {
         program: session.program.clone(),
-        directory: folder.0.clone(),
+        directory: folder.path().to_owned(),
         timeout: options.timeout.unwrap_or_else(|| limit(&record)),
     };
     let job = Job {
@@ -88,30 +85,5 @@ pub(super) fn limit(record: &TestRecord) -> Duration {
     match record.observation.outcome {
         Outcome::Timeout { limit } => Duration::from_secs_f64(limit),
         _ => default_timeout(record.observation.wall.run),
-    }
-}
-
-/// A folder for the worker that goes when it is no longer needed: a replay leaves nothing behind.
-struct Scratch(PathBuf);
-
-impl Scratch {
-    fn new() -> Result<Self, Failure> {
-        let moment = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default().as_nanos();
-        let folder = std::env::temp_dir().join(format!("sesame-replay-{}-{moment:x}", std::process::id()));
-        let mut builder = DirBuilder::new();
-        // Others must not write in it: it names the program that the worker starts.
-        #[cfg(unix)]
-        builder.mode(0o700);
-        builder
-            .create(&folder)
-            .map_err(|error| Failure(format!("cannot make a folder for the worker: {error}: {}", folder.display())))?;
-        Ok(Scratch(folder))
-    }
-}
-
-impl Drop for Scratch {
-    fn drop(&mut self) {
-        // What cannot be removed is left to the system, which clears its temporary files.
-        std::fs::remove_dir_all(&self.0).ok();
     }
 }

@@ -15,13 +15,13 @@ use sesame_gap::localise::{self, Extent, Words, localise};
 use sesame_gap::samples::{Samples, Side, Undefined, hedges_g, moments};
 use sesame_gap::split::Located;
 use sesame_gap::violations::{Confusion, Frequencies, Occurrence, Occurrences, frequencies};
-use sesame_plan::{CampaignPlan, Dimension, Lab, MetricId, Requirement};
+use sesame_plan::{CampaignPlan, Dimension, Lab, LabTask, MetricId, Requirement};
 use sesame_search::sspr::Convention;
 
 use crate::analysis::Datum;
 use crate::present::number::{fixed, plural, quantity};
 use crate::present::table::Table;
-use crate::record::{Origin, RecordError, Repository, TestRow, Verdict};
+use crate::record::{Origin, RecordError, Repetition, Repository, TestRow, Verdict};
 
 /// The probability of an error that verdicts allow.
 pub const ALPHA: f64 = 0.05;
@@ -53,6 +53,12 @@ pub enum GapError {
         /// The file.
         path: PathBuf,
     },
+    /// They are no results of tests that were simulated again for a lab.
+    #[error("{} has no results of `compensate`, which simulates the tests of a lab again", path.display())]
+    NotCompensated {
+        /// The file.
+        path: PathBuf,
+    },
     /// The lab ran tests of another run.
     #[error(
         "{} has results of other tests: its {test} is not that of {}; give the run whose tests were taken to the lab",
@@ -79,8 +85,22 @@ pub enum GapError {
 /// The runs in the results of a lab, without its runs without disturbance. They must be of tests of these results of a
 /// campaign.
 pub fn lab_runs(campaign: &Repository, lab: &Repository) -> Result<Vec<LabRun>, GapError> {
+    let Some(task) = lab.task().in_lab() else { return Err(GapError::NotOfALab { path: lab.path().to_owned() }) };
+    runs_of(campaign, lab, task)
+}
+
+/// The runs in results of `compensate`: the tests that a lab ran, simulated once more. They must be of tests of these
+/// results of a campaign.
+pub fn compensated_runs(campaign: &Repository, again: &Repository) -> Result<Vec<LabRun>, GapError> {
+    match again.task().compensated() {
+        Some(task) => runs_of(campaign, again, task),
+        None => Err(GapError::NotCompensated { path: again.path().to_owned() }),
+    }
+}
+
+/// The runs of a task, without those without disturbance.
+fn runs_of(campaign: &Repository, lab: &Repository, task: &LabTask) -> Result<Vec<LabRun>, GapError> {
     let paths = || (lab.path().to_owned(), campaign.path().to_owned());
-    let Some(task) = lab.task().in_lab() else { return Err(GapError::NotOfALab { path: paths().0 }) };
     // Only the robots may be others.
     let simulator = campaign.plan().simulator.clone();
     let reached = CampaignPlan { simulator, ..lab.plan().clone() };
@@ -163,6 +183,26 @@ pub struct EventGap {
 
 /// Compares the runs of a lab with the results of the campaign that its tests come from.
 pub fn gap(campaign: &Repository, runs: &[LabRun], lab: Option<&Lab>) -> Result<Gap, RecordError> {
+    compare(campaign, None, runs, lab)
+}
+
+/// Compares the runs of a lab with those in which its tests were simulated again ([`compensated_runs`]). Tests that were
+/// not are left out.
+pub fn gap_after(
+    campaign: &Repository,
+    again: &[LabRun],
+    runs: &[LabRun],
+    lab: Option<&Lab>,
+) -> Result<Gap, RecordError> {
+    compare(campaign, Some(again), runs, lab)
+}
+
+fn compare(
+    campaign: &Repository,
+    again: Option<&[LabRun]>,
+    runs: &[LabRun],
+    lab: Option<&Lab>,
+) -> Result<Gap, RecordError> {
     let plan = campaign.plan();
     let mut by_test: BTreeMap<u32, Vec<&TestRow>> = BTreeMap::new();
     for run in runs {
@@ -187,8 +227,16 @@ pub fn gap(campaign: &Repository, runs: &[LabRun], lab: Option<&Lab>) -> Result<
     let mut sides = Vec::with_capacity(by_test.len());
     for (&test, lab_runs) in &by_test {
         let row = campaign.row(test)?;
-        let fresh = judge.runs(row.duplicate_of.unwrap_or(test));
-        sides.push(Sides { test, row, fresh, lab_runs });
+        let simulated = match again {
+            Some(again) => Simulated::Again(again.iter().filter(|run| run.of == test).map(|run| &run.row).collect()),
+            None => match judge.runs(row.duplicate_of.unwrap_or(test)) {
+                [] => Simulated::Selected(Box::new(row)),
+                fresh => Simulated::Fresh(fresh),
+            },
+        };
+        if !matches!(&simulated, Simulated::Again(runs) if runs.is_empty()) {
+            sides.push(Sides { test, simulated, lab_runs });
+        }
     }
 
     let interlocked = lab.map_or(&[][..], |lab| &lab.interlock);
@@ -218,10 +266,7 @@ pub fn gap(campaign: &Repository, runs: &[LabRun], lab: Option<&Lab>) -> Result<
             Verdict::Inconclusive => Occurrence::Inconclusive,
         };
         event(&requirement.name, &sides, |sides| {
-            let simulation = match sides.fresh {
-                [] => Occurrences::of([occurrence(sides.row.verdict(requirement))]),
-                fresh => Occurrences::of(fresh.iter().map(|run| occurrence(run.verdict(requirement)))),
-            };
+            let simulation = Occurrences::of(sides.simulated.verdicts(requirement).into_iter().map(occurrence));
             let lab = Occurrences::of(sides.lab_runs.iter().map(|row| occurrence(row.verdict(requirement))));
             (simulation, lab)
         })
@@ -236,31 +281,56 @@ pub fn gap(campaign: &Repository, runs: &[LabRun], lab: Option<&Lab>) -> Result<
             Some(_) => Occurrence::Seen,
         };
         event(&plan.metric(metric).name, &sides, |sides| {
-            let simulation = match sides.fresh {
-                [] => Occurrences::of([occurrence(sides.row.value(metric).value)]),
-                fresh => Occurrences::of(fresh.iter().map(|run| occurrence(run.value(metric).value))),
-            };
+            let simulation = Occurrences::of(sides.simulated.values(metric).into_iter().map(occurrence));
             let lab = Occurrences::of(sides.lab_runs.iter().map(|row| occurrence(row.value(metric).value)));
             (simulation, lab)
         })
     });
     let events = requirements.chain(interlocks).collect();
-    Ok(Gap { tests: by_test.into_keys().collect(), metrics, events, dimensions })
+    Ok(Gap { tests: sides.iter().map(|sides| sides.test).collect(), metrics, events, dimensions })
 }
 
 /// A test on both sides.
 struct Sides<'a> {
     test: u32,
-    row: TestRow,
-    fresh: &'a [crate::record::Repetition],
+    simulated: Simulated<'a>,
     lab_runs: &'a [&'a TestRow],
+}
+
+/// The runs of a test in simulation.
+enum Simulated<'a> {
+    /// The run for which the test was chosen, because there is no other.
+    Selected(Box<TestRow>),
+    /// Fresh runs of a confirmation; at least one.
+    Fresh(&'a [Repetition]),
+    /// Runs after a compensation; at least one.
+    Again(Vec<&'a TestRow>),
+}
+
+impl Simulated<'_> {
+    /// The value of a metric in each run.
+    fn values(&self, metric: MetricId) -> Vec<Option<f64>> {
+        match self {
+            Simulated::Selected(row) => vec![row.value(metric).value],
+            Simulated::Fresh(runs) => runs.iter().map(|run| run.value(metric).value).collect(),
+            Simulated::Again(rows) => rows.iter().map(|row| row.value(metric).value).collect(),
+        }
+    }
+
+    /// What each run says of a requirement.
+    fn verdicts(&self, requirement: &Requirement) -> Vec<Verdict> {
+        match self {
+            Simulated::Selected(row) => vec![row.verdict(requirement)],
+            Simulated::Fresh(runs) => runs.iter().map(|run| run.verdict(requirement)).collect(),
+            Simulated::Again(rows) => rows.iter().map(|row| row.verdict(requirement)).collect(),
+        }
+    }
 }
 
 impl Sides<'_> {
     fn compared(&self, metric: MetricId, tolerance: f64) -> Option<Compared> {
-        let fresh: Vec<f64> = self.fresh.iter().filter_map(|run| run.value(metric).value).collect();
-        let selected = fresh.is_empty();
-        let simulation = if selected { Vec::from_iter(self.row.value(metric).value) } else { fresh };
+        let simulation: Vec<f64> = self.simulated.values(metric).into_iter().flatten().collect();
+        let selected = matches!(self.simulated, Simulated::Selected(_));
         let lab: Vec<f64> = self.lab_runs.iter().filter_map(|row| row.value(metric).value).collect();
         if simulation.is_empty() || lab.is_empty() {
             return None;
@@ -556,7 +626,7 @@ mod tests {
     use sesame_rng::Stream;
 
     use super::*;
-    use crate::record::{MetricValue, Recorder, Repetition, sample};
+    use crate::record::{MetricValue, Recorder, sample};
 
     const COLLISIONS: MetricId = MetricId(0);
     const FUZZING_TIME: MetricId = MetricId(1);

@@ -59,8 +59,10 @@ pub(super) fn header(
         ("Ended", facts.stop.clone().unwrap_or_else(|| "unfinished".to_owned())),
         ("Digest", digest.to_owned()),
     ];
+    let compensation = plan.compensation.as_ref();
+    let compensation = compensation.map(|it| ("Compensated", crate::analysis::compensation::in_words(plan, it)));
     body.open("dl", &[]);
-    for (name, value) in &rows {
+    for (name, value) in rows.iter().chain(&compensation) {
         body.open("div", &[("class", if *name == "Digest" { "digest" } else { "fact" })]);
         body.element("dt", &[], name);
         body.element("dd", &[], value);
