@@ -2,10 +2,10 @@
 //! simulated with adjustments, until what they publish is as close to the traces of the lab as can be.
 
 use std::collections::BTreeMap;
-use std::{fs, io};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
+use std::{fs, io};
 
 use sesame_base::test_number::TestNumber;
 use sesame_gap::discrepancy::discrepancy;
@@ -153,7 +153,11 @@ pub(crate) fn fit(
     let repeats = if noises.is_empty() { 1 } else { repeats.max(2) };
     let compensation = |levels: Vec<Vec<f64>>| Compensation {
         lab: lab.to_owned(),
-        adjustments: fits.iter().zip(levels).map(|(fit, levels)| Adjustment { what: fit.what.clone(), levels }).collect(),
+        adjustments: fits
+            .iter()
+            .zip(levels)
+            .map(|(fit, levels)| Adjustment { what: fit.what.clone(), levels })
+            .collect(),
     };
     let of_values = |values: &[f64]| compensation(values.iter().map(|&value| vec![value]).collect());
     let mut runner = Evaluations { simulations, repeats, seed, failure: None };
@@ -222,7 +226,8 @@ impl Evaluations<'_, '_> {
         match self.simulations.run(tests, with, self.repeats, self.seed) {
             Ok(Some(simulated)) => {
                 let of_tests = tests.iter().zip(&simulated);
-                let found: Vec<f64> = of_tests.flat_map(|(lab, simulated)| discrepancies(simulated, &lab.runs)).collect();
+                let found: Vec<f64> =
+                    of_tests.flat_map(|(lab, simulated)| discrepancies(simulated, &lab.runs)).collect();
                 if found.is_empty() { f64::INFINITY } else { found.iter().sum::<f64>() / found.len() as f64 }
             }
             Ok(None) => {
@@ -248,7 +253,8 @@ impl Simulations<'_> {
         seed: u64,
     ) -> Result<Option<Vec<Vec<Signals>>>, FitError> {
         let mut waiting: BTreeMap<u32, (usize, PathBuf)> = BTreeMap::new();
-        for (number, (at, run)) in (0u32..).zip((0..tests.len()).flat_map(|at| (1..=repeats).map(move |run| (at, run)))) {
+        for (number, (at, run)) in (0u32..).zip((0..tests.len()).flat_map(|at| (1..=repeats).map(move |run| (at, run))))
+        {
             let file = self.folder.join(format!("{number}.mcap"));
             let of_run = [u64::from(tests[at].number), u64::from(run)];
             self.executor.submit(Job {

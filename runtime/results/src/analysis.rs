@@ -16,6 +16,7 @@ pub mod regions;
 pub(crate) mod statistics;
 #[cfg(test)]
 mod tests;
+pub mod traces;
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -8,9 +8,9 @@ use clap::Subcommand;
 use sesame_plan::CampaignPlan;
 
 use crate::campaign;
-use crate::cli::failure::Failure;
 #[cfg(all(feature = "process", feature = "mcap"))]
 use crate::cli::compensate;
+use crate::cli::failure::Failure;
 #[cfg(feature = "process")]
 use crate::cli::physical;
 use crate::cli::session::Session;

@@ -11,8 +11,8 @@ use serde::Serialize;
 
 use sesame_base::test_number::TestNumber;
 use sesame_plan::{CampaignPlan, Compensation, Fit, Lab, LabTask, Task};
-use sesame_results::analysis::gap::{Gap, compensated_runs, gap, gap_after, lab_runs};
 use sesame_results::analysis::compensation;
+use sesame_results::analysis::gap::{Gap, compensated_runs, gap, gap_after, lab_runs};
 use sesame_results::record::Repository;
 use sesame_results::report::quantity;
 use sesame_rng::derive_seed;
@@ -248,12 +248,8 @@ fn fitted(
         directory: scratch.path().to_owned(),
         timeout: options.execution.timeout().unwrap_or(longest),
     })?;
-    let mut simulations = Simulations {
-        plan: &session.plan,
-        executor: &mut pool,
-        folder: scratch.path().to_owned(),
-        interrupted,
-    };
+    let mut simulations =
+        Simulations { plan: &session.plan, executor: &mut pool, folder: scratch.path().to_owned(), interrupted };
     let settings = Settings {
         lab: &lab.name,
         fits: &lab.fits,
@@ -308,7 +304,10 @@ fn fitted_text(
         format!("from {before} to {after} standard deviations")
     };
     let mut text = compensation::values(plan, fits, &outcome.compensation).text(text_options());
-    text.push_str(&format!("\nThe traces of {}, to which it was fitted, came closer to those of the lab: ", names(fitted_to)));
+    text.push_str(&format!(
+        "\nThe traces of {}, to which it was fitted, came closer to those of the lab: ",
+        names(fitted_to)
+    ));
     text.push_str(&format!("{}.\n", side(&outcome.fitted)));
     if let Some(judged) = &outcome.held_out {
         text.push_str(&format!("Those of {}, kept aside to judge by: {}.\n", names(held_out), side(judged)));

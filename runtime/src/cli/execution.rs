@@ -268,10 +268,9 @@ pub(super) fn perform(
     let (plan, seed) = (campaign.plan.clone(), campaign.seed);
     let settings = execution.settings(session, seed, &files);
     let mut display = Display::new(&plan, seed, execution.workers());
-    let end =
-        run_campaign(&plan, recorder, &settings, &folder.join("workers"), interrupted, &mut |event, progress| {
-            display.update(event, progress);
-        });
+    let end = run_campaign(&plan, recorder, &settings, &folder.join("workers"), interrupted, &mut |event, progress| {
+        display.update(event, progress);
+    });
     display.finish();
     files.finish()?;
     let resume = || session.caller.command("resume", &[&shown(folder)]);

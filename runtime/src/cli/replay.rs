@@ -1,5 +1,6 @@
 //! `replay`: a recorded test once more, just as it was.
 
+use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -7,11 +8,12 @@ use clap::Args;
 
 use sesame_base::observation::Outcome;
 use sesame_base::test_number::TestNumber;
-use sesame_results::record::{TestRecord, differences};
+use sesame_plan::Recorded;
+use sesame_results::record::{TestRecord, differences, trace_file};
 use sesame_results::report::{Replay, replay_text};
 
-use crate::campaign::{Job, JobResult, SingleSettings, default_timeout, run_single};
-use crate::cli::execution::{claim_files, interruptible, refuse_unfilled, seconds};
+use crate::campaign::{Job, JobResult, SingleSettings, TraceRequest, default_timeout, run_single};
+use crate::cli::execution::{claim_files, interruptible, refuse_unfilled, seconds, shown};
 use crate::cli::failure::{Failure, NOT_AS_REQUIRED, STOPPED};
 use crate::cli::results_folder::{open, refuse_changed};
 use crate::cli::scratch::Scratch;
@@ -27,6 +29,10 @@ pub struct Options {
     test: String,
     #[command(flatten)]
     which: Which,
+    /// Write the trace of the run as that of the recorded test, if it comes out the same: `traces/T158.mcap` in the folder
+    /// of the run
+    #[arg(long)]
+    record: bool,
     /// Seconds of wall time after which it is stopped; by default 20 times what it took, at least 60, or what stopped
     /// it
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
@@ -42,6 +48,9 @@ pub(super) fn replay(session: &Session, options: &Options) -> Result<ExitCode, F
     refuse_unfilled(&session.runner, plan, true)?;
     let interrupted = interruptible()?;
     let folder = Scratch::new("replay")?;
+    // It gets its place once it is known to be of the recorded run.
+    let recorded = folder.path().join("recorded.mcap");
+    let trace = options.record.then(|| TraceRequest { file: recorded.clone(), keep: Recorded::All });
     let settings = SingleSettings {
         program: session.program.clone(),
         directory: folder.path().to_owned(),
@@ -51,12 +60,12 @@ pub(super) fn replay(session: &Session, options: &Options) -> Result<ExitCode, F
         number: record.number,
         test: record.test.clone(),
         simulator_seed: record.simulator_seed,
-        trace: None,
+        trace,
         compensation: repository.plan().compensation.clone(),
     };
     let ended = run_single(job, &settings, &interrupted);
     files.finish()?;
-    let Some(JobResult { observation: again, notes, lock_stepped, .. }) = ended? else {
+    let Some(JobResult { observation: again, notes, lock_stepped, trace_failure, .. }) = ended? else {
         say(format_args!("stopped; a replay leaves nothing behind"));
         return Ok(ExitCode::from(STOPPED));
     };
@@ -73,11 +82,30 @@ pub(super) fn replay(session: &Session, options: &Options) -> Result<ExitCode, F
         same: differences.is_empty(),
         differences,
     };
+    if let Some(reason) = trace_failure {
+        return Err(Failure(format!("the trace of {} could not be written: {reason}", replay.test)));
+    }
+    if options.record && replay.same {
+        let file = trace_file(repository.folder(), record.number);
+        keep(&recorded, &file)?;
+        say(format_args!("recorded in {}", shown(&file)));
+    }
     match options.which.format {
         Format::Text => print(&replay_text(&replay, text_options()))?,
         Format::Json => print_json(&replay)?,
     };
     Ok(ExitCode::from(if replay.same || !lock_stepped { 0 } else { NOT_AS_REQUIRED }))
+}
+
+/// Puts a trace into its place, whole or not at all.
+fn keep(recorded: &Path, file: &Path) -> Result<(), Failure> {
+    let folder = file.parent().unwrap_or(Path::new("."));
+    let cannot = |error: std::io::Error| Failure(format!("cannot write the trace: {error}: {}", file.display()));
+    std::fs::create_dir_all(folder).map_err(cannot)?;
+    // The scratch folder may be on another file system.
+    let beside = file.with_extension("mcap.unfinished");
+    std::fs::copy(recorded, &beside).map_err(cannot)?;
+    std::fs::rename(&beside, file).map_err(cannot)
 }
 
 /// How long the test may take now.

@@ -7,9 +7,9 @@ use sesame_base::observation::{OperationEffect, Outcome};
 use sesame_plan::condition::ConditionEnd;
 use sesame_plan::testing::lab;
 use sesame_plan::{
-    Adjustment, BoostedChildren, CampaignPlan, Compensation, Confirmation, CoverageGoal, Dimension, Expectation, Exploration, Failing, Fit, Fitted, GridAxis,
-    Lab, LabBudget, LabExclusion, LabTask, LabTest, LabTolerance, MetricId, RankKey, RankOrder, RequirementId,
-    Shrinking, Statistic, StopRule, Task, TopicId,
+    Adjustment, BoostedChildren, CampaignPlan, Compensation, Confirmation, CoverageGoal, Dimension, Expectation,
+    Exploration, Failing, Fit, Fitted, GridAxis, Lab, LabBudget, LabExclusion, LabTask, LabTest, LabTolerance,
+    MetricId, RankKey, RankOrder, RequirementId, Shrinking, Statistic, StopRule, Task, TopicId,
 };
 use sesame_results::record::{DATABASE, GenerationCoverage, Origin, Recorder, Repetition, sample};
 use sesame_search as search;

@@ -47,8 +47,9 @@ impl RealCell {
     /// Starts a cell that differs so from the model.
     pub fn start_as(reality: &Reality, setup: &Setup, bus: &mut Bus<'_>) -> Result<Self, SimulatorError> {
         let mut world = World::start_shifted(setup, Vector::from_array(reality.zone_shift), bus)?;
-        for arm in &mut world.arms {
-            arm.reach_drives_by(reality.latency, reality.jump_limit);
+        for (at, arm) in world.arms.iter_mut().enumerate() {
+            // The first one moves the product.
+            arm.reach_drives_by(reality.latency, reality.soft_limit.filter(|_| at == 0));
         }
         let noise = torque_noise(setup, &world);
         Ok(RealCell { world, noise, noise_share: reality.noise_share })

@@ -89,7 +89,8 @@ pub fn values(plan: &CampaignPlan, fits: &[Fit], compensation: &Compensation) ->
 /// The reality gap before and after a compensation, per metric: the mean size of the differences over the tests that
 /// both have, and how many tests differ.
 pub fn before_and_after(plan: &CampaignPlan, before: &Gap, after: &Gap) -> Table {
-    let columns = ["metric", "unit", "tests", "difference_before", "difference_after", "different_before", "different_after"];
+    let columns =
+        ["metric", "unit", "tests", "difference_before", "difference_after", "different_before", "different_after"];
     let mut table = Table::new(columns.map(str::to_owned));
     for was in &before.metrics {
         let Some(is) = after.metrics.iter().find(|is| is.metric == was.metric) else { continue };

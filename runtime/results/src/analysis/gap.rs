@@ -208,20 +208,13 @@ fn compare(
     for run in runs {
         by_test.entry(run.of).or_default().push(&run.row);
     }
-    let dimensions = match lab.and_then(|lab| lab.budget.as_ref()) {
-        Some(budget) => budget.over.clone(),
-        None => DIMENSIONS.to_vec(),
-    };
+    let dimensions = dimensions(lab);
     let judge = campaign.judge()?;
-    let mut points = BTreeMap::new();
+    let points = points(campaign, &by_test.keys().copied().collect(), &dimensions)?;
     let mut reference = None;
     campaign.scan(&mut |test| {
         if test.origin == Origin::Reference && reference.is_none() {
             reference = Some(test.values);
-        } else if by_test.contains_key(&test.number) {
-            let point = test.point(plan, Convention::Ours);
-            let at = dimensions.iter().map(|&dimension| point.as_ref().and_then(|point| point.get(dimension)));
-            points.insert(test.number, at.collect::<Vec<_>>());
         }
     })?;
     let mut sides = Vec::with_capacity(by_test.len());
@@ -288,6 +281,28 @@ fn compare(
     });
     let events = requirements.chain(interlocks).collect();
     Ok(Gap { tests: sides.iter().map(|sides| sides.test).collect(), metrics, events, dimensions })
+}
+
+/// The dimensions in which a gap is looked for: those of the lab's budget, otherwise T1, T2 and P1.
+pub fn dimensions(lab: Option<&Lab>) -> Vec<Dimension> {
+    lab.and_then(|lab| lab.budget.as_ref()).map_or_else(|| DIMENSIONS.to_vec(), |budget| budget.over.clone())
+}
+
+/// The coordinates of these tests in these dimensions, by number.
+pub fn points(
+    campaign: &Repository,
+    tests: &BTreeSet<u32>,
+    dimensions: &[Dimension],
+) -> Result<BTreeMap<u32, Vec<Option<f64>>>, RecordError> {
+    let mut points = BTreeMap::new();
+    campaign.scan(&mut |test| {
+        if tests.contains(&test.number) {
+            let point = test.point(campaign.plan(), Convention::Ours);
+            let at = dimensions.iter().map(|&dimension| point.as_ref().and_then(|point| point.get(dimension)));
+            points.insert(test.number, at.collect());
+        }
+    })?;
+    Ok(points)
 }
 
 /// A test on both sides.
@@ -546,6 +561,7 @@ impl Gap {
             let metric = plan.metric(gap.metric);
             let words = Words {
                 metric: &format!("`{}`", metric.name),
+                than: ["smaller", "greater"],
                 value: &|value| quantity(value, metric.unit.as_deref()),
                 dimension: &|at| self.dimensions[at].name().to_owned(),
                 coordinate: &|_, value| fixed(value, 2),
