@@ -9,6 +9,7 @@ mod commands;
 mod compensate;
 mod confirm;
 mod execution;
+mod explore;
 mod export;
 mod failure;
 mod gate;

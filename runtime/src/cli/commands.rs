@@ -14,7 +14,7 @@ use crate::cli::failure::Failure;
 #[cfg(feature = "process")]
 use crate::cli::physical;
 use crate::cli::session::Session;
-use crate::cli::{confirm, export, known, repeat, replay, replay_recording, report, run, shrink, view};
+use crate::cli::{confirm, explore, export, known, repeat, replay, replay_recording, report, run, shrink, view};
 #[cfg(feature = "process")]
 use crate::runner::Runner;
 
@@ -29,6 +29,8 @@ pub enum Running {
     Repeat(repeat::Options),
     /// Run recorded tests again with fresh seeds of the simulator and say whether what was found comes again
     Confirm(confirm::Options),
+    /// Run variations of a recorded test along one dimension, to see where something begins and ends
+    Explore(explore::Options),
     /// Run recorded tests in a lab, and record what they show there as results of their own
     #[cfg(feature = "process")]
     Physical(physical::Options),
@@ -119,6 +121,7 @@ impl Running {
             Running::Known(options) => known::known(session, options),
             Running::Repeat(options) => repeat::repeat(session, options),
             Running::Confirm(options) => confirm::confirm(session, options),
+            Running::Explore(options) => explore::explore(session, options),
             #[cfg(feature = "process")]
             Running::Physical(options) => physical::physical(session, options),
             #[cfg(all(feature = "process", feature = "mcap"))]

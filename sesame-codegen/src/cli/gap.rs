@@ -89,6 +89,7 @@ pub(super) fn compared(shell: Shell, asked: &Compared) -> anyhow::Result<ExitCod
     if for_people && !asked.events {
         let mut sentences = found.sentences(plan);
         sentences.extend(traced.iter().flat_map(TraceGap::sentences));
+        sentences.extend(found.next_test(&campaign)?.map(|(_, why)| why));
         shell::asked_for(&format!("\n{}\n", sentences.join("\n")))?;
     }
     advise(shell, &found);

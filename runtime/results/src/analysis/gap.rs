@@ -12,8 +12,9 @@ use sesame_gap::bootstrap::{Resampling, intervals};
 use sesame_gap::equivalence::{self, Equivalence, Reason, Verdict as Equal, lab_runs_needed};
 use sesame_gap::holm::adjusted;
 use sesame_gap::localise::{self, Extent, Words, localise};
+use sesame_gap::next::{Next, Tried, Why, next};
 use sesame_gap::samples::{Samples, Side, Undefined, hedges_g, moments};
-use sesame_gap::split::Located;
+use sesame_gap::split::{Located, Split};
 use sesame_gap::violations::{Confusion, Frequencies, Occurrence, Occurrences, frequencies};
 use sesame_plan::{CampaignPlan, Dimension, Lab, LabTask, MetricId, Requirement};
 use sesame_search::sspr::Convention;
@@ -130,6 +131,8 @@ pub struct Gap {
     pub events: Vec<EventGap>,
     /// The names of dimensions in which gaps were looked for.
     pub dimensions: Vec<Dimension>,
+    /// The coordinates of the tests in these dimensions, by number.
+    pub points: BTreeMap<u32, Vec<Option<f64>>>,
 }
 
 /// How one metric differs.
@@ -280,7 +283,7 @@ fn compare(
         })
     });
     let events = requirements.chain(interlocks).collect();
-    Ok(Gap { tests: sides.iter().map(|sides| sides.test).collect(), metrics, events, dimensions })
+    Ok(Gap { tests: sides.iter().map(|sides| sides.test).collect(), metrics, events, dimensions, points })
 }
 
 /// The dimensions in which a gap is looked for: those of the lab's budget, otherwise T1, T2 and P1.
@@ -571,8 +574,77 @@ impl Gap {
                 Some([low, high]) => constant(words.metric, [low, high], gap.tests.len(), words.value),
                 None => localise::sentence(&gap.extent, gap.located.len(), &words),
             });
+            sentences.extend(self.edges(gap));
         }
         sentences
+    }
+}
+
+impl Gap {
+    /// Between which tests a gap that is local begins and ends; `None` for another one.
+    fn edges(&self, gap: &MetricGap) -> Option<String> {
+        let Extent::Range { split: Split { range, .. }, .. } = &gap.extent else { return None };
+        let name = self.dimensions[range.dimension].name();
+        let places = gap.located.iter().filter_map(|test| Some((*test, self.points.get(test)?[range.dimension]?)));
+        let places: Vec<(u32, f64)> = places.collect();
+        let edge = |end: f64| {
+            let below = places.iter().filter(|(_, at)| *at < end).max_by(|a, b| a.1.total_cmp(&b.1))?;
+            let above = places.iter().filter(|(_, at)| *at > end).min_by(|a, b| a.1.total_cmp(&b.1))?;
+            let [below, above] =
+                [below, above].map(|(test, at)| format!("{} ({name} {})", TestNumber(*test), fixed(*at, 2)));
+            Some(format!("between {below} and {above}"))
+        };
+        let (begins, ends) = (range.low.and_then(edge), range.high.and_then(edge));
+        match (begins, ends) {
+            (Some(begins), Some(ends)) => Some(format!("It begins {begins}, and ends {ends}.")),
+            (Some(begins), None) => Some(format!("It begins {begins}.")),
+            (None, Some(ends)) => Some(format!("It ends {ends}.")),
+            (None, None) => None,
+        }
+    }
+
+    /// The recorded test that would tell most about where a gap begins and ends if it were run in the lab next, with the
+    /// reason as a sentence; `None` if every test was run there.
+    ///
+    /// A test has a gap if one of its metrics differs, and none if all that is decided agrees.
+    pub fn next_test(&self, campaign: &Repository) -> Result<Option<(u32, String)>, RecordError> {
+        let verdict = |test: u32| {
+            let of_metrics = self.metrics.iter().flat_map(|gap| gap.tests.iter().filter(move |it| it.test == test));
+            let verdicts: Vec<Equal> = of_metrics.map(|it| it.equivalence.verdict).collect();
+            match () {
+                () if verdicts.contains(&Equal::Different) => Some(true),
+                () if verdicts.contains(&Equal::Equivalent) => Some(false),
+                () => None,
+            }
+        };
+        let tried: Vec<(u32, Tried)> =
+            self.points.iter().map(|(&test, at)| (test, Tried { at: at.clone(), gap: verdict(test) })).collect();
+        let others: BTreeSet<u32> = {
+            let rows = campaign.tests()?;
+            let own = |row: &&TestRow| row.origin != Origin::Reference && row.duplicate_of.is_none();
+            rows.iter().filter(own).map(|row| row.number).filter(|test| !self.points.contains_key(test)).collect()
+        };
+        let candidates: Vec<(u32, Vec<Option<f64>>)> = points(campaign, &others, &self.dimensions)?
+            .into_iter()
+            .filter(|(_, at)| at.iter().any(Option::is_some))
+            .collect();
+        let along = self.metrics.iter().find_map(|gap| match &gap.extent {
+            Extent::Range { split, .. } => Some(split.range.dimension),
+            _ => None,
+        });
+        let known: Vec<Tried> = tried.iter().map(|(_, it)| it.clone()).collect();
+        let places: Vec<Vec<Option<f64>>> = candidates.iter().map(|(_, at)| at.clone()).collect();
+        let Some(Next { candidate, why }) = next(&known, &places, along) else { return Ok(None) };
+        let test = candidates[candidate].0;
+        let why = match why {
+            Why::Between { gap, none } => format!(
+                "it lies between {}, which has a gap, and {}, which has none",
+                TestNumber(tried[gap].0),
+                TestNumber(tried[none].0)
+            ),
+            Why::Farthest { .. } => "it is the most unlike those that were run there".to_owned(),
+        };
+        Ok(Some((test, format!("{} would tell most if it were run in the lab next: {why}.", TestNumber(test)))))
     }
 }
 

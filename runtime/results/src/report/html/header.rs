@@ -33,6 +33,10 @@ pub(super) fn header(
         (Task::Campaign, Search::Strategy { strategy, .. }) => budget(&strategy.title()),
         (Task::Known { tests }, _) => plural(tests.len(), "regression test", "regression tests"),
         (Task::Shrink(shrinking), _) => format!("{} at most", budget(&format!("{} shrunk", shrinking.name))),
+        (Task::Variations(variations), _) => {
+            let count = plural(variations.tests.len(), "variation", "variations");
+            format!("{count} of {} along {}", variations.name, variations.dimension.name())
+        }
         (Task::Lab(lab) | Task::Compensated(lab), _) => {
             let each = if lab.repeats == 1 { String::new() } else { format!(", each {} times", lab.repeats) };
             let place = if facts.task.in_lab().is_some() { "in" } else { "simulated again for" };
