@@ -191,3 +191,95 @@ fn strengthen(parameter: &Parameter, choice: &mut Choice, by: f64) {
         _ => {}
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use sesame_plan::OperationKind;
+    use sesame_plan::testing::{operation_with, plan, test_of, use_of, value};
+
+    use super::*;
+
+    /// Two operations: one with a value, one with a value and a sub-range.
+    fn two() -> CampaignPlan {
+        let range = sesame_plan::testing::range("width", -1.0, 3.0);
+        plan(vec![
+            operation_with("bias", 0, OperationKind::Bias, vec![value("bias", 0.0, 2.0)]),
+            operation_with("both", 0, OperationKind::Bias, vec![value("bias", -1.0, 1.0), range]),
+        ])
+    }
+
+    fn windows(test: &Test) -> Vec<(f64, f64)> {
+        test.operations
+            .iter()
+            .map(|it| match it.activation {
+                Activation::Time { start, end } => (start, end),
+                _ => panic!("the test is by time"),
+            })
+            .collect()
+    }
+
+    fn any_test() -> impl Strategy<Value = Test> {
+        let ends = (0.0..4.0f64, 0.05..0.9f64, 5.0..8.0f64, 0.05..1.9f64);
+        (ends, 0.0..2.0f64, -1.0..1.0f64, (-1.0..1.0f64, 0.0..2.0f64), 0.0..2.0f64).prop_map(
+            |((start, length, later, longer), bias, other, (low, width), again)| {
+                test_of(vec![
+                    use_of(0, start, start + length, vec![Choice::Value { value: bias }], 1),
+                    use_of(0, later, later + longer, vec![Choice::Value { value: again }], 2),
+                    use_of(
+                        1,
+                        start,
+                        later,
+                        vec![Choice::Value { value: other }, Choice::Range { low, high: low + width }],
+                        3,
+                    ),
+                ])
+            },
+        )
+    }
+
+    proptest! {
+        #[test]
+        fn a_variation_is_where_it_is_wanted_and_changes_nothing_else(
+            test in any_test(), at in 0usize..3, share in -0.2..1.2f64
+        ) {
+            let plan = two();
+            let dimension = [Dimension::P1, Dimension::T1, Dimension::T2][at];
+            let [low, high] = reach(&plan, &test, dimension).unwrap();
+            let here = coordinate(&plan, &test, dimension).unwrap();
+            prop_assert!(low - 1e-9 <= here && here <= high + 1e-9, "{low} {here} {high}");
+            let wanted = low + share * (high - low);
+            let varied = vary(&plan, &test, dimension, wanted).unwrap();
+            let found = coordinate(&plan, &varied, dimension).unwrap();
+            prop_assert!((found - wanted.clamp(low, high)).abs() < 1e-9, "{found} instead of {wanted}");
+            plan.validate_test(&varied).unwrap();
+            let choices = |test: &Test| test.operations.iter().map(|it| it.parameters.clone()).collect::<Vec<_>>();
+            prop_assert_eq!(choices(&varied) == choices(&test), dimension != Dimension::P1 || varied == test);
+            let seeds = |test: &Test| test.operations.iter().map(|it| it.operation_seed).collect::<Vec<_>>();
+            prop_assert_eq!(seeds(&varied), seeds(&test));
+            let (before, after) = (windows(&test), windows(&varied));
+            for (was, is) in before.iter().zip(&after) {
+                prop_assert!(0.0 <= is.0 && is.0 < is.1 && is.1 <= 10.0, "{is:?}");
+                let (length, now) = (was.1 - was.0, is.1 - is.0);
+                let (middle, moved) = (f64::midpoint(was.0, was.1), f64::midpoint(is.0, is.1));
+                match dimension {
+                    Dimension::T1 => prop_assert!((length - now).abs() < 1e-9),
+                    Dimension::T2 => prop_assert!((middle - moved).abs() < 1e-6),
+                    _ => prop_assert_eq!(was, is),
+                }
+            }
+            // Copies of the first operation stay apart.
+            prop_assert!(after[0].1 <= after[1].0 + 1e-9, "{after:?}");
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_varied_is_refused() {
+        let plan = two();
+        let test = test_of(vec![use_of(0, 0.0, 10.0, vec![Choice::Value { value: 1.0 }], 1)]);
+        assert_eq!(reach(&plan, &test, Dimension::P1), Ok([0.0, 1.0]));
+        assert_eq!(vary(&plan, &test, Dimension::T1, 0.2), Err(VaryError::Fixed("T1")));
+        let error = reach(&plan, &test, Dimension::O0).unwrap_err();
+        assert_eq!(error.to_string(), "tests are varied along T1, T2 and P1, not along O0");
+    }
+}

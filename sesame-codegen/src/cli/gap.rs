@@ -9,6 +9,7 @@ use anyhow::bail;
 use clap::Args;
 
 use sesame_plan::Lab;
+use sesame_results::analysis::extents;
 use sesame_results::analysis::gap::{Gap, GapError, compensated_runs, gap, gap_after, lab_runs};
 use sesame_results::analysis::traces::TraceGap;
 use sesame_results::record::Repository;
@@ -28,8 +29,12 @@ pub(super) struct Compared {
     #[arg(long, value_name = "DIR")]
     simulation: Option<PathBuf>,
     /// Show the traces instead: each signal of each test, how far both sides are apart, and how much later the lab is.
-    #[arg(long, conflicts_with = "events")]
+    #[arg(long, conflicts_with_all = ["events", "extents"])]
     traces: bool,
+    /// Show how far each gap extends instead: everywhere, in a range, in some tests, or nowhere; of metrics, and of the
+    /// lag and level of signals.
+    #[arg(long, conflicts_with = "events")]
+    extents: bool,
     /// Show requirements and interlocked metrics instead: how many tests violate them where.
     #[arg(long)]
     events: bool,
@@ -80,13 +85,14 @@ pub(super) fn compared(shell: Shell, asked: &Compared) -> anyhow::Result<ExitCod
         None => gap(&campaign, &runs, lab.as_ref())?,
     };
     let for_people = asked.output.format() == Format::Table;
-    let table = match (asked.events, for_people) {
-        (true, _) => found.events(),
-        (false, true) => found.overview(plan),
-        (false, false) => found.comparisons(plan),
+    let table = match () {
+        () if asked.events => found.events(),
+        () if asked.extents => extents(plan, &found, traced.as_ref()),
+        () if for_people => found.overview(plan),
+        () => found.comparisons(plan),
     };
     print(&table, &asked.output)?;
-    if for_people && !asked.events {
+    if for_people && !asked.events && !asked.extents {
         let mut sentences = found.sentences(plan);
         sentences.extend(traced.iter().flat_map(TraceGap::sentences));
         sentences.extend(found.next_test(&campaign)?.map(|(_, why)| why));

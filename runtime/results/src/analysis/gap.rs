@@ -651,7 +651,7 @@ impl Gap {
 impl MetricGap {
     /// The smallest and the largest difference, where all runs of each test are equal on each side, so that there is no
     /// chance to speak of; `None` elsewhere.
-    fn without_spread(&self) -> Option<[f64; 2]> {
+    pub(crate) fn without_spread(&self) -> Option<[f64; 2]> {
         let no_spread = |test: &Compared| test.equivalence.tests == Err(Undefined::NoSpread);
         if !self.tests.iter().all(no_spread) {
             return None;
