@@ -26,9 +26,8 @@ pub fn discrepancy(simulation: &[Series<'_>], lab: &[Series<'_>]) -> Result<f64,
     let step = interval.max((end - start) / STEPS);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it is at most the number of steps")]
     let count = libm::floor((end - start) / step) as usize + 1;
-    let resampled = |runs: &[Series<'_>]| -> Vec<Vec<f64>> {
-        runs.iter().map(|run| run.resampled(start, step, count)).collect()
-    };
+    let resampled =
+        |runs: &[Series<'_>]| -> Vec<Vec<f64>> { runs.iter().map(|run| run.resampled(start, step, count)).collect() };
     let (simulation, lab) = (resampled(simulation), resampled(lab));
     let scale = deviation(&lab)?;
     let distances = (0..count).map(|at| energy_distance(&at_time(&simulation, at), &at_time(&lab, at)));

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Campaign, Compensation, KnownTest, KnownTestId, Lab, MessageId, MessageType, Metric, MetricId, Node, NodeId, Operation,
-    OperationId, Requirement, RequirementId, Simulator, Topic, TopicId,
+    Campaign, Compensation, KnownTest, KnownTestId, Lab, MessageId, MessageType, Metric, MetricId, Node, NodeId,
+    Operation, OperationId, Requirement, RequirementId, Simulator, Topic, TopicId,
 };
 
 /// Everything a runner knows of its campaign. Deserializing one [validates](CampaignPlan::validate) it.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{CampaignPlan, KnownTestId, Recorded, RequirementId, Search, Test};
+use crate::{CampaignPlan, Dimension, KnownTestId, Recorded, RequirementId, Search, Test};
 
 /// What one run of a runner does.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -32,6 +32,19 @@ pub enum Task {
     /// It simulates the tests that a lab ran, with what [compensates](crate::Compensation) for the reality gap:
     /// `compensate`.
     Compensated(LabTask),
+    /// It runs variations of a test along one dimension, each once: `explore`.
+    Variations(Variations),
+}
+
+/// Variations of a test of a campaign.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Variations {
+    /// The test's name.
+    pub name: String,
+    /// The dimension along which they differ.
+    pub dimension: Dimension,
+    /// The tests, in the order of their coordinates; at least one.
+    pub tests: Vec<Test>,
 }
 
 /// Tests of a campaign that are run in a lab, or once more in simulation to compare them with a lab.
@@ -119,6 +132,7 @@ impl Task {
             Task::Lab(LabTask { tests, repeats, .. }) | Task::Compensated(LabTask { tests, repeats, .. }) => {
                 u32::try_from(tests.len()).unwrap_or(u32::MAX).saturating_mul(*repeats)
             }
+            Task::Variations(variations) => u32::try_from(variations.tests.len()).unwrap_or(u32::MAX),
         }
     }
 
@@ -135,7 +149,7 @@ impl Task {
             campaign.neighbours = None;
             campaign.stop.clear();
             // What is compared with a simulation is compared in its traces too.
-            if self.of_lab().is_some() {
+            if self.of_lab().is_some() || matches!(self, Task::Variations(_)) {
                 campaign.record = Some(Recorded::All);
             }
         }
@@ -188,6 +202,7 @@ impl Task {
             Task::Shrink(_) => "shrink",
             Task::Lab(_) => "lab",
             Task::Compensated(_) => "compensated",
+            Task::Variations(_) => "variations",
         }
     }
 }

@@ -20,7 +20,7 @@ use crate::condition::{Condition, Constraint, Operand};
 use crate::{
     Activation, Bound, CampaignPlan, Choice, Domain, Failing, FieldRef, KnownTest, KnownTestId, LabTask, MessageId,
     Metric, MetricId, MetricSource, Operation, OperationId, OperationKind, RequirementId, SCHEMA, Shrinking, Span,
-    Task, Test, TopicId, Type,
+    Task, Test, TopicId, Type, Variations,
 };
 
 use check::{
@@ -251,6 +251,11 @@ impl CampaignPlan {
                     each("failing.requirements", requirements, |&id| self.has_requirement(id))?;
                 }
                 at("runs", at_least_one(*runs))
+            }
+            Task::Variations(Variations { name: of, dimension: _, tests }) => {
+                at("name", name(of))?;
+                at("tests", filled(tests))?;
+                each("tests", tests, |test| self.validate_test(test))
             }
             Task::Lab(of_lab) | Task::Compensated(of_lab) => {
                 let LabTask { lab, results: _, tests, repeats } = of_lab;

@@ -6,8 +6,10 @@
 mod candidates;
 pub mod choice;
 mod compare;
+pub mod compensation;
 pub(crate) mod confirmed;
 mod distances;
+mod extents;
 pub mod gap;
 mod indicators;
 mod rank_sum;
@@ -15,6 +17,7 @@ pub mod regions;
 pub(crate) mod statistics;
 #[cfg(test)]
 mod tests;
+pub mod traces;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -32,6 +35,7 @@ pub use crate::present::table::{Datum, Table, TextOptions};
 pub use candidates::{Candidate, Candidates, LeftOut, Terms, candidates, qualities};
 pub use compare::{CompareError, Comparison, Run, compare};
 pub use distances::{FrontDistance, GivenFront, GivenFrontError, distance_table, distances};
+pub use extents::extents;
 pub use indicators::{Indicator, IndicatorAnalysis, indicators};
 pub use rank_sum::{RankSum, rank_sum};
 pub use sesame_optimise::igd::Scaling;

@@ -3,10 +3,10 @@
 use sesame_plan::condition::{ConditionEnd, ConditionSpace};
 use sesame_plan::testing::{field, lab, message, minimal, node, topic};
 use sesame_plan::{
-    Activation, ActivationMode, Adjustment, Answer, Bound, CampaignPlan, Clock, Command, Dimension, Domain, Fitted, Interface,
-    InterfaceField, KnownTestId, LabBudget, Launch, Lifecycle, MessageId, MessageType, MetricId, MetricSource, Node,
-    NodeId, OperationId, RankOrder, Ready, ReadyWhen, RelayBudget, Ros2, Search, Simulator, StepBy, Stepping, Strategy,
-    Topic, TopicId, Transport, Type, WireType, Wiring,
+    Activation, ActivationMode, Adjustment, Answer, Bound, CampaignPlan, Clock, Command, Dimension, Domain, Fitted,
+    Interface, InterfaceField, KnownTestId, LabBudget, Launch, Lifecycle, MessageId, MessageType, MetricId,
+    MetricSource, Node, NodeId, OperationId, RankOrder, Ready, ReadyWhen, RelayBudget, Ros2, Search, Simulator, StepBy,
+    Stepping, Strategy, Topic, TopicId, Transport, Type, WireType, Wiring,
 };
 use sesame_results::record::sample;
 

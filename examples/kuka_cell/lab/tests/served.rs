@@ -95,8 +95,8 @@ fn each_difference_shows_where_it_acts() {
     let late = served(7, &["--as-modelled", "--latency", "50"]);
     assert!(!same(&late, STATE));
 
-    // What the PLC sends does not jump.
-    let limited = served(7, &["--as-modelled", "--jump-limit", "0.25"]);
+    // What the PLC sends is below the limit.
+    let limited = served(7, &["--as-modelled", "--soft-limit", "1.1"]);
     assert!(same(&limited, STATE) && same(&limited, ZONE));
 
     let quiet = served(7, &["--as-modelled", "--noise", "0"]);

@@ -1,7 +1,7 @@
 //! A connection to a running system: the node between its nodes.
 
-use std::collections::btree_map::{BTreeMap, Entry};
 use std::collections::BTreeSet;
+use std::collections::btree_map::{BTreeMap, Entry};
 use std::time::Instant;
 
 use rustdds::QosPolicies;

@@ -79,6 +79,10 @@ pub(crate) enum ShapePlace {
 pub(crate) enum Fit {
     Delay(Option<Target>, Range),
     /// As an operation of this rule.
-    Relay { rule: Rule, target: Target, amounts: Amounts },
+    Relay {
+        rule: Rule,
+        target: Target,
+        amounts: Amounts,
+    },
     Parameter(Text, Range),
 }

@@ -3,8 +3,8 @@
 use sesame_grammar::Rule;
 
 use super::reader::{Pair, Reader, child, children, expect_child};
-use crate::syntax::ast::{Amounts, Name};
 use crate::syntax::ast::physical::{Budget, Fit, Form, LabSimulator, Physical, RankOrder, Setting, Shape, ShapePlace};
+use crate::syntax::ast::{Amounts, Name};
 
 impl Reader<'_> {
     pub(super) fn physical(&mut self, pair: &Pair<'_>) -> Physical {

@@ -33,6 +33,10 @@ pub(super) fn header(
         (Task::Campaign, Search::Strategy { strategy, .. }) => budget(&strategy.title()),
         (Task::Known { tests }, _) => plural(tests.len(), "regression test", "regression tests"),
         (Task::Shrink(shrinking), _) => format!("{} at most", budget(&format!("{} shrunk", shrinking.name))),
+        (Task::Variations(variations), _) => {
+            let count = plural(variations.tests.len(), "variation", "variations");
+            format!("{count} of {} along {}", variations.name, variations.dimension.name())
+        }
         (Task::Lab(lab) | Task::Compensated(lab), _) => {
             let each = if lab.repeats == 1 { String::new() } else { format!(", each {} times", lab.repeats) };
             let place = if facts.task.in_lab().is_some() { "in" } else { "simulated again for" };
@@ -60,6 +64,8 @@ pub(super) fn header(
     ];
     rows.extend(entered(repository)?);
     rows.push(("Digest", digest.to_owned()));
+    let compensation = plan.compensation.as_ref();
+    rows.extend(compensation.map(|it| ("Compensated", crate::analysis::compensation::in_words(plan, it))));
     body.open("dl", &[]);
     for (name, value) in &rows {
         body.open("div", &[("class", if *name == "Digest" { "digest" } else { "fact" })]);
