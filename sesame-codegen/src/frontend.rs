@@ -289,7 +289,7 @@ mod tests {
                  through the relay",
                 "monitor `transport` (blocks.sesame:32) is checked, but not used by runners yet",
                 "monitor `conveyor` (blocks.sesame:41) is checked, but not used by runners yet",
-                "`simulator`, `shape` and `fit` of lab `lab` (blocks.sesame:47) are checked, but not used yet",
+                "`simulator` and `shape` of lab `lab` (blocks.sesame:47) are checked, but not used yet",
             ]
         );
     }
