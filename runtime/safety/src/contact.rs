@@ -5,7 +5,7 @@
 //! integration*: two robots are recorded in two runs, and their motions are laid over each other; both bodies move.
 //!
 //! Contact is detected continuously, with a bound on motion, and not only at samples or at instants of a grid: a test
-//! that says that there was no contact must not have looked away. This is conservative advancement (Mirtich 1996) on
+//! that says that there was no contact must not have looked away. This is conservative advancement [Mirtich 1996] on
 //! cells of time, which are halved until each is decided. Let f be the signed distance of the bodies
 //! ([`crate::distance`]), and consider a cell between two neighbouring samples, with its middle m.
 //!
@@ -25,11 +25,11 @@
 //! f ≤ ε/2 + 2(|d| + r) ≤ ε. So there are at most 2 cells per ε/4 of motion, and far fewer where bodies are not within ε
 //! of each other for long. The margin of ε/2 is for rounding, which stays below 10⁻⁷ m for permitted coordinates.
 
-use parry3d_f64::math::Pose;
+use parry3d_f64::math::{Pose, Vector};
 
 use crate::body::{Body, Place, Shape};
 use crate::distance::{Separation, separation};
-use crate::trace::between;
+use crate::trace::{angle, between};
 
 /// The least tolerance, in metres.
 pub const LEAST_TOLERANCE: f64 = 1e-6;
@@ -204,7 +204,7 @@ struct Stretch<'b> {
     /// Of each body, the pose at the start and the end.
     poses: [[Pose; 2]; 2],
     /// The way of the second body relative to the first one.
-    way: parry3d_f64::math::Vector,
+    way: Vector,
     /// How far turns move a point of both cores, in total at most.
     turns: f64,
 }
@@ -221,7 +221,11 @@ impl<'b> Stretch<'b> {
         let poses = [0, 1].map(|body| [instants[0].poses[body], instants[1].poses[body]]);
         let way = |[from, to]: [Pose; 2]| to.translation - from.translation;
         let shapes = [one.shape(), other.shape()];
-        let turns = shapes.iter().zip(poses).map(|(shape, poses)| shape.reach() * angle(&poses)).sum();
+        let turns = shapes
+            .iter()
+            .zip(poses)
+            .map(|(shape, poses)| shape.reach() * angle(&poses[0].rotation, &poses[1].rotation))
+            .sum();
         Stretch { shapes, times, poses, way: way(poses[1]) - way(poses[0]), turns }
     }
 
@@ -264,11 +268,4 @@ impl<'b> Stretch<'b> {
         self.search(Cell { shares: [from, middle], distances: [at_from, at_middle.distance] }, found);
         self.search(Cell { shares: [middle, to], distances: [at_middle.distance, at_to] }, found);
     }
-}
-
-/// The angle between two orientations, in `0..=π`. Near 0 the arc cosine of a scalar product would lose half of the
-/// digits.
-fn angle([from, to]: &[Pose; 2]) -> f64 {
-    let turn = from.rotation.inverse() * to.rotation;
-    2.0 * libm::atan2(turn.xyz().length(), turn.w.abs())
 }

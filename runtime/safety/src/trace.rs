@@ -163,6 +163,13 @@ pub(crate) fn between(from: &Pose, to: &Pose, share: f64) -> Pose {
     Pose::from_parts(translation, from.rotation.slerp(to.rotation, share).normalize())
 }
 
+/// The angle between two orientations, in `0..=π`. Near 0 the arc cosine of a scalar product would lose half of the
+/// digits.
+pub(crate) fn angle(one: &Rotation, other: &Rotation) -> f64 {
+    let turn = one.inverse() * *other;
+    2.0 * libm::atan2(turn.xyz().length(), turn.w.abs())
+}
+
 fn check_times(times: &[f64]) -> Result<(), TraceError> {
     if times.is_empty() {
         return Err(TraceError::Empty);
