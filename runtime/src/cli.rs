@@ -11,6 +11,8 @@ mod export;
 mod failure;
 mod gate;
 mod known;
+#[cfg(feature = "process")]
+mod physical;
 mod progress;
 mod progress_line;
 mod repeat;

@@ -23,7 +23,7 @@ pub struct Interpreted {
 }
 
 /// The transport to the simulator of a plan, which is a program or a system of ROS 2 nodes.
-fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
+pub(crate) fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
     let connect = match &plan.simulator.transport {
         #[cfg(feature = "ros2")]
         sesame_plan::Transport::Ros2(_) => sesame_ros2::ros2(folder.to_owned()),

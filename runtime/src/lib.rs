@@ -16,6 +16,8 @@ mod changed_files;
 pub mod cli;
 #[cfg(all(feature = "campaign", feature = "process"))]
 mod interpreted;
+#[cfg(all(feature = "campaign", feature = "process"))]
+mod lab;
 #[cfg(feature = "campaign")]
 mod runner;
 #[cfg(feature = "campaign")]

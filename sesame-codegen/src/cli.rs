@@ -4,6 +4,7 @@ mod arguments;
 mod build;
 mod commands;
 mod fmt;
+mod gap;
 mod import;
 mod progress;
 mod results;
@@ -12,6 +13,7 @@ mod scan;
 #[cfg(feature = "ros2")]
 mod scan_ros2;
 mod search_space;
+mod select;
 mod shell;
 
 use std::path::PathBuf;
@@ -117,6 +119,12 @@ enum Command {
     /// Analyse the results of campaigns: what ran, fronts, points in the reduced parameter space, coverage.
     #[command(subcommand)]
     Results(results::Results),
+    /// Choose the tests of a campaign that are worth running in a lab: interesting ones that differ from each other,
+    /// within a budget.
+    Select(select::Selected),
+    /// Compare the results of a lab with those of the campaign that its tests come from: where simulation and reality
+    /// differ, and by how much.
+    Gap(gap::Compared),
     /// Import a testing space of the original SESAME platform (an EMF file, `.model`), with the tests that it
     /// performed.
     Import {
@@ -202,6 +210,8 @@ pub fn run(
         Command::Showing(command) => runner::showing(shell, language, &command, of_campaign.1),
         Command::Internal(command) => Ok(sesame_runtime::cli::serve(&command)),
         Command::Results(asked) => results::results(shell, asked),
+        Command::Select(asked) => select::selected(shell, &asked),
+        Command::Gap(asked) => gap::compared(shell, &asked),
         Command::Import { file, out } => import::import(shell, language, &file, &out),
         Command::Scan(asked) => scan::scan(shell, language, &asked),
         Command::Explain { what: Some(what), file: Some(file), format } => {

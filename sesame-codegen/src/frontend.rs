@@ -5,13 +5,14 @@ use std::path::Path;
 use sesame_dsl::Analysis;
 use sesame_dsl::diagnostic::{Diagnostic, MEANINGS, Severity, page, render};
 use sesame_dsl::index::Kind;
-use sesame_dsl::model::{Space, Transport};
+use sesame_dsl::model::eddi::Eddi;
+use sesame_dsl::model::{Declaration, Space, Transport};
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::span::Span;
 
 use crate::input::{self, Unreadable};
 use crate::interfaces::Files;
-use crate::lower::lower;
+use crate::lower::{lab_simulator, lower};
 use crate::plan::RunnerPlan;
 use crate::uses;
 
@@ -143,11 +144,23 @@ fn not_used(space: &Space, sources: &SourceMap) -> Vec<String> {
     if let (Some(budget), Some(why)) = (&space.lifecycle.relay_budget, unmeasured) {
         notes.push(format!("`relay budget` ({}) has no effect: {why}", at(budget.span)));
     }
-    let monitors = space.eddis.values().map(|eddi| ("monitor", &eddi.declaration));
-    let labs = space.physicals.values().map(|lab| ("lab", &lab.declaration));
-    notes.extend(monitors.chain(labs).map(|(what, declaration)| {
-        let place = at(declaration.span);
-        format!("{what} `{}` ({place}) is checked, but not used by runners yet", declaration.name)
+    notes.extend(space.eddis.values().map(|Eddi { declaration, .. }| {
+        format!("monitor `{}` ({}) is checked, but not used by runners yet", declaration.name, at(declaration.span))
+    }));
+    notes.extend(space.physicals.values().filter_map(|lab| {
+        let Declaration { name, span, .. } = &lab.declaration;
+        let unused = [
+            ("simulator", lab.simulator.is_some() && lab_simulator(space, lab).is_none()),
+            ("shape", !lab.shapes.is_empty()),
+            ("fit", !lab.fits.is_empty()),
+        ];
+        let unused: Vec<&str> = unused.into_iter().filter_map(|(what, is_there)| is_there.then_some(what)).collect();
+        let (last, others) = unused.split_last()?;
+        let (list, are) = match others {
+            [] => (format!("`{last}`"), "is"),
+            _ => (format!("`{}` and `{last}`", others.join("`, `")), "are"),
+        };
+        Some(format!("{list} of lab `{name}` ({}) {are} checked, but not used yet", at(*span)))
     }));
     notes
 }
@@ -277,8 +290,7 @@ mod tests {
                  through the relay",
                 "monitor `transport` (blocks.sesame:32) is checked, but not used by runners yet",
                 "monitor `conveyor` (blocks.sesame:41) is checked, but not used by runners yet",
-                "lab `lab` (blocks.sesame:47) is checked, but not used by runners yet",
-                "lab `by_hand` (blocks.sesame:62) is checked, but not used by runners yet",
+                "`simulator`, `shape` and `fit` of lab `lab` (blocks.sesame:47) are checked, but not used yet",
             ]
         );
     }

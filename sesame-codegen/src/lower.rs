@@ -6,12 +6,14 @@
 //! - operations: those its tests may hold, or those of the test it repeats;
 //! - known tests: one without operations for a campaign that only observes; else those whose operations are all in the
 //!   plan and begin before the campaign's end;
-//! - metrics: its objectives, those it observes, its condition variables, and those of all requirements and of the
-//!   conditions and expectations of these tests.
+//! - metrics: its objectives, those it observes, its condition variables, and those of all requirements, of the labs,
+//!   and of the conditions and expectations of these tests;
+//! - all labs of the space.
 
 mod condition;
 mod formula;
 mod id;
+mod lab;
 mod operation;
 mod robustness;
 mod ros2;
@@ -22,6 +24,7 @@ use sesame_dsl::model::{self, CampaignId, Space};
 use sesame_plan as plan;
 
 use self::id::topic_id;
+pub(crate) use self::lab::lab_simulator;
 use self::operation::custom_operations;
 use self::ros2::ros2;
 use self::selection::{Selection, without_operations};
@@ -72,6 +75,7 @@ pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str)
             tests.map(|&id| selection.test(space, &space.tests[id], declared.end_after)).collect()
         },
         campaign: selection.campaign(space, declared),
+        labs: space.physicals.values().map(|lab| selection.lab(space, lab)).collect(),
     };
     RunnerPlan { plan, hooks: hooks(space), operations: custom_operations(space), simulator_crate, system_file }
 }

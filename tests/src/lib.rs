@@ -4,11 +4,13 @@
 //! what cargo knows a crate by, and all runners in one target folder, so that the runtime is compiled once.
 
 pub mod dds;
+pub mod gap;
 pub mod models;
 pub mod optimisers;
 mod python;
 pub mod python_mcap;
 pub mod rtamt;
+pub mod selecting;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -35,19 +37,28 @@ pub fn target() -> PathBuf {
 /// The program `sesamec` of this workspace, with ROS 2 as in the rest of these tests, built if it is not up to date.
 pub fn sesamec() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
-    PROGRAM.get_or_init(|| built(&[]))
+    PROGRAM.get_or_init(|| built(&SESAMEC))
 }
 
 /// The same, optimised: for what is to be measured.
 pub fn optimised_sesamec() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
-    PROGRAM.get_or_init(|| built(&["--release"]))
+    PROGRAM.get_or_init(|| built(&[&SESAMEC[..], &["--release"]].concat()))
 }
 
+/// The stand-in for the lab of the gearbox cell, built if it is not up to date.
+pub fn kuka_cell_lab() -> &'static Path {
+    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+    PROGRAM.get_or_init(|| built(&["--package", "kuka_cell_lab"]))
+}
+
+/// `sesamec`, as cargo is asked for it.
+const SESAMEC: [&str; 4] = ["--package", "sesame-codegen", "--features", "ros2"];
+
+/// The program that cargo builds when it is asked for this.
 fn built(arguments: &[&str]) -> PathBuf {
     let output = Command::new(env!("CARGO"))
-        .args(["build", "--quiet", "--package", "sesame-codegen", "--features", "ros2"])
-        .arg("--message-format=json-render-diagnostics")
+        .args(["build", "--quiet", "--message-format=json-render-diagnostics"])
         .args(arguments)
         .current_dir(workspace())
         .output()

@@ -13,7 +13,7 @@ use sesame_tests::{Done, Project, command, done, fresh_folder, sesamec, workspac
 const LEGACY: &str = "SESAME_LEGACY_DIR";
 
 /// The folder of the original platform's files.
-fn legacy() -> Option<PathBuf> {
+pub(crate) fn legacy() -> Option<PathBuf> {
     let folder = std::env::var_os(LEGACY).map(PathBuf::from);
     if folder.is_none() {
         eprintln!("skipped: {LEGACY} names no folder of files of the original platform");
@@ -26,18 +26,18 @@ fn import(file: &Path, out: &Path) -> Done {
 }
 
 /// A file of that folder, imported into a fresh folder of this name.
-fn imported(file: &str, name: &str) -> Option<PathBuf> {
+pub(crate) fn imported(file: &str, name: &str) -> Option<PathBuf> {
     let out = fresh_folder(name);
     import(&legacy()?.join(file), &out).expect(0);
     Some(out)
 }
 
-fn results(out: &Path, campaign: &str) -> Repository {
+pub(crate) fn results(out: &Path, campaign: &str) -> Repository {
     Repository::open(&out.join("results").join(campaign)).unwrap()
 }
 
 /// `sesamec results …` as rows of CSV, with its head.
-fn rows(arguments: &[&str], folder: &Path) -> Vec<Vec<String>> {
+pub(crate) fn rows(arguments: &[&str], folder: &Path) -> Vec<Vec<String>> {
     let said = done(command(sesamec()).arg("results").args(arguments).args(["--format", "csv"]).arg(folder)).expect(0);
     said.out.lines().map(|line| line.split(',').map(str::to_owned).collect()).collect()
 }

@@ -3,6 +3,7 @@
 
 mod architecture;
 mod building;
+mod choice;
 mod commands;
 mod conditions;
 mod confirm;
@@ -16,6 +17,7 @@ mod falsification;
 mod faults;
 mod first_front;
 mod free_running;
+mod gap;
 mod hostile;
 mod import;
 #[cfg(unix)]
@@ -27,9 +29,11 @@ mod kuka_cell;
 mod large_results;
 mod latest;
 mod optimisers;
+mod physical;
 mod random_models;
 mod regeneration;
 mod search;
+mod select;
 mod shrink;
 mod stl;
 mod strategies;

@@ -4,7 +4,8 @@ use crate::{Campaign, CampaignPlan, Field, KnownTest, MessageType, Metric, Node,
 
 impl CampaignPlan {
     /// The plan without what it says to people only: doc comments, the sentences of requirements, where things are
-    /// declared, and by which generator. These parts are empty in what is returned.
+    /// declared, and by which generator; and without labs, which change nothing of what a campaign does. These parts
+    /// are empty in what is returned.
     ///
     /// Two plans with equal meanings are the same campaign: digests are over meanings, and
     /// [same models](CampaignPlan::same_model) are told by them.
@@ -78,10 +79,13 @@ fn forget_what_is_for_people(plan: &mut CampaignPlan) {
         operations,
         tests,
         campaign,
+        labs,
     } = plan;
     for text in [generator, source, doc] {
         text.clear();
     }
+    // Nothing of a campaign depends on what is done with its results.
+    labs.clear();
     for MessageType { name: _, doc, fields } in messages {
         doc.clear();
         for Field { name: _, doc, ty: _ } in fields {
@@ -194,7 +198,7 @@ fn align_what_no_test_depends_on(one: &mut CampaignPlan, other: &mut CampaignPla
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{known_test, metric, node, operation, plan, requirement};
+    use crate::testing::{known_test, lab, metric, node, operation, plan, requirement};
     use crate::{
         Bound, CoverageGoal, Dimension, GridAxis, MetricId, MetricSource, OperationKind, Recorded, Task, Test,
     };
@@ -214,7 +218,7 @@ mod tests {
     #[test]
     fn what_is_only_for_people_is_not_part_of_the_meaning() {
         let plan = whole();
-        let changes: [fn(&mut CampaignPlan); 13] = [
+        let changes: [fn(&mut CampaignPlan); 14] = [
             |plan| plan.generator = "sesamec 9.9.9".to_owned(),
             |plan| plan.source = "moved.sesame".to_owned(),
             |plan| plan.doc = "Corrected.".to_owned(),
@@ -228,6 +232,7 @@ mod tests {
             |plan| plan.operations[1].doc = "Corrected.".to_owned(),
             |plan| plan.tests[0].doc = "Corrected.".to_owned(),
             |plan| plan.campaign.doc = "Corrected.".to_owned(),
+            |plan| plan.labs.push(lab("lab")),
         ];
         for (at, change) in changes.into_iter().enumerate() {
             let mut changed = plan.clone();

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Campaign, KnownTest, KnownTestId, MessageId, MessageType, Metric, MetricId, Node, NodeId, Operation, OperationId,
-    Requirement, RequirementId, Simulator, Topic, TopicId,
+    Campaign, KnownTest, KnownTestId, Lab, MessageId, MessageType, Metric, MetricId, Node, NodeId, Operation,
+    OperationId, Requirement, RequirementId, Simulator, Topic, TopicId,
 };
 
 /// Everything a runner knows of its campaign. Deserializing one [validates](CampaignPlan::validate) it.
@@ -41,6 +41,9 @@ pub struct CampaignPlan {
     pub tests: Vec<KnownTest>,
     /// The campaign.
     pub campaign: Campaign,
+    /// All labs of the space, in declaration order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub labs: Vec<Lab>,
 }
 
 impl CampaignPlan {

@@ -27,6 +27,38 @@ pub enum Task {
     },
     /// It shrinks a failing test: `shrink`.
     Shrink(Shrinking),
+    /// It runs chosen tests of a campaign in a lab: `physical`; or somebody ran them there by hand.
+    Lab(LabTask),
+}
+
+/// Tests of a campaign that are run in a lab.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LabTask {
+    /// The lab's name.
+    pub lab: String,
+    /// The digest of the campaign's results.
+    pub results: String,
+    /// The tests, no two equal; at least one.
+    pub tests: Vec<LabTest>,
+    /// How often each is run; at least once. All tests are run once before any is run again, so that what changes in
+    /// the lab with time is no difference of tests.
+    pub repeats: u32,
+}
+
+/// A test of a campaign that is run in a lab.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LabTest {
+    /// Its number in the campaign's results.
+    pub number: u32,
+    /// The test.
+    pub test: Test,
+}
+
+impl LabTask {
+    /// The number in the campaign's results of a test that was run in the lab; `None` of another test.
+    pub fn of(&self, test: &Test) -> Option<u32> {
+        self.tests.iter().find(|it| it.test == *test).map(|it| it.number)
+    }
 }
 
 /// How a failing test is shrunk.
@@ -81,6 +113,9 @@ impl Task {
             Task::Known { tests } => u32::try_from(tests.len()).unwrap_or(u32::MAX),
             Task::Repeat { times, .. } => *times,
             Task::Shrink(shrinking) => shrinking.evaluations,
+            Task::Lab(LabTask { tests, repeats, .. }) => {
+                u32::try_from(tests.len()).unwrap_or(u32::MAX).saturating_mul(*repeats)
+            }
         }
     }
 
@@ -117,6 +152,11 @@ impl Task {
         if let Task::Shrink(shrinking) = self { Some(shrinking) } else { None }
     }
 
+    /// What is run in a lab; `None` if nothing is.
+    pub fn in_lab(&self) -> Option<&LabTask> {
+        if let Task::Lab(lab) = self { Some(lab) } else { None }
+    }
+
     /// Whether it searches for tests: only a campaign does, unless it repeats a test.
     pub fn searches(&self, plan: &CampaignPlan) -> bool {
         *self == Task::Campaign && plan.campaign.search.strategy().is_some()
@@ -129,6 +169,7 @@ impl Task {
             Task::Known { .. } => "known tests",
             Task::Repeat { .. } => "repeat",
             Task::Shrink(_) => "shrink",
+            Task::Lab(_) => "lab",
         }
     }
 }

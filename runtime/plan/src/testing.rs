@@ -6,8 +6,8 @@
 
 use crate::{
     Activation, ActivationMode, Bound, Campaign, CampaignPlan, Channel, Choice, Copies, Count, Distribution, Domain,
-    Drain, Field, FieldRef, KnownTest, Lifecycle, MessageId, MessageType, Metric, MetricId, MetricSource, Node,
-    Operation, OperationId, OperationKind, Parameter, Requirement, SCHEMA, Search, Shape, Simulator, Span, Step,
+    Drain, Field, FieldRef, KnownTest, Lab, LabCost, Lifecycle, MessageId, MessageType, Metric, MetricId, MetricSource,
+    Node, Operation, OperationId, OperationKind, Parameter, Requirement, SCHEMA, Search, Shape, Simulator, Span, Step,
     Strategy, Test, TestOperation, Topic, TopicId, Transport, Type, ValueMode,
 };
 
@@ -28,6 +28,7 @@ pub fn minimal() -> CampaignPlan {
         operations: Vec::new(),
         tests: Vec::new(),
         campaign: campaign("campaign", 0),
+        labs: Vec::new(),
     }
 }
 
@@ -97,6 +98,22 @@ pub fn node(name: &str) -> Node {
         launch: None,
         answers: Vec::new(),
         every_step: Vec::new(),
+    }
+}
+
+/// A lab in which a test costs 1, and whose tests are chosen by hand.
+pub fn lab(name: &str) -> Lab {
+    Lab {
+        name: name.to_owned(),
+        doc: String::new(),
+        simulator: None,
+        repeats: 1,
+        cost: LabCost::default(),
+        exclude: Vec::new(),
+        rank: Vec::new(),
+        budget: None,
+        tolerances: Vec::new(),
+        interlock: Vec::new(),
     }
 }
 

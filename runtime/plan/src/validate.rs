@@ -10,6 +10,7 @@
 mod campaign;
 mod check;
 mod formula;
+mod lab;
 mod system;
 
 use serde::de::Error as _;
@@ -17,9 +18,9 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::condition::{Condition, Constraint, Operand};
 use crate::{
-    Activation, Bound, CampaignPlan, Choice, Domain, Failing, FieldRef, KnownTest, KnownTestId, MessageId, Metric,
-    MetricId, MetricSource, Operation, OperationId, OperationKind, RequirementId, SCHEMA, Shrinking, Span, Task, Test,
-    TopicId, Type,
+    Activation, Bound, CampaignPlan, Choice, Domain, Failing, FieldRef, KnownTest, KnownTestId, LabTask, MessageId,
+    Metric, MetricId, MetricSource, Operation, OperationId, OperationKind, RequirementId, SCHEMA, Shrinking, Span,
+    Task, Test, TopicId, Type,
 };
 
 use check::{
@@ -64,8 +65,7 @@ impl CampaignPlan {
     pub fn validate(&self) -> Result<(), PlanError> {
         at("schema", known_schema(self.schema))?;
         at("space", name(&self.space))?;
-        at("simulator.name", name(&self.simulator.name))?;
-        at("simulator", self.sound_simulator())?;
+        at("simulator", self.sound_simulator(&self.simulator))?;
         self.messages.iter().enumerate().try_for_each(|(index, message)| {
             let field = |field: &crate::Field| {
                 at("name", name(&field.name))?;
@@ -92,7 +92,9 @@ impl CampaignPlan {
         at("operations", distinct(self.operations.iter().map(|operation| &operation.name)))?;
         each("operations", &self.operations, |operation| self.sound_operation(operation))?;
         each("tests", &self.tests, |test| self.sound_known_test(test))?;
-        at("campaign", self.sound_campaign(&self.campaign))
+        at("campaign", self.sound_campaign(&self.campaign))?;
+        at("labs", distinct(self.labs.iter().map(|lab| &lab.name)))?;
+        each("labs", &self.labs, |lab| self.sound_lab(lab))
     }
 
     /// Makes sure that a test is one of this plan: its operations are there, each with a choice for every parameter,
@@ -248,6 +250,17 @@ impl CampaignPlan {
                 }
                 at("runs", at_least_one(*runs))
             }
+            Task::Lab(LabTask { lab, results: _, tests, repeats }) => {
+                at("lab", name(lab))?;
+                at("tests", filled(tests))?;
+                at("tests", distinct(tests.iter().map(|test| test.number)))?;
+                each("tests", tests, |test| at("test", self.validate_test(&test.test)))?;
+                let repeated = |at: &usize| tests[..*at].iter().any(|before| before.test == tests[*at].test);
+                if let Some(twice) = (1..tests.len()).find(repeated) {
+                    return at(&format!("tests[{twice}].test"), wrong("is there twice"));
+                }
+                at("repeats", at_least_one(*repeats))
+            }
         }
     }
 }
@@ -293,5 +306,30 @@ fn fits(choice: &Choice, domain: &Domain) -> Checked {
         (Choice::Point { point }, Domain::Point { .. }) => point.iter().try_for_each(|&axis| finite(axis)),
         (Choice::Text { .. }, Domain::Texts { .. } | Domain::Files { .. }) => Ok(()),
         _ => wrong("is of another kind than its parameter"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::LabTest;
+    use crate::testing::{operation, plan, test_of, use_of};
+
+    #[test]
+    fn a_task_in_a_lab_has_different_tests_of_the_plan() {
+        let plan = plan(vec![operation(0, OperationKind::Blackhole), operation(1, OperationKind::Blackhole)]);
+        let of =
+            |number, operation| LabTest { number, test: test_of(vec![use_of(operation, 1.0, 2.0, Vec::new(), 0)]) };
+        let refused = |tests: Vec<LabTest>, repeats| {
+            let task = Task::Lab(LabTask { lab: "hall".to_owned(), results: String::new(), tests, repeats });
+            plan.validate_task(&task).map_err(|error| error.to_string())
+        };
+        assert_eq!(refused(vec![of(3, 0), of(4, 1)], 1), Ok(()));
+        let said = |tests, repeats| refused(tests, repeats).unwrap_err();
+        assert_eq!(said(vec![], 1), "tests: there is none");
+        assert_eq!(said(vec![of(3, 0), of(3, 1)], 1), "tests: 3 is there twice");
+        assert_eq!(said(vec![of(3, 0), of(4, 0)], 1), "tests[1].test: is there twice");
+        assert_eq!(said(vec![of(3, 0)], 0), "repeats: must be at least 1");
+        assert!(said(vec![of(3, 9)], 1).starts_with("tests[0].test.operations[0].operation: there is no operation 9"));
     }
 }

@@ -11,7 +11,7 @@
 pub mod evaluate;
 pub mod files;
 pub mod fuzz;
-#[cfg(any(feature = "process", feature = "mcap"))]
+#[cfg(any(feature = "process", feature = "mcap", feature = "serve"))]
 mod json;
 #[cfg(feature = "programs")]
 pub mod lifecycle;

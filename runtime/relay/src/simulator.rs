@@ -110,3 +110,8 @@ pub(crate) trait Wires {
 }
 
 pub mod bench;
+#[cfg(feature = "serve")]
+mod serve;
+
+#[cfg(feature = "serve")]
+pub use serve::serve;

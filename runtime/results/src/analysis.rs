@@ -3,9 +3,12 @@
 //! They read any results file, of any campaign, finished or not. Each analysis reads the file
 //! once from beginning to end, and gives a [`Table`], which prints as a table, as CSV and as JSON.
 
+mod candidates;
+pub mod choice;
 mod compare;
 pub(crate) mod confirmed;
 mod distances;
+pub mod gap;
 mod indicators;
 mod rank_sum;
 pub mod regions;
@@ -13,7 +16,7 @@ pub(crate) mod statistics;
 #[cfg(test)]
 mod tests;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use sesame_optimise::dominance::lexicographic;
 use sesame_optimise::front::{Front, FrontMember};
@@ -26,6 +29,7 @@ use crate::analysis::statistics::Sample;
 use crate::record::{Origin, RecordError, Repository, ScannedTest};
 
 pub use crate::present::table::{Datum, Table, TextOptions};
+pub use candidates::{Candidate, Candidates, LeftOut, Terms, candidates, qualities};
 pub use compare::{CompareError, Comparison, Run, compare};
 pub use distances::{FrontDistance, GivenFront, GivenFrontError, distance_table, distances};
 pub use indicators::{Indicator, IndicatorAnalysis, indicators};
@@ -102,21 +106,25 @@ pub fn campaigns(repositories: &[Repository], readers: Readers) -> Result<Table,
 }
 
 /// All tests but the reference runs: where each comes from, how it ended, and the value of each metric; of imported
-/// ones also what they were called.
+/// ones also what they were called, and of runs in a lab the test of the campaign (`run_of`).
 pub fn tests(repository: &Repository, selection: &Selection) -> Result<Table, RecordError> {
     let plan = repository.plan();
     let originals = repository.original_names()?;
     let original = (!originals.is_empty()).then(|| "original_name".to_owned());
+    let run_of = runs_in_a_lab(repository)?;
+    let lab = (!run_of.is_empty()).then(|| "run_of".to_owned());
     let columns = ["origin", "generation", "outcome", "duplicate_of", "operations"].map(str::to_owned);
     let metrics = plan.metrics.iter().map(|metric| metric.name.clone());
-    let mut dataset =
-        Table::new(std::iter::once("test".to_owned()).chain(original.clone()).chain(columns).chain(metrics));
+    let mut dataset = Table::new(
+        std::iter::once("test".to_owned()).chain(original.clone()).chain(lab.clone()).chain(columns).chain(metrics),
+    );
     repository.scan(&mut |test| {
         if test.origin == Origin::Reference || !selection.holds(test.number) {
             return;
         }
         let called =
             original.is_some().then(|| originals.get(&test.number).cloned().map_or(Datum::Missing, Datum::Text));
+        let of = lab.is_some().then(|| run_of.get(&test.number).copied().map_or(Datum::Missing, Datum::test));
         let head = [
             Datum::Text(test.origin.word().to_owned()),
             test.generation.map_or(Datum::Missing, |generation| Datum::Whole(i64::from(generation))),
@@ -125,9 +133,16 @@ pub fn tests(repository: &Repository, selection: &Selection) -> Result<Table, Re
             Datum::Text(operations(plan, &test)),
         ];
         let values = (0u32..).map(MetricId).take(plan.metrics.len()).map(|id| Datum::real(test.value(id).value));
-        dataset.row(std::iter::once(Datum::test(test.number)).chain(called).chain(head).chain(values));
+        dataset.row(std::iter::once(Datum::test(test.number)).chain(called).chain(of).chain(head).chain(values));
     })?;
     Ok(dataset)
+}
+
+/// Of the results of a lab, the test of the campaign that each test is a run of, by number; of others nothing.
+fn runs_in_a_lab(repository: &Repository) -> Result<BTreeMap<u32, u32>, RecordError> {
+    let Some(task) = repository.task().in_lab() else { return Ok(BTreeMap::new()) };
+    let rows = repository.tests()?;
+    Ok(rows.iter().filter_map(|row| Some((row.number, task.of(&row.test)?))).collect())
 }
 
 /// The values of each metric over the tests of a selection: how many have one, their mean, standard deviation (of a

@@ -1,6 +1,6 @@
 //! Tests that are known before anything is run: known tests, and one test that is repeated.
 
-use sesame_plan::{CampaignPlan, KnownTest, KnownTestId, Test};
+use sesame_plan::{CampaignPlan, KnownTest, KnownTestId, LabTask, Test};
 use sesame_rng::derive_seed;
 
 use crate::{Candidate, Evaluated, Strategy};
@@ -34,6 +34,19 @@ impl FixedTests {
             simulator_seed: Some(derive_seed(seed, "simulator", &[u64::from(repetition)])),
         };
         FixedTests { candidates: (1..=times).map(repetition).collect(), awaited: 0 }
+    }
+
+    /// Tests in a lab, each as often as the task says, round by round. A stand-in for the lab has another seed in each
+    /// run.
+    pub(crate) fn in_lab(task: &LabTask, seed: u64) -> Self {
+        let tests = (1..=task.repeats).flat_map(|_| &task.tests).zip(1u64..).map(|(it, run)| Candidate {
+            test: it.test.clone(),
+            parents: Vec::new(),
+            generation: 0,
+            known: None,
+            simulator_seed: Some(derive_seed(seed, "simulator", &[run])),
+        });
+        FixedTests { candidates: tests.collect(), awaited: 0 }
     }
 }
 

@@ -23,7 +23,7 @@ impl TestKey {
 
     /// Of a test without operation seeds, its operations in any order, its conditions in any order and grouping: two
     /// tests that a search need not both try.
-    pub(crate) fn without_seeds(test: &Test) -> TestKey {
+    pub fn without_seeds(test: &Test) -> TestKey {
         let operations = identity(test).into_iter();
         TestKey::of(operations.flat_map(|numbers| [vec![numbers.len() as u64], numbers].concat()))
     }

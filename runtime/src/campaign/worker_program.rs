@@ -12,19 +12,27 @@ pub struct WorkerProgram {
     executable: PathBuf,
     /// What an interpreted runner's worker has to know, as JSON.
     interpreted: Option<String>,
+    /// The lab in which it runs tests, instead of the simulator.
+    lab: Option<String>,
 }
 
 impl WorkerProgram {
     /// A compiled runner contains all that its workers have to know.
     pub fn compiled() -> io::Result<Self> {
-        Ok(WorkerProgram { executable: std::env::current_exe()?, interpreted: None })
+        Ok(WorkerProgram { executable: std::env::current_exe()?, interpreted: None, lab: None })
     }
 
     /// A program that interprets a runner reads it from a file.
     #[cfg(feature = "process")]
     pub fn interpreted(runner: &crate::interpreted::Interpreted) -> io::Result<Self> {
         let text = serde_json::to_string(runner)?;
-        Ok(WorkerProgram { executable: std::env::current_exe()?, interpreted: Some(text) })
+        Ok(WorkerProgram { executable: std::env::current_exe()?, interpreted: Some(text), lab: None })
+    }
+
+    /// The same program as a worker that runs tests in this lab.
+    #[cfg(feature = "process")]
+    pub(crate) fn in_lab(self, name: &str) -> Self {
+        WorkerProgram { lab: Some(name.to_owned()), ..self }
     }
 
     /// The command that starts a worker with this folder of its own.
@@ -39,6 +47,9 @@ impl WorkerProgram {
                 _ => std::fs::File::create_new(&file)?.write_all(text.as_bytes())?,
             }
             command.arg("--runner").arg(file.canonicalize()?);
+        }
+        if let Some(lab) = &self.lab {
+            command.arg("--lab").arg(lab);
         }
         Ok(command)
     }

@@ -4,11 +4,17 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use clap::Subcommand;
+#[cfg(feature = "process")]
+use sesame_plan::CampaignPlan;
 
 use crate::campaign;
 use crate::cli::failure::Failure;
+#[cfg(feature = "process")]
+use crate::cli::physical;
 use crate::cli::session::Session;
 use crate::cli::{confirm, export, known, repeat, replay, replay_recording, report, run, shrink, view};
+#[cfg(feature = "process")]
+use crate::runner::Runner;
 
 /// What runs tests, or takes them from a recording.
 #[derive(Debug, Subcommand)]
@@ -21,6 +27,9 @@ pub enum Running {
     Repeat(repeat::Options),
     /// Run recorded tests again with fresh seeds of the simulator and say whether what was found comes again
     Confirm(confirm::Options),
+    /// Run recorded tests in a lab, and record what they show there as results of their own
+    #[cfg(feature = "process")]
+    Physical(physical::Options),
     /// Run a recorded test again just as it was and say whether it is the same, bit for bit
     Replay(replay::Options),
     /// Make a failing test smaller for as long as it fails as it did: fewer operations, shorter, milder
@@ -60,6 +69,10 @@ pub enum Internal {
         #[cfg(feature = "process")]
         #[arg(long, value_name = "FILE")]
         runner: Option<std::path::PathBuf>,
+        /// The lab in which it runs tests, instead of the simulator
+        #[cfg(feature = "process")]
+        #[arg(long, value_name = "NAME")]
+        lab: Option<String>,
         /// Where the supervisor is
         #[command(flatten)]
         supervisor: campaign::Address,
@@ -101,6 +114,8 @@ impl Running {
             Running::Known(options) => known::known(session, options),
             Running::Repeat(options) => repeat::repeat(session, options),
             Running::Confirm(options) => confirm::confirm(session, options),
+            #[cfg(feature = "process")]
+            Running::Physical(options) => physical::physical(session, options),
             Running::Replay(options) => replay::replay(session, options),
             Running::Shrink(options) => shrink::shrink(session, options),
             Running::ReplayRecording(options) => replay_recording::replay_recording(session, options),
@@ -126,18 +141,20 @@ impl Internal {
     pub(super) fn carry_out(&self, compiled: Option<&Session>) -> Result<ExitCode, Failure> {
         match self {
             #[cfg(feature = "process")]
-            Internal::Worker { runner: Some(file), supervisor } => {
+            Internal::Worker { runner: Some(file), lab, supervisor } => {
                 let runner = crate::interpreted::Interpreted::read(file)
                     .map_err(|error| Failure(format!("cannot read {}: {error}", file.display())))?
                     .runner();
                 let plan = serde_json::from_str(&runner.plan)?;
-                campaign::serve(&runner, &plan, supervisor)?;
-                Ok(ExitCode::SUCCESS)
+                serve(runner, plan, lab.as_deref(), supervisor)
+            }
+            #[cfg(feature = "process")]
+            Internal::Worker { lab: Some(lab), supervisor, .. } => {
+                let session = of_its_own(compiled)?;
+                serve(session.runner.clone(), session.plan.clone(), Some(lab), supervisor)
             }
             Internal::Worker { supervisor, .. } => {
-                let Some(session) = compiled else {
-                    return Err(Failure("`worker` is started by `run`, not by hand".to_owned()));
-                };
+                let session = of_its_own(compiled)?;
                 campaign::serve(&session.runner, &session.plan, supervisor)?;
                 Ok(ExitCode::SUCCESS)
             }
@@ -153,4 +170,25 @@ impl Internal {
             }
         }
     }
+}
+
+/// The session of a runner that contains its own plan.
+fn of_its_own(compiled: Option<&Session>) -> Result<&Session, Failure> {
+    compiled.ok_or_else(|| Failure("`worker` is started by `run`, not by hand".to_owned()))
+}
+
+/// Serves a supervisor, in a lab if one is named.
+#[cfg(feature = "process")]
+fn serve(
+    runner: Runner,
+    plan: CampaignPlan,
+    lab: Option<&str>,
+    supervisor: &campaign::Address,
+) -> Result<ExitCode, Failure> {
+    let (runner, plan) = match lab {
+        Some(lab) => crate::lab::in_lab(runner, plan, lab)?,
+        None => (runner, plan),
+    };
+    campaign::serve(&runner, &plan, supervisor)?;
+    Ok(ExitCode::SUCCESS)
 }

@@ -112,6 +112,13 @@ impl ExecutionArgs {
         }
     }
 
+    /// The same with one worker.
+    #[cfg(feature = "process")]
+    pub(super) fn one_at_a_time(&self) -> ExecutionArgs {
+        let ExecutionArgs { workers: _, timeout, reference_timeout, allow_unheard } = *self;
+        ExecutionArgs { workers: Some(NonZeroUsize::MIN), timeout, reference_timeout, allow_unheard }
+    }
+
     fn processes(&self) -> usize {
         let processors = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get).min(MOST_WORKERS);
         self.workers.map_or_else(processors, NonZeroUsize::get)

@@ -1,6 +1,6 @@
 //! `run` and `resume`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
@@ -62,7 +62,7 @@ pub(super) fn run(session: &Session, options: &Options) -> Result<ExitCode, Fail
 }
 
 pub(super) fn resume(session: &Session, options: &ResumeOptions) -> Result<ExitCode, Failure> {
-    let Session { plan, results, .. } = session;
+    let results = &session.results;
     let folder = match &options.results {
         Some(folder) => run_folder(results, folder),
         None => record::latest_unfinished(results)?.ok_or_else(|| {
@@ -70,14 +70,30 @@ pub(super) fn resume(session: &Session, options: &ResumeOptions) -> Result<ExitC
         })?,
     };
     let recorder = Recorder::resume(&folder, options.execution.workers())?;
+    #[cfg(feature = "process")]
+    if let Some(task) = recorder.repository().task().in_lab() {
+        let (session, execution) = (session.in_lab(&task.lab.clone())?, options.execution.one_at_a_time());
+        return go_on(&session, recorder, &folder, &execution, &options.output);
+    }
+    go_on(session, recorder, &folder, &options.execution, &options.output)
+}
+
+fn go_on(
+    session: &Session,
+    recorder: Recorder,
+    folder: &Path,
+    execution: &ExecutionArgs,
+    output: &OutputArgs,
+) -> Result<ExitCode, Failure> {
+    let plan = &session.plan;
     if let Some(difference) = recorder.repository().campaign().plan.model_difference(plan) {
         return Err(Failure(format!(
             "the model has changed since {} was begun ({difference}). This starts anew:\n    {}",
-            shown(&folder),
+            shown(folder),
             session.caller.command("run", &[])
         )));
     }
     let files = claim_files(&session.runner, plan)?;
     refuse_unfilled(&session.runner, plan, true)?;
-    execute(session, recorder, &folder, &options.execution, &options.output, files)
+    execute(session, recorder, folder, execution, output, files)
 }

@@ -22,6 +22,14 @@ pub(super) struct Session {
 }
 
 impl Session {
+    /// The same with a lab in place of the simulator.
+    #[cfg(feature = "process")]
+    pub(super) fn in_lab(&self, name: &str) -> Result<Self, Failure> {
+        let (runner, plan) = crate::lab::in_lab(self.runner.clone(), self.plan.clone(), name)?;
+        let (results, caller) = (self.results.clone(), self.caller.clone());
+        Ok(Session { runner, plan, results, program: self.program.clone().in_lab(name), caller })
+    }
+
     pub(super) fn new(runner: Runner, program: WorkerProgram, caller: Caller) -> Result<Self, Failure> {
         let plan = serde_json::from_str(&runner.plan).map_err(|error| {
             Failure(format!("the plan in this runner is damaged ({error}): run `sesamec generate` again"))

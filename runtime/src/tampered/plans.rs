@@ -1,16 +1,20 @@
 //! Plans in which one thing is wrong that later code relies on: each is refused with the place of it.
 
 use sesame_plan::condition::{ConditionEnd, ConditionSpace};
-use sesame_plan::testing::{field, message, minimal, node, topic};
+use sesame_plan::testing::{field, lab, message, minimal, node, topic};
 use sesame_plan::{
     Activation, ActivationMode, Answer, Bound, CampaignPlan, Clock, Command, Dimension, Domain, Interface,
-    InterfaceField, KnownTestId, Launch, Lifecycle, MessageId, MessageType, MetricId, MetricSource, Node, NodeId,
-    OperationId, Ready, ReadyWhen, RelayBudget, Ros2, Search, Simulator, StepBy, Stepping, Strategy, Topic, TopicId,
-    Transport, Type, WireType, Wiring,
+    InterfaceField, KnownTestId, LabBudget, Launch, Lifecycle, MessageId, MessageType, MetricId, MetricSource, Node,
+    NodeId, OperationId, RankOrder, Ready, ReadyWhen, RelayBudget, Ros2, Search, Simulator, StepBy, Stepping, Strategy,
+    Topic, TopicId, Transport, Type, WireType, Wiring,
 };
 use sesame_results::record::sample;
 
 use super::whole::rich;
+
+fn budget(plan: &mut CampaignPlan) -> &mut LabBudget {
+    plan.labs[0].budget.as_mut().expect("its lab has one")
+}
 
 /// A change to a plan, and what is then said of it.
 type Altered = (fn(&mut CampaignPlan), &'static str);
@@ -85,6 +89,17 @@ fn each_thing_that_later_code_relies_on_is_asked_for() {
             |plan| plan.tests[0].expectations[0].metric = MetricId(9),
             "tests[0].expectations[0].metric: there is no metric 9",
         ),
+        (|plan| plan.labs.push(lab("lab")), "labs: \"lab\" is there twice"),
+        (|plan| plan.labs[0].repeats = 0, "labs[0].repeats: must be at least 1"),
+        (|plan| plan.labs[0].cost.per_operation = -1.0, "labs[0].cost.per_operation: -1 is below 0"),
+        (|plan| plan.labs[0].cost.base = 0.0, "labs[0].cost: 0 is not above 0"),
+        (|plan| plan.labs[0].exclude[0].metric = MetricId(9), "labs[0].exclude[0].metric: there is no metric 9"),
+        (|plan| plan.labs[0].rank[0].order = RankOrder::ClosestTo { value: f64::NAN }, "labs[0].rank[0].value: NaN"),
+        (|plan| budget(plan).limit = 0.0, "labs[0].budget.limit: 0 is not above 0"),
+        (|plan| budget(plan).lambda = 1.5, "labs[0].budget.lambda: 1.5 is not in 0..=1"),
+        (|plan| budget(plan).over.push(Dimension::T1), "labs[0].budget.over: T1 is there twice"),
+        (|plan| plan.labs[0].tolerances[0].value = -1.0, "labs[0].tolerances[0].value: -1 is below 0"),
+        (|plan| plan.labs[0].interlock.push(MetricId(0)), "labs[0].interlock: MetricId(0) is there twice"),
     ];
     let by_condition: &[Altered] = &[
         (

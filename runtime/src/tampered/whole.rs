@@ -5,9 +5,11 @@ use std::path::Path;
 
 use sesame_base::observation::{OperationEffect, Outcome};
 use sesame_plan::condition::ConditionEnd;
+use sesame_plan::testing::lab;
 use sesame_plan::{
     BoostedChildren, CampaignPlan, Confirmation, CoverageGoal, Dimension, Expectation, Exploration, Failing, GridAxis,
-    MetricId, RequirementId, Shrinking, Statistic, StopRule, Task,
+    Lab, LabBudget, LabExclusion, LabTask, LabTest, LabTolerance, MetricId, RankKey, RankOrder, RequirementId,
+    Shrinking, Statistic, StopRule, Task,
 };
 use sesame_results::record::{DATABASE, GenerationCoverage, Origin, Recorder, Repetition, sample};
 use sesame_search as search;
@@ -50,6 +52,14 @@ pub(super) fn rich() -> CampaignPlan {
         vec![StopRule::Stagnation { generations: 3, below: 0.01 }, StopRule::Completeness { share: 0.9 }];
     let bound = plan.requirements[0].bound;
     plan.tests[0].expectations = vec![Expectation { metric: MetricId(0), bound }];
+    plan.labs = vec![Lab {
+        exclude: vec![LabExclusion { metric: MetricId(0), bound }],
+        rank: vec![RankKey { metric: MetricId(0), order: RankOrder::ClosestTo { value: 5.0 } }],
+        budget: Some(LabBudget { limit: 5.0, lambda: 0.5, over: vec![Dimension::T1, Dimension::P1] }),
+        tolerances: vec![LabTolerance { metric: MetricId(1), value: 1.0 }],
+        interlock: vec![MetricId(0)],
+        ..lab("lab")
+    }];
     plan
 }
 
@@ -137,6 +147,24 @@ pub(super) fn wholes() -> Vec<Whole> {
         }
         recorder.finish("nothing more to try").unwrap();
         wholes.push(taken("shrunk", folder.path()));
+    }
+    {
+        let folder = tempfile::tempdir().unwrap();
+        let plan = rich();
+        let test = plan.tests[0].test.clone();
+        let mut other = test.clone();
+        other.operations[0].operation_seed += 1;
+        let tests = vec![LabTest { number: 7, test }, LabTest { number: 12, test: other }];
+        let task = Task::Lab(LabTask { lab: "lab".to_owned(), results: "0".repeat(64), tests, repeats: 3 });
+        let plan = task.plan(&plan);
+        let mut recorder = Recorder::create_for(folder.path(), &plan, &task, 1, 1).unwrap();
+        let candidates = search::strategy_of_task(&plan, &task, 1).unwrap().ask();
+        assert_eq!(candidates.len(), 6);
+        for (number, candidate) in (1..).zip(candidates) {
+            recorder.commit(&sample::record(&plan, number, Origin::Search, candidate.test)).unwrap();
+        }
+        recorder.finish("all tests are done").unwrap();
+        wholes.push(taken("lab", folder.path()));
     }
     wholes
 }

@@ -166,8 +166,15 @@ pub(super) struct Output {
     format: Format,
 }
 
+impl Output {
+    /// For whom.
+    pub(super) fn format(&self) -> Format {
+        self.format
+    }
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-enum Format {
+pub(super) enum Format {
     #[default]
     Table,
     Csv,
@@ -187,7 +194,7 @@ pub(super) enum Compat {
 }
 
 impl Compat {
-    fn convention(self) -> Convention {
+    pub(super) fn convention(self) -> Convention {
         match self {
             Compat::Ours => Convention::Ours,
             Compat::Original => Convention::Original,
@@ -196,7 +203,7 @@ impl Compat {
     }
 }
 
-fn dimension(name: &str) -> Result<Dimension, String> {
+pub(super) fn dimension(name: &str) -> Result<Dimension, String> {
     Dimension::named(name).ok_or_else(|| "expected one of T1, T2, T3, P1, P2, O0, O1, O2 and O3".to_owned())
 }
 
@@ -398,7 +405,7 @@ fn gather(path: &Path, found: &mut Vec<PathBuf>) -> anyhow::Result<()> {
 }
 
 /// Prints for people or programs.
-fn print(table: &Table, output: &Output) -> anyhow::Result<ExitCode> {
+pub(super) fn print(table: &Table, output: &Output) -> anyhow::Result<ExitCode> {
     let terminal = std::io::stdout().is_terminal();
     let colour = terminal && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
     let text = match output.format {

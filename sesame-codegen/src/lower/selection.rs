@@ -52,6 +52,7 @@ impl Selection {
         }
         let expectations = tests.iter().flat_map(|&test| &space.tests[test].expectations);
         metrics.extend(expectations.map(|expectation| expectation.metric));
+        space.physicals.values().for_each(|lab| lab.metrics_into(&mut metrics));
         campaign.end_when.iter().for_each(|condition| condition.metrics_into(&mut metrics));
         metrics.sort();
         metrics.dedup();

@@ -64,10 +64,7 @@ fn used_metrics(space: &Space) -> BTreeSet<MetricId> {
     used.extend(space.requirements.values().map(|requirement| requirement.metric));
     used.extend(space.tests.values().flat_map(|test| &test.expectations).map(|expectation| expectation.metric));
     for lab in space.physicals.values() {
-        used.extend(lab.exclude.iter().map(|(metric, _)| metric));
-        used.extend(lab.rank.iter().map(|(metric, _)| metric));
-        used.extend(lab.tolerance.iter().map(|(metric, _)| metric));
-        used.extend(&lab.interlock);
+        lab.metrics_into(&mut used);
     }
     used
 }

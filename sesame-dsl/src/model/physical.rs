@@ -1,6 +1,7 @@
 //! Physical labs: how tests are chosen for one, run in it, and compared with simulation.
 
-use sesame_plan::{Bound, Dimension};
+use sesame_plan::Bound;
+pub use sesame_plan::{LabBudget, LabCost, RankOrder};
 
 use super::declaration::Declaration;
 use super::ids::MetricId;
@@ -16,13 +17,13 @@ pub struct Physical {
     /// How often each chosen test is run; at least 1. Default 1.
     pub repeats: u32,
     /// What running a test costs.
-    pub cost: Cost,
+    pub cost: LabCost,
     /// Tests of which one of these holds are not run in the lab.
     pub exclude: Vec<(MetricId, Bound)>,
     /// What makes a test interesting, the most important first. Each metric once.
-    pub rank: Vec<(MetricId, Order)>,
+    pub rank: Vec<(MetricId, RankOrder)>,
     /// How many tests are chosen, and by what; `None` for a lab that chooses by hand.
-    pub budget: Option<Budget>,
+    pub budget: Option<LabBudget>,
     /// Differences between simulation and lab that do not matter, in the metric's unit; 0 or more. Each metric once.
     pub tolerance: Vec<(MetricId, f64)>,
     /// Metrics of which only the presence is compared: in the lab an interlock ends the test.
@@ -31,6 +32,16 @@ pub struct Physical {
     pub shapes: Vec<Shape>,
     /// What may be fitted to make simulation and lab agree.
     pub fits: Vec<Fit>,
+}
+
+impl Physical {
+    /// Adds the metrics that it speaks of.
+    pub fn metrics_into(&self, metrics: &mut impl Extend<MetricId>) {
+        metrics.extend(self.exclude.iter().map(|&(metric, _)| metric));
+        metrics.extend(self.rank.iter().map(|&(metric, _)| metric));
+        metrics.extend(self.tolerance.iter().map(|&(metric, _)| metric));
+        metrics.extend(self.interlock.iter().copied());
+    }
 }
 
 /// How a lab is reached. Its transports are those of a simulator.
@@ -57,35 +68,6 @@ pub enum LabSetting {
     Seconds(f64),
     /// A text.
     Text(String),
-}
-
-/// What running a test costs, in the unit of the budget.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Cost {
-    /// Any test; 0 or more. Default 1.
-    pub base: f64,
-    /// Each of its operations; 0 or more. Default 0. One of the two is positive.
-    pub per_operation: f64,
-}
-
-/// Which values come first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Order {
-    /// Small ones.
-    Ascending,
-    /// Large ones.
-    Descending,
-}
-
-/// How tests are chosen: as different and as interesting as the budget allows.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Budget {
-    /// The sum of costs at most; positive.
-    pub limit: f64,
-    /// The weight of difference against interest, in `0..=1`.
-    pub lambda: f64,
-    /// What tests differ in; at least one, each once.
-    pub over: Vec<Dimension>,
 }
 
 /// A body.

@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::physical::{Budget, Cost, Fit, Form, LabSetting, LabSimulator, Order, Physical, Place, Shape};
+use crate::model::physical::{
+    Fit, Form, LabBudget, LabCost, LabSetting, LabSimulator, Physical, Place, RankOrder, Shape,
+};
 use crate::model::{Dimension, Id as _, MetricId};
 use crate::similar::most_similar;
 use crate::span::Span;
@@ -20,6 +22,9 @@ enum Takes {
     Time,
     Text,
 }
+
+/// The highest domain of ROS whose ports exist on every system: domains are the only settings that count.
+const MOST_DOMAIN: f64 = 232.0;
 
 /// What a transport takes.
 struct LabTransport {
@@ -58,7 +63,7 @@ impl<'a> Resolver<'a> {
         };
         let cost = match self.single(&lab.costs, "cost") {
             Some((base, each)) => self.cost(base, each.as_ref()),
-            None => Some(Cost { base: 1.0, per_operation: 0.0 }),
+            None => Some(LabCost { base: 1.0, per_operation: 0.0 }),
         };
         let exclude: Vec<_> = lab.excludes.iter().map(|(name, bound)| self.bound(name, bound)).collect();
         let rank = match self.single(&lab.ranks, "rank by") {
@@ -177,7 +182,7 @@ impl<'a> Resolver<'a> {
                 if !self.whole(value, number.span, &what) {
                     return None;
                 }
-                if (0.0..=f64::from(u32::MAX)).contains(&value) {
+                if (0.0..=MOST_DOMAIN).contains(&value) {
                     #[expect(
                         clippy::cast_possible_truncation,
                         clippy::cast_sign_loss,
@@ -185,7 +190,7 @@ impl<'a> Resolver<'a> {
                     )]
                     return Some(LabSetting::Count(value as u32));
                 }
-                "a whole number from 0 to 4294967295"
+                "a whole number from 0 to 232"
             }
             (Takes::Nothing, Some(_)) => "no value",
             (Takes::Text, _) => "a text",
@@ -208,12 +213,13 @@ impl<'a> Resolver<'a> {
         None
     }
 
-    fn cost(&mut self, base: &Quantity, each: Option<&Quantity>) -> Option<Cost> {
+    fn cost(&mut self, base: &Quantity, each: Option<&Quantity>) -> Option<LabCost> {
         let per_operation = match each {
             Some(each) => self.not_negative(each, None, "the cost of an operation"),
             None => Some(0.0),
         };
-        let cost = Cost { base: self.not_negative(base, None, "the cost of a test")?, per_operation: per_operation? };
+        let cost =
+            LabCost { base: self.not_negative(base, None, "the cost of a test")?, per_operation: per_operation? };
         if cost.base + cost.per_operation > 0.0 {
             return Some(cost);
         }
@@ -222,11 +228,20 @@ impl<'a> Resolver<'a> {
         None
     }
 
-    fn rank(&mut self, keys: &'a [(Name, bool)]) -> Option<Vec<(MetricId, Order)>> {
+    fn rank(&mut self, keys: &'a [(Name, written::RankOrder)]) -> Option<Vec<(MetricId, RankOrder)>> {
         self.once(keys.iter().map(|(name, _)| name));
-        let found = keys.iter().map(|(name, descending)| {
-            let order = if *descending { Order::Descending } else { Order::Ascending };
-            Some((MetricId::from_index(self.find(name, Kind::Metric)?), order))
+        let found = keys.iter().map(|(name, order)| {
+            let index = self.find(name, Kind::Metric)?;
+            let order = match order {
+                written::RankOrder::Ascending => RankOrder::Ascending,
+                written::RankOrder::Descending => RankOrder::Descending,
+                written::RankOrder::ClosestTo(value) => {
+                    let unit = self.metrics[index].as_ref()?.unit.clone();
+                    let what = format!("a value of `{}`", name.text);
+                    RankOrder::ClosestTo { value: self.value(value, unit.as_ref(), &what)? }
+                }
+            };
+            Some((MetricId::from_index(index), order))
         });
         found.collect::<Vec<_>>().into_iter().collect()
     }
@@ -242,7 +257,7 @@ impl<'a> Resolver<'a> {
         }
     }
 
-    fn budget(&mut self, budget: &'a written::Budget) -> Option<Budget> {
+    fn budget(&mut self, budget: &'a written::Budget) -> Option<LabBudget> {
         let mut complete = true;
         let limit = self.value(&budget.limit, None, "the budget");
         if limit.is_some_and(|limit| limit <= 0.0) {
@@ -259,7 +274,7 @@ impl<'a> Resolver<'a> {
         self.once(budget.over.iter());
         let over: Vec<_> = budget.over.iter().map(|name| self.dimension(name)).collect();
         complete.then_some(())?;
-        Some(Budget { limit: limit?, lambda: lambda?, over: over.into_iter().collect::<Option<_>>()? })
+        Some(LabBudget { limit: limit?, lambda: lambda?, over: over.into_iter().collect::<Option<_>>()? })
     }
 
     /// A dimension of the reduced test space.

@@ -594,10 +594,15 @@ impl Space {
         let metric = self.draw.below(self.metrics.len());
         let bound = self.bound(metric);
         let (metric, unit) = (self.metrics[metric].name.clone(), self.metrics[metric].unit);
+        let order = match self.draw.below(3) {
+            0 => "ascending".to_owned(),
+            1 => "descending".to_owned(),
+            _ => format!("closest to 2{unit}"),
+        };
         let [pose, parameter] = [(); 2].map(|()| quoted(&text(&mut self.draw)));
         Some(format!(
             "{}physical {name} {{\n  simulator {} = simlog \"http://lab:8089\" {{ step 20ms }}\n  repeats 3\n  \
-             exclude when {metric} {bound}\n  rank by {metric} descending\n  tolerance {metric} 2{unit}\n  \
+             exclude when {metric} {bound}\n  rank by {metric} {order}\n  tolerance {metric} 2{unit}\n  \
              shape {} = sphere 300mm on pose {pose}\n  fit parameter {parameter} [0.5, 1.5]\n}}\n",
             docs(&mut self.draw),
             names[0],

@@ -1,8 +1,10 @@
 //! An arm of the cell: six driven joints, moved by the targets that reach it over the bus.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 use sesame_runtime::simulator::{Bus, Port};
+use sesame_runtime::time::SimTime;
 use sesame_runtime::value::{Fields, Record, Value};
 
 use crate::geometry::Vector;
@@ -106,6 +108,18 @@ pub struct Arm {
     targets: [Port; 6],
     state: Port,
     state_fields: Arc<Fields>,
+    field_bus: FieldBus,
+}
+
+/// How targets come from the bus to the drives.
+#[derive(Debug, Clone, Default)]
+struct FieldBus {
+    latency: SimTime,
+    jump_limit: Option<f64>,
+    /// The joint, its target, and when it arrives; the earliest first.
+    underway: VecDeque<(SimTime, usize, f64)>,
+    /// The last target of each joint that a drive was sent.
+    sent: [Option<f64>; 6],
 }
 
 impl Arm {
@@ -123,16 +137,35 @@ impl Arm {
             targets,
             state: bus.open(&state_topic(model.name)),
             state_fields: Fields::new(STATE_FIELDS),
+            field_bus: FieldBus::default(),
         }
+    }
+
+    /// Targets take this long to arrive at the drives. A drive ignores one that is further than `jump_limit`, in rad,
+    /// from the one that it was sent before.
+    pub fn reach_drives_by(&mut self, latency: SimTime, jump_limit: Option<f64>) {
+        self.field_bus.latency = latency;
+        self.field_bus.jump_limit = jump_limit;
     }
 
     /// Takes the targets that have arrived, the last one of each joint. Values that are not numbers are ignored.
     pub fn receive(&mut self, bus: &mut Bus<'_>) {
-        for (servo, &port) in self.servos.iter_mut().zip(&self.targets) {
+        let FieldBus { latency, jump_limit, underway, sent } = &mut self.field_bus;
+        for (joint, &port) in self.targets.iter().enumerate() {
             while let Some(message) = bus.receive(port) {
                 if let Some(target) = message.number_at::<&str>(&[]) {
-                    servo.aim(target);
+                    underway.push_back((bus.now() + *latency, joint, target));
                 }
+            }
+        }
+        while let Some(&(arrives, joint, target)) = underway.front()
+            && arrives <= bus.now()
+        {
+            underway.pop_front();
+            let before = sent[joint].replace(target);
+            let jumps = before.zip(*jump_limit).is_some_and(|(before, limit)| (target - before).abs() > limit);
+            if !jumps {
+                self.servos[joint].aim(target);
             }
         }
     }

@@ -5,6 +5,8 @@ use sesame_runtime::time::SimTime;
 
 use crate::arm::{Arm, R3200, R270072, R270073};
 use crate::conveyor::{Conveyor, INFEED, OUTFEED};
+use crate::geometry::Vector;
+use crate::lab::Reality;
 use crate::noise::TorqueNoise;
 use crate::plc::Plc;
 use crate::program::programs;
@@ -30,6 +32,44 @@ pub struct NoisyCell {
     noise: [TorqueNoise; 3],
 }
 
+/// A stand-in for the real cell: [as noisy](NoisyCell), and different from the model where reality often is.
+#[derive(Debug, Clone)]
+pub struct RealCell {
+    world: World,
+    noise: [TorqueNoise; 3],
+    noise_share: f64,
+}
+
+impl RealCell {
+    /// Starts a cell that differs so from the model.
+    pub fn start_as(reality: &Reality, setup: &Setup, bus: &mut Bus<'_>) -> Result<Self, SimulatorError> {
+        let mut world = World::start_shifted(setup, Vector::from_array(reality.zone_shift), bus)?;
+        for arm in &mut world.arms {
+            arm.reach_drives_by(reality.latency, reality.jump_limit);
+        }
+        let noise = torque_noise(setup, &world);
+        Ok(RealCell { world, noise, noise_share: reality.noise_share })
+    }
+}
+
+impl Simulator for RealCell {
+    fn start(setup: &Setup, bus: &mut Bus<'_>) -> Result<Self, SimulatorError> {
+        RealCell::start_as(&Reality::default(), setup, bus)
+    }
+
+    fn step(&mut self, bus: &mut Bus<'_>) -> Result<Progress, SimulatorError> {
+        let share = self.noise_share;
+        let disturbances = self.noise.each_mut().map(|noise| noise.draw().map(|torque| share * torque));
+        self.world.step(bus, &disturbances);
+        Ok(Progress::Running)
+    }
+}
+
+/// The noise of each arm.
+fn torque_noise(setup: &Setup, world: &World) -> [TorqueNoise; 3] {
+    std::array::from_fn(|arm| TorqueNoise::new(setup.seed, arm, world.arms[arm].model(), setup.step.seconds()))
+}
+
 impl Simulator for Cell {
     fn start(setup: &Setup, bus: &mut Bus<'_>) -> Result<Self, SimulatorError> {
         World::start(setup, bus).map(Cell)
@@ -44,8 +84,7 @@ impl Simulator for Cell {
 impl Simulator for NoisyCell {
     fn start(setup: &Setup, bus: &mut Bus<'_>) -> Result<Self, SimulatorError> {
         let world = World::start(setup, bus)?;
-        let noise = |arm: usize| TorqueNoise::new(setup.seed, arm, world.arms[arm].model(), setup.step.seconds());
-        let noise = std::array::from_fn(noise);
+        let noise = torque_noise(setup, &world);
         Ok(NoisyCell { world, noise })
     }
 
@@ -84,6 +123,11 @@ struct World {
 
 impl World {
     fn start(setup: &Setup, bus: &mut Bus<'_>) -> Result<Self, SimulatorError> {
+        World::start_shifted(setup, Vector::ZERO, bus)
+    }
+
+    /// With the zones elsewhere by so many metres.
+    fn start_shifted(setup: &Setup, zone_shift: Vector, bus: &mut Bus<'_>) -> Result<Self, SimulatorError> {
         let step = setup.step;
         if step <= SimTime::ZERO || step > LONGEST_STEP {
             return Err(SimulatorError(format!(
@@ -103,7 +147,7 @@ impl World {
         let conveyors = [Conveyor::open(&INFEED, bus), Conveyor::open(&OUTFEED, bus)];
         Ok(World {
             plc: Plc::open(programs, bus),
-            monitor: ZoneMonitor::open(&arms, bus),
+            monitor: ZoneMonitor::open(&arms, zone_shift, bus),
             arms,
             conveyors,
             gripper_speed: bus.open(GRIPPER_SPEED_TOPIC),

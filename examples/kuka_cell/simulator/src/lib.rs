@@ -13,6 +13,7 @@ mod cell;
 pub mod conveyor;
 pub mod geometry;
 pub mod kinematics;
+pub mod lab;
 pub mod noise;
 pub mod plc;
 pub mod program;
@@ -20,7 +21,7 @@ pub mod sequence;
 pub mod servo;
 pub mod zones;
 
-pub use cell::{Cell, GRIPPER_SPEED_TOPIC, NoisyCell};
+pub use cell::{Cell, GRIPPER_SPEED_TOPIC, NoisyCell, RealCell};
 pub use plc::CYCLE_TIME_TOPIC;
 pub use program::TAKT_SECONDS;
 pub use sequence::{IN_POSITION_MONITORING, IN_POSITION_TOLERANCE};

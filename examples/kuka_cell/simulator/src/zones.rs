@@ -62,10 +62,11 @@ pub struct ZoneMonitor {
 }
 
 impl ZoneMonitor {
-    /// Opens the topics.
-    pub fn open(arms: &[Arm; 3], bus: &mut Bus<'_>) -> Self {
+    /// Opens the topics. The zones are `shift` metres from where the model has them.
+    pub fn open(arms: &[Arm; 3], shift: Vector, bus: &mut Bus<'_>) -> Self {
         let zones = ZONES.iter().map(|zone| {
-            let cuboid = Aabb::new(Vector::from_array(zone.lowest), Vector::from_array(zone.highest));
+            let [lowest, highest] = [zone.lowest, zone.highest].map(|corner| Vector::from_array(corner) + shift);
+            let cuboid = Aabb::new(lowest, highest);
             (cuboid, bus.open(&zone_topic(zone.name)), Text::from(zone.name))
         });
         let zones = zones.collect();

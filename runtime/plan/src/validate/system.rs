@@ -4,24 +4,26 @@ use std::collections::BTreeSet;
 
 use super::check::{Checked, at, each, id, name, positive, require};
 use crate::{
-    CampaignPlan, Clock, Interface, Launch, Lifecycle, Node, NodeId, ReadyWhen, Ros2, Transport, WireType, Wiring,
+    CampaignPlan, Clock, Interface, Launch, Lifecycle, Node, NodeId, ReadyWhen, Ros2, Simulator, Transport, WireType,
+    Wiring,
 };
 
 /// The highest domain of ROS whose ports exist on every system.
 const MOST_DOMAIN: u16 = 232;
 
 impl CampaignPlan {
-    pub(super) fn sound_simulator(&self) -> Checked {
-        let step_ns = match &self.simulator.transport {
+    pub(super) fn sound_simulator(&self, simulator: &Simulator) -> Checked {
+        at("name", name(&simulator.name))?;
+        let step_ns = match &simulator.transport {
             Transport::InProcess { step_ns, .. } => Some(*step_ns),
             Transport::Process { step_ns, .. } => *step_ns,
             Transport::Ros2(ros2) => ros2.step.as_ref().map(|step| step.step_ns),
         };
         at("transport.step_ns", require(step_ns != Some(0), || "must be positive".to_owned()))?;
-        if let Transport::Ros2(ros2) = &self.simulator.transport {
+        if let Transport::Ros2(ros2) = &simulator.transport {
             at("transport", self.sound_ros2(ros2))?;
         }
-        let Lifecycle { launch, terminate: _, relay_budget } = &self.simulator.lifecycle;
+        let Lifecycle { launch, terminate: _, relay_budget } = &simulator.lifecycle;
         at("lifecycle.launch", launch.as_ref().map_or(Ok(()), |launch| self.sound_launch(launch)))?;
         let Some(budget) = relay_budget else { return Ok(()) };
         at("lifecycle.relay_budget.latency", budget.latency.map_or(Ok(()), positive))?;

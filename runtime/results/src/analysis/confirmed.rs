@@ -6,9 +6,9 @@ use serde::Serialize;
 
 use sesame_base::observation::Outcome;
 use sesame_base::test_number::TestNumber;
+use sesame_gap::proportion::wilson;
 use sesame_plan::CampaignPlan;
 
-use crate::analysis::statistics::wilson;
 use crate::present::number::{fixed, plural};
 use crate::record::{Judge, RecordError, Repetition, Repository, Standing, Tally, TestRow, Verdict, confirmed_fitness};
 

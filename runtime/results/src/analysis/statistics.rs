@@ -1,25 +1,6 @@
-//! Intervals of probabilities, and samples of numbers.
+//! Samples of numbers.
 
 use serde::Serialize;
-
-/// The 0.975 quantile of the standard normal distribution.
-const Z: f64 = 1.959_963_984_540_054;
-
-/// The 95 % Wilson score interval of a probability, from `k` of `n` independent trials (Wilson 1927); `None` without a
-/// trial. Both ends are in `0..=1`.
-pub(crate) fn wilson(k: usize, n: usize) -> Option<[f64; 2]> {
-    if n == 0 {
-        return None;
-    }
-    let (k, n) = (k as f64, n as f64);
-    let share = k / n;
-    let centre = (share + Z * Z / (2.0 * n)) / (1.0 + Z * Z / n);
-    let half = Z / (1.0 + Z * Z / n) * libm::sqrt(share * (1.0 - share) / n + Z * Z / (4.0 * n * n));
-    // At its ends the interval is exact, which rounding would hide.
-    let low = if k == 0.0 { 0.0 } else { (centre - half).max(0.0) };
-    let high = if k == n { 1.0 } else { (centre + half).min(1.0) };
-    Some([low, high])
-}
 
 /// A sample of numbers at a glance.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -62,19 +43,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn wilson_intervals_are_those_of_the_literature() {
-        let rounded = |k, n| wilson(k, n).map(|ends| ends.map(|end| libm::round(end * 1e4) / 1e4));
-        assert_eq!(rounded(7, 10), Some([0.3968, 0.8922]));
-        assert_eq!(rounded(0, 10), Some([0.0, 0.2775]));
-        assert_eq!(rounded(10, 10), Some([0.7225, 1.0]));
-        assert_eq!(rounded(1, 2), Some([0.0945, 0.9055]));
-        // Newcombe 1998, table I, method 3.
-        assert_eq!(rounded(81, 263), Some([0.2553, 0.3662]));
-        assert_eq!(rounded(15, 148), Some([0.0624, 0.1605]));
-        assert_eq!(wilson(0, 0), None);
-    }
-
-    #[test]
     fn a_sample_is_described_as_textbooks_do() {
         let sample = Sample::of([2.0, 4.0, 4.0, 4.0, 5.0, 5.0, 7.0, 9.0]).unwrap();
         assert_eq!((sample.count, sample.mean, sample.median), (8, 5.0, 4.5));
@@ -98,20 +66,6 @@ mod tests {
             prop_assert!(sample.min <= sample.median && sample.median <= sample.max);
             let backwards = numbers.iter().rev().copied();
             prop_assert_eq!(Sample::of(backwards), Some(sample), "the order makes no difference");
-        }
-
-        /// The oracle: the ends are where the score test of a probability `p` just rejects.
-        #[test]
-        fn the_ends_are_where_the_score_test_rejects(n in 1usize..400, share in 0.0..=1.0f64) {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a small count")]
-            let k = (share * n as f64) as usize;
-            let [low, high] = wilson(k, n).unwrap();
-            let observed = k as f64 / n as f64;
-            prop_assert!(0.0 <= low && low <= observed && observed <= high && high <= 1.0);
-            for p in [low, high].into_iter().filter(|&p| p > 0.0 && p < 1.0) {
-                let score = (observed - p).abs() / (p * (1.0 - p) / n as f64).sqrt();
-                prop_assert!((score - Z).abs() < 1e-6, "{} of {}: {} at {}", k, n, score, p);
-            }
         }
     }
 }

@@ -12,8 +12,8 @@ pub(crate) struct Physical {
     /// What a test costs, and what each of its operations costs besides.
     pub(crate) costs: Vec<(Span, (Quantity, Option<Quantity>))>,
     pub(crate) excludes: Vec<(Name, Bound)>,
-    /// Metrics, with whether larger values come first.
-    pub(crate) ranks: Vec<(Span, Vec<(Name, bool)>)>,
+    /// Metrics, with which of their values come first.
+    pub(crate) ranks: Vec<(Span, Vec<(Name, RankOrder)>)>,
     pub(crate) budgets: Vec<(Span, Budget)>,
     pub(crate) tolerances: Vec<(Span, Vec<(Name, Quantity)>)>,
     pub(crate) interlocks: Vec<(Span, Vec<Name>)>,
@@ -35,6 +35,14 @@ pub(crate) struct LabSimulator {
 pub(crate) enum Setting {
     Quantity(Quantity),
     Text(Text),
+}
+
+/// Which values come first.
+#[derive(Debug)]
+pub(crate) enum RankOrder {
+    Ascending,
+    Descending,
+    ClosestTo(Quantity),
 }
 
 #[derive(Debug)]

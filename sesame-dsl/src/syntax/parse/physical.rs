@@ -4,7 +4,7 @@ use sesame_grammar::Rule;
 
 use super::reader::{Pair, Reader, child, children, expect_child};
 use crate::syntax::ast::Name;
-use crate::syntax::ast::physical::{Budget, Fit, Form, LabSimulator, Physical, Setting, Shape, ShapePlace};
+use crate::syntax::ast::physical::{Budget, Fit, Form, LabSimulator, Physical, RankOrder, Setting, Shape, ShapePlace};
 
 impl Reader<'_> {
     pub(super) fn physical(&mut self, pair: &Pair<'_>) -> Physical {
@@ -38,8 +38,12 @@ impl Reader<'_> {
                 }
                 Rule::rank => {
                     let keys = children(&member, Rule::rank_key).map(|key| {
-                        let descending = child(&key, Rule::k_descending).is_some();
-                        (reader.name(&expect_child(&key, Rule::name)), descending)
+                        let order = match child(&key, Rule::signed) {
+                            Some(value) => RankOrder::ClosestTo(reader.signed(&value)),
+                            None if child(&key, Rule::k_descending).is_some() => RankOrder::Descending,
+                            None => RankOrder::Ascending,
+                        };
+                        (reader.name(&expect_child(&key, Rule::name)), order)
                     });
                     lab.ranks.push((span, keys.collect()));
                 }

@@ -5,7 +5,7 @@
 //! Fisher's exact test at 5 % over all questions that were weighed for it (Bonferroni); the same data give the same
 //! tree.
 
-use crate::analysis::statistics::wilson;
+use sesame_gap::proportion::wilson;
 
 /// Columns of numbers, a NaN where a row has none.
 #[derive(Debug, Clone, Default)]

@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
+use sesame_gap::proportion::wilson;
 use sesame_plan::{CampaignPlan, Task};
 
-use crate::analysis::statistics::wilson;
 use crate::present::number::plural;
 use crate::record::{Origin, Tally, TestRow};
 

@@ -8,12 +8,12 @@ use serde::Serialize;
 use sesame_base::observation::{Counters, MetricObservation};
 use sesame_base::robustness;
 use sesame_base::test_number::TestNumber;
+use sesame_gap::proportion::wilson;
 use sesame_notation as notation;
 use sesame_plan::stl::Formula;
 use sesame_plan::{Activation, Bound, CampaignPlan, Choice, Metric, MetricSource, Span, Task};
 
 use crate::analysis::confirmed::{ConfirmedTest, confirmed_test};
-use crate::analysis::statistics::wilson;
 use crate::present::number;
 use crate::record::{
     EventKind, Judge, MetricValue, Origin, RecordError, Repetition, Repository, Tally, TestRecord, TestRow, Verdict,

@@ -33,6 +33,10 @@ pub(super) fn header(
         (Task::Campaign, Search::Strategy { strategy, .. }) => budget(&strategy.title()),
         (Task::Known { tests }, _) => plural(tests.len(), "regression test", "regression tests"),
         (Task::Shrink(shrinking), _) => format!("{} at most", budget(&format!("{} shrunk", shrinking.name))),
+        (Task::Lab(lab), _) => {
+            let each = if lab.repeats == 1 { String::new() } else { format!(", each {} times", lab.repeats) };
+            format!("{} in lab {}{each}", plural(lab.tests.len(), "test", "tests"), lab.lab)
+        }
         (Task::Campaign, Search::Repeat { .. }) | (Task::Repeat { .. }, _) => {
             repeated_words(plan, &facts.task).unwrap_or_default()
         }

@@ -1,0 +1,37 @@
+//! In what a real cell differs from the model: what a stand-in for a lab does otherwise.
+
+use sesame_runtime::time::SimTime;
+
+/// How a cell differs from the model. Nothing of it is in the model, so that tools which compare the two have something
+/// to find.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reality {
+    /// How long targets take from the PLC to the drives: the field bus and the shared memory between them. They act at
+    /// the next step.
+    pub latency: SimTime,
+    /// The strength of the torque noise, as a share of that of [`crate::NoisyCell`].
+    pub noise_share: f64,
+    /// How far the zones are from where the model has them, in m: they were measured by hand.
+    pub zone_shift: [f64; 3],
+    /// A drive takes a target that is further than this from the last one, in rad, for a broken telegram, and goes on
+    /// towards the last one. Targets of the PLC are 0.04 rad apart at most, so only strong disturbances are weaker than
+    /// in the model.
+    pub jump_limit: Option<f64>,
+}
+
+impl Reality {
+    /// What does not differ from [`crate::NoisyCell`].
+    pub const AS_MODELLED: Reality =
+        Reality { latency: SimTime::ZERO, noise_share: 1.0, zone_shift: [0.0; 3], jump_limit: None };
+}
+
+impl Default for Reality {
+    fn default() -> Self {
+        Reality {
+            latency: SimTime::from_nanos(50_000_000),
+            zone_shift: [0.03, -0.02, 0.0],
+            jump_limit: Some(0.25),
+            ..Reality::AS_MODELLED
+        }
+    }
+}

@@ -1,0 +1,292 @@
+//! The tests that are run in a lab: the choice itself, and how it depends on what it is made by.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use sesame_plan::{CampaignPlan, Dimension};
+use sesame_search::sspr::Convention;
+use sesame_select::{Invalid, Pairs, Problem, Selection, State, Test, choose};
+
+use crate::analysis::Datum;
+use crate::analysis::candidates::{Candidate, Candidates, Terms, qualities};
+use crate::present::table::Table;
+
+/// Why nothing is chosen.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ChoiceError {
+    /// Nothing can be compared.
+    #[error("none of these tests is a candidate")]
+    NoCandidates,
+    /// A test that is said to have been run is no candidate.
+    #[error("T{test} is no candidate, so it cannot count as run")]
+    NotACandidate {
+        /// Its number.
+        test: u32,
+    },
+    /// The numbers are no problem to be solved.
+    #[error("{0}")]
+    Invalid(String),
+}
+
+impl From<Invalid> for ChoiceError {
+    fn from(invalid: Invalid) -> Self {
+        ChoiceError::Invalid(invalid.to_string())
+    }
+}
+
+/// A choice among candidates.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Choice {
+    /// The weight of difference against interest.
+    pub lambda: f64,
+    /// What the tests may cost that were not run already.
+    pub budget: f64,
+    /// The numbers of the chosen tests, ascending; those that were run already are among them.
+    pub tests: Vec<u32>,
+    /// Its value [SESAME 2023, Algorithm 1].
+    pub value: f64,
+    /// Whether it is proved to be the best.
+    pub state: State,
+    /// How far the best choice may be above it, as a share of its value; 0 if it is proved.
+    pub gap: f64,
+    /// What the tests cost that were not run already.
+    pub cost: f64,
+}
+
+/// The problem of choosing among candidates.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Choosing<'a> {
+    candidates: &'a Candidates,
+    qualities: BTreeMap<u32, f64>,
+    run: &'a BTreeSet<u32>,
+    problem: Problem,
+}
+
+impl<'a> Choosing<'a> {
+    /// Of candidates, with the weight of difference against interest in `0..=1`. Tests that were run already are in
+    /// every choice and cost nothing: the budget is for others.
+    pub fn new(
+        candidates: &'a Candidates,
+        terms: &Terms,
+        lambda: f64,
+        run: &'a BTreeSet<u32>,
+    ) -> Result<Self, ChoiceError> {
+        if candidates.tests.is_empty() {
+            return Err(ChoiceError::NoCandidates);
+        }
+        let is_candidate = |number: &u32| candidates.tests.iter().any(|candidate| candidate.number == *number);
+        if let Some(&test) = run.iter().find(|number| !is_candidate(number)) {
+            return Err(ChoiceError::NotACandidate { test });
+        }
+        let qualities = qualities(&candidates.measured, terms.convention);
+        let test = |candidate: &Candidate| {
+            let forced = run.contains(&candidate.number);
+            Test {
+                point: candidate.point.clone(),
+                // Without anything to rank by, all are equally interesting.
+                quality: if terms.rank.is_empty() { 0.0 } else { qualities[&candidate.number] },
+                cost: if forced { 0.0 } else { candidate.cost },
+                forced,
+            }
+        };
+        let pairs = if terms.convention == Convention::Ours { Pairs::Unordered } else { Pairs::Ordered };
+        let tests = candidates.tests.iter().map(test).collect();
+        let problem = Problem::new(tests, lambda, terms.budget, pairs)?;
+        Ok(Choosing { candidates, qualities, run, problem })
+    }
+
+    /// The best choice, or the best that was found until `stop` said yes.
+    pub fn best(&self, stop: &mut dyn FnMut() -> bool) -> Choice {
+        self.choice(&self.problem, stop)
+    }
+
+    /// The best choices for these weights.
+    pub fn sweep(&self, lambdas: &[f64], stop: &mut dyn FnMut() -> bool) -> Result<Vec<Choice>, ChoiceError> {
+        let choices = lambdas.iter().map(|&lambda| {
+            let problem = self.problem.clone().with_lambda(lambda)?;
+            Ok(self.choice(&problem, stop))
+        });
+        choices.collect()
+    }
+
+    /// What the smallest greater budget would buy with which another choice is affordable: the budget and one more test
+    /// of the least cost. `None` if all tests are chosen.
+    pub fn next_budget(&self, best: &Choice, stop: &mut dyn FnMut() -> bool) -> Result<Option<Choice>, ChoiceError> {
+        let others = self.candidates.tests.iter().filter(|candidate| !best.tests.contains(&candidate.number));
+        let Some(least) = others.map(|candidate| candidate.cost).min_by(f64::total_cmp) else { return Ok(None) };
+        let problem = self.problem.clone().with_budget(best.cost + least)?;
+        Ok(Some(self.choice(&problem, stop)))
+    }
+
+    fn choice(&self, problem: &Problem, stop: &mut dyn FnMut() -> bool) -> Choice {
+        let selection = choose(problem, stop);
+        let gap = selection.gap();
+        let Selection { chosen, value, state } = selection;
+        Choice {
+            lambda: problem.lambda(),
+            budget: problem.budget(),
+            tests: chosen.iter().map(|&at| self.candidates.tests[at].number).collect(),
+            value,
+            state,
+            gap,
+            cost: problem.cost(&chosen),
+        }
+    }
+
+    /// The chosen tests: their cost, the values that they are ranked by, their quality (0 to 1), and where they are.
+    pub fn table(&self, plan: &CampaignPlan, terms: &Terms, choice: &Choice) -> Table {
+        let mut columns = vec!["test".to_owned(), "cost".to_owned(), "run".to_owned()];
+        columns.extend(terms.rank.iter().map(|key| plan.metric(key.metric).name.clone()));
+        columns.push("quality".to_owned());
+        columns.extend(terms.over.iter().map(|dimension: &Dimension| dimension.name().to_owned()));
+        let mut table = Table::new(columns);
+        for candidate in self.candidates.tests.iter().filter(|it| choice.tests.contains(&it.number)) {
+            let head = [
+                Datum::test(candidate.number),
+                Datum::Real(candidate.cost),
+                Datum::Truth(self.run.contains(&candidate.number)),
+            ];
+            let values = candidate.values.iter().map(|&value| Datum::Real(value));
+            let quality = Datum::real(self.qualities.get(&candidate.number).copied());
+            let point = candidate.point.iter().map(|&coordinate| Datum::Real(coordinate));
+            table.row(head.into_iter().chain(values).chain([quality]).chain(point));
+        }
+        table
+    }
+}
+
+impl Choice {
+    /// Whether it is proved, in words.
+    pub fn proof(&self) -> String {
+        match self.state {
+            State::Proved => "proved to be the best".to_owned(),
+            State::TiesOpen => "proved to be the best; not all choices of the same value were compared".to_owned(),
+            State::Open { .. } => format!("not proved: the best is at most {:.2} % better", 100.0 * self.gap),
+        }
+    }
+}
+
+/// Choices side by side, a row each: the weight, the value, and which tests enter and leave from one to the next.
+pub fn sweep_table(choices: &[Choice]) -> Table {
+    let mut table = Table::new(["lambda", "value", "tests", "enter", "leave", "proved"].map(str::to_owned));
+    let names = |tests: &mut dyn Iterator<Item = &u32>| {
+        let names: Vec<String> = tests.map(|number| format!("T{number}")).collect();
+        if names.is_empty() { Datum::Missing } else { Datum::Text(names.join(" ")) }
+    };
+    for (at, choice) in choices.iter().enumerate() {
+        let before = at.checked_sub(1).map(|before| &choices[before].tests);
+        let new = |number: &&u32| before.is_some_and(|before| !before.contains(number));
+        let gone = |number: &&u32| !choice.tests.contains(number);
+        table.row([
+            Datum::Real(choice.lambda),
+            Datum::Real(choice.value),
+            names(&mut choice.tests.iter()),
+            names(&mut choice.tests.iter().filter(new)),
+            names(&mut before.into_iter().flatten().filter(gone)),
+            Datum::Truth(matches!(choice.state, State::Proved | State::TiesOpen)),
+        ]);
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use sesame_plan::{LabCost, MetricId, RankKey, RankOrder};
+
+    use super::*;
+    use crate::analysis::Selection as Looked;
+    use crate::analysis::candidates::candidates;
+    use crate::record::sample;
+
+    fn terms(budget: f64) -> Terms {
+        Terms {
+            over: vec![Dimension::T1, Dimension::T2],
+            rank: vec![RankKey { metric: MetricId(0), order: RankOrder::Descending }],
+            cost: LabCost { base: 1.0, per_operation: 0.5 },
+            exclude: Vec::new(),
+            budget,
+            confirmed: false,
+            convention: Convention::Ours,
+        }
+    }
+
+    /// All candidates of the sample's sixty tests.
+    fn found(terms: &Terms) -> Candidates {
+        let folder = tempfile::tempdir().unwrap();
+        let repository = sample::campaign(folder.path(), &sample::plan(), 60);
+        candidates(&repository, &Looked::default(), terms).unwrap()
+    }
+
+    fn never() -> impl FnMut() -> bool {
+        || false
+    }
+
+    #[test]
+    fn a_choice_keeps_the_budget_is_proved_and_no_exchange_of_two_tests_is_better() {
+        let terms = terms(9.0);
+        let found = found(&terms);
+        let run = BTreeSet::new();
+        let choosing = Choosing::new(&found, &terms, 0.5, &run).unwrap();
+        let best = choosing.best(&mut never());
+        assert!(best.cost <= 9.0 && best.tests.len() >= 3, "{best:?}");
+        assert_eq!((best.state, best.gap), (State::Proved, 0.0));
+        let at = |number: u32| found.tests.iter().position(|test| test.number == number).unwrap();
+        let chosen: Vec<usize> = best.tests.iter().map(|&number| at(number)).collect();
+        for out in 0..chosen.len() {
+            for other in (0..found.tests.len()).filter(|other| !chosen.contains(other)) {
+                let mut exchanged = chosen.clone();
+                exchanged[out] = other;
+                let fits = choosing.problem.cost(&exchanged) <= 9.0;
+                assert!(!fits || choosing.problem.value(&exchanged) <= best.value + 1e-9);
+            }
+        }
+        let table = choosing.table(&sample::plan(), &terms, &best);
+        assert_eq!(table.columns(), ["test", "cost", "run", "collision_occurrence", "quality", "T1", "T2"]);
+        assert_eq!(table.rows().len(), best.tests.len());
+    }
+
+    #[test]
+    fn tests_that_were_run_stay_in_the_choice_and_leave_the_budget_to_others() {
+        let terms = terms(6.0);
+        let found = found(&terms);
+        let none = BTreeSet::new();
+        let before = Choosing::new(&found, &terms, 0.5, &none).unwrap().best(&mut never());
+        let outsider =
+            found.tests.iter().map(|test| test.number).find(|number| !before.tests.contains(number)).unwrap();
+        let run = BTreeSet::from([outsider]);
+        let again = Choosing::new(&found, &terms, 0.5, &run).unwrap().best(&mut never());
+        assert!(again.tests.contains(&outsider) && again.cost <= 6.0);
+        assert!(again.tests.len() > before.tests.len(), "{before:?} {again:?}");
+        let stranger = BTreeSet::from([9999]);
+        let refused = Choosing::new(&found, &terms, 0.5, &stranger).unwrap_err().to_string();
+        assert_eq!(refused, "T9999 is no candidate, so it cannot count as run");
+    }
+
+    #[test]
+    fn a_sweep_says_what_enters_and_leaves_and_more_money_never_buys_less() {
+        let terms = terms(6.0);
+        let found = found(&terms);
+        let run = BTreeSet::new();
+        let choosing = Choosing::new(&found, &terms, 0.5, &run).unwrap();
+        let sweep = choosing.sweep(&[0.0, 0.5, 1.0], &mut never()).unwrap();
+        let table = sweep_table(&sweep);
+        let Datum::Text(entered) = &table.rows()[2][3] else { panic!("{:?}", table.rows()) };
+        for number in entered.split(' ').map(|name| name[1..].parse::<u32>().unwrap()) {
+            assert!(!sweep[1].tests.contains(&number) && sweep[2].tests.contains(&number));
+        }
+        let more = choosing.next_budget(&sweep[1], &mut never()).unwrap().unwrap();
+        assert!(more.value >= sweep[1].value && more.budget > sweep[1].cost);
+        // Stopped at once, it is still a choice, and says that it is not proved.
+        let stopped = choosing.best(&mut || true);
+        assert!(stopped.cost <= 6.0 && !stopped.tests.is_empty());
+        assert!(stopped.value <= sweep[1].value + 1e-9 && stopped.value * (1.0 + stopped.gap) >= sweep[1].value - 1e-9);
+    }
+
+    #[test]
+    fn without_candidates_nothing_is_chosen() {
+        let terms = terms(0.5);
+        let found = found(&terms);
+        let run = BTreeSet::new();
+        let refused = Choosing::new(&found, &terms, 0.5, &run).unwrap_err();
+        assert_eq!(refused, ChoiceError::NoCandidates);
+    }
+}

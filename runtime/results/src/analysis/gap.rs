@@ -1,0 +1,700 @@
+//! The reality gap: the results of a lab beside those of the campaign that its tests come from, per test, metric and
+//! requirement, and over the space of tests.
+//!
+//! Both sides are independent samples of a test's two distributions; the tests are the pairs. Of the simulation, fresh
+//! runs are the sample, where there are any: the run for which a test was chosen shows more than a test usually does.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+
+use sesame_base::test_number::TestNumber;
+use sesame_gap::bootstrap::{Resampling, intervals};
+use sesame_gap::equivalence::{self, Equivalence, Reason, Verdict as Equal, lab_runs_needed};
+use sesame_gap::holm::adjusted;
+use sesame_gap::localise::{self, Extent, Words, localise};
+use sesame_gap::samples::{Samples, Side, Undefined, hedges_g, moments};
+use sesame_gap::split::Located;
+use sesame_gap::violations::{Confusion, Frequencies, Occurrence, Occurrences, frequencies};
+use sesame_plan::{CampaignPlan, Dimension, Lab, MetricId, Requirement};
+use sesame_search::sspr::Convention;
+
+use crate::analysis::Datum;
+use crate::present::number::{fixed, plural, quantity};
+use crate::present::table::Table;
+use crate::record::{Origin, RecordError, Repository, TestRow, Verdict};
+
+/// The probability of an error that verdicts allow.
+pub const ALPHA: f64 = 0.05;
+
+/// Permutations that decide whether a gap is in a range of a dimension.
+const PERMUTATIONS: u32 = 999;
+
+/// The dimensions in which a gap is looked for, where a lab says nothing else.
+const DIMENSIONS: [Dimension; 3] = [Dimension::T1, Dimension::T2, Dimension::P1];
+
+/// A run in a lab: the test of the campaign that it was a run of, and what it showed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LabRun {
+    /// The number of the test in the results of the campaign.
+    pub of: u32,
+    /// The run.
+    pub row: TestRow,
+}
+
+/// Why results cannot be compared as those of a campaign and of its lab.
+#[derive(Debug, thiserror::Error)]
+pub enum GapError {
+    /// They cannot be read.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// They are no results of a lab.
+    #[error("{} has no results of a lab: `physical` runs tests in one", path.display())]
+    NotOfALab {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The lab ran tests of another run.
+    #[error(
+        "{} has results of other tests: its {test} is not that of {}; give the run whose tests were taken to the lab",
+        lab.display(), campaign.display()
+    )]
+    OtherTests {
+        /// The lab's file.
+        lab: PathBuf,
+        /// The campaign's file.
+        campaign: PathBuf,
+        /// The test.
+        test: TestNumber,
+    },
+    /// What was measured or disturbed there is something else.
+    #[error("{} was recorded with another model ({difference}), so its values cannot be compared", lab.display())]
+    OtherModel {
+        /// The lab's file.
+        lab: PathBuf,
+        /// In what they differ.
+        difference: String,
+    },
+}
+
+/// The runs in the results of a lab, without its runs without disturbance. They must be of tests of these results of a
+/// campaign.
+pub fn lab_runs(campaign: &Repository, lab: &Repository) -> Result<Vec<LabRun>, GapError> {
+    let paths = || (lab.path().to_owned(), campaign.path().to_owned());
+    let Some(task) = lab.task().in_lab() else { return Err(GapError::NotOfALab { path: paths().0 }) };
+    // Only the robots may be others.
+    let simulator = campaign.plan().simulator.clone();
+    let reached = CampaignPlan { simulator, ..lab.plan().clone() };
+    if let Some(difference) = campaign.plan().model_difference(&reached) {
+        return Err(GapError::OtherModel { lab: paths().0, difference });
+    }
+    let known: BTreeSet<u32> = campaign.numbers()?.into_iter().collect();
+    for it in &task.tests {
+        if !known.contains(&it.number) || campaign.row(it.number)?.test != it.test {
+            let (lab, campaign) = paths();
+            return Err(GapError::OtherTests { lab, campaign, test: TestNumber(it.number) });
+        }
+    }
+    let rows = lab.tests()?.into_iter().filter(|row| row.origin != Origin::Reference);
+    Ok(rows.filter_map(|row| Some(LabRun { of: task.of(&row.test)?, row })).collect())
+}
+
+/// How a simulation and a lab differ.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gap {
+    /// The tests that were run in the lab, by number.
+    pub tests: Vec<u32>,
+    /// The objectives, the metrics of requirements and those with a tolerance, in the plan's order, if they have a
+    /// value on both sides in some test; without interlocked ones.
+    pub metrics: Vec<MetricGap>,
+    /// Every requirement, and every interlocked metric.
+    pub events: Vec<EventGap>,
+    /// The names of dimensions in which gaps were looked for.
+    pub dimensions: Vec<Dimension>,
+}
+
+/// How one metric differs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MetricGap {
+    /// The metric.
+    pub metric: MetricId,
+    /// A difference that does not matter, in its unit.
+    pub tolerance: f64,
+    /// The tests with a value on both sides, by number.
+    pub tests: Vec<Compared>,
+    /// Where the gap is. Its positions are those of the located tests.
+    pub extent: Extent,
+    /// The numbers of the tests whose difference has a standard error.
+    pub located: Vec<u32>,
+}
+
+/// One metric of one test on both sides.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Compared {
+    /// The number of the test.
+    pub test: u32,
+    /// Whether the sample of the simulation is the run that selected the test, because it was never run again.
+    pub selected: bool,
+    /// Values of the simulation; at least one.
+    pub simulation: Vec<f64>,
+    /// Values of the lab; at least one.
+    pub lab: Vec<f64>,
+    /// The difference, with the verdict of all comparisons together (Holm).
+    pub equivalence: Equivalence,
+    /// The p value that the means are equal, adjusted for all comparisons (Holm).
+    pub p_different: Option<f64>,
+    /// The p value of equivalence, adjusted likewise.
+    pub p_equivalent: Option<f64>,
+    /// Hedges' g with the 95 % interval by bootstrap (bias-corrected and accelerated).
+    pub effect: Option<(f64, Option<[f64; 2]>)>,
+    /// How many runs in the lab would show equivalence with a power of 0.8, if there is none.
+    pub runs_needed: Option<usize>,
+}
+
+/// How often an event occurs on both sides: the violation of a requirement, or what ends a test in the lab.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EventGap {
+    /// The name of the requirement or interlocked metric.
+    pub name: String,
+    /// Tests by what the two sides say.
+    pub confusion: Confusion,
+    /// Each test, by number.
+    pub tests: Vec<(u32, Frequencies)>,
+}
+
+/// Compares the runs of a lab with the results of the campaign that its tests come from.
+pub fn gap(campaign: &Repository, runs: &[LabRun], lab: Option<&Lab>) -> Result<Gap, RecordError> {
+    let plan = campaign.plan();
+    let mut by_test: BTreeMap<u32, Vec<&TestRow>> = BTreeMap::new();
+    for run in runs {
+        by_test.entry(run.of).or_default().push(&run.row);
+    }
+    let dimensions = match lab.and_then(|lab| lab.budget.as_ref()) {
+        Some(budget) => budget.over.clone(),
+        None => DIMENSIONS.to_vec(),
+    };
+    let judge = campaign.judge()?;
+    let mut points = BTreeMap::new();
+    let mut reference = None;
+    campaign.scan(&mut |test| {
+        if test.origin == Origin::Reference && reference.is_none() {
+            reference = Some(test.values);
+        } else if by_test.contains_key(&test.number) {
+            let point = test.point(plan, Convention::Ours);
+            let at = dimensions.iter().map(|&dimension| point.as_ref().and_then(|point| point.get(dimension)));
+            points.insert(test.number, at.collect::<Vec<_>>());
+        }
+    })?;
+    let mut sides = Vec::with_capacity(by_test.len());
+    for (&test, lab_runs) in &by_test {
+        let row = campaign.row(test)?;
+        let fresh = judge.runs(row.duplicate_of.unwrap_or(test));
+        sides.push(Sides { test, row, fresh, lab_runs });
+    }
+
+    let interlocked = lab.map_or(&[][..], |lab| &lab.interlock);
+    let ids = (0u32..).map(MetricId).take(plan.metrics.len());
+    let mut metrics = Vec::new();
+    let tolerances = lab.map_or(&[][..], |lab| &lab.tolerances);
+    let matters = |metric: &MetricId| {
+        plan.campaign.objectives.contains(metric)
+            || plan.requirements.iter().any(|requirement| requirement.metric == *metric)
+            || tolerances.iter().any(|tolerance| tolerance.metric == *metric)
+    };
+    for metric in ids.filter(|metric| matters(metric) && !interlocked.contains(metric)) {
+        let tolerance = tolerances.iter().find(|it| it.metric == metric).map_or(0.0, |it| it.value);
+        let tests: Vec<Compared> = sides.iter().filter_map(|sides| sides.compared(metric, tolerance)).collect();
+        if !tests.is_empty() {
+            metrics.push(MetricGap { metric, tolerance, tests, extent: Extent::None, located: Vec::new() });
+        }
+    }
+    adjust(&mut metrics);
+    for gap in &mut metrics {
+        locate(gap, &points);
+    }
+    let requirements = plan.requirements.iter().map(|requirement| {
+        let occurrence = |said: Verdict| match said {
+            Verdict::Violated => Occurrence::Seen,
+            Verdict::Satisfied => Occurrence::Absent,
+            Verdict::Inconclusive => Occurrence::Inconclusive,
+        };
+        event(&requirement.name, &sides, |sides| {
+            let simulation = match sides.fresh {
+                [] => Occurrences::of([occurrence(sides.row.verdict(requirement))]),
+                fresh => Occurrences::of(fresh.iter().map(|run| occurrence(run.verdict(requirement)))),
+            };
+            let lab = Occurrences::of(sides.lab_runs.iter().map(|row| occurrence(row.verdict(requirement))));
+            (simulation, lab)
+        })
+    });
+    let is_bounded = |metric: MetricId| plan.requirements.iter().any(|it: &Requirement| it.metric == metric);
+    let interlocks = interlocked.iter().filter(|&&metric| !is_bounded(metric)).map(|&metric| {
+        let usual = reference.as_ref().and_then(|values| values.get(metric.index())).and_then(|value| value.value);
+        // Without a requirement, an interlock has acted where the metric is not as it is without disturbance.
+        let occurrence = |value: Option<f64>| match value {
+            None => Occurrence::Inconclusive,
+            Some(_) if value == usual => Occurrence::Absent,
+            Some(_) => Occurrence::Seen,
+        };
+        event(&plan.metric(metric).name, &sides, |sides| {
+            let simulation = match sides.fresh {
+                [] => Occurrences::of([occurrence(sides.row.value(metric).value)]),
+                fresh => Occurrences::of(fresh.iter().map(|run| occurrence(run.value(metric).value))),
+            };
+            let lab = Occurrences::of(sides.lab_runs.iter().map(|row| occurrence(row.value(metric).value)));
+            (simulation, lab)
+        })
+    });
+    let events = requirements.chain(interlocks).collect();
+    Ok(Gap { tests: by_test.into_keys().collect(), metrics, events, dimensions })
+}
+
+/// A test on both sides.
+struct Sides<'a> {
+    test: u32,
+    row: TestRow,
+    fresh: &'a [crate::record::Repetition],
+    lab_runs: &'a [&'a TestRow],
+}
+
+impl Sides<'_> {
+    fn compared(&self, metric: MetricId, tolerance: f64) -> Option<Compared> {
+        let fresh: Vec<f64> = self.fresh.iter().filter_map(|run| run.value(metric).value).collect();
+        let selected = fresh.is_empty();
+        let simulation = if selected { Vec::from_iter(self.row.value(metric).value) } else { fresh };
+        let lab: Vec<f64> = self.lab_runs.iter().filter_map(|row| row.value(metric).value).collect();
+        if simulation.is_empty() || lab.is_empty() {
+            return None;
+        }
+        let samples = Samples::new(&simulation, &lab);
+        let equivalence = equivalence::compare(samples, tolerance, ALPHA);
+        let interval = || {
+            let found = intervals(samples, Resampling::default(), hedges_g).ok()?;
+            Some(found.bca.unwrap_or(found.percentile))
+        };
+        let effect = hedges_g(samples).ok().map(|g| (g, interval()));
+        let runs_needed = match equivalence.verdict {
+            Equal::Undecided(Reason::NoPower) => lab_runs_needed(samples, tolerance, ALPHA).ok().flatten(),
+            _ => None,
+        };
+        let (p_different, p_equivalent) = (None, None);
+        let test = self.test;
+        Some(Compared { test, selected, simulation, lab, equivalence, p_different, p_equivalent, effect, runs_needed })
+    }
+}
+
+/// Adjusts the p values of all comparisons, and their verdicts.
+fn adjust(metrics: &mut [MetricGap]) {
+    let tests = || metrics.iter().flat_map(|gap| &gap.tests).filter_map(|test| test.equivalence.tests.as_ref().ok());
+    let different = adjusted(&tests().map(|test| test.p_different).collect::<Vec<_>>());
+    let equivalent = adjusted(&tests().map(equivalence::Tests::p_equivalent).collect::<Vec<_>>());
+    let mut adjusted = different.into_iter().zip(equivalent);
+    for gap in metrics {
+        for compared in &mut gap.tests {
+            let Ok(tests) = &compared.equivalence.tests else { continue };
+            let Some((different, equivalent)) = adjusted.next() else { continue };
+            compared.p_different = Some(different);
+            compared.p_equivalent = Some(equivalent);
+            compared.equivalence.verdict = equivalence::verdict(tests, equivalent, different, gap.tolerance, ALPHA);
+        }
+    }
+}
+
+fn locate(gap: &mut MetricGap, points: &BTreeMap<u32, Vec<Option<f64>>>) {
+    let mut located = Vec::new();
+    for compared in &gap.tests {
+        let (Ok(tests), Some(at)) = (&compared.equivalence.tests, points.get(&compared.test)) else { continue };
+        located.push(Located { at: at.clone(), difference: tests.welch });
+        gap.located.push(compared.test);
+    }
+    let settings = localise::Settings { tolerance: gap.tolerance, alpha: ALPHA, permutations: PERMUTATIONS, seed: 0 };
+    gap.extent = localise(&located, settings);
+}
+
+fn event(name: &str, sides: &[Sides<'_>], of: impl Fn(&Sides<'_>) -> (Occurrences, Occurrences)) -> EventGap {
+    let counts: Vec<(u32, (Occurrences, Occurrences))> = sides.iter().map(|sides| (sides.test, of(sides))).collect();
+    EventGap {
+        name: name.to_owned(),
+        confusion: Confusion::of(counts.iter().map(|(_, counts)| *counts)),
+        tests: counts.into_iter().map(|(test, (simulation, lab))| (test, frequencies(simulation, lab))).collect(),
+    }
+}
+
+impl Gap {
+    /// Each metric of each test: both sides, their difference (the lab's mean minus the simulation's), the effect size,
+    /// and the verdict. Intervals are of 95 %, except that of the difference, which is of 90 %: it is within the
+    /// tolerance if the test is equivalent by itself.
+    pub fn comparisons(&self, plan: &CampaignPlan) -> Table {
+        let columns = [
+            "test",
+            "metric",
+            "unit",
+            "simulation_runs",
+            "simulation_mean",
+            "simulation_deviation",
+            "lab_runs",
+            "lab_mean",
+            "lab_deviation",
+            "difference",
+            "difference_low",
+            "difference_high",
+            "tolerance",
+            "effect",
+            "effect_low",
+            "effect_high",
+            "p_different",
+            "p_equivalent",
+            "power",
+            "verdict",
+            "remark",
+        ];
+        let mut table = Table::new(columns.map(str::to_owned));
+        for gap in &self.metrics {
+            let metric = plan.metric(gap.metric);
+            for compared in &gap.tests {
+                let Compared { simulation, lab, equivalence, effect, .. } = compared;
+                let [simulated, measured] =
+                    moments(Samples::new(simulation, lab)).map_or([None; 2], |both| both.map(Some));
+                let mean = |of: Option<sesame_gap::samples::Moments>| Datum::lone(of.map(|of| of.mean));
+                let deviation = |of: Option<sesame_gap::samples::Moments>| Datum::lone(of.and_then(|of| of.deviation));
+                let tests = equivalence.tests.as_ref().ok();
+                let difference = simulated.zip(measured).map(|(simulated, measured)| measured.mean - simulated.mean);
+                let interval = effect.and_then(|(_, interval)| interval);
+                table.row([
+                    Datum::test(compared.test),
+                    Datum::text(&metric.name),
+                    metric.unit.clone().map_or(Datum::Missing, Datum::Text),
+                    Datum::count(simulation.len()),
+                    mean(simulated),
+                    deviation(simulated),
+                    Datum::count(lab.len()),
+                    mean(measured),
+                    deviation(measured),
+                    Datum::lone(difference),
+                    Datum::lone(tests.map(|tests| tests.interval[0])),
+                    Datum::lone(tests.map(|tests| tests.interval[1])),
+                    Datum::Lone(gap.tolerance),
+                    Datum::lone(effect.map(|(g, _)| g)),
+                    Datum::lone(interval.map(|[low, _]| low)),
+                    Datum::lone(interval.map(|[_, high]| high)),
+                    Datum::lone(compared.p_different),
+                    Datum::lone(compared.p_equivalent),
+                    Datum::lone(tests.map(|tests| tests.power)),
+                    Datum::text(word(equivalence.verdict)),
+                    Datum::maybe(compared.remark()),
+                ]);
+            }
+        }
+        table
+    }
+
+    /// The same for people: what a line holds.
+    pub fn overview(&self, plan: &CampaignPlan) -> Table {
+        let columns = ["test", "metric", "simulation", "lab", "difference", "verdict", "remark"];
+        let mut table = Table::new(columns.map(str::to_owned));
+        for gap in &self.metrics {
+            let metric = plan.metric(gap.metric);
+            let unit = metric.unit.as_deref();
+            for compared in &gap.tests {
+                let Ok([simulation, lab]) = moments(Samples::new(&compared.simulation, &compared.lab)) else {
+                    continue;
+                };
+                let side = |of: sesame_gap::samples::Moments| match of.deviation {
+                    Some(deviation) => {
+                        format!("{} ± {} ({})", quantity(of.mean, None), quantity(deviation, unit), of.count)
+                    }
+                    None => format!("{} ({})", quantity(of.mean, unit), of.count),
+                };
+                table.row([
+                    Datum::test(compared.test),
+                    Datum::text(&metric.name),
+                    Datum::Text(side(simulation)),
+                    Datum::Text(side(lab)),
+                    Datum::Text(quantity(lab.mean - simulation.mean, unit)),
+                    Datum::text(word(compared.equivalence.verdict)),
+                    Datum::maybe(compared.remark()),
+                ]);
+            }
+        }
+        table
+    }
+
+    /// Each requirement and interlocked metric: how many tests violate it on both sides, in the simulation only (false
+    /// alarms), in the lab only (misses), or nowhere.
+    pub fn events(&self) -> Table {
+        let columns = [
+            "event",
+            "both",
+            "false_alarms",
+            "misses",
+            "neither",
+            "inconclusive",
+            "precision",
+            "recall",
+            "missed_tests",
+        ];
+        let mut table = Table::new(columns.map(str::to_owned));
+        for EventGap { name, confusion, tests } in &self.events {
+            let missed = tests.iter().filter(|(_, found)| {
+                found.simulation.is_some_and(|share| share.count == 0) && found.lab.is_some_and(|share| share.count > 0)
+            });
+            let missed: Vec<String> = missed.map(|(test, _)| TestNumber(*test).to_string()).collect();
+            table.row([
+                Datum::text(name),
+                Datum::count(confusion.both),
+                Datum::count(confusion.false_alarms),
+                Datum::count(confusion.misses),
+                Datum::count(confusion.neither),
+                Datum::count(confusion.inconclusive),
+                Datum::lone(confusion.precision().map(sesame_gap::proportion::Share::value)),
+                Datum::lone(confusion.recall().map(sesame_gap::proportion::Share::value)),
+                if missed.is_empty() { Datum::Missing } else { Datum::Text(missed.join(" ")) },
+            ]);
+        }
+        table
+    }
+
+    /// What the study says, most important first: misses, then where each metric differs.
+    pub fn sentences(&self, plan: &CampaignPlan) -> Vec<String> {
+        let mut sentences = Vec::new();
+        for EventGap { name, confusion, .. } in &self.events {
+            let Confusion { misses, false_alarms, .. } = *confusion;
+            let tests = |count| plural(count, "test", "tests");
+            if misses > 0 {
+                sentences.push(format!(
+                    "`{name}` is missed: {} violate it in the lab and not in the simulation.",
+                    tests(misses)
+                ));
+            }
+            if false_alarms > 0 {
+                sentences.push(format!(
+                    "`{name}` is a false alarm in {}, which violate it in the simulation and not in the lab.",
+                    tests(false_alarms)
+                ));
+            }
+        }
+        for gap in &self.metrics {
+            let metric = plan.metric(gap.metric);
+            let words = Words {
+                metric: &format!("`{}`", metric.name),
+                value: &|value| quantity(value, metric.unit.as_deref()),
+                dimension: &|at| self.dimensions[at].name().to_owned(),
+                coordinate: &|_, value| fixed(value, 2),
+                test: &|at| TestNumber(gap.located[at]).to_string(),
+            };
+            sentences.push(match gap.without_spread() {
+                Some([low, high]) => constant(words.metric, [low, high], gap.tests.len(), words.value),
+                None => localise::sentence(&gap.extent, gap.located.len(), &words),
+            });
+        }
+        sentences
+    }
+}
+
+impl MetricGap {
+    /// The smallest and the largest difference, where all runs of each test are equal on each side, so that there is no
+    /// chance to speak of; `None` elsewhere.
+    fn without_spread(&self) -> Option<[f64; 2]> {
+        let no_spread = |test: &Compared| test.equivalence.tests == Err(Undefined::NoSpread);
+        if !self.tests.iter().all(no_spread) {
+            return None;
+        }
+        let differences = self.tests.iter().map(|test| test.lab[0] - test.simulation[0]);
+        Some(differences.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)]))
+    }
+}
+
+/// A sentence on a metric whose runs are all equal on each side.
+fn constant(metric: &str, [low, high]: [f64; 2], tests: usize, value: &dyn Fn(f64) -> String) -> String {
+    let tests = plural(tests, "test", "tests");
+    if low == 0.0 && high == 0.0 {
+        return format!("There is no gap: {metric} is the same in every run of {tests}.");
+    }
+    let by = if low == high { format!("by {}", value(low)) } else { format!("by {} to {}", value(low), value(high)) };
+    format!("{metric} does not vary from run to run, and differs {by} in the lab over {tests}.")
+}
+
+/// One word for tables.
+fn word(verdict: Equal) -> &'static str {
+    match verdict {
+        Equal::Equivalent => "equivalent",
+        Equal::Different => "different",
+        Equal::Undecided(_) => "undecided",
+    }
+}
+
+impl Compared {
+    /// Why nothing is decided, and what would help.
+    fn remark(&self) -> Option<String> {
+        let why = match self.equivalence.verdict {
+            Equal::Equivalent | Equal::Different => return self.selected.then(|| SELECTED.to_owned()),
+            Equal::Undecided(Reason::Undefined(Undefined::OneRun(Side::Simulation))) if self.selected => {
+                return Some(SELECTED.to_owned());
+            }
+            Equal::Undecided(Reason::Undefined(Undefined::NoSpread)) if self.lab[0] == self.simulation[0] => {
+                "the same in every run".to_owned()
+            }
+            Equal::Undecided(Reason::Undefined(why)) => why.to_string(),
+            Equal::Undecided(Reason::NoTolerance) => "no difference is tolerated, and none is shown".to_owned(),
+            Equal::Undecided(Reason::NoPower) => match self.runs_needed {
+                Some(runs) => format!("too few runs: {runs} in the lab would do"),
+                None => "too few runs for such a spread".to_owned(),
+            },
+            Equal::Undecided(Reason::NotShown) => "neither is shown".to_owned(),
+        };
+        Some(why)
+    }
+}
+
+/// The only run of the simulation was the one for which the test was chosen.
+const SELECTED: &str = "run once in the simulation: `confirm` runs it again";
+
+#[cfg(test)]
+mod tests {
+    use sesame_base::observation::Observation;
+    use sesame_plan::LabTolerance;
+    use sesame_plan::testing::lab;
+    use sesame_rng::Stream;
+
+    use super::*;
+    use crate::record::{MetricValue, Recorder, Repetition, sample};
+
+    const COLLISIONS: MetricId = MetricId(0);
+    const FUZZING_TIME: MetricId = MetricId(1);
+
+    /// What a lab makes of a value of the simulation, given the T1 of its test.
+    type Made = fn(f64, f64) -> f64;
+
+    /// A campaign of which 24 tests were run again five times, and as many runs of them in a lab. Collisions are about
+    /// 5, fuzzing times as in the sample.
+    fn study(collisions: Made, fuzzing_time: Made) -> (Vec<LabRun>, Repository, tempfile::TempDir) {
+        let folder = tempfile::tempdir().unwrap();
+        let plan = sample::plan();
+        drop(sample::campaign(folder.path(), &plan, 60));
+        let mut recorder = Recorder::reopen(folder.path(), 1).unwrap();
+        let mut places = BTreeMap::new();
+        let mut keep = |test: crate::record::ScannedTest| {
+            let is_own = test.origin != Origin::Reference && test.duplicate_of.is_none();
+            let complete = test.values.iter().all(|value| value.value.is_some());
+            if let Some(point) = test.point(&plan, Convention::Ours).filter(|_| is_own && complete) {
+                places.insert(test.number, point.get(Dimension::T1).unwrap());
+            }
+        };
+        recorder.repository().scan(&mut keep).unwrap();
+        let mut stream = Stream::derive(1, "lab", &[]);
+        let mut noisy = |observed: &Observation| {
+            let mut observed = observed.clone();
+            observed.metrics[COLLISIONS.index()].value = Some(5.0 + 0.2 * stream.normal());
+            let time = observed.metrics[FUZZING_TIME.index()].value.unwrap();
+            observed.metrics[FUZZING_TIME.index()].value = Some(time + 0.1 * stream.normal());
+            observed
+        };
+        let mut runs = Vec::new();
+        for (test, t1) in places.into_iter().take(24) {
+            let record = recorder.repository().test(test).unwrap();
+            for position in 1..=5 {
+                let simulated = noisy(&record.observation);
+                recorder.put_repetition(&Repetition::of(test, position, 1, &simulated), &[]).unwrap();
+                let mut measured = noisy(&record.observation);
+                for (metric, made) in [(COLLISIONS, collisions), (FUZZING_TIME, fuzzing_time)] {
+                    let value = &mut measured.metrics[metric.index()].value;
+                    *value = value.map(|value| made(value, t1));
+                }
+                let mut row = recorder.repository().row(test).unwrap();
+                row.values = measured.metrics.iter().map(MetricValue::from).collect();
+                runs.push(LabRun { of: test, row });
+            }
+        }
+        let repository = recorder.finish("done").unwrap();
+        (runs, repository, folder)
+    }
+
+    fn tolerant() -> Lab {
+        let tolerance = |metric, value| LabTolerance { metric, value };
+        Lab { tolerances: vec![tolerance(COLLISIONS, 1.0), tolerance(FUZZING_TIME, 1.0)], ..lab("lab") }
+    }
+
+    fn of(gap: &Gap, metric: MetricId) -> &MetricGap {
+        gap.metrics.iter().find(|gap| gap.metric == metric).unwrap()
+    }
+
+    #[test]
+    fn a_lab_that_agrees_is_equivalent_test_by_test() {
+        let (runs, repository, _folder) = study(|value, _| value, |value, _| value);
+        let gap = gap(&repository, &runs, Some(&tolerant())).unwrap();
+        assert_eq!(gap.tests.len(), 24);
+        for metric in [COLLISIONS, FUZZING_TIME] {
+            let gap = of(&gap, metric);
+            assert!(gap.tests.iter().all(|test| test.equivalence.verdict == Equal::Equivalent && !test.selected));
+            assert_eq!(gap.extent, Extent::None);
+        }
+        let said = gap.sentences(repository.plan());
+        assert!(
+            said.contains(&"There is no gap: `fuzzing_time` agrees within the tolerance in all 24 tests.".to_owned()),
+            "{said:?}"
+        );
+    }
+
+    #[test]
+    fn a_gap_that_is_everywhere_is_systematic_and_one_in_late_tests_is_local() {
+        let (runs, repository, _folder) =
+            study(|value, t1| if t1 > 0.5 { value - 3.0 } else { value }, |value, _| value + 4.0);
+        let gap = gap(&repository, &runs, Some(&tolerant())).unwrap();
+        let everywhere = of(&gap, FUZZING_TIME);
+        let Extent::Systematic { pooled, .. } = &everywhere.extent else { panic!("{:?}", everywhere.extent) };
+        assert!((pooled.estimate - 4.0).abs() < 0.1, "{pooled:?}");
+        assert!(everywhere.tests.iter().all(|test| test.equivalence.verdict == Equal::Different));
+        let late = of(&gap, COLLISIONS);
+        let Extent::Range { split, inside, .. } = &late.extent else { panic!("{:?}", late.extent) };
+        assert_eq!(gap.dimensions[split.range.dimension], Dimension::T1);
+        assert!((split.range.low.unwrap() - 0.5).abs() < 0.1 && split.range.high.is_none(), "{split:?}");
+        assert!((inside.estimate + 3.0).abs() < 0.3, "{inside:?}");
+    }
+
+    #[test]
+    fn violations_are_compared_as_false_alarms_and_misses() {
+        let (mut runs, repository, _folder) = study(|value, _| value, |value, _| value);
+        // R2 bounds the top speed, which the sample's tests satisfy or violate.
+        let speed = &repository.plan().requirements[1];
+        let violated: Vec<u32> = runs.iter().map(|run| run.of).collect();
+        let first = violated[0];
+        for run in runs.iter_mut().filter(|run| run.of == first) {
+            run.row.values[speed.metric.index()] = MetricValue::whole(Some(99.0), true);
+        }
+        let gap = gap(&repository, &runs, None).unwrap();
+        let [_, event, ..] = &gap.events[..] else { panic!("there are requirements") };
+        let fresh = repository.judge().unwrap().tally(first, speed);
+        let (misses, both) = if fresh.violated == 0 { (1, 0) } else { (0, 1) };
+        assert_eq!(event.confusion.misses, misses);
+        assert!(event.confusion.both >= both);
+        assert_eq!(event.confusion.false_alarms, 0);
+        let Confusion { both, neither, inconclusive, .. } = event.confusion;
+        assert_eq!(both + neither + inconclusive + misses, 24);
+    }
+
+    #[test]
+    fn an_interlocked_metric_is_compared_by_presence_only() {
+        let (runs, repository, _folder) = study(|value, _| value + 30.0, |value, _| value);
+        let interlocked = Lab { interlock: vec![COLLISIONS, FUZZING_TIME], ..tolerant() };
+        let gap = gap(&repository, &runs, Some(&interlocked)).unwrap();
+        assert!(gap.metrics.iter().all(|gap| gap.metric != COLLISIONS && gap.metric != FUZZING_TIME));
+        // Collisions have a requirement, R1; fuzzing times have none.
+        let names: Vec<&str> = gap.events.iter().map(|event| event.name.as_str()).collect();
+        assert_eq!(names, ["R1", "R2", "R3", "R4", "fuzzing_time"]);
+        assert_eq!(gap.events[4].confusion.both, 24);
+    }
+
+    #[test]
+    fn a_test_that_was_run_once_says_how_it_is_run_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let repository = sample::campaign(folder.path(), &sample::plan(), 60);
+        let rows = repository.tests().unwrap();
+        let row = rows.iter().find(|row| row.origin == Origin::Search && row.duplicate_of.is_none()).unwrap();
+        let runs = [LabRun { of: row.number, row: row.clone() }];
+        let gap = gap(&repository, &runs, Some(&tolerant())).unwrap();
+        let compared = &gap.metrics[0].tests[0];
+        assert!(compared.selected);
+        assert_eq!(compared.remark().as_deref(), Some(SELECTED));
+        assert!(gap.comparisons(repository.plan()).rows()[0].contains(&Datum::text("undecided")));
+        assert_eq!(gap.overview(repository.plan()).rows().len(), gap.metrics.len());
+    }
+}

@@ -1,0 +1,91 @@
+//! `physical`: recorded tests in a lab.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+
+use sesame_base::test_number::TestNumber;
+use sesame_plan::{LabTask, LabTest, Task};
+use sesame_rng::derive_seed;
+
+use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled};
+use crate::cli::failure::Failure;
+use crate::cli::results_folder::{open, refuse_changed};
+use crate::cli::session::Session;
+use crate::lab::find;
+
+/// Which tests are run in a lab, and how often.
+#[derive(Debug, Args)]
+pub struct Options {
+    /// Recorded tests, for example `T158 T17`
+    #[arg(required = true, value_name = "TEST")]
+    tests: Vec<String>,
+    /// The lab; by default the only one of the space
+    #[arg(long, value_name = "NAME")]
+    lab: Option<String>,
+    /// How often each test is run; by default as often as the lab says
+    #[arg(short = 'n', long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    times: Option<u32>,
+    /// Folder of the run that recorded the tests, for example `results/42`; by default the latest
+    #[arg(long, value_name = "DIR")]
+    results: Option<PathBuf>,
+    /// Folder in which the results of the lab get a folder of their own; by default beside the run
+    #[arg(long, value_name = "DIR")]
+    into: Option<PathBuf>,
+    #[command(flatten)]
+    execution: ExecutionArgs,
+    #[command(flatten)]
+    output: OutputArgs,
+}
+
+pub(super) fn physical(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
+    let lab = find(&session.plan, options.lab.as_deref())?;
+    let repository = open(&session.results, options.results.as_deref())?;
+    let mut numbers = Vec::new();
+    for name in &options.tests {
+        let number = repository.find(name)?;
+        refuse_changed(session, &repository, number)?;
+        // A duplicate is what its original is.
+        let number = repository.row(number)?.duplicate_of.unwrap_or(number);
+        if numbers.contains(&number) {
+            return Err(Failure(format!("{} is named twice", TestNumber(number))));
+        }
+        numbers.push(number);
+    }
+    let mut tests = Vec::with_capacity(numbers.len());
+    for &number in &numbers {
+        let test = repository.row(number)?.test;
+        if test.operations.is_empty() {
+            return Err(Failure(format!(
+                "{} disturbs nothing; a run without disturbance is made before and after the tests anyway",
+                TestNumber(number)
+            )));
+        }
+        tests.push(LabTest { number, test });
+    }
+    let task = LabTask {
+        lab: lab.name.clone(),
+        results: repository.digest()?,
+        tests,
+        repeats: options.times.unwrap_or(lab.repeats),
+    };
+    // Of its own: equal seeds would make a stand-in for the lab repeat the runs of the simulation.
+    let seed = derive_seed(repository.campaign().seed, &format!("lab {}", lab.name), &[]);
+    let name = format!("{}-{}", repository.folder().file_name().unwrap_or_default().display(), lab.name);
+    let results = match &options.into {
+        Some(into) => into.clone(),
+        None => repository.folder().parent().unwrap_or(&session.results).to_owned(),
+    };
+    drop(repository);
+
+    let session = session.in_lab(&task.lab)?;
+    let task = Task::Lab(task);
+    let plan = task.plan(&session.plan);
+    let files = claim_files(&session.runner, &plan)?;
+    refuse_unfilled(&session.runner, &plan, true)?;
+    // There is one lab.
+    let execution = options.execution.one_at_a_time();
+    let (recorder, folder) = begin(&session, &results, &name, &plan, &task, seed, &execution)?;
+    execute(&session, recorder, &folder, &execution, &options.output, files)
+}

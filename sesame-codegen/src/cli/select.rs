@@ -1,0 +1,193 @@
+//! `sesamec select`: which tests of a campaign are run in a lab.
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use anyhow::{bail, ensure};
+use clap::Args;
+
+use sesame_plan::{CampaignPlan, Dimension, Lab, LabBudget, LabCost, MetricId, RankKey, RankOrder};
+use sesame_results::analysis::choice::{Choice, Choosing, sweep_table};
+use sesame_results::analysis::{Selection, Terms, candidates};
+use sesame_results::record::Repository;
+
+use super::results::{Compat, Format, Output, dimension, print};
+use super::shell::{self, Shell};
+
+/// The weights of a sweep.
+const SWEEP: [f64; 11] = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0];
+
+/// What is chosen from, and by what.
+#[derive(Debug, Args)]
+pub(super) struct Selected {
+    /// A results file, or the folder of a run.
+    file: PathBuf,
+    /// The lab whose `physical` block says what the options below do not; the only one of the space if omitted.
+    #[arg(long, value_name = "NAME")]
+    lab: Option<String>,
+    /// Choose from this result set; from the latest front if omitted. `sesamec results campaigns` names them.
+    #[arg(long, value_name = "NAME", conflicts_with = "all")]
+    set: Option<String>,
+    /// Choose from all tests instead of the front.
+    #[arg(long)]
+    all: bool,
+    /// What the tests together may cost.
+    #[arg(long, value_name = "COST")]
+    budget: Option<f64>,
+    /// The weight of difference against interest, from 0 (the most interesting tests) to 1 (the most different ones).
+    #[arg(long, value_name = "WEIGHT")]
+    lambda: Option<f64>,
+    /// The dimensions in which tests differ, for example `T1,T2,P1`.
+    #[arg(long, value_delimiter = ',', value_name = "NAMES", value_parser = dimension)]
+    dims: Vec<Dimension>,
+    /// What makes a test interesting, the most important metric first: `collisions:descending,time:ascending`; with a
+    /// number, tests close to it come first: `clearance:0.5`.
+    #[arg(long, value_delimiter = ',', value_name = "METRIC:ORDER")]
+    rank: Vec<String>,
+    /// What a test costs, for example `1`, or `1+0.5` with what each of its operations costs besides.
+    #[arg(long, value_name = "COST", value_parser = cost)]
+    cost: Option<LabCost>,
+    /// Tests that must not be run, for example `T5,T9`.
+    #[arg(long, value_delimiter = ',', value_name = "TESTS")]
+    exclude: Vec<String>,
+    /// Tests that were run already: they are in the choice, and the budget is for others.
+    #[arg(long, value_delimiter = ',', value_name = "TESTS")]
+    run: Vec<String>,
+    /// Only tests of which fresh runs have confirmed a finding.
+    #[arg(long)]
+    confirmed: bool,
+    /// Show the choices for eleven weights from 0 to 1 instead, and which tests enter and leave.
+    #[arg(long)]
+    sweep: bool,
+    /// Wall time after which the best choice so far is taken, with what is known of a better one.
+    #[arg(long, value_name = "SECONDS", default_value_t = 60.0)]
+    limit: f64,
+    /// The formulas to use: `original` for those of the original platform, `paper` for those of the paper.
+    #[arg(long, value_enum, default_value_t)]
+    compat: Compat,
+    #[command(flatten)]
+    output: Output,
+}
+
+/// `1` or `1+0.5`.
+fn cost(text: &str) -> Result<LabCost, String> {
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|number| number.is_finite() && *number >= 0.0);
+    let (base, each) = text.split_once('+').unwrap_or((text, "0"));
+    match number(base).zip(number(each)) {
+        Some((base, per_operation)) if base + per_operation > 0.0 => Ok(LabCost { base, per_operation }),
+        _ => Err("expected a cost such as 1, or 1+0.5".to_owned()),
+    }
+}
+
+/// Chooses, and says what was chosen.
+pub(super) fn selected(shell: Shell, asked: &Selected) -> anyhow::Result<ExitCode> {
+    let repository = Repository::open(&asked.file)?;
+    let plan = repository.plan();
+    let lab = lab(plan, asked.lab.as_deref())?;
+    let declared = lab.and_then(|lab| lab.budget.as_ref());
+    let Some(budget) = asked.budget.or(declared.map(|budget| budget.limit)) else {
+        bail!("how much may the tests cost? give `--budget`, or a `budget` in the lab's `physical` block")
+    };
+    let lambda = asked.lambda.or(declared.map(|budget| budget.lambda)).unwrap_or(0.5);
+    ensure!(asked.limit > 0.0, "`--limit` must be above 0");
+    let numbers_of = |names: &[String]| -> anyhow::Result<BTreeSet<u32>> {
+        names.iter().map(|name| Ok(repository.find(name)?)).collect()
+    };
+    let (excluded, run) = (numbers_of(&asked.exclude)?, numbers_of(&asked.run)?);
+    let terms = Terms {
+        over: dimensions(&asked.dims, declared),
+        rank: rank(plan, &asked.rank, lab)?,
+        cost: asked.cost.or(lab.map(|lab| lab.cost)).unwrap_or_default(),
+        exclude: lab.map_or_else(Vec::new, |lab| lab.exclude.clone()),
+        budget,
+        confirmed: asked.confirmed,
+        convention: asked.compat.convention(),
+    };
+    let latest = repository.latest_result_set()?.map(|set| set.name).filter(|_| !asked.all);
+    let set = asked.set.clone().or(latest);
+    let mut found = candidates(&repository, &Selection::of(&repository, set.as_deref())?, &terms)?;
+    found.tests.retain(|candidate| !excluded.contains(&candidate.number));
+    let choosing = Choosing::new(&found, &terms, lambda, &run)?;
+    let until = Instant::now() + Duration::from_secs_f64(asked.limit.min(1e6));
+    let mut stop = || Instant::now() >= until;
+    if asked.sweep {
+        print(&sweep_table(&choosing.sweep(&SWEEP, &mut stop)?), &asked.output)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let choice = choosing.best(&mut stop);
+    print(&choosing.table(plan, &terms, &choice), &asked.output)?;
+    let Choice { tests, value, cost, .. } = &choice;
+    let said = format!(
+        "{} of {} candidates for {cost} of {budget}, λ {lambda}: value {value}, {}",
+        tests.len(),
+        found.tests.len(),
+        choice.proof()
+    );
+    if asked.output.format() == Format::Table {
+        shell::asked_for(&format!("\n{said}\n"))?;
+    } else {
+        shell.note(said);
+    }
+    for (number, reason) in &found.left_out {
+        shell.note(format!("T{number} is no candidate: {}", reason.words(plan)));
+    }
+    if let Some(more) = choosing.next_budget(&choice, &mut stop)? {
+        let names: Vec<String> = more.tests.iter().map(|number| format!("T{number}")).collect();
+        shell.note(format!("a budget of {} would buy a value of {}: {}", more.budget, more.value, names.join(" ")));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The lab of this name, or the only one; `None` for results whose space has none.
+fn lab<'a>(plan: &'a CampaignPlan, name: Option<&str>) -> anyhow::Result<Option<&'a Lab>> {
+    let known = || plan.labs.iter().map(|lab| format!("`{}`", lab.name)).collect::<Vec<_>>().join(", ");
+    match (name, &plan.labs[..]) {
+        (None, []) => Ok(None),
+        (None, [lab]) => Ok(Some(lab)),
+        (None, _) => bail!("the space has several labs; name one with `--lab`: {}", known()),
+        (Some(name), []) => bail!("there is no lab `{name}`: the space had none when this was recorded"),
+        (Some(name), labs) => match labs.iter().find(|lab| lab.name == name) {
+            Some(lab) => Ok(Some(lab)),
+            None => bail!("there is no lab `{name}`, there is {}", known()),
+        },
+    }
+}
+
+fn dimensions(asked: &[Dimension], declared: Option<&LabBudget>) -> Vec<Dimension> {
+    match (asked, declared) {
+        ([], Some(budget)) => budget.over.clone(),
+        ([], None) => vec![Dimension::T1, Dimension::T2, Dimension::P1],
+        (asked, _) => asked.to_vec(),
+    }
+}
+
+/// What tests are ranked by: as asked, else as the lab says, else by the objectives.
+fn rank(plan: &CampaignPlan, asked: &[String], lab: Option<&Lab>) -> anyhow::Result<Vec<RankKey>> {
+    let mut keys: Vec<RankKey> = Vec::new();
+    for key in asked {
+        let Some((name, order)) = key.split_once(':') else {
+            bail!("`{key}` does not say which values come first; write `{key}:descending`, `:ascending`, or a number")
+        };
+        let Some(metric) = (0u32..).map(MetricId).zip(&plan.metrics).find(|(_, metric)| metric.name == name) else {
+            let known: Vec<&str> = plan.metrics.iter().map(|metric| metric.name.as_str()).collect();
+            bail!("there is no metric `{name}`; there are {}", known.join(", "))
+        };
+        let order = match order {
+            "ascending" => RankOrder::Ascending,
+            "descending" => RankOrder::Descending,
+            number => match number.parse::<f64>() {
+                Ok(value) if value.is_finite() => RankOrder::ClosestTo { value },
+                _ => bail!("`{order}` is neither `ascending` nor `descending` nor a number"),
+            },
+        };
+        ensure!(keys.iter().all(|known| known.metric != metric.0), "`{name}` is listed twice");
+        keys.push(RankKey { metric: metric.0, order });
+    }
+    if !keys.is_empty() {
+        return Ok(keys);
+    }
+    let declared = lab.map_or(&[][..], |lab| &lab.rank);
+    Ok(if declared.is_empty() { Terms::rank_by_objectives(plan) } else { declared.to_vec() })
+}
