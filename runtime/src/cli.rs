@@ -5,8 +5,11 @@
 
 mod caller;
 mod commands;
+#[cfg(all(feature = "process", feature = "mcap"))]
+mod compensate;
 mod confirm;
 mod execution;
+mod explore;
 mod export;
 mod failure;
 mod gate;
@@ -21,6 +24,7 @@ mod replay_recording;
 mod report;
 mod results_folder;
 mod run;
+mod scratch;
 mod session;
 mod shrink;
 mod terminal;

@@ -14,6 +14,8 @@ pub mod campaign;
 mod changed_files;
 #[cfg(feature = "campaign")]
 pub mod cli;
+#[cfg(all(feature = "campaign", feature = "process", feature = "mcap"))]
+mod fitting;
 #[cfg(all(feature = "campaign", feature = "process"))]
 mod interpreted;
 #[cfg(all(feature = "campaign", feature = "process"))]

@@ -152,7 +152,6 @@ fn not_used(space: &Space, sources: &SourceMap) -> Vec<String> {
         let unused = [
             ("simulator", lab.simulator.is_some() && lab_simulator(space, lab).is_none()),
             ("shape", !lab.shapes.is_empty()),
-            ("fit", !lab.fits.is_empty()),
         ];
         let unused: Vec<&str> = unused.into_iter().filter_map(|(what, is_there)| is_there.then_some(what)).collect();
         let (last, others) = unused.split_last()?;

@@ -76,6 +76,7 @@ pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str)
         },
         campaign: selection.campaign(space, declared),
         labs: space.physicals.values().map(|lab| selection.lab(space, lab)).collect(),
+        compensation: None,
     };
     RunnerPlan { plan, hooks: hooks(space), operations: custom_operations(space), simulator_crate, system_file }
 }

@@ -9,7 +9,7 @@
 //!   (DTW).
 //! - [`localise`]: whether a gap is everywhere or in a part of the tests, by what estimates say together ([`pooled`])
 //!   and where they change ([`split`]); [`next`]: which test tells more about it.
-//! - [`fit`]: parameters of a simulation under which it is closer to the lab.
+//! - [`fit`]: parameters of a simulation under which it is closer to the lab; [`discrepancy`]: how close it is.
 //! - [`distribution`]: the distributions that all this needs.
 //!
 //! Every difference is the lab's value minus the simulation's, and a positive lag says that the lab is later.
@@ -18,6 +18,7 @@
 //! of its arguments and a seed; equal seeds give equal results on every machine.
 
 pub mod bootstrap;
+pub mod discrepancy;
 pub mod distribution;
 pub mod equivalence;
 pub mod fit;

@@ -66,7 +66,7 @@ pub enum Reason {
 /// Whether there is a gap and where.
 ///
 /// The order of questions: whether all tests agree within the tolerance; whether the differences are of one size
-/// (Welch's F at α); if so, whether this size is a gap; if not, whether a range of one coordinate explains it (by
+/// (Welch's F at α, or none further from the middle of all than the tolerance); if so, whether this size is a gap; if not, whether a range of one coordinate explains it (by
 /// permutation, at α), or else few tests do, which are left out one after the other, the most deviating first, until
 /// the others agree: at most a third. So where all true differences are equal, a local gap is reported with a
 /// probability of about α at most, and where they are all 0, a systematic one.
@@ -81,7 +81,11 @@ pub fn localise(tests: &[Located], settings: Settings) -> Extent {
     let Some(heterogeneity) = Heterogeneity::of(differences(tests)) else {
         return Extent::Undecided(Reason::OneTest);
     };
-    if heterogeneity.p > alpha {
+    let estimates = differences(tests).map(|of| of.difference);
+    let [least, greatest] =
+        estimates.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)]);
+    // However sure it is that differences are not quite equal: what does not matter is not looked for.
+    if heterogeneity.p > alpha || greatest - least <= 2.0 * tolerance {
         return if pooled.p() <= alpha && pooled.estimate.abs() > tolerance {
             Extent::Systematic { pooled, heterogeneity }
         } else {
@@ -140,6 +144,9 @@ fn few_tests(tests: &[Located], alpha: f64) -> Option<Extent> {
 pub struct Words<'a> {
     /// The metric.
     pub metric: &'a str,
+    /// What the metric is in the lab where a difference is below 0, and where it is above, for example `smaller` and
+    /// `greater`.
+    pub than: [&'a str; 2],
     /// A value of the metric with its unit.
     pub value: &'a dyn Fn(f64) -> String,
     /// The name of a coordinate.
@@ -156,7 +163,8 @@ pub fn sentence(extent: &Extent, count: usize, words: &Words<'_>) -> String {
     let about = |of: &Pooled| {
         let [low, high] = of.interval(0.95);
         let size = (words.value)(of.estimate.abs());
-        let than = if of.estimate < 0.0 { "smaller" } else { "greater" };
+        let [smaller, greater] = words.than;
+        let than = if of.estimate < 0.0 { smaller } else { greater };
         format!(
             "{size} {than} in the lab (95 % interval of the difference: {} to {})",
             (words.value)(low),
@@ -307,6 +315,7 @@ mod tests {
     fn an_extent_is_told_in_a_sentence() {
         let words = Words {
             metric: "distance",
+            than: ["smaller", "greater"],
             value: &|value| format!("{value:.1} m"),
             dimension: &|dimension| format!("T{}", dimension + 1),
             coordinate: &|_, at| format!("{at:.1}"),

@@ -25,6 +25,8 @@ pub struct Comparison {
     pub step: f64,
     /// How many samples both series have in common.
     pub samples: usize,
+    /// The standard deviation of the simulation's values.
+    pub spread: f64,
     /// The root mean square of the differences.
     pub rms: f64,
     /// Pearson's correlation.
@@ -35,6 +37,8 @@ pub struct Comparison {
     pub lag: Result<Lag, Undefined>,
     /// The root mean square of the differences once the lag is taken out.
     pub rms_without_lag: Result<f64, Undefined>,
+    /// The lab's mean minus the simulation's once the lag is taken out.
+    pub level: Result<f64, Undefined>,
     /// Gain, offset and noise once the lag is taken out.
     pub line: Result<Line, Undefined>,
 }
@@ -51,13 +55,24 @@ pub fn compare(simulation: &Series<'_>, lab: &Series<'_>, settings: Settings) ->
     Ok(Comparison {
         step,
         samples: a.len(),
+        spread: deviation(&a),
         rms: rms(&a, &b),
         correlation: pearson(&a, &b),
         warping: dtw(&a, &b, band),
         lag,
         rms_without_lag: without.as_ref().map(|[a, b]| rms(a, b)).map_err(|why| *why),
+        level: without.as_ref().map(|[a, b]| mean(b) - mean(a)).map_err(|why| *why),
         line: without.as_ref().map_err(|why| *why).and_then(|[a, b]| Line::of(a, b)),
     })
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+fn deviation(values: &[f64]) -> f64 {
+    let mean = mean(values);
+    libm::sqrt(values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / values.len() as f64)
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Bound, Dimension, MetricId, Simulator};
+use crate::{Bound, Dimension, Fit, MetricId, Simulator};
 
 /// A lab in which chosen tests are run on real robots.
 ///
@@ -31,6 +31,9 @@ pub struct Lab {
     pub tolerances: Vec<LabTolerance>,
     /// Metrics of which only the presence is compared: in the lab an interlock ends the test. Each metric once.
     pub interlock: Vec<MetricId>,
+    /// What of the simulation may be fitted to the lab. Each thing once.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fits: Vec<Fit>,
 }
 
 /// What running a test costs, in the unit of the budget. One of the two is positive.

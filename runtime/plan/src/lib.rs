@@ -10,6 +10,7 @@
 //! `0..=1`.
 
 mod campaign;
+mod compensation;
 pub mod condition;
 mod confirmation;
 mod coverage;
@@ -37,6 +38,7 @@ mod validate;
 mod wiring;
 
 pub use campaign::*;
+pub use compensation::*;
 pub use confirmation::*;
 pub use coverage::*;
 pub use exploration::*;

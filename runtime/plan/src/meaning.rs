@@ -80,6 +80,7 @@ fn forget_what_is_for_people(plan: &mut CampaignPlan) {
         tests,
         campaign,
         labs,
+        compensation: _,
     } = plan;
     for text in [generator, source, doc] {
         text.clear();
@@ -164,6 +165,8 @@ fn forget_what_is_for_people(plan: &mut CampaignPlan) {
 /// Gives both plans the same of what decides which tests are run, and not what a test does.
 fn align_what_no_test_depends_on(one: &mut CampaignPlan, other: &mut CampaignPlan) {
     one.tests.clone_from(&other.tests);
+    // Results say with which one they were recorded, and a test is run again with the same.
+    one.compensation.clone_from(&other.compensation);
     let Campaign {
         name: _,
         doc: _,

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Campaign, KnownTest, KnownTestId, Lab, MessageId, MessageType, Metric, MetricId, Node, NodeId, Operation,
-    OperationId, Requirement, RequirementId, Simulator, Topic, TopicId,
+    Campaign, Compensation, KnownTest, KnownTestId, Lab, MessageId, MessageType, Metric, MetricId, Node, NodeId,
+    Operation, OperationId, Requirement, RequirementId, Simulator, Topic, TopicId,
 };
 
 /// Everything a runner knows of its campaign. Deserializing one [validates](CampaignPlan::validate) it.
@@ -44,6 +44,9 @@ pub struct CampaignPlan {
     /// All labs of the space, in declaration order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub labs: Vec<Lab>,
+    /// What brings the simulation closer to a lab; `None` for the simulation as it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub compensation: Option<Compensation>,
 }
 
 impl CampaignPlan {

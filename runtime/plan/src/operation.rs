@@ -113,7 +113,7 @@ pub enum Times {
 pub type Place = Vec<Step>;
 
 /// One step into a message.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Step {
     /// The field of this name.

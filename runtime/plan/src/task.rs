@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{CampaignPlan, KnownTestId, RequirementId, Search, Test};
+use crate::{CampaignPlan, Dimension, KnownTestId, Recorded, RequirementId, Search, Test};
 
 /// What one run of a runner does.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -29,9 +29,25 @@ pub enum Task {
     Shrink(Shrinking),
     /// It runs chosen tests of a campaign in a lab: `physical`; or somebody ran them there by hand.
     Lab(LabTask),
+    /// It simulates the tests that a lab ran, with what [compensates](crate::Compensation) for the reality gap:
+    /// `compensate`.
+    Compensated(LabTask),
+    /// It runs variations of a test along one dimension, each once: `explore`.
+    Variations(Variations),
 }
 
-/// Tests of a campaign that are run in a lab.
+/// Variations of a test of a campaign.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Variations {
+    /// The test's name.
+    pub name: String,
+    /// The dimension along which they differ.
+    pub dimension: Dimension,
+    /// The tests, in the order of their coordinates; at least one.
+    pub tests: Vec<Test>,
+}
+
+/// Tests of a campaign that are run in a lab, or once more in simulation to compare them with a lab.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LabTask {
     /// The lab's name.
@@ -113,9 +129,10 @@ impl Task {
             Task::Known { tests } => u32::try_from(tests.len()).unwrap_or(u32::MAX),
             Task::Repeat { times, .. } => *times,
             Task::Shrink(shrinking) => shrinking.evaluations,
-            Task::Lab(LabTask { tests, repeats, .. }) => {
+            Task::Lab(LabTask { tests, repeats, .. }) | Task::Compensated(LabTask { tests, repeats, .. }) => {
                 u32::try_from(tests.len()).unwrap_or(u32::MAX).saturating_mul(*repeats)
             }
+            Task::Variations(variations) => u32::try_from(variations.tests.len()).unwrap_or(u32::MAX),
         }
     }
 
@@ -131,6 +148,10 @@ impl Task {
             campaign.confirm = None;
             campaign.neighbours = None;
             campaign.stop.clear();
+            // What is compared with a simulation is compared in its traces too.
+            if self.of_lab().is_some() || matches!(self, Task::Variations(_)) {
+                campaign.record = Some(Recorded::All);
+            }
         }
         plan
     }
@@ -157,6 +178,16 @@ impl Task {
         if let Task::Lab(lab) = self { Some(lab) } else { None }
     }
 
+    /// Which tests are simulated once more with what compensates for a reality gap; `None` if none are.
+    pub fn compensated(&self) -> Option<&LabTask> {
+        if let Task::Compensated(lab) = self { Some(lab) } else { None }
+    }
+
+    /// The tests of a lab that are run, in the lab or in simulation; `None` if none are.
+    pub fn of_lab(&self) -> Option<&LabTask> {
+        self.in_lab().or(self.compensated())
+    }
+
     /// Whether it searches for tests: only a campaign does, unless it repeats a test.
     pub fn searches(&self, plan: &CampaignPlan) -> bool {
         *self == Task::Campaign && plan.campaign.search.strategy().is_some()
@@ -170,6 +201,8 @@ impl Task {
             Task::Repeat { .. } => "repeat",
             Task::Shrink(_) => "shrink",
             Task::Lab(_) => "lab",
+            Task::Compensated(_) => "compensated",
+            Task::Variations(_) => "variations",
         }
     }
 }

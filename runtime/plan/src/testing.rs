@@ -29,6 +29,7 @@ pub fn minimal() -> CampaignPlan {
         tests: Vec::new(),
         campaign: campaign("campaign", 0),
         labs: Vec::new(),
+        compensation: None,
     }
 }
 
@@ -114,6 +115,7 @@ pub fn lab(name: &str) -> Lab {
         budget: None,
         tolerances: Vec::new(),
         interlock: Vec::new(),
+        fits: Vec::new(),
     }
 }
 

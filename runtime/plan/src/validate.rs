@@ -20,7 +20,7 @@ use crate::condition::{Condition, Constraint, Operand};
 use crate::{
     Activation, Bound, CampaignPlan, Choice, Domain, Failing, FieldRef, KnownTest, KnownTestId, LabTask, MessageId,
     Metric, MetricId, MetricSource, Operation, OperationId, OperationKind, RequirementId, SCHEMA, Shrinking, Span,
-    Task, Test, TopicId, Type,
+    Task, Test, TopicId, Type, Variations,
 };
 
 use check::{
@@ -94,7 +94,9 @@ impl CampaignPlan {
         each("tests", &self.tests, |test| self.sound_known_test(test))?;
         at("campaign", self.sound_campaign(&self.campaign))?;
         at("labs", distinct(self.labs.iter().map(|lab| &lab.name)))?;
-        each("labs", &self.labs, |lab| self.sound_lab(lab))
+        each("labs", &self.labs, |lab| self.sound_lab(lab))?;
+        let compensation = self.compensation.as_ref();
+        at("compensation", compensation.map_or(Ok(()), |compensation| self.sound_compensation(compensation)))
     }
 
     /// Makes sure that a test is one of this plan: its operations are there, each with a choice for every parameter,
@@ -250,7 +252,13 @@ impl CampaignPlan {
                 }
                 at("runs", at_least_one(*runs))
             }
-            Task::Lab(LabTask { lab, results: _, tests, repeats }) => {
+            Task::Variations(Variations { name: of, dimension: _, tests }) => {
+                at("name", name(of))?;
+                at("tests", filled(tests))?;
+                each("tests", tests, |test| self.validate_test(test))
+            }
+            Task::Lab(of_lab) | Task::Compensated(of_lab) => {
+                let LabTask { lab, results: _, tests, repeats } = of_lab;
                 at("lab", name(lab))?;
                 at("tests", filled(tests))?;
                 at("tests", distinct(tests.iter().map(|test| test.number)))?;

@@ -55,7 +55,8 @@ pub fn evaluate_tapped(
 ) -> Result<Observation, ChoiceError> {
     #[expect(clippy::disallowed_methods, reason = "how long a run took is recorded, and decides nothing")]
     let started = Instant::now();
-    let mut relay = Relay::new(plan, wires, test, metrics.start(), custom.hooks)?;
+    let relay = Relay::new(plan, wires, test, metrics.start(), custom.hooks)?;
+    let mut relay = relay.compensated(plan, test, simulator_seed);
     if let Some(tap) = tap {
         relay = relay.tapped(tap);
     }

@@ -14,6 +14,7 @@
 //! A change of a message is an effect only if its wire has a receiver: a subscriber, or an outbound metric. Changes on
 //! other wires are counted separately.
 
+mod compensation;
 mod exchange;
 mod fuzzing_time;
 mod listener;
@@ -51,11 +52,16 @@ pub const COPIES_LIMIT: u32 = 10_000;
 /// The relay of one run.
 pub struct Relay<'a> {
     wires: &'a WireTable,
+    /// The operations of the test, and behind them what compensates for a reality gap.
     operations: Vec<Stage>,
-    /// Their positions by priority, then declaration.
+    /// Positions of the test's operations by priority, then declaration.
     order: Vec<usize>,
-    /// Per wire: the stages a message passes, in order, with the wire's position in the operation's topic.
+    /// Per wire: the stages a message passes, in order, with the wire's position in the operation's topic. The test's
+    /// operations come first.
     pipelines: Vec<Vec<(usize, u64)>>,
+    /// Per wire: how many stages of its pipeline are operations of the test. Behind them the message is delivered, as
+    /// far as metrics and listeners are concerned: what compensates stands for the robots.
+    disturbed_by: Vec<usize>,
     /// Per wire: messages published so far.
     published: Vec<u64>,
     queue: ReleaseQueue,
@@ -75,6 +81,8 @@ pub struct Relay<'a> {
     flooded: bool,
     /// What the transport has to do.
     orders: Vec<Order>,
+    /// Parameters of the simulator that are not as it has them, by name.
+    parameters: Vec<(String, f64)>,
     /// The listeners besides the metrics.
     taps: Vec<&'a mut dyn Listener>,
 }
@@ -153,6 +161,8 @@ impl<'a> Relay<'a> {
         let reads = |wire, side| variables.iter().any(|&metric| metrics.hears(metric, wire, side));
         Ok(Relay {
             wires,
+            disturbed_by: pipelines.iter().map(Vec::len).collect(),
+            parameters: Vec::new(),
             heard: wires.iter().map(|wire| metrics.delivers(wire)).chain(wires.links().iter().map(|_| false)).collect(),
             acted_on: plan.operations.iter().flat_map(|operation| wires.acted_on(operation)).collect(),
             conditions: Conditions {
@@ -218,7 +228,11 @@ impl<'a> Relay<'a> {
         Ok(())
     }
 
+    /// Tells the listeners of an action, if an operation of the test took it.
     fn tell(&mut self, now: SimTime, operation: usize, event: OperationEvent) {
+        if operation >= self.order.len() {
+            return;
+        }
         for tap in &mut self.taps {
             tap.operated(now, operation, event);
         }
@@ -252,6 +266,7 @@ impl<'a> Relay<'a> {
         let operations: Vec<OperationEffect> = self
             .operations
             .iter()
+            .take(self.order.len())
             .map(|stage| OperationEffect {
                 intervals: stage.activity.intervals(end),
                 tails: stage.tails(end),
@@ -495,6 +510,10 @@ impl Exchange for Relay<'_> {
             self.evaluate_conditions();
             self.release_due(deliveries);
         }
+    }
+
+    fn parameters(&self) -> &[(String, f64)] {
+        &self.parameters
     }
 
     fn take_orders(&mut self) -> Vec<Order> {

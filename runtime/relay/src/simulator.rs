@@ -4,6 +4,9 @@
 //! only. The relay is part of the bus. A message of one part is disturbed if the test says so, and reaches its
 //! subscribers in the same step: a relay without operations adds no delay.
 
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet};
+
 use sesame_base::time::SimTime;
 
 use crate::value::Value;
@@ -27,6 +30,58 @@ pub struct Setup {
     pub seed: u64,
     /// Length of one step.
     pub step: SimTime,
+    /// What is not as the simulator has it.
+    parameters: Parameters,
+}
+
+impl Setup {
+    /// Settings with which every parameter is as the simulator has it.
+    pub fn new(seed: u64, step: SimTime) -> Self {
+        Setup { seed, step, parameters: Parameters::default() }
+    }
+
+    /// The same with other values of these parameters.
+    #[must_use]
+    pub fn with_parameters(self, values: impl IntoIterator<Item = (String, f64)>) -> Self {
+        let parameters = Parameters { values: values.into_iter().collect(), asked: RefCell::default() };
+        Setup { parameters, ..self }
+    }
+
+    /// The value of a parameter in this run: `usual`, unless a compensation of a reality gap sets it. A simulator asks
+    /// for each of its parameters when it starts; a compensation that sets another one is an error.
+    pub fn parameter(&self, name: &str, usual: f64) -> f64 {
+        self.parameters.asked.borrow_mut().insert(name.to_owned());
+        self.parameters.values.get(name).copied().unwrap_or(usual)
+    }
+
+    /// The parameters that the simulator has asked for.
+    #[cfg(any(feature = "in-process", feature = "serve"))]
+    pub(crate) fn asked(&self) -> Vec<String> {
+        self.parameters.asked.borrow().iter().cloned().collect()
+    }
+
+    /// What is wrong if a value was given to a parameter that the simulator has not asked for.
+    #[cfg(feature = "in-process")]
+    pub(crate) fn unknown_parameter(&self) -> Option<SimulatorError> {
+        let asked = self.asked();
+        let unknown = self.parameters.values.keys().find(|name| !asked.contains(name))?;
+        Some(SimulatorError(no_such_parameter(unknown, &asked)))
+    }
+}
+
+/// What is wrong with a parameter that a simulator does not have.
+#[cfg(any(feature = "in-process", feature = "process"))]
+pub(crate) fn no_such_parameter(name: &str, known: &[String]) -> String {
+    let known: Vec<String> = known.iter().map(|name| format!("`{name}`")).collect();
+    let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+    format!("it has no parameter `{name}` that a compensation can set; it has {known}")
+}
+
+/// Values of parameters, and which were asked for.
+#[derive(Debug, Clone, Default)]
+struct Parameters {
+    values: BTreeMap<String, f64>,
+    asked: RefCell<BTreeSet<String>>,
 }
 
 /// Whether there is more to simulate.

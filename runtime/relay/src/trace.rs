@@ -15,6 +15,7 @@ mod recording;
 mod records;
 mod recover;
 mod schema;
+mod signals;
 mod writer;
 
 use std::collections::BTreeMap;
@@ -29,6 +30,7 @@ use sesame_plan::{CampaignPlan, Test};
 
 pub use recording::{Fed, RecordedMetric, RecordedRun, RecordingError, feed};
 pub use recover::recover;
+pub use signals::{Signal, signals};
 pub use writer::TraceWriter;
 
 /// Name of the metadata record that identifies the run of a trace.

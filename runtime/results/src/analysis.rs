@@ -6,8 +6,10 @@
 mod candidates;
 pub mod choice;
 mod compare;
+pub mod compensation;
 pub(crate) mod confirmed;
 mod distances;
+mod extents;
 pub mod gap;
 mod indicators;
 mod rank_sum;
@@ -15,6 +17,7 @@ pub mod regions;
 pub(crate) mod statistics;
 #[cfg(test)]
 mod tests;
+pub mod traces;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -32,6 +35,7 @@ pub use crate::present::table::{Datum, Table, TextOptions};
 pub use candidates::{Candidate, Candidates, LeftOut, Terms, candidates, qualities};
 pub use compare::{CompareError, Comparison, Run, compare};
 pub use distances::{FrontDistance, GivenFront, GivenFrontError, distance_table, distances};
+pub use extents::extents;
 pub use indicators::{Indicator, IndicatorAnalysis, indicators};
 pub use rank_sum::{RankSum, rank_sum};
 pub use sesame_optimise::igd::Scaling;
@@ -140,7 +144,7 @@ pub fn tests(repository: &Repository, selection: &Selection) -> Result<Table, Re
 
 /// Of the results of a lab, the test of the campaign that each test is a run of, by number; of others nothing.
 fn runs_in_a_lab(repository: &Repository) -> Result<BTreeMap<u32, u32>, RecordError> {
-    let Some(task) = repository.task().in_lab() else { return Ok(BTreeMap::new()) };
+    let Some(task) = repository.task().of_lab() else { return Ok(BTreeMap::new()) };
     let rows = repository.tests()?;
     Ok(rows.iter().filter_map(|row| Some((row.number, task.of(&row.test)?))).collect())
 }

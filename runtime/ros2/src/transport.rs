@@ -164,7 +164,7 @@ impl System {
             (sesame_plan::Clock::Topic { .. }, None) => Zero::Clock(session.tick(&mut self.launched, now() + SILENCE)?),
         };
         self.ticked = now();
-        Ok(())
+        self.set_parameters(relay.parameters())
     }
 
     fn fail(&mut self, error: TransportError) -> TransportError {

@@ -32,7 +32,8 @@ pub fn strategy_of_task(plan: &CampaignPlan, task: &Task, seed: u64) -> Result<B
         Task::Known { tests } => Ok(Box::new(FixedTests::known(plan, tests))),
         Task::Repeat { test, times, .. } => Ok(Box::new(FixedTests::repeated(test, *times, seed))),
         Task::Shrink(shrinking) => Ok(Box::new(Shrink::new(plan, shrinking.clone()))),
-        Task::Lab(lab) => Ok(Box::new(FixedTests::in_lab(lab, seed))),
+        Task::Variations(variations) => Ok(Box::new(FixedTests::each_once(&variations.tests))),
+        Task::Lab(lab) | Task::Compensated(lab) => Ok(Box::new(FixedTests::in_lab(lab, seed))),
     }
 }
 

@@ -36,6 +36,18 @@ impl FixedTests {
         FixedTests { candidates: (1..=times).map(repetition).collect(), awaited: 0 }
     }
 
+    /// These tests, each once.
+    pub(crate) fn each_once(tests: &[Test]) -> Self {
+        let candidate = |test: &Test| Candidate {
+            test: test.clone(),
+            parents: Vec::new(),
+            generation: 0,
+            known: None,
+            simulator_seed: None,
+        };
+        FixedTests { candidates: tests.iter().map(candidate).collect(), awaited: 0 }
+    }
+
     /// Tests in a lab, each as often as the task says, round by round. A stand-in for the lab has another seed in each
     /// run.
     pub(crate) fn in_lab(task: &LabTask, seed: u64) -> Self {

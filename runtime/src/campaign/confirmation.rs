@@ -221,7 +221,13 @@ impl Evaluator<'_> {
                     continue;
                 }
                 let job = jobs.next().unwrap_or(u32::MAX);
-                queue.push_back(Job { number: job, test: test.clone(), simulator_seed, trace: None });
+                queue.push_back(Job {
+                    number: job,
+                    test: test.clone(),
+                    simulator_seed,
+                    trace: None,
+                    compensation: self.compensation(),
+                });
                 waiting.insert(job, (number, position, simulator_seed));
             }
             let known = self.repetitions_of(number).len();

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use sesame_plan::{CampaignPlan, Recorded};
+use sesame_plan::{CampaignPlan, Compensation, Recorded};
 use sesame_results::record::{self, Event, EventKind, Origin, RecordError, Recorder, Repetition, TestRecord};
 
 use crate::campaign::error::{CampaignError, Halt};
@@ -48,6 +48,11 @@ impl Traces {
 }
 
 impl<'a> Evaluator<'a> {
+    /// What brings the simulation closer to a lab in all of these results.
+    pub(super) fn compensation(&self) -> Option<Compensation> {
+        self.recorder.repository().plan().compensation.clone()
+    }
+
     /// One that goes on with what the recorder holds. `series` says whether the search reads the series of metrics.
     pub(super) fn new(
         plan: &CampaignPlan,
@@ -112,6 +117,7 @@ impl<'a> Evaluator<'a> {
                     test: test.test.clone(),
                     simulator_seed: test.simulator_seed,
                     trace: self.traces.as_ref().map(|traces| traces.request(&test)),
+                    compensation: self.compensation(),
                 });
                 waiting.insert(test.number, test);
             }

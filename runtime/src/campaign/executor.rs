@@ -9,7 +9,7 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use sesame_base::observation::Observation;
-use sesame_plan::{Recorded, Test};
+use sesame_plan::{Compensation, Recorded, Test};
 
 /// Carries out tests, in any order.
 pub trait Executor {
@@ -37,6 +37,8 @@ pub struct Job {
     pub simulator_seed: u64,
     /// The trace that is asked for, if any.
     pub trace: Option<TraceRequest>,
+    /// What brings the simulation closer to a lab in this run, in place of what the worker's plan says.
+    pub compensation: Option<Compensation>,
 }
 
 /// Asks for the trace of a test.

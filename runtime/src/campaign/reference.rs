@@ -54,7 +54,8 @@ pub(super) fn unheard(plan: &CampaignPlan, task: &Task, reference: &Observation)
         (_, Some(repeated)) => of_test(repeated.test).into_iter().collect(),
         (Task::Known { tests }, _) => tests.iter().flat_map(|&id| of_test(&plan.test(id).test)).collect(),
         (Task::Shrink(shrinking), _) => of_test(&shrinking.test).into_iter().collect(),
-        (Task::Lab(lab), _) => lab.tests.iter().flat_map(|it| of_test(&it.test)).collect(),
+        (Task::Variations(variations), _) => variations.tests.iter().flat_map(of_test).collect(),
+        (Task::Lab(lab) | Task::Compensated(lab), _) => lab.tests.iter().flat_map(|it| of_test(&it.test)).collect(),
         (Task::Campaign | Task::Repeat { .. }, _) => plan.campaign.operations.iter().copied().collect(),
     };
     let found = operations.into_iter().filter_map(|id| {

@@ -41,10 +41,12 @@ pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: &Address) -> io::
     let mut custom = Custom { hooks: runner.operations, files: Box::new(files.map_err(io::Error::other)?) };
     let mut transport = Some(transport);
     let directory = std::env::current_dir()?;
+    let mut compensated = plan.clone();
     for job in jobs {
         let simulator = transport.get_or_insert_with(|| runner.connect.transport(plan));
+        compensated.compensation.clone_from(&job.compensation);
         let (observation, trace_failure) =
-            traces::run(plan, &wires, &metrics, simulator.as_mut(), &job, &directory, &mut custom);
+            traces::run(&compensated, &wires, &metrics, simulator.as_mut(), &job, &directory, &mut custom);
         let incidents = simulator.incidents();
         if !observation.outcome.is_whole() {
             transport = None;

@@ -8,11 +8,13 @@ use clap::Subcommand;
 use sesame_plan::CampaignPlan;
 
 use crate::campaign;
+#[cfg(all(feature = "process", feature = "mcap"))]
+use crate::cli::compensate;
 use crate::cli::failure::Failure;
 #[cfg(feature = "process")]
 use crate::cli::physical;
 use crate::cli::session::Session;
-use crate::cli::{confirm, export, known, repeat, replay, replay_recording, report, run, shrink, view};
+use crate::cli::{confirm, explore, export, known, repeat, replay, replay_recording, report, run, shrink, view};
 #[cfg(feature = "process")]
 use crate::runner::Runner;
 
@@ -27,9 +29,14 @@ pub enum Running {
     Repeat(repeat::Options),
     /// Run recorded tests again with fresh seeds of the simulator and say whether what was found comes again
     Confirm(confirm::Options),
+    /// Run variations of a recorded test along one dimension, to see where something begins and ends
+    Explore(explore::Options),
     /// Run recorded tests in a lab, and record what they show there as results of their own
     #[cfg(feature = "process")]
     Physical(physical::Options),
+    /// Fit the simulation to what a lab recorded, and say how much smaller the reality gap is then
+    #[cfg(all(feature = "process", feature = "mcap"))]
+    Compensate(compensate::Options),
     /// Run a recorded test again just as it was and say whether it is the same, bit for bit
     Replay(replay::Options),
     /// Make a failing test smaller for as long as it fails as it did: fewer operations, shorter, milder
@@ -114,8 +121,11 @@ impl Running {
             Running::Known(options) => known::known(session, options),
             Running::Repeat(options) => repeat::repeat(session, options),
             Running::Confirm(options) => confirm::confirm(session, options),
+            Running::Explore(options) => explore::explore(session, options),
             #[cfg(feature = "process")]
             Running::Physical(options) => physical::physical(session, options),
+            #[cfg(all(feature = "process", feature = "mcap"))]
+            Running::Compensate(options) => compensate::compensate(session, options),
             Running::Replay(options) => replay::replay(session, options),
             Running::Shrink(options) => shrink::shrink(session, options),
             Running::ReplayRecording(options) => replay_recording::replay_recording(session, options),

@@ -64,6 +64,14 @@ pub(super) struct OutputArgs {
     gate: Gate,
 }
 
+impl OutputArgs {
+    /// How it is shown.
+    #[cfg(all(feature = "process", feature = "mcap"))]
+    pub(super) fn format(&self) -> Format {
+        self.format
+    }
+}
+
 /// A number of workers from the command line.
 fn workers(text: &str) -> Result<NonZeroUsize, String> {
     let asked: NonZeroUsize = text.parse().map_err(|_| "not a number above 0".to_owned())?;
@@ -117,6 +125,12 @@ impl ExecutionArgs {
     pub(super) fn one_at_a_time(&self) -> ExecutionArgs {
         let ExecutionArgs { workers: _, timeout, reference_timeout, allow_unheard } = *self;
         ExecutionArgs { workers: Some(NonZeroUsize::MIN), timeout, reference_timeout, allow_unheard }
+    }
+
+    /// The wall time after which a test is stopped, if the user says one.
+    #[cfg(all(feature = "process", feature = "mcap"))]
+    pub(super) fn timeout(&self) -> Option<Duration> {
+        self.timeout
     }
 
     fn processes(&self) -> usize {
@@ -227,17 +241,36 @@ pub(super) fn execute(
     output: &OutputArgs,
     files: Files,
 ) -> Result<ExitCode, Failure> {
-    let campaign = recorder.repository().campaign();
-    let (plan, seed) = (campaign.plan.clone(), campaign.seed);
-    let settings = execution.settings(session, seed, &files);
     let interrupted = interruptible()?;
     let started = Instant::now();
     let before = runs(recorder.repository())?;
+    let Some(repository) = perform(session, recorder, folder, execution, files, &interrupted)? else {
+        return Ok(ExitCode::from(STOPPED));
+    };
+    let code = report_outcome(&repository, folder, &folder.join("report.html"), output)?;
+    let (took, runs) = (started.elapsed(), runs(&repository)?);
+    let took = if took.as_secs() < 90 { format!("{:.1} s", took.as_secs_f64()) } else { wait(took.as_secs_f64()) };
+    let of_all = if before == 0 { String::new() } else { format!(" of {runs}") };
+    say(format_args!("      Took {took} for {} runs{of_all}", runs - before));
+    Ok(code)
+}
+
+/// Runs a campaign to its end; `None` if the user stopped it, which is said.
+pub(super) fn perform(
+    session: &Session,
+    recorder: Recorder,
+    folder: &Path,
+    execution: &ExecutionArgs,
+    files: Files,
+    interrupted: &AtomicBool,
+) -> Result<Option<Repository>, Failure> {
+    let campaign = recorder.repository().campaign();
+    let (plan, seed) = (campaign.plan.clone(), campaign.seed);
+    let settings = execution.settings(session, seed, &files);
     let mut display = Display::new(&plan, seed, execution.workers());
-    let end =
-        run_campaign(&plan, recorder, &settings, &folder.join("workers"), &interrupted, &mut |event, progress| {
-            display.update(event, progress);
-        });
+    let end = run_campaign(&plan, recorder, &settings, &folder.join("workers"), interrupted, &mut |event, progress| {
+        display.update(event, progress);
+    });
     display.finish();
     files.finish()?;
     let resume = || session.caller.command("resume", &[&shown(folder)]);
@@ -253,21 +286,13 @@ pub(super) fn execute(
         Failure(format!("{error}{continued}"))
     });
     match end? {
-        CampaignEnd::Finished(repository) => {
-            let code = report_outcome(&repository, folder, &folder.join("report.html"), output)?;
-            let (took, runs) = (started.elapsed(), runs(&repository)?);
-            let took =
-                if took.as_secs() < 90 { format!("{:.1} s", took.as_secs_f64()) } else { wait(took.as_secs_f64()) };
-            let of_all = if before == 0 { String::new() } else { format!(" of {runs}") };
-            say(format_args!("      Took {took} for {} runs{of_all}", runs - before));
-            Ok(code)
-        }
+        CampaignEnd::Finished(repository) => Ok(Some(*repository)),
         CampaignEnd::Interrupted => {
             say(format_args!(
                 "stopped; everything measured so far is kept. This continues to the same results:\n    {}",
                 resume()
             ));
-            Ok(ExitCode::from(STOPPED))
+            Ok(None)
         }
     }
 }

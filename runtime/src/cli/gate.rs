@@ -154,7 +154,7 @@ fn seed_note(summary: &Summary, plan: &CampaignPlan, task: &Task, seed: u64) -> 
 /// chosen for how dangerous it is.
 fn insufficient(summary: &Summary, plan: &CampaignPlan, task: &Task) -> Vec<String> {
     let counts = summary.counts;
-    let is_about_one_test = task.shrinking().is_some() || task.repeated(plan).is_some() || task.in_lab().is_some();
+    let is_about_one_test = task.shrinking().is_some() || task.repeated(plan).is_some() || task.of_lab().is_some();
     let ran = counts.evaluations - counts.duplicates;
     if ran == 0 || is_about_one_test {
         return Vec::new();

@@ -1,23 +1,22 @@
 //! `replay`: a recorded test once more, just as it was.
 
-use std::fs::DirBuilder;
-#[cfg(unix)]
-use std::os::unix::fs::DirBuilderExt as _;
-use std::path::PathBuf;
+use std::path::Path;
 use std::process::ExitCode;
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 use clap::Args;
 
 use sesame_base::observation::Outcome;
 use sesame_base::test_number::TestNumber;
-use sesame_results::record::{TestRecord, differences};
+use sesame_plan::Recorded;
+use sesame_results::record::{TestRecord, differences, trace_file};
 use sesame_results::report::{Replay, replay_text};
 
-use crate::campaign::{Job, JobResult, SingleSettings, default_timeout, run_single};
-use crate::cli::execution::{claim_files, interruptible, refuse_unfilled, seconds};
+use crate::campaign::{Job, JobResult, SingleSettings, TraceRequest, default_timeout, run_single};
+use crate::cli::execution::{claim_files, interruptible, refuse_unfilled, seconds, shown};
 use crate::cli::failure::{Failure, NOT_AS_REQUIRED, STOPPED};
 use crate::cli::results_folder::{open, refuse_changed};
+use crate::cli::scratch::Scratch;
 use crate::cli::session::Session;
 use crate::cli::terminal::Format;
 use crate::cli::terminal::{print, print_json, say, text_options};
@@ -30,6 +29,10 @@ pub struct Options {
     test: String,
     #[command(flatten)]
     which: Which,
+    /// Write the trace of the run as that of the recorded test, if it comes out the same: `traces/T158.mcap` in the folder
+    /// of the run
+    #[arg(long)]
+    record: bool,
     /// Seconds of wall time after which it is stopped; by default 20 times what it took, at least 60, or what stopped
     /// it
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
@@ -44,17 +47,25 @@ pub(super) fn replay(session: &Session, options: &Options) -> Result<ExitCode, F
     let files = claim_files(&session.runner, plan)?;
     refuse_unfilled(&session.runner, plan, true)?;
     let interrupted = interruptible()?;
-    let folder = Scratch::new()?;
+    let folder = Scratch::new("replay")?;
+    // It gets its place once it is known to be of the recorded run.
+    let recorded = folder.path().join("recorded.mcap");
+    let trace = options.record.then(|| TraceRequest { file: recorded.clone(), keep: Recorded::All });
     let settings = SingleSettings {
         program: session.program.clone(),
-        directory: folder.0.clone(),
+        directory: folder.path().to_owned(),
         timeout: options.timeout.unwrap_or_else(|| limit(&record)),
     };
-    let job =
-        Job { number: record.number, test: record.test.clone(), simulator_seed: record.simulator_seed, trace: None };
+    let job = Job {
+        number: record.number,
+        test: record.test.clone(),
+        simulator_seed: record.simulator_seed,
+        trace,
+        compensation: repository.plan().compensation.clone(),
+    };
     let ended = run_single(job, &settings, &interrupted);
     files.finish()?;
-    let Some(JobResult { observation: again, notes, lock_stepped, .. }) = ended? else {
+    let Some(JobResult { observation: again, notes, lock_stepped, trace_failure, .. }) = ended? else {
         say(format_args!("stopped; a replay leaves nothing behind"));
         return Ok(ExitCode::from(STOPPED));
     };
@@ -71,6 +82,14 @@ pub(super) fn replay(session: &Session, options: &Options) -> Result<ExitCode, F
         same: differences.is_empty(),
         differences,
     };
+    if let Some(reason) = trace_failure {
+        return Err(Failure(format!("the trace of {} could not be written: {reason}", replay.test)));
+    }
+    if options.record && replay.same {
+        let file = trace_file(repository.folder(), record.number);
+        keep(&recorded, &file)?;
+        say(format_args!("recorded in {}", shown(&file)));
+    }
     match options.which.format {
         Format::Text => print(&replay_text(&replay, text_options()))?,
         Format::Json => print_json(&replay)?,
@@ -78,35 +97,21 @@ pub(super) fn replay(session: &Session, options: &Options) -> Result<ExitCode, F
     Ok(ExitCode::from(if replay.same || !lock_stepped { 0 } else { NOT_AS_REQUIRED }))
 }
 
+/// Puts a trace into its place, whole or not at all.
+fn keep(recorded: &Path, file: &Path) -> Result<(), Failure> {
+    let folder = file.parent().unwrap_or(Path::new("."));
+    let cannot = |error: std::io::Error| Failure(format!("cannot write the trace: {error}: {}", file.display()));
+    std::fs::create_dir_all(folder).map_err(cannot)?;
+    // The scratch folder may be on another file system.
+    let beside = file.with_extension("mcap.unfinished");
+    std::fs::copy(recorded, &beside).map_err(cannot)?;
+    std::fs::rename(&beside, file).map_err(cannot)
+}
+
 /// How long the test may take now.
 pub(super) fn limit(record: &TestRecord) -> Duration {
     match record.observation.outcome {
         Outcome::Timeout { limit } => Duration::from_secs_f64(limit),
         _ => default_timeout(record.observation.wall.run),
-    }
-}
-
-/// A folder for the worker that goes when it is no longer needed: a replay leaves nothing behind.
-struct Scratch(PathBuf);
-
-impl Scratch {
-    fn new() -> Result<Self, Failure> {
-        let moment = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default().as_nanos();
-        let folder = std::env::temp_dir().join(format!("sesame-replay-{}-{moment:x}", std::process::id()));
-        let mut builder = DirBuilder::new();
-        // Others must not write in it: it names the program that the worker starts.
-        #[cfg(unix)]
-        builder.mode(0o700);
-        builder
-            .create(&folder)
-            .map_err(|error| Failure(format!("cannot make a folder for the worker: {error}: {}", folder.display())))?;
-        Ok(Scratch(folder))
-    }
-}
-
-impl Drop for Scratch {
-    fn drop(&mut self) {
-        // What cannot be removed is left to the system, which clears its temporary files.
-        std::fs::remove_dir_all(&self.0).ok();
     }
 }

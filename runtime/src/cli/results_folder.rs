@@ -34,3 +34,14 @@ pub(super) fn refuse_changed(session: &Session, repository: &Repository, test: u
         session.caller.command("export", &[&format!("T{test}"), "--results", &shown(repository.folder())])
     )))
 }
+
+/// Insists that results are of the model of this runner.
+pub(super) fn refuse_other_model(session: &Session, repository: &Repository) -> Result<(), Failure> {
+    match repository.plan().model_difference(&session.plan) {
+        None => Ok(()),
+        Some(difference) => Err(Failure(format!(
+            "the model has changed since {} was recorded ({difference})",
+            shown(repository.path())
+        ))),
+    }
+}

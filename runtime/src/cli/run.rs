@@ -10,7 +10,7 @@ use sesame_results::record::{self, Recorder};
 
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled, shown};
 use crate::cli::failure::Failure;
-use crate::cli::results_folder::run_folder;
+use crate::cli::results_folder::{open, refuse_other_model, run_folder};
 use crate::cli::session::Session;
 
 /// How a campaign is run. Nothing here but the seed and the number of evaluations changes results.
@@ -22,6 +22,10 @@ pub(super) struct Options {
     /// Evaluate this many tests instead of the campaign's number
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     evaluations: Option<u32>,
+    /// Run with the simulation as `compensate` fitted it to a lab: the folder with its results, for example
+    /// `results/42-hall-compensated`
+    #[arg(long, value_name = "DIR")]
+    compensation: Option<PathBuf>,
     /// Run although a hook of an objective is not filled in: tests then count as unmeasured
     #[arg(long)]
     allow_unimplemented: bool,
@@ -52,13 +56,30 @@ pub(super) fn run(session: &Session, options: &Options) -> Result<ExitCode, Fail
     if let Some(wanted) = options.evaluations {
         plan.campaign.search.set_evaluations(wanted);
     }
+    let seed = options.seed.unwrap_or(plan.campaign.seed);
+    let mut name = seed.to_string();
+    if let Some(folder) = &options.compensation {
+        let compensated = open(results, Some(folder))?;
+        refuse_other_model(session, &compensated)?;
+        let Some(compensation) = compensated.plan().compensation.clone() else {
+            return Err(Failure(format!(
+                "{} has no compensation: `compensate` fits the simulation to a lab and records one",
+                shown(compensated.path())
+            )));
+        };
+        name = compensated_name(&name, &compensation.lab);
+        plan.compensation = Some(compensation);
+    }
     let files = claim_files(&session.runner, &plan)?;
     refuse_unfilled(&session.runner, &plan, options.allow_unimplemented)?;
-    let seed = options.seed.unwrap_or(plan.campaign.seed);
     let results = options.results.as_deref().unwrap_or(results);
-    let (recorder, folder) =
-        begin(session, results, &seed.to_string(), &plan, &Task::Campaign, seed, &options.execution)?;
+    let (recorder, folder) = begin(session, results, &name, &plan, &Task::Campaign, seed, &options.execution)?;
     execute(session, recorder, &folder, &options.execution, &options.output, files)
+}
+
+/// The name of the results of a campaign whose simulation is compensated for a lab.
+pub(super) fn compensated_name(seed: &str, lab: &str) -> String {
+    format!("{seed}-like-{lab}")
 }
 
 pub(super) fn resume(session: &Session, options: &ResumeOptions) -> Result<ExitCode, Failure> {

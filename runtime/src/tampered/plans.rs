@@ -3,10 +3,10 @@
 use sesame_plan::condition::{ConditionEnd, ConditionSpace};
 use sesame_plan::testing::{field, lab, message, minimal, node, topic};
 use sesame_plan::{
-    Activation, ActivationMode, Answer, Bound, CampaignPlan, Clock, Command, Dimension, Domain, Interface,
-    InterfaceField, KnownTestId, LabBudget, Launch, Lifecycle, MessageId, MessageType, MetricId, MetricSource, Node,
-    NodeId, OperationId, RankOrder, Ready, ReadyWhen, RelayBudget, Ros2, Search, Simulator, StepBy, Stepping, Strategy,
-    Topic, TopicId, Transport, Type, WireType, Wiring,
+    Activation, ActivationMode, Adjustment, Answer, Bound, CampaignPlan, Clock, Command, Dimension, Domain, Fitted,
+    Interface, InterfaceField, KnownTestId, LabBudget, Launch, Lifecycle, MessageId, MessageType, MetricId,
+    MetricSource, Node, NodeId, OperationId, RankOrder, Ready, ReadyWhen, RelayBudget, Ros2, Search, Simulator, StepBy,
+    Stepping, Strategy, Topic, TopicId, Transport, Type, WireType, Wiring,
 };
 use sesame_results::record::sample;
 
@@ -14,6 +14,10 @@ use super::whole::rich;
 
 fn budget(plan: &mut CampaignPlan) -> &mut LabBudget {
     plan.labs[0].budget.as_mut().expect("its lab has one")
+}
+
+fn adjustments(plan: &mut CampaignPlan) -> &mut Vec<Adjustment> {
+    &mut plan.compensation.as_mut().expect("it has one").adjustments
 }
 
 /// A change to a plan, and what is then said of it.
@@ -100,6 +104,15 @@ fn each_thing_that_later_code_relies_on_is_asked_for() {
         (|plan| budget(plan).over.push(Dimension::T1), "labs[0].budget.over: T1 is there twice"),
         (|plan| plan.labs[0].tolerances[0].value = -1.0, "labs[0].tolerances[0].value: -1 is below 0"),
         (|plan| plan.labs[0].interlock.push(MetricId(0)), "labs[0].interlock: MetricId(0) is there twice"),
+        (|plan| plan.labs[0].fits[0].low = -0.1, "labs[0].fits[0].low: -0.1 is below 0"),
+        (|plan| plan.labs[0].fits[0].low = 0.6, "labs[0].fits[0]: 0.6 is above 0.5"),
+        (
+            |plan| plan.labs[0].fits[0].what = Fitted::Delay { topic: Some(TopicId(99)) },
+            "labs[0].fits[0].what.topic: there is no topic 99",
+        ),
+        (|plan| adjustments(plan)[1].levels.clear(), "compensation.adjustments[1].levels: there is none"),
+        (|plan| adjustments(plan)[1].levels[0] = f64::NAN, "compensation.adjustments[1].levels[0]: NaN"),
+        (|plan| adjustments(plan)[0].levels[0] = -1.0, "compensation.adjustments[0].levels[0]: -1 is below 0"),
     ];
     let by_condition: &[Altered] = &[
         (

@@ -7,9 +7,9 @@ use sesame_base::observation::{OperationEffect, Outcome};
 use sesame_plan::condition::ConditionEnd;
 use sesame_plan::testing::lab;
 use sesame_plan::{
-    BoostedChildren, CampaignPlan, Confirmation, CoverageGoal, Dimension, Expectation, Exploration, Failing, GridAxis,
-    Lab, LabBudget, LabExclusion, LabTask, LabTest, LabTolerance, MetricId, RankKey, RankOrder, RequirementId,
-    Shrinking, Statistic, StopRule, Task,
+    Adjustment, BoostedChildren, CampaignPlan, Compensation, Confirmation, CoverageGoal, Dimension, Expectation,
+    Exploration, Failing, Fit, Fitted, GridAxis, Lab, LabBudget, LabExclusion, LabTask, LabTest, LabTolerance,
+    MetricId, RankKey, RankOrder, RequirementId, Shrinking, Statistic, StopRule, Task, TopicId,
 };
 use sesame_results::record::{DATABASE, GenerationCoverage, Origin, Recorder, Repetition, sample};
 use sesame_search as search;
@@ -58,8 +58,17 @@ pub(super) fn rich() -> CampaignPlan {
         budget: Some(LabBudget { limit: 5.0, lambda: 0.5, over: vec![Dimension::T1, Dimension::P1] }),
         tolerances: vec![LabTolerance { metric: MetricId(1), value: 1.0 }],
         interlock: vec![MetricId(0)],
+        fits: vec![Fit { what: Fitted::Delay { topic: Some(TopicId(0)) }, low: 0.0, high: 0.5 }],
         ..lab("lab")
     }];
+    let servo = Fitted::Parameter { name: "servo_gain".to_owned() };
+    plan.compensation = Some(Compensation {
+        lab: "lab".to_owned(),
+        adjustments: vec![
+            Adjustment { what: Fitted::Delay { topic: None }, levels: vec![0.04] },
+            Adjustment { what: servo, levels: vec![0.9, 1.1] },
+        ],
+    });
     plan
 }
 

@@ -1,9 +1,10 @@
 //! Labs.
 
-use sesame_dsl::model::physical::{LabSetting, LabSimulator, Physical};
+use sesame_dsl::model::physical::{Fit, LabSetting, LabSimulator, Physical};
 use sesame_dsl::model::{self, Space};
 use sesame_plan as plan;
 
+use super::id::topic_id;
 use super::ros2::ros2;
 use super::selection::Selection;
 
@@ -68,6 +69,25 @@ impl Selection {
                 .map(|&(metric, value)| plan::LabTolerance { metric: self.metric(metric), value })
                 .collect(),
             interlock: lab.interlock.iter().map(|&metric| self.metric(metric)).collect(),
+            fits: lab.fits.iter().map(fit).collect(),
         }
     }
+}
+
+fn fit(fit: &Fit) -> plan::Fit {
+    let (what, range) = match fit {
+        Fit::RelayDelay(topic, range) => (plan::Fitted::Delay { topic: topic.map(topic_id) }, range),
+        Fit::Relay { kind, target, range } => {
+            let values = plan::Values { topic: topic_id(target.topic), places: target.places.clone() };
+            let what = match kind {
+                model::OperationKind::Scale => plan::Fitted::Scale(values),
+                model::OperationKind::Bias => plan::Fitted::Bias(values),
+                model::OperationKind::Noise => plan::Fitted::Noise(values),
+                _ => unreachable!("a relay is fitted by a scale, a bias or noise"),
+            };
+            (what, range)
+        }
+        Fit::Parameter(name, range) => (plan::Fitted::Parameter { name: name.clone() }, range),
+    };
+    plan::Fit { what, low: range.low, high: range.high }
 }

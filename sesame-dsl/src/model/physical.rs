@@ -1,10 +1,11 @@
 //! Physical labs: how tests are chosen for one, run in it, and compared with simulation.
 
-use sesame_plan::Bound;
+use sesame_plan::{Bound, OperationKind};
 pub use sesame_plan::{LabBudget, LabCost, RankOrder};
 
 use super::declaration::Declaration;
-use super::ids::MetricId;
+use super::fuzz::Target;
+use super::ids::{MetricId, TopicId};
 use super::metrics::Range;
 
 /// A lab.
@@ -104,8 +105,18 @@ pub enum Place {
 /// Something that may be fitted within a range.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Fit {
-    /// A delay of all messages, in seconds; 0 or more.
-    RelayDelay(Range),
+    /// A delay of the messages of a topic, in seconds; 0 or more. Without a topic, of all messages that nodes receive.
+    RelayDelay(Option<TopicId>, Range),
+    /// What the relay does to values in messages, as an operation of this kind: scale, bias or noise. The range is that
+    /// of the operation's parameter.
+    Relay {
+        /// Scale, bias or noise.
+        kind: OperationKind,
+        /// Which values.
+        target: Target,
+        /// The permitted factor, bias or standard deviation, in the unit of the values.
+        range: Range,
+    },
     /// A parameter of the simulator, a plain number.
     Parameter(String, Range),
 }

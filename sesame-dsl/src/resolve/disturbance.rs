@@ -88,7 +88,12 @@ impl<'a> Resolver<'a> {
     }
 
     /// A kind of which the rule of the grammar says everything but the amount after its words.
-    fn plain(&mut self, target: &'a ast::Target, rule: Rule, amounts: Option<&'a ast::Amounts>) -> Option<Resolved> {
+    pub(super) fn plain(
+        &mut self,
+        target: &'a ast::Target,
+        rule: Rule,
+        amounts: Option<&'a ast::Amounts>,
+    ) -> Option<Resolved> {
         match (rule, amounts) {
             (Rule::bias, Some(amounts)) => {
                 let (target, held) = self.amounts_of(target, "a bias")?;

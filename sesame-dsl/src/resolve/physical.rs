@@ -7,7 +7,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::model::physical::{
     Fit, Form, LabBudget, LabCost, LabSetting, LabSimulator, Physical, Place, RankOrder, Shape,
 };
-use crate::model::{Dimension, Id as _, MetricId};
+use crate::model::{Dimension, Domain, Id as _, MetricId, Parameter};
 use crate::similar::most_similar;
 use crate::span::Span;
 use crate::syntax::ast::physical as written;
@@ -339,7 +339,23 @@ impl<'a> Resolver<'a> {
 
     fn fit(&mut self, fit: &'a written::Fit) -> Option<Fit> {
         match fit {
-            written::Fit::Delay(range) => Some(Fit::RelayDelay(self.times(range, "the delay of a relay")?)),
+            written::Fit::Delay(target, range) => {
+                let topic = match target {
+                    Some(target) => self.whole_messages(target, "a relay delays").map(|found| Some(found.topic)),
+                    None => Some(None),
+                };
+                let delay = self.times(range, "the delay of a relay");
+                Some(Fit::RelayDelay(topic?, delay?))
+            }
+            written::Fit::Relay { rule, target, amounts } => {
+                let (target, kind, parameters) = self.plain(target, *rule, Some(amounts))?;
+                match parameters.as_slice() {
+                    [Parameter { domain: Domain::Number { range, .. }, .. }] => {
+                        Some(Fit::Relay { kind, target, range: *range })
+                    }
+                    _ => unreachable!("a scale, a bias and a noise of numbers have one parameter"),
+                }
+            }
             written::Fit::Parameter(name, range) => {
                 let permitted = self.range(range, None, &format!("parameter \"{}\"", name.text))?;
                 Some(Fit::Parameter(name.text.clone(), permitted))

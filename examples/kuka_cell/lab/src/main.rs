@@ -1,7 +1,7 @@
 //! A stand-in for the lab of the gearbox cell, where no robot is at hand.
 //!
 //! It is reached as a simulator is that is a program (`process "kuka_cell_lab"`), and differs from the model: targets
-//! arrive later, the zones were measured a little differently, drives ignore targets that jump. Its arguments say by
+//! arrive later, the zones were measured a little differently, an axis has a limit that the model does not know. Its arguments say by
 //! how much, so that a study can be repeated with other gaps, or with none.
 
 use std::io;
@@ -20,7 +20,7 @@ Usage: kuka_cell_lab [OPTION VALUE]…
       --latency MS        how late targets arrive at the drives [default: 50]
       --noise SHARE       the strength of the torque noise, as a share of the model's [default: 1]
       --zone-shift X,Y,Z  how far the zones are from where the model has them, in mm [default: 30,-20,0]
-      --jump-limit RAD    drives ignore a target that is further than this from the last; `none` for any [default: 0.25]
+      --soft-limit RAD    targets of the product arm's second axis are cut to this; `none` for no limit [default: 1.1]
       --as-modelled       no difference from the noisy model, except for the options after it
 ";
 
@@ -66,8 +66,8 @@ fn reality(arguments: &[String]) -> Result<Reality, String> {
                 let axes: [f64; 3] = axes.try_into().map_err(|_| format!("`{option}` takes three numbers"))?;
                 reality.zone_shift = axes.map(|axis| axis / 1000.0);
             }
-            "--jump-limit" if value == "none" => reality.jump_limit = None,
-            "--jump-limit" => reality.jump_limit = Some(not_negative(option, value)?),
+            "--soft-limit" if value == "none" => reality.soft_limit = None,
+            "--soft-limit" => reality.soft_limit = Some(not_negative(option, value)?),
             _ => return Err(format!("there is no option `{option}`")),
         }
     }
@@ -103,9 +103,9 @@ mod tests {
         assert_eq!(read(&["--latency", "80", "--as-modelled"]), Ok(Reality::AS_MODELLED));
         let latency = SimTime::from_nanos(80_000_000);
         assert_eq!(read(&["--as-modelled", "--latency", "80"]), Ok(Reality { latency, ..Reality::AS_MODELLED }));
-        let shifted = read(&["--zone-shift", "1, -2.5,0", "--noise", "0.5", "--jump-limit", "none"]);
+        let shifted = read(&["--zone-shift", "1, -2.5,0", "--noise", "0.5", "--soft-limit", "none"]);
         let zone_shift = [0.001, -0.0025, 0.0];
-        assert_eq!(shifted, Ok(Reality { zone_shift, noise_share: 0.5, jump_limit: None, ..Reality::default() }));
+        assert_eq!(shifted, Ok(Reality { zone_shift, noise_share: 0.5, soft_limit: None, ..Reality::default() }));
     }
 
     #[test]

@@ -67,7 +67,7 @@ fn json(value: &Value) -> serde_json::Value {
 
 #[test]
 fn as_modelled_it_has_the_runs_of_the_noisy_cell_to_the_last_bit() {
-    let mut bench = Bench::<NoisyCell>::start(&Setup { seed: 7, step: STEP }).expect("the cell starts");
+    let mut bench = Bench::<NoisyCell>::start(&Setup::new(7, STEP)).expect("the cell starts");
     bench.run_until(SimTime::from_nanos(STEP.nanos() * i64::from(STEPS))).expect("the cell runs");
     let inside: Published = bench
         .topics()
@@ -95,8 +95,8 @@ fn each_difference_shows_where_it_acts() {
     let late = served(7, &["--as-modelled", "--latency", "50"]);
     assert!(!same(&late, STATE));
 
-    // What the PLC sends does not jump.
-    let limited = served(7, &["--as-modelled", "--jump-limit", "0.25"]);
+    // What the PLC sends is below the limit.
+    let limited = served(7, &["--as-modelled", "--soft-limit", "1.1"]);
     assert!(same(&limited, STATE) && same(&limited, ZONE));
 
     let quiet = served(7, &["--as-modelled", "--noise", "0"]);

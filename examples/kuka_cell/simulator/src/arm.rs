@@ -115,12 +115,13 @@ pub struct Arm {
 #[derive(Debug, Clone, Default)]
 struct FieldBus {
     latency: SimTime,
-    jump_limit: Option<f64>,
+    soft_limit: Option<f64>,
     /// The joint, its target, and when it arrives; the earliest first.
     underway: VecDeque<(SimTime, usize, f64)>,
-    /// The last target of each joint that a drive was sent.
-    sent: [Option<f64>; 6],
 }
+
+/// The joint of the second axis, the lower arm.
+const SECOND_AXIS: usize = 1;
 
 impl Arm {
     /// An arm at rest; opens its topics.
@@ -141,16 +142,15 @@ impl Arm {
         }
     }
 
-    /// Targets take this long to arrive at the drives. A drive ignores one that is further than `jump_limit`, in rad,
-    /// from the one that it was sent before.
-    pub fn reach_drives_by(&mut self, latency: SimTime, jump_limit: Option<f64>) {
+    /// Targets take this long to arrive at the drives. Those of the second axis are cut to `soft_limit`, in rad.
+    pub fn reach_drives_by(&mut self, latency: SimTime, soft_limit: Option<f64>) {
         self.field_bus.latency = latency;
-        self.field_bus.jump_limit = jump_limit;
+        self.field_bus.soft_limit = soft_limit;
     }
 
     /// Takes the targets that have arrived, the last one of each joint. Values that are not numbers are ignored.
     pub fn receive(&mut self, bus: &mut Bus<'_>) {
-        let FieldBus { latency, jump_limit, underway, sent } = &mut self.field_bus;
+        let FieldBus { latency, soft_limit, underway } = &mut self.field_bus;
         for (joint, &port) in self.targets.iter().enumerate() {
             while let Some(message) = bus.receive(port) {
                 if let Some(target) = message.number_at::<&str>(&[]) {
@@ -162,11 +162,8 @@ impl Arm {
             && arrives <= bus.now()
         {
             underway.pop_front();
-            let before = sent[joint].replace(target);
-            let jumps = before.zip(*jump_limit).is_some_and(|(before, limit)| (target - before).abs() > limit);
-            if !jumps {
-                self.servos[joint].aim(target);
-            }
+            let limit = soft_limit.filter(|_| joint == SECOND_AXIS).unwrap_or(f64::INFINITY);
+            self.servos[joint].aim(target.min(limit));
         }
     }
 

@@ -15,6 +15,9 @@ use crate::zones::ZoneMonitor;
 /// The topic of the fastest gripper's speed, in m/s.
 pub const GRIPPER_SPEED_TOPIC: &str = "cell/gripper_speed";
 
+/// Parameters: how far the zones are from where the model has them, in m.
+pub(crate) const ZONE_SHIFT: [&str; 3] = ["zone_shift_x", "zone_shift_y", "zone_shift_z"];
+
 /// The longest step that still moves smoothly.
 const LONGEST_STEP: SimTime = SimTime::from_nanos(50_000_000);
 
@@ -44,8 +47,9 @@ impl RealCell {
     /// Starts a cell that differs so from the model.
     pub fn start_as(reality: &Reality, setup: &Setup, bus: &mut Bus<'_>) -> Result<Self, SimulatorError> {
         let mut world = World::start_shifted(setup, Vector::from_array(reality.zone_shift), bus)?;
-        for arm in &mut world.arms {
-            arm.reach_drives_by(reality.latency, reality.jump_limit);
+        for (at, arm) in world.arms.iter_mut().enumerate() {
+            // The first one moves the product.
+            arm.reach_drives_by(reality.latency, reality.soft_limit.filter(|_| at == 0));
         }
         let noise = torque_noise(setup, &world);
         Ok(RealCell { world, noise, noise_share: reality.noise_share })
@@ -127,7 +131,10 @@ impl World {
     }
 
     /// With the zones elsewhere by so many metres.
+    ///
+    /// Where the zones are is also what a study may fit to a lab: three parameters of the simulator, in metres.
     fn start_shifted(setup: &Setup, zone_shift: Vector, bus: &mut Bus<'_>) -> Result<Self, SimulatorError> {
+        let zone_shift = zone_shift + Vector::from_array(ZONE_SHIFT.map(|axis| setup.parameter(axis, 0.0)));
         let step = setup.step;
         if step <= SimTime::ZERO || step > LONGEST_STEP {
             return Err(SimulatorError(format!(

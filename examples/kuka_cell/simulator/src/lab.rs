@@ -13,16 +13,16 @@ pub struct Reality {
     pub noise_share: f64,
     /// How far the zones are from where the model has them, in m: they were measured by hand.
     pub zone_shift: [f64; 3],
-    /// A drive takes a target that is further than this from the last one, in rad, for a broken telegram, and goes on
-    /// towards the last one. Targets of the PLC are 0.04 rad apart at most, so only strong disturbances are weaker than
-    /// in the model.
-    pub jump_limit: Option<f64>,
+    /// The software limit of the product arm's second axis, in rad: whoever put the cell into service set it, and the
+    /// model does not know of it. Targets beyond are cut to it. The PLC's own are below 0.9 rad, so only strong
+    /// disturbances are weaker than in the model.
+    pub soft_limit: Option<f64>,
 }
 
 impl Reality {
     /// What does not differ from [`crate::NoisyCell`].
     pub const AS_MODELLED: Reality =
-        Reality { latency: SimTime::ZERO, noise_share: 1.0, zone_shift: [0.0; 3], jump_limit: None };
+        Reality { latency: SimTime::ZERO, noise_share: 1.0, zone_shift: [0.0; 3], soft_limit: None };
 }
 
 impl Default for Reality {
@@ -30,7 +30,7 @@ impl Default for Reality {
         Reality {
             latency: SimTime::from_nanos(50_000_000),
             zone_shift: [0.03, -0.02, 0.0],
-            jump_limit: Some(0.25),
+            soft_limit: Some(1.1),
             ..Reality::AS_MODELLED
         }
     }

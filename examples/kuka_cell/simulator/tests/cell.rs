@@ -251,7 +251,7 @@ fn torque_noise_follows_the_seed_and_breaks_nothing_by_itself() {
 
 #[test]
 fn a_step_that_does_not_suit_is_refused_in_words() {
-    let start = |nanos| Bench::<Cell>::start(&Setup { seed: 0, step: SimTime::from_nanos(nanos) }).err();
+    let start = |nanos| Bench::<Cell>::start(&Setup::new(0, SimTime::from_nanos(nanos))).err();
     for nanos in [0, -20_000_000, 100_000_000] {
         let message = start(nanos).expect("refused").to_string();
         assert!(message.contains("at most 50 ms"), "{message}");

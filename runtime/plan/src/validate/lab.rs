@@ -1,6 +1,6 @@
-//! Labs.
+//! Labs, and what brings a simulation closer to one.
 
-use crate::{CampaignPlan, Lab, LabCost, RankOrder};
+use crate::{CampaignPlan, Compensation, Fitted, Lab, LabCost, RankOrder};
 
 use super::bound;
 use super::check::{Checked, at, at_least_one, distinct, each, filled, finite, name, positive, require, share};
@@ -8,6 +8,11 @@ use super::check::{Checked, at, at_least_one, distinct, each, filled, finite, na
 fn not_negative(number: f64) -> Checked {
     finite(number)?;
     require(number >= 0.0, || format!("{number} is below 0"))
+}
+
+/// A value that something of a simulation can be set to.
+fn level(what: &Fitted, value: f64) -> Checked {
+    if what.is_not_negative() { not_negative(value) } else { finite(value) }
 }
 
 impl CampaignPlan {
@@ -40,6 +45,30 @@ impl CampaignPlan {
             at("value", not_negative(tolerance.value))
         })?;
         at("interlock", distinct(&lab.interlock))?;
-        each("interlock", &lab.interlock, |&metric| self.has_metric(metric))
+        each("interlock", &lab.interlock, |&metric| self.has_metric(metric))?;
+        at("fits", distinct(lab.fits.iter().map(|fit| &fit.what)))?;
+        each("fits", &lab.fits, |fit| {
+            at("what", self.sound_fitted(&fit.what))?;
+            at("low", level(&fit.what, fit.low))?;
+            at("high", level(&fit.what, fit.high))?;
+            require(fit.low <= fit.high, || format!("{} is above {}", fit.low, fit.high))
+        })
+    }
+
+    pub(super) fn sound_compensation(&self, compensation: &Compensation) -> Checked {
+        at("lab", name(&compensation.lab))?;
+        at("adjustments", distinct(compensation.adjustments.iter().map(|it| &it.what)))?;
+        each("adjustments", &compensation.adjustments, |it| {
+            at("what", self.sound_fitted(&it.what))?;
+            at("levels", filled(&it.levels))?;
+            each("levels", &it.levels, |&value| level(&it.what, value))
+        })
+    }
+
+    fn sound_fitted(&self, what: &Fitted) -> Checked {
+        if let Fitted::Parameter { name: parameter } = what {
+            at("name", name(parameter))?;
+        }
+        what.topic().map_or(Ok(()), |topic| at("topic", self.has_topic(topic)))
     }
 }

@@ -42,6 +42,9 @@ pub trait Exchange {
     fn message(&mut self, now: SimTime, wire: Wire, value: Value, deliveries: &mut Vec<Delivery>) {
         self.message_from(now, wire, None, value, deliveries);
     }
+    /// Parameters of the simulator that have other values in this run than the simulator gives them, by name. They are
+    /// set before the run begins; one that the simulator does not have is an error.
+    fn parameters(&self) -> &[(String, f64)];
     /// What operations on nodes want done since the last call, in this order. A transport without nodes has nothing to
     /// do with them.
     fn take_orders(&mut self) -> Vec<Order>;

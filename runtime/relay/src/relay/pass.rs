@@ -9,7 +9,12 @@ use crate::relay::{COPIES_LIMIT, Delivery, HELD_LIMIT, Listener as _, OperationE
 impl Relay<'_> {
     /// Takes a message through the rest of its pipeline.
     pub(super) fn pass(&mut self, now: SimTime, mut message: Held, deliveries: &mut Vec<Delivery>) {
-        while let Some(&(at, member)) = self.pipelines[message.wire.index()].get(message.next_stage) {
+        loop {
+            let wire = message.wire.index();
+            if message.next_stage == self.disturbed_by[wire] {
+                self.disturbed(now, &message, deliveries);
+            }
+            let Some(&(at, member)) = self.pipelines[wire].get(message.next_stage) else { break };
             message.next_stage += 1;
             let heard = self.heard[message.wire.index()];
             let stage = &mut self.operations[at];
@@ -74,16 +79,21 @@ impl Relay<'_> {
                 return;
             }
         }
-        if self.wires.link(message.wire).is_none() {
-            if self.phase != Phase::Over {
-                self.metrics.delivered(now, message.wire, message.published, &message.value);
-                for tap in &mut self.taps {
-                    tap.delivered(now, message.wire, message.published, &message.value);
-                }
-            }
-            self.fan_out(now, &message, deliveries);
-        }
         deliveries.push(Delivery { wire: message.wire, index: message.published, value: message.value });
+    }
+
+    /// A message has passed all operations of the test on its wire.
+    fn disturbed(&mut self, now: SimTime, message: &Held, deliveries: &mut Vec<Delivery>) {
+        if self.wires.link(message.wire).is_some() {
+            return;
+        }
+        if self.phase != Phase::Over {
+            self.metrics.delivered(now, message.wire, message.published, &message.value);
+            for tap in &mut self.taps {
+                tap.delivered(now, message.wire, message.published, &message.value);
+            }
+        }
+        self.fan_out(now, message, deliveries);
     }
 
     /// Sends a copy of a message on each of the links of its wire.

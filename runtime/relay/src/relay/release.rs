@@ -87,6 +87,7 @@ impl Ord for Entry {
 pub(super) struct ReleaseQueue {
     heap: BinaryHeap<Reverse<Entry>>,
     sequence: u64,
+    wires: usize,
     /// Per operation and wire: how many messages are held, and when the last one is released.
     tails: Vec<Vec<Tail>>,
     /// Per operation: how many are held on all wires.
@@ -102,10 +103,17 @@ struct Tail {
 impl ReleaseQueue {
     pub(super) fn new(operations: usize, wires: usize) -> Self {
         ReleaseQueue {
+            wires,
             tails: vec![vec![Tail::default(); wires]; operations],
             held: vec![0; operations],
             ..ReleaseQueue::default()
         }
+    }
+
+    /// Makes room for what another operation holds.
+    pub(super) fn add_operation(&mut self) {
+        self.tails.push(vec![Tail::default(); self.wires]);
+        self.held.push(0);
     }
 
     pub(super) fn len(&self) -> usize {

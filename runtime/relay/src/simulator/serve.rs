@@ -40,7 +40,8 @@ pub fn serve<S: Simulator>(
     while let Some(request) = lines.next()? {
         match request {
             Request::Reset(reset) => {
-                let setup = Setup { seed: reset.seed, step: SimTime::from_seconds(reset.step) };
+                let setup = Setup::new(reset.seed, SimTime::from_seconds(reset.step));
+                let setup = setup.with_parameters(reset.parameters);
                 world = match World::start(&setup, &mut start, &mut lines)? {
                     Ok(started) => Some(started),
                     Err(error) => {
@@ -76,6 +77,9 @@ struct Reset {
     seed: u64,
     /// Seconds.
     step: f64,
+    /// What is not as the simulator has it.
+    #[serde(default)]
+    parameters: BTreeMap<String, f64>,
 }
 
 #[derive(Deserialize)]
@@ -153,10 +157,15 @@ impl<S: Simulator> World<S> {
             Ok(simulator) => simulator,
             Err(error) => return Ok(Err(error)),
         };
+        let parameters = setup.asked();
         let mut line = b"{\"ready\":{\"publishes\":".to_vec();
         names(topics.opened.iter(), &mut line);
         line.extend_from_slice(b",\"subscribes\":");
         names(topics.opened.iter().filter(|topic| topic.inbox.is_some()), &mut line);
+        if !parameters.is_empty() {
+            line.extend_from_slice(b",\"parameters\":");
+            list(parameters.iter().map(String::as_str), &mut line);
+        }
         line.extend_from_slice(b",\"resets\":true,\"messages\":[");
         line.append(&mut topics.pending);
         line.extend_from_slice(b"]}}");
@@ -191,12 +200,16 @@ impl<S: Simulator> World<S> {
 }
 
 fn names<'a>(topics: impl Iterator<Item = &'a Topic>, line: &mut Vec<u8>) {
+    list(topics.map(|topic| topic.path.as_str()), line);
+}
+
+fn list<'a>(texts: impl Iterator<Item = &'a str>, line: &mut Vec<u8>) {
     line.push(b'[');
-    for (at, topic) in topics.enumerate() {
+    for (at, text) in texts.enumerate() {
         if at > 0 {
             line.push(b',');
         }
-        json::quoted(&topic.path, line);
+        json::quoted(text, line);
     }
     line.push(b']');
 }

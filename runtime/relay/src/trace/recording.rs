@@ -195,7 +195,7 @@ pub fn feed(
 }
 
 /// Reads a file from start to end, a record at a time.
-fn read(
+pub(super) fn read(
     file: File,
     path: &Path,
     each: &mut dyn FnMut(Record<'_>) -> Result<(), RecordingError>,
@@ -429,7 +429,7 @@ fn timed(subject: &BTreeMap<String, String>, effects: &str) -> serde_json::Resul
 }
 
 /// Reads a payload. If it is not an object, it may also stand alone, without the object around it.
-fn payload(plan: &CampaignPlan, shapes: &mut Shapes, ty: &Type, data: &[u8]) -> Result<Value, String> {
+pub(super) fn payload(plan: &CampaignPlan, shapes: &mut Shapes, ty: &Type, data: &[u8]) -> Result<Value, String> {
     #[derive(Deserialize)]
     struct Alone<'a> {
         #[serde(borrow)]

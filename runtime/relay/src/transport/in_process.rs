@@ -51,10 +51,11 @@ impl<S: Simulator> Transport for InProcess<S> {
         self.simulator = None;
         self.now = SimTime::ZERO;
         self.bus = InProcessBus::new(relay.wires().len());
+        let setup = Setup::new(seed, self.step).with_parameters(relay.parameters().iter().cloned());
         let mut linked = RelayedBus { board: &mut self.bus, plan: &self.plan, relay };
-        let setup = Setup { seed, step: self.step };
         let started = S::start(&setup, &mut Bus { now: SimTime::ZERO, wires: &mut linked });
         self.simulator = Some(started.map_err(failed)?);
+        setup.unknown_parameter().map_or(Ok(()), |unknown| Err(failed(unknown)))?;
         self.bus.every_wire_is_open(relay)?;
         self.bus.every_message_fits()
     }

@@ -12,16 +12,17 @@ use sesame_gap::bootstrap::{Resampling, intervals};
 use sesame_gap::equivalence::{self, Equivalence, Reason, Verdict as Equal, lab_runs_needed};
 use sesame_gap::holm::adjusted;
 use sesame_gap::localise::{self, Extent, Words, localise};
+use sesame_gap::next::{Next, Tried, Why, next};
 use sesame_gap::samples::{Samples, Side, Undefined, hedges_g, moments};
-use sesame_gap::split::Located;
+use sesame_gap::split::{Located, Split};
 use sesame_gap::violations::{Confusion, Frequencies, Occurrence, Occurrences, frequencies};
-use sesame_plan::{CampaignPlan, Dimension, Lab, MetricId, Requirement};
+use sesame_plan::{CampaignPlan, Dimension, Lab, LabTask, MetricId, Requirement};
 use sesame_search::sspr::Convention;
 
 use crate::analysis::Datum;
 use crate::present::number::{fixed, plural, quantity};
 use crate::present::table::Table;
-use crate::record::{Origin, RecordError, Repository, TestRow, Verdict};
+use crate::record::{Origin, RecordError, Repetition, Repository, TestRow, Verdict};
 
 /// The probability of an error that verdicts allow.
 pub const ALPHA: f64 = 0.05;
@@ -53,6 +54,12 @@ pub enum GapError {
         /// The file.
         path: PathBuf,
     },
+    /// They are no results of tests that were simulated again for a lab.
+    #[error("{} has no results of `compensate`, which simulates the tests of a lab again", path.display())]
+    NotCompensated {
+        /// The file.
+        path: PathBuf,
+    },
     /// The lab ran tests of another run.
     #[error(
         "{} has results of other tests: its {test} is not that of {}; give the run whose tests were taken to the lab",
@@ -79,8 +86,22 @@ pub enum GapError {
 /// The runs in the results of a lab, without its runs without disturbance. They must be of tests of these results of a
 /// campaign.
 pub fn lab_runs(campaign: &Repository, lab: &Repository) -> Result<Vec<LabRun>, GapError> {
+    let Some(task) = lab.task().in_lab() else { return Err(GapError::NotOfALab { path: lab.path().to_owned() }) };
+    runs_of(campaign, lab, task)
+}
+
+/// The runs in results of `compensate`: the tests that a lab ran, simulated once more. They must be of tests of these
+/// results of a campaign.
+pub fn compensated_runs(campaign: &Repository, again: &Repository) -> Result<Vec<LabRun>, GapError> {
+    match again.task().compensated() {
+        Some(task) => runs_of(campaign, again, task),
+        None => Err(GapError::NotCompensated { path: again.path().to_owned() }),
+    }
+}
+
+/// The runs of a task, without those without disturbance.
+fn runs_of(campaign: &Repository, lab: &Repository, task: &LabTask) -> Result<Vec<LabRun>, GapError> {
     let paths = || (lab.path().to_owned(), campaign.path().to_owned());
-    let Some(task) = lab.task().in_lab() else { return Err(GapError::NotOfALab { path: paths().0 }) };
     // Only the robots may be others.
     let simulator = campaign.plan().simulator.clone();
     let reached = CampaignPlan { simulator, ..lab.plan().clone() };
@@ -110,6 +131,8 @@ pub struct Gap {
     pub events: Vec<EventGap>,
     /// The names of dimensions in which gaps were looked for.
     pub dimensions: Vec<Dimension>,
+    /// The coordinates of the tests in these dimensions, by number.
+    pub points: BTreeMap<u32, Vec<Option<f64>>>,
 }
 
 /// How one metric differs.
@@ -163,32 +186,53 @@ pub struct EventGap {
 
 /// Compares the runs of a lab with the results of the campaign that its tests come from.
 pub fn gap(campaign: &Repository, runs: &[LabRun], lab: Option<&Lab>) -> Result<Gap, RecordError> {
+    compare(campaign, None, runs, lab)
+}
+
+/// Compares the runs of a lab with those in which its tests were simulated again ([`compensated_runs`]). Tests that were
+/// not are left out.
+pub fn gap_after(
+    campaign: &Repository,
+    again: &[LabRun],
+    runs: &[LabRun],
+    lab: Option<&Lab>,
+) -> Result<Gap, RecordError> {
+    compare(campaign, Some(again), runs, lab)
+}
+
+fn compare(
+    campaign: &Repository,
+    again: Option<&[LabRun]>,
+    runs: &[LabRun],
+    lab: Option<&Lab>,
+) -> Result<Gap, RecordError> {
     let plan = campaign.plan();
     let mut by_test: BTreeMap<u32, Vec<&TestRow>> = BTreeMap::new();
     for run in runs {
         by_test.entry(run.of).or_default().push(&run.row);
     }
-    let dimensions = match lab.and_then(|lab| lab.budget.as_ref()) {
-        Some(budget) => budget.over.clone(),
-        None => DIMENSIONS.to_vec(),
-    };
+    let dimensions = dimensions(lab);
     let judge = campaign.judge()?;
-    let mut points = BTreeMap::new();
+    let points = points(campaign, &by_test.keys().copied().collect(), &dimensions)?;
     let mut reference = None;
     campaign.scan(&mut |test| {
         if test.origin == Origin::Reference && reference.is_none() {
             reference = Some(test.values);
-        } else if by_test.contains_key(&test.number) {
-            let point = test.point(plan, Convention::Ours);
-            let at = dimensions.iter().map(|&dimension| point.as_ref().and_then(|point| point.get(dimension)));
-            points.insert(test.number, at.collect::<Vec<_>>());
         }
     })?;
     let mut sides = Vec::with_capacity(by_test.len());
     for (&test, lab_runs) in &by_test {
         let row = campaign.row(test)?;
-        let fresh = judge.runs(row.duplicate_of.unwrap_or(test));
-        sides.push(Sides { test, row, fresh, lab_runs });
+        let simulated = match again {
+            Some(again) => Simulated::Again(again.iter().filter(|run| run.of == test).map(|run| &run.row).collect()),
+            None => match judge.runs(row.duplicate_of.unwrap_or(test)) {
+                [] => Simulated::Selected(Box::new(row)),
+                fresh => Simulated::Fresh(fresh),
+            },
+        };
+        if !matches!(&simulated, Simulated::Again(runs) if runs.is_empty()) {
+            sides.push(Sides { test, simulated, lab_runs });
+        }
     }
 
     let interlocked = lab.map_or(&[][..], |lab| &lab.interlock);
@@ -218,10 +262,7 @@ pub fn gap(campaign: &Repository, runs: &[LabRun], lab: Option<&Lab>) -> Result<
             Verdict::Inconclusive => Occurrence::Inconclusive,
         };
         event(&requirement.name, &sides, |sides| {
-            let simulation = match sides.fresh {
-                [] => Occurrences::of([occurrence(sides.row.verdict(requirement))]),
-                fresh => Occurrences::of(fresh.iter().map(|run| occurrence(run.verdict(requirement)))),
-            };
+            let simulation = Occurrences::of(sides.simulated.verdicts(requirement).into_iter().map(occurrence));
             let lab = Occurrences::of(sides.lab_runs.iter().map(|row| occurrence(row.verdict(requirement))));
             (simulation, lab)
         })
@@ -236,31 +277,78 @@ pub fn gap(campaign: &Repository, runs: &[LabRun], lab: Option<&Lab>) -> Result<
             Some(_) => Occurrence::Seen,
         };
         event(&plan.metric(metric).name, &sides, |sides| {
-            let simulation = match sides.fresh {
-                [] => Occurrences::of([occurrence(sides.row.value(metric).value)]),
-                fresh => Occurrences::of(fresh.iter().map(|run| occurrence(run.value(metric).value))),
-            };
+            let simulation = Occurrences::of(sides.simulated.values(metric).into_iter().map(occurrence));
             let lab = Occurrences::of(sides.lab_runs.iter().map(|row| occurrence(row.value(metric).value)));
             (simulation, lab)
         })
     });
     let events = requirements.chain(interlocks).collect();
-    Ok(Gap { tests: by_test.into_keys().collect(), metrics, events, dimensions })
+    Ok(Gap { tests: sides.iter().map(|sides| sides.test).collect(), metrics, events, dimensions, points })
+}
+
+/// The dimensions in which a gap is looked for: those of the lab's budget, otherwise T1, T2 and P1.
+pub fn dimensions(lab: Option<&Lab>) -> Vec<Dimension> {
+    lab.and_then(|lab| lab.budget.as_ref()).map_or_else(|| DIMENSIONS.to_vec(), |budget| budget.over.clone())
+}
+
+/// The coordinates of these tests in these dimensions, by number.
+pub fn points(
+    campaign: &Repository,
+    tests: &BTreeSet<u32>,
+    dimensions: &[Dimension],
+) -> Result<BTreeMap<u32, Vec<Option<f64>>>, RecordError> {
+    let mut points = BTreeMap::new();
+    campaign.scan(&mut |test| {
+        if tests.contains(&test.number) {
+            let point = test.point(campaign.plan(), Convention::Ours);
+            let at = dimensions.iter().map(|&dimension| point.as_ref().and_then(|point| point.get(dimension)));
+            points.insert(test.number, at.collect());
+        }
+    })?;
+    Ok(points)
 }
 
 /// A test on both sides.
 struct Sides<'a> {
     test: u32,
-    row: TestRow,
-    fresh: &'a [crate::record::Repetition],
+    simulated: Simulated<'a>,
     lab_runs: &'a [&'a TestRow],
+}
+
+/// The runs of a test in simulation.
+enum Simulated<'a> {
+    /// The run for which the test was chosen, because there is no other.
+    Selected(Box<TestRow>),
+    /// Fresh runs of a confirmation; at least one.
+    Fresh(&'a [Repetition]),
+    /// Runs after a compensation; at least one.
+    Again(Vec<&'a TestRow>),
+}
+
+impl Simulated<'_> {
+    /// The value of a metric in each run.
+    fn values(&self, metric: MetricId) -> Vec<Option<f64>> {
+        match self {
+            Simulated::Selected(row) => vec![row.value(metric).value],
+            Simulated::Fresh(runs) => runs.iter().map(|run| run.value(metric).value).collect(),
+            Simulated::Again(rows) => rows.iter().map(|row| row.value(metric).value).collect(),
+        }
+    }
+
+    /// What each run says of a requirement.
+    fn verdicts(&self, requirement: &Requirement) -> Vec<Verdict> {
+        match self {
+            Simulated::Selected(row) => vec![row.verdict(requirement)],
+            Simulated::Fresh(runs) => runs.iter().map(|run| run.verdict(requirement)).collect(),
+            Simulated::Again(rows) => rows.iter().map(|row| row.verdict(requirement)).collect(),
+        }
+    }
 }
 
 impl Sides<'_> {
     fn compared(&self, metric: MetricId, tolerance: f64) -> Option<Compared> {
-        let fresh: Vec<f64> = self.fresh.iter().filter_map(|run| run.value(metric).value).collect();
-        let selected = fresh.is_empty();
-        let simulation = if selected { Vec::from_iter(self.row.value(metric).value) } else { fresh };
+        let simulation: Vec<f64> = self.simulated.values(metric).into_iter().flatten().collect();
+        let selected = matches!(self.simulated, Simulated::Selected(_));
         let lab: Vec<f64> = self.lab_runs.iter().filter_map(|row| row.value(metric).value).collect();
         if simulation.is_empty() || lab.is_empty() {
             return None;
@@ -476,6 +564,7 @@ impl Gap {
             let metric = plan.metric(gap.metric);
             let words = Words {
                 metric: &format!("`{}`", metric.name),
+                than: ["smaller", "greater"],
                 value: &|value| quantity(value, metric.unit.as_deref()),
                 dimension: &|at| self.dimensions[at].name().to_owned(),
                 coordinate: &|_, value| fixed(value, 2),
@@ -485,15 +574,84 @@ impl Gap {
                 Some([low, high]) => constant(words.metric, [low, high], gap.tests.len(), words.value),
                 None => localise::sentence(&gap.extent, gap.located.len(), &words),
             });
+            sentences.extend(self.edges(gap));
         }
         sentences
+    }
+}
+
+impl Gap {
+    /// Between which tests a gap that is local begins and ends; `None` for another one.
+    fn edges(&self, gap: &MetricGap) -> Option<String> {
+        let Extent::Range { split: Split { range, .. }, .. } = &gap.extent else { return None };
+        let name = self.dimensions[range.dimension].name();
+        let places = gap.located.iter().filter_map(|test| Some((*test, self.points.get(test)?[range.dimension]?)));
+        let places: Vec<(u32, f64)> = places.collect();
+        let edge = |end: f64| {
+            let below = places.iter().filter(|(_, at)| *at < end).max_by(|a, b| a.1.total_cmp(&b.1))?;
+            let above = places.iter().filter(|(_, at)| *at > end).min_by(|a, b| a.1.total_cmp(&b.1))?;
+            let [below, above] =
+                [below, above].map(|(test, at)| format!("{} ({name} {})", TestNumber(*test), fixed(*at, 2)));
+            Some(format!("between {below} and {above}"))
+        };
+        let (begins, ends) = (range.low.and_then(edge), range.high.and_then(edge));
+        match (begins, ends) {
+            (Some(begins), Some(ends)) => Some(format!("It begins {begins}, and ends {ends}.")),
+            (Some(begins), None) => Some(format!("It begins {begins}.")),
+            (None, Some(ends)) => Some(format!("It ends {ends}.")),
+            (None, None) => None,
+        }
+    }
+
+    /// The recorded test that would tell most about where a gap begins and ends if it were run in the lab next, with the
+    /// reason as a sentence; `None` if every test was run there.
+    ///
+    /// A test has a gap if one of its metrics differs, and none if all that is decided agrees.
+    pub fn next_test(&self, campaign: &Repository) -> Result<Option<(u32, String)>, RecordError> {
+        let verdict = |test: u32| {
+            let of_metrics = self.metrics.iter().flat_map(|gap| gap.tests.iter().filter(move |it| it.test == test));
+            let verdicts: Vec<Equal> = of_metrics.map(|it| it.equivalence.verdict).collect();
+            match () {
+                () if verdicts.contains(&Equal::Different) => Some(true),
+                () if verdicts.contains(&Equal::Equivalent) => Some(false),
+                () => None,
+            }
+        };
+        let tried: Vec<(u32, Tried)> =
+            self.points.iter().map(|(&test, at)| (test, Tried { at: at.clone(), gap: verdict(test) })).collect();
+        let others: BTreeSet<u32> = {
+            let rows = campaign.tests()?;
+            let own = |row: &&TestRow| row.origin != Origin::Reference && row.duplicate_of.is_none();
+            rows.iter().filter(own).map(|row| row.number).filter(|test| !self.points.contains_key(test)).collect()
+        };
+        let candidates: Vec<(u32, Vec<Option<f64>>)> = points(campaign, &others, &self.dimensions)?
+            .into_iter()
+            .filter(|(_, at)| at.iter().any(Option::is_some))
+            .collect();
+        let along = self.metrics.iter().find_map(|gap| match &gap.extent {
+            Extent::Range { split, .. } => Some(split.range.dimension),
+            _ => None,
+        });
+        let known: Vec<Tried> = tried.iter().map(|(_, it)| it.clone()).collect();
+        let places: Vec<Vec<Option<f64>>> = candidates.iter().map(|(_, at)| at.clone()).collect();
+        let Some(Next { candidate, why }) = next(&known, &places, along) else { return Ok(None) };
+        let test = candidates[candidate].0;
+        let why = match why {
+            Why::Between { gap, none } => format!(
+                "it lies between {}, which has a gap, and {}, which has none",
+                TestNumber(tried[gap].0),
+                TestNumber(tried[none].0)
+            ),
+            Why::Farthest { .. } => "it is the most unlike those that were run there".to_owned(),
+        };
+        Ok(Some((test, format!("{} would tell most if it were run in the lab next: {why}.", TestNumber(test)))))
     }
 }
 
 impl MetricGap {
     /// The smallest and the largest difference, where all runs of each test are equal on each side, so that there is no
     /// chance to speak of; `None` elsewhere.
-    fn without_spread(&self) -> Option<[f64; 2]> {
+    pub(crate) fn without_spread(&self) -> Option<[f64; 2]> {
         let no_spread = |test: &Compared| test.equivalence.tests == Err(Undefined::NoSpread);
         if !self.tests.iter().all(no_spread) {
             return None;
@@ -556,7 +714,7 @@ mod tests {
     use sesame_rng::Stream;
 
     use super::*;
-    use crate::record::{MetricValue, Recorder, Repetition, sample};
+    use crate::record::{MetricValue, Recorder, sample};
 
     const COLLISIONS: MetricId = MetricId(0);
     const FUZZING_TIME: MetricId = MetricId(1);

@@ -17,6 +17,9 @@ const ANSWER: Duration = Duration::from_secs(2);
 /// How long it takes until a slowed node has had its share and its pause.
 const PERIOD: Duration = Duration::from_millis(50);
 
+/// In place of the position of an operation: what compensates for a reality gap is undone with everything else.
+const COMPENSATION: usize = usize::MAX;
+
 /// What is not as it was before the run.
 #[derive(Debug)]
 pub(super) struct Change {
@@ -81,6 +84,33 @@ impl System {
             self.incidents.notes.push(format!("nothing could be done to node `{name}`: it is not running"));
         }
         done
+    }
+
+    /// Sets the parameters that compensate for a reality gap, for this run. A name is `NODE/PARAMETER`, with the node as
+    /// the space calls it.
+    pub(super) fn set_parameters(&mut self, parameters: &[(String, f64)]) -> Result<(), TransportError> {
+        for (name, value) in parameters {
+            let nodes = || (0u32..).map(NodeId).zip(&self.plan.nodes);
+            let found = name.split_once('/').and_then(|(node, parameter)| {
+                let (id, _) = nodes().find(|(_, declared)| declared.name == node)?;
+                Some((id, parameter.to_owned()))
+            });
+            let Some((node, parameter)) = found else {
+                let known: Vec<String> = nodes().map(|(_, node)| format!("`{}/…`", node.name)).collect();
+                return Err(TransportError::Wiring(format!(
+                    "`{name}` is no parameter of a node; a node and its parameter are {}",
+                    known.join(", ")
+                )));
+            };
+            let notes = self.incidents.notes.len();
+            let what = self.set_parameter(node, parameter, *value)?;
+            // A run without it would be that of another simulation.
+            if let Some(note) = self.incidents.notes.drain(notes..).next() {
+                return Err(TransportError::Wiring(note));
+            }
+            self.changes.extend(what.map(|what| Change { operation: COMPENSATION, what }));
+        }
+        Ok(())
     }
 
     /// Sets a parameter; `None` if it already has that value.

@@ -1,12 +1,13 @@
 //! A connection to a running system: the node between its nodes.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
+use std::collections::btree_map::{BTreeMap, Entry};
 use std::time::Instant;
 
 use rustdds::QosPolicies;
 use rustdds::policy::{Durability, History, Reliability};
 use rustdds::rpc::SampleIdentity;
-use sesame_plan::{CampaignPlan, Clock, NodeId, OperationKind, Ros2, StepBy, TopicId};
+use sesame_plan::{CampaignPlan, Clock, Fitted, NodeId, OperationKind, Ros2, StepBy, TopicId};
 use sesame_relay::wire::{Wire, WireTable};
 
 use crate::cdr::Codec;
@@ -226,14 +227,23 @@ fn prefix(gid: Gid) -> [u8; PREFIX] {
     std::array::from_fn(|at| gid[at])
 }
 
-/// What sets the parameters of the nodes that operations act on.
+/// What sets the parameters of the nodes that operations act on, or that may be fitted to a lab.
 fn parameters(plan: &CampaignPlan, dds: &mut Participant) -> Result<BTreeMap<NodeId, Parameters>, DdsError> {
+    let operations = plan.operations.iter().filter_map(|operation| match operation.kind {
+        OperationKind::Set { node, .. } => Some(node),
+        _ => None,
+    });
+    let fitted = plan.labs.iter().flat_map(|lab| &lab.fits).map(|fit| &fit.what);
+    let adjusted = plan.compensation.iter().flat_map(|compensation| &compensation.adjustments).map(|it| &it.what);
+    let named = fitted.chain(adjusted).filter_map(|what| {
+        let Fitted::Parameter { name } = what else { return None };
+        let (node, _) = name.split_once('/')?;
+        (0u32..).map(NodeId).zip(&plan.nodes).find(|(_, declared)| declared.name == node).map(|(id, _)| id)
+    });
     let mut found = BTreeMap::new();
-    for operation in &plan.operations {
-        if let OperationKind::Set { node, .. } = operation.kind
-            && !found.contains_key(&node)
-        {
-            found.insert(node, Parameters::join(&in_ros(plan, node), dds)?);
+    for node in operations.chain(named) {
+        if let Entry::Vacant(place) = found.entry(node) {
+            place.insert(Parameters::join(&in_ros(plan, node), dds)?);
         }
     }
     Ok(found)

@@ -1,5 +1,8 @@
 //! Physical labs, and how tests are chosen for them.
 
+use sesame_grammar::Rule;
+
+use super::operation::{Amounts, Target};
 use super::words::{Bound, Count, Head, Name, Point, Quantity, Range, Text};
 use crate::span::Span;
 
@@ -74,6 +77,12 @@ pub(crate) enum ShapePlace {
 
 #[derive(Debug)]
 pub(crate) enum Fit {
-    Delay(Range),
+    Delay(Option<Target>, Range),
+    /// As an operation of this rule.
+    Relay {
+        rule: Rule,
+        target: Target,
+        amounts: Amounts,
+    },
     Parameter(Text, Range),
 }

@@ -66,7 +66,7 @@ impl Reader<'_> {
         }
     }
 
-    fn target(&mut self, pair: &Pair<'_>) -> Target {
+    pub(super) fn target(&mut self, pair: &Pair<'_>) -> Target {
         let places: Vec<Place> = children(pair, Rule::target).map(|place| self.place(&place)).collect();
         let topic = places.first().expect("an operation has a target").topic.clone();
         Target { topic, places, span: self.span(pair) }

@@ -3,8 +3,8 @@
 use sesame_grammar::Rule;
 
 use super::reader::{Pair, Reader, child, children, expect_child};
-use crate::syntax::ast::Name;
 use crate::syntax::ast::physical::{Budget, Fit, Form, LabSimulator, Physical, RankOrder, Setting, Shape, ShapePlace};
+use crate::syntax::ast::{Amounts, Name};
 
 impl Reader<'_> {
     pub(super) fn physical(&mut self, pair: &Pair<'_>) -> Physical {
@@ -64,22 +64,30 @@ impl Reader<'_> {
                 Rule::interlock => lab.interlocks.push((span, reader.names(&member))),
                 Rule::shape => lab.shapes.push(reader.shape(&member)),
                 _ => {
-                    let fitted = member.clone().into_inner().filter_map(|one| {
-                        let range = child(&one, Rule::range);
-                        match one.as_rule() {
-                            Rule::fit_delay => Some(Fit::Delay(reader.range(&range?))),
-                            Rule::fit_parameter => {
-                                let text = reader.text_of(&expect_child(&one, Rule::text));
-                                Some(Fit::Parameter(text, reader.range(&range?)))
-                            }
-                            _ => None,
-                        }
-                    });
+                    let fitted = member.clone().into_inner().filter_map(|one| reader.fit(&one));
                     lab.fits.push((span, fitted.collect()));
                 }
             }
         });
         lab
+    }
+
+    /// One thing that may be fitted; `None` for the words around them.
+    fn fit(&mut self, one: &Pair<'_>) -> Option<Fit> {
+        let range = self.range(&child(one, Rule::range)?);
+        let target = child(one, Rule::targets).map(|targets| self.target(&targets));
+        Some(match one.as_rule() {
+            Rule::fit_delay => Fit::Delay(target, range),
+            Rule::fit_parameter => Fit::Parameter(self.text_of(&expect_child(one, Rule::text)), range),
+            _ => {
+                let rule = match () {
+                    () if child(one, Rule::k_scale).is_some() => Rule::scale,
+                    () if child(one, Rule::k_bias).is_some() => Rule::bias,
+                    () => Rule::noise,
+                };
+                Fit::Relay { rule, target: target?, amounts: Amounts::Range(range) }
+            }
+        })
     }
 
     fn lab_simulator(&mut self, pair: &Pair<'_>) -> LabSimulator {

@@ -36,7 +36,7 @@ pub(crate) struct Outcome {
 
 /// How a simulator is set up everywhere here.
 pub(crate) fn setup(seed: u64) -> Setup {
-    Setup { seed, step: SimTime::from_seconds(0.02) }
+    Setup::new(seed, SimTime::from_seconds(0.02))
 }
 
 /// 70 s of the cell, disturbed.

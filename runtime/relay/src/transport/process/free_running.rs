@@ -179,7 +179,7 @@ impl Connection {
         const AWAITED: &str = "its answer to `reset`";
         self.topics.clear();
         let (mut line, wires) = (Vec::new(), relay.wires());
-        request::reset(&mut line, seed, None, wires.iter().map(|wire| wires.path(wire)));
+        request::reset(&mut line, seed, None, relay.parameters(), wires.iter().map(|wire| wires.path(wire)));
         send(&mut self.input, &line);
         self.line.number = 0;
         loop {
@@ -190,6 +190,7 @@ impl Connection {
                 _ if was_used => continue,
                 other => return Err(self.line.out_of_turn(&other, AWAITED, "answer `reset` with `ready`").into()),
             };
+            ready.takes(relay.parameters())?;
             self.resets = ready.resets;
             self.clock = if ready.clock { Clock::Simulator } else { Clock::Wall(Instant::now()) };
             self.topics.open(&ready, relay)?;

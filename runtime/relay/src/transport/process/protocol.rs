@@ -11,6 +11,7 @@ use serde_json::value::RawValue;
 use sesame_base::time::SimTime;
 
 use crate::json::{number, quoted};
+use crate::simulator::no_such_parameter;
 use crate::transport::TransportError;
 
 /// The longest line either side may write, in bytes.
@@ -58,6 +59,9 @@ pub(super) struct Ready<'a> {
     /// Topics to which it subscribes.
     #[serde(default)]
     pub(super) subscribes: Vec<String>,
+    /// Parameters that it takes with `reset`.
+    #[serde(default)]
+    pub(super) parameters: Vec<String>,
     /// Whether it can be reset again; if not, it is restarted for each test.
     #[serde(default)]
     pub(super) resets: bool,
@@ -67,6 +71,16 @@ pub(super) struct Ready<'a> {
     /// Messages of time zero.
     #[serde(default, borrow)]
     pub(super) messages: Vec<Message<'a>>,
+}
+
+impl Ready<'_> {
+    /// Refuses a parameter that was sent and that the simulator does not take.
+    pub(super) fn takes(&self, parameters: &[(String, f64)]) -> Result<(), TransportError> {
+        match parameters.iter().find(|(name, _)| !self.parameters.contains(name)) {
+            None => Ok(()),
+            Some((unknown, _)) => Err(TransportError::Simulator(no_such_parameter(unknown, &self.parameters))),
+        }
+    }
 }
 
 /// The end of a step.
@@ -239,11 +253,13 @@ fn shown(text: &str) -> String {
 pub(super) mod request {
     use super::{SimTime, number, quoted};
 
-    /// `{"reset":{"seed":1,"step":0.02,"topics":["a"]}}`, without `step` for a free-running simulator.
+    /// `{"reset":{"seed":1,"step":0.02,"parameters":{"gain":0.9},"topics":["a"]}}`, without `step` for a free-running
+    /// simulator, and without `parameters` if there are none.
     pub(in super::super) fn reset<'a>(
         line: &mut Vec<u8>,
         seed: u64,
         step: Option<SimTime>,
+        parameters: &[(String, f64)],
         topics: impl Iterator<Item = &'a str>,
     ) {
         line.extend_from_slice(format!("{{\"reset\":{{\"seed\":{seed},").as_bytes());
@@ -251,6 +267,18 @@ pub(super) mod request {
             line.extend_from_slice(b"\"step\":");
             number(step.seconds(), line);
             line.push(b',');
+        }
+        if !parameters.is_empty() {
+            line.extend_from_slice(b"\"parameters\":{");
+            for (at, (name, value)) in parameters.iter().enumerate() {
+                if at > 0 {
+                    line.push(b',');
+                }
+                quoted(name, line);
+                line.push(b':');
+                number(*value, line);
+            }
+            line.extend_from_slice(b"},");
         }
         line.extend_from_slice(b"\"topics\":[");
         for (at, topic) in topics.enumerate() {

@@ -119,7 +119,7 @@ impl<R: BufRead, W: Write> Session<R, W> {
         self.ready = false;
         self.topics.clear();
         let wires = relay.wires();
-        request::reset(&mut self.line, seed, Some(step), wires.iter().map(|wire| wires.path(wire)));
+        request::reset(&mut self.line, seed, Some(step), relay.parameters(), wires.iter().map(|wire| wires.path(wire)));
         self.send();
         let awaited = || "its answer to `reset`".to_owned();
         if !self.lines.read()? {
@@ -140,6 +140,7 @@ impl<R: BufRead, W: Write> Session<R, W> {
                 .wrong(problem, "leave `clock` out, or declare the simulator `free running`")
                 .into());
         }
+        ready.takes(relay.parameters())?;
         self.resets = ready.resets;
         self.ready = true;
         self.topics.open(&ready, relay)?;

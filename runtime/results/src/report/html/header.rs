@@ -33,9 +33,14 @@ pub(super) fn header(
         (Task::Campaign, Search::Strategy { strategy, .. }) => budget(&strategy.title()),
         (Task::Known { tests }, _) => plural(tests.len(), "regression test", "regression tests"),
         (Task::Shrink(shrinking), _) => format!("{} at most", budget(&format!("{} shrunk", shrinking.name))),
-        (Task::Lab(lab), _) => {
+        (Task::Variations(variations), _) => {
+            let count = plural(variations.tests.len(), "variation", "variations");
+            format!("{count} of {} along {}", variations.name, variations.dimension.name())
+        }
+        (Task::Lab(lab) | Task::Compensated(lab), _) => {
             let each = if lab.repeats == 1 { String::new() } else { format!(", each {} times", lab.repeats) };
-            format!("{} in lab {}{each}", plural(lab.tests.len(), "test", "tests"), lab.lab)
+            let place = if facts.task.in_lab().is_some() { "in" } else { "simulated again for" };
+            format!("{} {place} lab {}{each}", plural(lab.tests.len(), "test", "tests"), lab.lab)
         }
         (Task::Campaign, Search::Repeat { .. }) | (Task::Repeat { .. }, _) => {
             repeated_words(plan, &facts.task).unwrap_or_default()
@@ -58,8 +63,10 @@ pub(super) fn header(
         ("Ended", facts.stop.clone().unwrap_or_else(|| "unfinished".to_owned())),
         ("Digest", digest.to_owned()),
     ];
+    let compensation = plan.compensation.as_ref();
+    let compensation = compensation.map(|it| ("Compensated", crate::analysis::compensation::in_words(plan, it)));
     body.open("dl", &[]);
-    for (name, value) in &rows {
+    for (name, value) in rows.iter().chain(&compensation) {
         body.open("div", &[("class", if *name == "Digest" { "digest" } else { "fact" })]);
         body.element("dt", &[], name);
         body.element("dd", &[], value);

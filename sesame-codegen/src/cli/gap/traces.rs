@@ -1,0 +1,69 @@
+//! The traces of a campaign and of a lab, read for a comparison.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use sesame_plan::{CampaignPlan, Lab};
+use sesame_results::analysis::gap::{LabRun, dimensions, points};
+use sesame_results::analysis::traces::{Signal, Signals, TraceGap, TracedTest, compare};
+use sesame_results::record::{Repository, trace_file};
+use sesame_runtime::trace;
+use sesame_runtime::wire::WireTable;
+
+use super::super::shell;
+
+/// The runs in a folder of results.
+pub(super) type Runs = (PathBuf, Vec<LabRun>);
+
+/// Compares the traces of tests that have some on both sides; `None` if there are none.
+///
+/// The simulation's trace of a test is that of the recorded test, or of the first run in which it was simulated again.
+pub(super) fn compared(
+    campaign: &Repository,
+    again: Option<&Runs>,
+    labs: &[Runs],
+    lab: Option<&Lab>,
+) -> anyhow::Result<Option<TraceGap>> {
+    let plan = campaign.plan();
+    let tests: BTreeSet<u32> = labs.iter().flat_map(|(_, runs)| runs).map(|run| run.of).collect();
+    let dimensions = dimensions(lab);
+    let points = points(campaign, &tests, &dimensions)?;
+    let mut traced = Vec::new();
+    for test in tests {
+        let simulated = match again {
+            Some((folder, runs)) => {
+                let run = runs.iter().find(|run| run.of == test);
+                run.map(|run| trace_file(folder, run.row.number))
+            }
+            None => Some(trace_file(campaign.folder(), test)),
+        };
+        let Some(simulated) = simulated.filter(|file| file.is_file()) else { continue };
+        let runs = labs.iter().flat_map(|(folder, runs)| runs.iter().map(move |run| (folder, run)));
+        let of_test = runs.filter(|(_, run)| run.of == test);
+        let files: Vec<PathBuf> =
+            of_test.map(|(folder, run)| trace_file(folder, run.row.number)).filter(|file| file.is_file()).collect();
+        if files.is_empty() {
+            continue;
+        }
+        let lab = files.iter().map(|file| signals(plan, file)).collect::<anyhow::Result<_>>()?;
+        let at = points.get(&test).cloned().unwrap_or_else(|| vec![None; dimensions.len()]);
+        traced.push(TracedTest { test, at, simulation: signals(plan, &simulated)?, lab });
+    }
+    Ok((!traced.is_empty()).then(|| compare(&traced, &dimensions)))
+}
+
+fn signals(plan: &CampaignPlan, file: &Path) -> anyhow::Result<Signals> {
+    let found: BTreeMap<String, trace::Signal> = trace::signals(file, plan, &WireTable::new(plan))?;
+    Ok(found.into_iter().map(|(name, trace::Signal { times, values })| (name, Signal { times, values })).collect())
+}
+
+/// Why there is nothing to compare, and what to do.
+pub(super) fn missing(campaign: &Repository, runs: &[LabRun]) -> String {
+    let test = runs.first().map_or(1, |run| run.of);
+    format!(
+        "no test has a trace on both sides. In the lab, runners record each run; this records a test of {}:\n    {} replay \
+         FILE T{test} --record",
+        campaign.folder().display(),
+        shell::command(),
+    )
+}
