@@ -4,6 +4,8 @@
 //! anticipated effects* [SESAME 2023, Section 4.3]. A sheet says what is disturbed and when, what happened in
 //! simulation, when to stop, and who must be there. [`text`] and [`html`] render it.
 
+use std::fmt::Write as _;
+
 pub mod html;
 pub mod text;
 
@@ -22,6 +24,12 @@ pub struct Briefing {
     pub verdicts: Vec<ExpectedVerdict>,
     /// First contacts in simulation.
     pub contacts: Vec<ExpectedContact>,
+    /// Which interlocks end the test, and which violations they stand for; each a sentence.
+    pub interlocks: Vec<String>,
+    /// How fast the robots were, and by how much safety zones must be wider; each a sentence.
+    pub zones: Vec<String>,
+    /// Whether motions depend on each other, so that robots must not be run one at a time; each a sentence.
+    pub coupling: Vec<String>,
     /// When to stop the test; each a condition that can be seen, such as "the gripper is lower than the belt".
     pub stop_when: Vec<String>,
     /// Who must be present.
@@ -73,6 +81,10 @@ pub struct ExpectedVerdict {
     pub requirement: String,
     /// The verdict.
     pub verdict: Verdict,
+    /// When it was violated, as begin and end in seconds, in order.
+    pub violated: Vec<[f64; 2]>,
+    /// Of repeated runs, how many violate it and how many there are, if there were any.
+    pub repeated: Option<[usize; 2]>,
 }
 
 /// What a run says about a requirement.
@@ -105,6 +117,8 @@ pub struct ExpectedContact {
     pub zone: String,
     /// When, in seconds; `None` if it does not.
     pub first: Option<f64>,
+    /// The least distance in metres, negative where they overlap, and when that is in seconds; `None` if not known.
+    pub nearest: Option<[f64; 2]>,
 }
 
 /// Somebody who must be present.
@@ -133,9 +147,19 @@ fn sections(briefing: &Briefing) -> Vec<Section> {
         });
         format!("{}: {}{unit}{interval}", expected.metric, number(expected.value))
     };
-    let contact = |expected: &ExpectedContact| match expected.first {
-        Some(time) => format!("{} touches {} first at {}", expected.body, expected.zone, seconds(time)),
-        None => format!("{} does not touch {}", expected.body, expected.zone),
+    let contact = |expected: &ExpectedContact| {
+        let ExpectedContact { body, zone, first, nearest } = expected;
+        let said = match first {
+            Some(time) => format!("{body} touches {zone} first at {}", seconds(*time)),
+            None => format!("{body} does not touch {zone}"),
+        };
+        match nearest {
+            Some([least, time]) if *least < 0.0 => {
+                format!("{said}, and is up to {} m inside at {}", number(-least), seconds(*time))
+            }
+            Some([least, time]) => format!("{said}; nearest are {} m at {}", number(*least), seconds(*time)),
+            None => said,
+        }
     };
     let disturbance = |one: &Disturbance| match &one.active {
         Active::During { from, to } => {
@@ -143,7 +167,6 @@ fn sections(briefing: &Briefing) -> Vec<Section> {
         }
         Active::While(condition) => format!("while {condition}: {} on {}", one.operation, one.target),
     };
-    let verdict = |one: &ExpectedVerdict| format!("{}: {}", one.requirement, one.verdict.word());
     vec![
         Section {
             title: "Must be present",
@@ -161,6 +184,17 @@ fn sections(briefing: &Briefing) -> Vec<Section> {
             lines: briefing.disturbances.iter().map(disturbance).collect(),
         },
         Section {
+            title: "Interlocks",
+            empty: "None is named: nobody but the people who are present ends this test.",
+            lines: briefing.interlocks.clone(),
+        },
+        Section { title: "Safety zones", empty: "No speed is known.", lines: briefing.zones.clone() },
+        Section {
+            title: "Coupled motion",
+            empty: "Not judged: fewer than two bodies with a recorded pose are known.",
+            lines: briefing.coupling.clone(),
+        },
+        Section {
             title: "First contacts in simulation",
             empty: "Not computed.",
             lines: briefing.contacts.iter().map(contact).collect(),
@@ -168,7 +202,7 @@ fn sections(briefing: &Briefing) -> Vec<Section> {
         Section {
             title: "Verdicts in simulation",
             empty: "There are no requirements.",
-            lines: briefing.verdicts.iter().map(verdict).collect(),
+            lines: briefing.verdicts.iter().map(expected_verdict).collect(),
         },
         Section {
             title: "Metrics in simulation",
@@ -176,6 +210,31 @@ fn sections(briefing: &Briefing) -> Vec<Section> {
             lines: briefing.metrics.iter().map(metric).collect(),
         },
     ]
+}
+
+/// How many violations of one requirement are listed.
+const LISTED: usize = 4;
+
+fn expected_verdict(expected: &ExpectedVerdict) -> String {
+    let mut said = format!("{}: {}", expected.requirement, expected.verdict.word());
+    let when: Vec<String> = expected
+        .violated
+        .iter()
+        .take(LISTED)
+        .map(|[from, to]| format!("from {} to {}", seconds(*from), seconds(*to)))
+        .collect();
+    if !when.is_empty() {
+        said.push_str(", outside its bound ");
+        said.push_str(&when.join(", "));
+        if expected.violated.len() > LISTED {
+            let more = expected.violated.len() - LISTED;
+            let _ = write!(said, " and {more} times more");
+        }
+    }
+    if let Some([violated, runs]) = expected.repeated {
+        let _ = write!(said, "; violated in {violated} of {runs} repeated runs");
+    }
+    said
 }
 
 /// A number for people: with three decimals at most, five below 0.1, and an exponent where these do not show it.
@@ -249,11 +308,32 @@ pub(crate) mod tests {
                 },
                 ExpectedMetric { metric: text("clearance"), unit: text("m"), value: 0.0375, interval: None },
             ],
-            verdicts: vec![ExpectedVerdict { requirement: text("no_collision"), verdict: Verdict::Violated }],
-            contacts: vec![
-                ExpectedContact { body: text("gripper"), zone: text("Z1"), first: Some(3.875) },
-                ExpectedContact { body: text("gripper"), zone: text("Z2"), first: None },
+            verdicts: vec![
+                ExpectedVerdict {
+                    requirement: text("no_collision"),
+                    verdict: Verdict::Violated,
+                    violated: vec![[3.875, 4.25]],
+                    repeated: Some([4, 5]),
+                },
+                ExpectedVerdict {
+                    requirement: text("in_time"),
+                    verdict: Verdict::Satisfied,
+                    violated: Vec::new(),
+                    repeated: None,
+                },
             ],
+            contacts: vec![
+                ExpectedContact {
+                    body: text("gripper"),
+                    zone: text("Z1"),
+                    first: Some(3.875),
+                    nearest: Some([-0.02, 4.0]),
+                },
+                ExpectedContact { body: text("gripper"), zone: text("Z2"), first: None, nearest: Some([0.4, 4.5]) },
+            ],
+            interlocks: vec![text("collision_occurrence: its interlock stands for a violation of no_collision.")],
+            zones: vec![text("The robots were up to 2.1 m/s fast.")],
+            coupling: vec![text("r3200 and r2700: the motion is coupled.")],
             stop_when: vec![text("the gripper is nearer than a hand's breadth to the belt")],
             present: vec![Person { role: text("operator"), task: text("holds the enabling switch") }],
         }

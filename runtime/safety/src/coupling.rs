@@ -61,6 +61,8 @@ pub enum Evidence {
 /// Why a motion cannot be judged.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Missing {
+    /// There is no recording of a run in which what was removed was there.
+    Run,
     /// The recordings have no instant in common up to the end of the comparison.
     CommonTime,
     /// The recordings agree as long as both last, but one begins late or ends before the comparison does.
@@ -104,6 +106,11 @@ impl Coupling {
                 deviation.angle_time,
                 deviation.exceeded.map_or_else(String::new, |time| format!(" from {time:.3} s"))
             ),
+            Coupling::Unknown(Missing::Run) => {
+                "It is unknown whether the motion is coupled: there is no recording of a run in which what was removed \
+                 was there."
+                    .to_owned()
+            }
             Coupling::Unknown(Missing::CommonTime) => {
                 "It is unknown whether the motion is coupled: the recordings have no time in common before the end of \
                  the comparison."

@@ -1,0 +1,36 @@
+//! `sesamec lab`: what a lab needs to know before tests are run there, and what its recordings show.
+
+mod brief;
+mod briefing;
+mod contacts;
+mod poses;
+mod replay;
+#[cfg(test)]
+mod tests;
+
+use std::process::ExitCode;
+
+use clap::Subcommand;
+
+use super::shell::Shell;
+use crate::frontend::Language;
+
+/// What is done for a lab.
+#[derive(Debug, Subcommand)]
+pub(super) enum Lab {
+    /// Print a briefing for those who run tests in a lab: what is disturbed, what the simulation showed, and when to
+    /// stop.
+    Brief(brief::Brief),
+    /// Find contacts between the shapes of a lab in recordings: of a robot with objects that were not there, and of
+    /// robots that were recorded one at a time.
+    Contacts(contacts::Asked),
+}
+
+/// Does what is asked.
+pub(super) fn lab(shell: Shell, language: &Language, asked: &Lab) -> anyhow::Result<ExitCode> {
+    match asked {
+        Lab::Brief(asked) => brief::brief(shell, asked)?,
+        Lab::Contacts(asked) => contacts::print_contacts(shell, language, asked)?,
+    }
+    Ok(ExitCode::SUCCESS)
+}
