@@ -278,7 +278,7 @@ impl Simulations<'_> {
                 return Err(FitError::NotRecorded(reason));
             }
             if !result.observation.outcome.is_whole() {
-                let why = result.observation.outcome.detail().unwrap_or_default().to_owned();
+                let why = result.observation.outcome.detail().unwrap_or_default().clone();
                 return Err(FitError::BrokeOff { test: TestNumber(tests[at].number), why });
             }
             let signals = trace::signals(&file, self.plan, &wires)?;

@@ -5,6 +5,7 @@ mod architecture;
 mod building;
 mod choice;
 mod commands;
+mod compensation;
 mod conditions;
 mod confirm;
 mod coverage;

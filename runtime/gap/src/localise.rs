@@ -66,10 +66,11 @@ pub enum Reason {
 /// Whether there is a gap and where.
 ///
 /// The order of questions: whether all tests agree within the tolerance; whether the differences are of one size
-/// (Welch's F at α, or none further from the middle of all than the tolerance); if so, whether this size is a gap; if not, whether a range of one coordinate explains it (by
-/// permutation, at α), or else few tests do, which are left out one after the other, the most deviating first, until
-/// the others agree: at most a third. So where all true differences are equal, a local gap is reported with a
-/// probability of about α at most, and where they are all 0, a systematic one.
+/// (Welch's F at α, or none further from the middle of all than the tolerance); if so, whether this size is a gap; if
+/// not, whether a range of one coordinate explains it (by permutation, at α), or else few tests do, which are left out
+/// one after the other, the most deviating first, until the others agree: at most a third. So where all true
+/// differences are equal, a local gap is reported with a probability of about α at most, and where they are all 0, a
+/// systematic one.
 pub fn localise(tests: &[Located], settings: Settings) -> Extent {
     let Settings { tolerance, alpha, permutations, seed } = settings;
     assert!(tolerance >= 0.0 && alpha > 0.0 && alpha < 0.5, "a tolerance is a size, an error is less likely than not");

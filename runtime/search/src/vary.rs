@@ -135,8 +135,8 @@ impl<'a> Family<'a> {
     }
 }
 
-/// By how much the windows of a test can be lengthened about their middles, so that each stays within what its operation
-/// permits, and copies of an operation stay apart where they must not overlap.
+/// By how much the windows of a test can be lengthened about their middles, so that each stays within what its
+/// operation permits, and copies of an operation stay apart where they must not overlap.
 fn longest(plan: &CampaignPlan, test: &Test) -> f64 {
     let windows = || {
         test.operations.iter().filter_map(|it| match it.activation {

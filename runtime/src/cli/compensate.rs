@@ -133,15 +133,20 @@ pub(super) fn compensate(session: &Session, options: &Options) -> Result<ExitCod
         print(&fitted_text(&session.plan, &found.fits, &outcome, (&fitted_to, &held_out)))?;
     }
 
-    let beside = lab.folder().parent().unwrap_or(results).to_owned();
-    let plan = CampaignPlan { compensation: Some(outcome.compensation.clone()), ..session.plan.clone() };
-    let again = Task::Compensated(LabTask { repeats: task.repeats.max(2), ..task.clone() });
+    let again = Again {
+        session,
+        options,
+        results: lab.folder().parent().unwrap_or(results).to_owned(),
+        plan: CampaignPlan { compensation: Some(outcome.compensation.clone()), ..session.plan.clone() },
+        interrupted: &interrupted,
+    };
     let name = format!("{}-compensated", lab.folder().file_name().unwrap_or_default().display());
-    let Some((again, again_folder)) = run(session, options, &beside, &name, &plan, &again, seed, &interrupted)? else {
+    let of_lab = Task::Compensated(LabTask { repeats: task.repeats.max(2), ..task.clone() });
+    let Some((simulated, simulated_folder)) = again.run(&name, &of_lab, seed)? else {
         return Ok(ExitCode::from(STOPPED));
     };
     let before = gap(&campaign, &runs_in_lab, Some(&found))?;
-    let after = gap_after(&campaign, &compensated_runs(&campaign, &again)?, &runs_in_lab, Some(&found))?;
+    let after = gap_after(&campaign, &compensated_runs(&campaign, &simulated)?, &runs_in_lab, Some(&found))?;
     if for_people {
         print(&gap_text(&session.plan, &before, &after))?;
     }
@@ -150,7 +155,7 @@ pub(super) fn compensate(session: &Session, options: &Options) -> Result<ExitCod
     if !options.no_campaign {
         let seed = campaign.campaign().seed;
         let name = compensated_name(&seed.to_string(), &found.name);
-        let done = run(session, options, &beside, &name, &plan, &Task::Campaign, seed, &interrupted)?;
+        let done = again.run(&name, &Task::Campaign, seed)?;
         let Some((repository, folder)) = done else { return Ok(ExitCode::from(STOPPED)) };
         if for_people {
             report_outcome(&repository, &folder, &folder.join("report.html"), &options.output)?;
@@ -169,7 +174,7 @@ pub(super) fn compensate(session: &Session, options: &Options) -> Result<ExitCod
             fitted: side(&fitted_to, &outcome.fitted),
             held_out: outcome.held_out.as_ref().map(|judged| side(&held_out, judged)),
             metrics: serde_json::from_str(&metrics.json())?,
-            simulated_again: &again_folder,
+            simulated_again: &simulated_folder,
             campaign_again: campaign_again.as_deref(),
         })?;
     }
@@ -269,23 +274,27 @@ fn fitted(
     Ok(found?)
 }
 
-/// Runs a task with the compensated simulation; `None` when the user stopped it.
-fn run(
-    session: &Session,
-    options: &Options,
-    results: &Path,
-    name: &str,
-    plan: &CampaignPlan,
-    task: &Task,
-    seed: u64,
-    interrupted: &AtomicBool,
-) -> Result<Option<(Repository, PathBuf)>, Failure> {
-    let plan = task.plan(plan);
-    let files = claim_files(&session.runner, &plan)?;
-    let (recorder, folder) = begin(session, results, name, &plan, task, seed, &options.execution)?;
-    say(format_args!("   Running {} in {}", task.keyword(&plan), shown(&folder)));
-    let done = perform(session, recorder, &folder, &options.execution, files, interrupted)?;
-    Ok(done.map(|repository| (repository, folder)))
+/// How the compensated simulation runs.
+struct Again<'a> {
+    session: &'a Session,
+    options: &'a Options,
+    /// The folder for folders of results.
+    results: PathBuf,
+    plan: CampaignPlan,
+    interrupted: &'a AtomicBool,
+}
+
+impl Again<'_> {
+    /// Runs a task; `None` when the user stopped it.
+    fn run(&self, name: &str, task: &Task, seed: u64) -> Result<Option<(Repository, PathBuf)>, Failure> {
+        let Again { session, options, results, plan, interrupted } = self;
+        let plan = task.plan(plan);
+        let files = claim_files(&session.runner, &plan)?;
+        let (recorder, folder) = begin(session, results, name, &plan, task, seed, &options.execution)?;
+        say(format_args!("   Running {} in {}", task.keyword(&plan), shown(&folder)));
+        let done = perform(session, recorder, &folder, &options.execution, files, interrupted)?;
+        Ok(done.map(|repository| (repository, folder)))
+    }
 }
 
 /// What was fitted, and how far the simulation is from the lab.
@@ -303,17 +312,17 @@ fn fitted_text(
         let [before, after] = [judged.before, judged.after].map(|value| quantity(value, None));
         format!("from {before} to {after} standard deviations")
     };
-    let mut text = compensation::values(plan, fits, &outcome.compensation).text(text_options());
-    text.push_str(&format!(
-        "\nThe traces of {}, to which it was fitted, came closer to those of the lab: ",
-        names(fitted_to)
-    ));
-    text.push_str(&format!("{}.\n", side(&outcome.fitted)));
-    if let Some(judged) = &outcome.held_out {
-        text.push_str(&format!("Those of {}, kept aside to judge by: {}.\n", names(held_out), side(judged)));
-    }
-    text.push('\n');
-    text
+    let values = compensation::values(plan, fits, &outcome.compensation).text(text_options());
+    let fitted = format!(
+        "The traces of {}, to which it was fitted, came closer to those of the lab: {}.",
+        names(fitted_to),
+        side(&outcome.fitted)
+    );
+    let held_out = outcome
+        .held_out
+        .as_ref()
+        .map(|judged| format!("Those of {}, kept aside to judge by: {}.\n", names(held_out), side(judged)));
+    format!("{values}\n{fitted}\n{}\n", held_out.unwrap_or_default())
 }
 
 /// The gap before and after.

@@ -1,5 +1,5 @@
-//! `explore`: variations of a test along one dimension of the reduced space, in the simulation. What is found with them,
-//! a violation or a reality gap, is then known to begin and end somewhere [SESAME 2023, Section 4.6].
+//! `explore`: variations of a test along one dimension of the reduced space, in the simulation. What is found with
+//! them, a violation or a reality gap, is then known to begin and end somewhere [SESAME 2023, Section 4.6].
 
 use std::path::PathBuf;
 use std::process::ExitCode;

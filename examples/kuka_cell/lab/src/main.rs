@@ -1,8 +1,8 @@
 //! A stand-in for the lab of the gearbox cell, where no robot is at hand.
 //!
 //! It is reached as a simulator is that is a program (`process "kuka_cell_lab"`), and differs from the model: targets
-//! arrive later, the zones were measured a little differently, an axis has a limit that the model does not know. Its arguments say by
-//! how much, so that a study can be repeated with other gaps, or with none.
+//! arrive later, the zones were measured a little differently, an axis has a limit that the model does not know. Its
+//! arguments say by how much, so that a study can be repeated with other gaps, or with none.
 
 use std::io;
 use std::process::ExitCode;

@@ -98,3 +98,121 @@ fn drawn(levels: &[f64], seed: u64) -> f64 {
     let at = (keyed_unit(seed, 0, 0) * levels.len() as f64) as usize;
     levels[at.min(levels.len() - 1)]
 }
+
+#[cfg(test)]
+mod tests {
+    use sesame_plan::testing::{node, operation, plan, test_of, use_of};
+    use sesame_plan::{Adjustment, Choice, Node, OperationKind};
+
+    use super::*;
+    use crate::metric::MetricTable;
+    use crate::relay::{Delivery, Exchange, Finished, Listener};
+    use crate::value::Value;
+    use crate::wire::{Wire, WireTable};
+
+    const COMMAND: TopicId = TopicId(0);
+
+    fn values() -> Values {
+        Values { topic: COMMAND, places: Vec::new() }
+    }
+
+    fn adjusted(adjustments: &[(Fitted, &[f64])]) -> Compensation {
+        let adjustments =
+            adjustments.iter().map(|(what, levels)| Adjustment { what: what.clone(), levels: levels.to_vec() });
+        Compensation { lab: "hall".to_owned(), adjustments: adjustments.collect() }
+    }
+
+    /// A plan with a node that receives commands.
+    fn model() -> CampaignPlan {
+        let mut plan = plan(vec![operation(0, OperationKind::Bias)]);
+        plan.nodes = vec![Node { subscribes: vec![COMMAND], ..node("drive") }];
+        plan
+    }
+
+    /// What listeners are told was delivered.
+    #[derive(Default)]
+    struct Told(Vec<f64>);
+
+    impl Listener for Told {
+        fn published(&mut self, _: SimTime, _: Wire, _: u64, _: &Value) {}
+        fn delivered(&mut self, _: SimTime, _: Wire, _: u64, value: &Value) {
+            self.0.extend(value.number_at::<&str>(&[]));
+        }
+    }
+
+    struct Run {
+        /// What was delivered, with its time in tenths of a second.
+        delivered: Vec<(i64, f64)>,
+        told: Vec<f64>,
+        finished: Finished,
+        parameters: Vec<(String, f64)>,
+    }
+
+    /// Ten commands, 1 at each tenth of a second.
+    fn relayed(plan: &CampaignPlan, test: &Test, seed: u64) -> Run {
+        let mut told = Told::default();
+        let wires = WireTable::new(plan);
+        let metrics = MetricTable::new(plan, &wires, &[]).unwrap();
+        let relay = Relay::new(plan, &wires, test, metrics.start(), &[]).unwrap().received_everywhere();
+        let mut relay = relay.compensated(plan, test, seed).tapped(&mut told);
+        let parameters = relay.parameters().to_vec();
+        let mut delivered = Vec::new();
+        for tick in 0..100 {
+            let (now, mut out) = (SimTime::from_nanos(tick * 100_000_000), Vec::new());
+            relay.advance(now, &mut out);
+            if tick < 10 {
+                relay.message(now, wires.find("arm/command").unwrap(), Value::Real(1.0), &mut out);
+            }
+            let number = |it: Delivery| (tick, it.value.number_at::<&str>(&[]).unwrap());
+            delivered.extend(out.into_iter().map(number));
+        }
+        let finished = relay.finish(SimTime::from_seconds(10.0));
+        Run { delivered, told: told.0, finished, parameters }
+    }
+
+    #[test]
+    fn it_acts_behind_the_test_and_nothing_of_the_run_but_deliveries_shows_it() {
+        let mut plan = model();
+        let test = test_of(vec![use_of(0, 0.0, 0.5, vec![Choice::Value { value: 2.0 }], 1)]);
+        let before = relayed(&plan, &test, 1);
+        plan.compensation = Some(adjusted(&[
+            (Fitted::Delay { topic: None }, &[0.3]),
+            (Fitted::Scale(values()), &[2.0]),
+            (Fitted::Bias(values()), &[0.5]),
+            (Fitted::Parameter { name: "servo_gain".to_owned() }, &[0.9]),
+        ]));
+        let after = relayed(&plan, &test, 1);
+        let expected: Vec<(i64, f64)> = (0..10).map(|tick| (tick + 3, if tick < 5 { 6.5 } else { 2.5 })).collect();
+        assert_eq!(after.delivered, expected);
+        assert_eq!(after.parameters, [("servo_gain".to_owned(), 0.9)]);
+        // The operation, what is told of what was delivered, and the fuzzing time are those of the test.
+        assert_eq!(after.finished.operations, before.finished.operations);
+        assert_eq!(after.finished.metrics, before.finished.metrics);
+        assert_eq!((&after.told, after.told[0], after.told[9]), (&before.told, 3.0, 1.0));
+    }
+
+    #[test]
+    fn a_run_draws_one_of_the_levels_of_noise_and_always_the_same_one() {
+        let mut plan = model();
+        plan.compensation = Some(adjusted(&[(Fitted::Noise(values()), &[0.0, 5.0])]));
+        let test = test_of(vec![]);
+        let of = |seed| relayed(&plan, &test, seed).delivered;
+        let noisy = |run: &[(i64, f64)]| run.iter().any(|(_, value)| *value != 1.0);
+        let runs: Vec<_> = (0..40).map(of).collect();
+        let count = runs.iter().filter(|run| noisy(run)).count();
+        assert!((8..=32).contains(&count), "{count} of 40 draw the level above 0");
+        assert_eq!(runs, (0..40).map(of).collect::<Vec<_>>());
+        let noisy: Vec<_> = runs.iter().filter(|run| noisy(run)).collect();
+        assert_ne!(noisy[0], noisy[1], "the noise itself is drawn anew");
+    }
+
+    #[test]
+    fn without_a_subscriber_there_is_nothing_to_delay() {
+        let mut plan = model();
+        plan.nodes.clear();
+        plan.compensation = Some(adjusted(&[(Fitted::Delay { topic: None }, &[0.3])]));
+        assert_eq!(relayed(&plan, &test_of(vec![]), 1).delivered[0], (0, 1.0));
+        plan.compensation = Some(adjusted(&[(Fitted::Delay { topic: Some(COMMAND) }, &[0.3])]));
+        assert_eq!(relayed(&plan, &test_of(vec![]), 1).delivered[0], (3, 1.0));
+    }
+}

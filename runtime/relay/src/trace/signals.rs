@@ -117,7 +117,9 @@ impl Collector<'_> {
             }
             Value::List(elements) => {
                 for (at, element) in elements.iter().take(MOST_ELEMENTS).enumerate() {
-                    name.push_str(&format!("[{at}]"));
+                    name.push('[');
+                    name.push_str(&at.to_string());
+                    name.push(']');
                     self.collect(name, time, element);
                     name.truncate(length);
                 }

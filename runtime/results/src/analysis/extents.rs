@@ -41,14 +41,14 @@ pub fn extents(plan: &CampaignPlan, gap: &Gap, traces: Option<&TraceGap>) -> Tab
             Some(ends) => Told::Constant(ends),
             None => Told::Extent(&metric.extent),
         };
-        row(&mut table, &subject, extent, &metric.located, &gap.dimensions);
+        row(&mut table, &subject, &extent, &metric.located, &gap.dimensions);
     }
     for SignalGap { signal, lag, level } in traces.iter().flat_map(|traces| &traces.signals) {
         let dimensions = &gap.dimensions;
         let subject = Subject { of: signal, quantity: "lag", unit: Some("s") };
-        row(&mut table, &subject, Told::Extent(&lag.extent), &lag.tests, dimensions);
+        row(&mut table, &subject, &Told::Extent(&lag.extent), &lag.tests, dimensions);
         let subject = Subject { of: signal, quantity: "level", unit: None };
-        row(&mut table, &subject, Told::Extent(&level.extent), &level.tests, dimensions);
+        row(&mut table, &subject, &Told::Extent(&level.extent), &level.tests, dimensions);
     }
     table
 }
@@ -67,11 +67,11 @@ enum Told<'a> {
     Constant([f64; 2]),
 }
 
-fn row(table: &mut Table, subject: &Subject<'_>, told: Told<'_>, tests: &[u32], dimensions: &[Dimension]) {
+fn row(table: &mut Table, subject: &Subject<'_>, told: &Told<'_>, tests: &[u32], dimensions: &[Dimension]) {
     let name = |at: &usize| TestNumber(tests[*at]).to_string();
     let mut unlike = None;
     let mut range = (None, None, None);
-    let (word, pooled): (&str, Option<&Pooled>) = match &told {
+    let (word, pooled): (&str, Option<&Pooled>) = match told {
         Told::Constant([low, high]) if *low == 0.0 && *high == 0.0 => ("none", None),
         Told::Constant(_) => ("systematic", None),
         Told::Extent(extent) => match extent {
@@ -91,7 +91,7 @@ fn row(table: &mut Table, subject: &Subject<'_>, told: Told<'_>, tests: &[u32], 
     };
     let interval = pooled.map(|pooled| pooled.interval(CONFIDENCE));
     let (estimate, interval) = match told {
-        Told::Constant([low, high]) => (Some(f64::midpoint(low, high)), Some([low, high])),
+        Told::Constant([low, high]) => (Some(f64::midpoint(*low, *high)), Some([*low, *high])),
         Told::Extent(_) => (pooled.map(|pooled| pooled.estimate), interval),
     };
     let (dimension, from, to) = range;

@@ -189,8 +189,8 @@ pub fn gap(campaign: &Repository, runs: &[LabRun], lab: Option<&Lab>) -> Result<
     compare(campaign, None, runs, lab)
 }
 
-/// Compares the runs of a lab with those in which its tests were simulated again ([`compensated_runs`]). Tests that were
-/// not are left out.
+/// Compares the runs of a lab with those in which its tests were simulated again ([`compensated_runs`]). Tests that
+/// were not are left out.
 pub fn gap_after(
     campaign: &Repository,
     again: &[LabRun],
@@ -603,8 +603,8 @@ impl Gap {
         }
     }
 
-    /// The recorded test that would tell most about where a gap begins and ends if it were run in the lab next, with the
-    /// reason as a sentence; `None` if every test was run there.
+    /// The recorded test that would tell most about where a gap begins and ends if it were run in the lab next, with
+    /// the reason as a sentence; `None` if every test was run there.
     ///
     /// A test has a gap if one of its metrics differs, and none if all that is decided agrees.
     pub fn next_test(&self, campaign: &Repository) -> Result<Option<(u32, String)>, RecordError> {

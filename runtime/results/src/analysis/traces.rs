@@ -199,8 +199,8 @@ impl TraceGap {
         table
     }
 
-    /// What the traces say: of each signal, how much later and how much greater it is in the lab. Signals that agree are
-    /// counted.
+    /// What the traces say: of each signal, how much later and how much greater it is in the lab. Signals that agree
+    /// are counted.
     pub fn sentences(&self) -> Vec<String> {
         let mut sentences = Vec::new();
         let mut agreeing = 0;

@@ -86,8 +86,8 @@ impl System {
         done
     }
 
-    /// Sets the parameters that compensate for a reality gap, for this run. A name is `NODE/PARAMETER`, with the node as
-    /// the space calls it.
+    /// Sets the parameters that compensate for a reality gap, for this run. A name is `NODE/PARAMETER`, with the node
+    /// as the space calls it.
     pub(super) fn set_parameters(&mut self, parameters: &[(String, f64)]) -> Result<(), TransportError> {
         for (name, value) in parameters {
             let nodes = || (0u32..).map(NodeId).zip(&self.plan.nodes);
