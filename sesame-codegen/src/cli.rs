@@ -126,7 +126,8 @@ enum Command {
     /// Compare the results of a lab with those of the campaign that its tests come from: where simulation and reality
     /// differ, and by how much.
     Gap(gap::Compared),
-    /// Print forms for tests that people run in a lab, and record what they filled in.
+    /// Prepare tests in a lab so that nobody gets hurt, record what people saw who ran them there, and find contacts in
+    /// its recordings.
     #[command(subcommand)]
     Lab(lab::Lab),
     /// Import a testing space of the original SESAME platform (an EMF file, `.model`), with the tests that it
@@ -216,7 +217,7 @@ pub fn run(
         Command::Results(asked) => results::results(shell, asked),
         Command::Select(asked) => select::selected(shell, &asked),
         Command::Gap(asked) => gap::compared(shell, &asked),
-        Command::Lab(asked) => lab::lab(shell, &asked),
+        Command::Lab(asked) => lab::lab(shell, language, &asked),
         Command::Import { file, out } => import::import(shell, language, &file, &out),
         Command::Scan(asked) => scan::scan(shell, language, &asked),
         Command::Explain { what: Some(what), file: Some(file), format } => {

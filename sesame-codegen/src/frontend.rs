@@ -149,17 +149,8 @@ fn not_used(space: &Space, sources: &SourceMap) -> Vec<String> {
     }));
     notes.extend(space.physicals.values().filter_map(|lab| {
         let Declaration { name, span, .. } = &lab.declaration;
-        let unused = [
-            ("simulator", lab.simulator.is_some() && lab_simulator(space, lab).is_none()),
-            ("shape", !lab.shapes.is_empty()),
-        ];
-        let unused: Vec<&str> = unused.into_iter().filter_map(|(what, is_there)| is_there.then_some(what)).collect();
-        let (last, others) = unused.split_last()?;
-        let (list, are) = match others {
-            [] => (format!("`{last}`"), "is"),
-            _ => (format!("`{}` and `{last}`", others.join("`, `")), "are"),
-        };
-        Some(format!("{list} of lab `{name}` ({}) {are} checked, but not used yet", at(*span)))
+        let unused = lab.simulator.is_some() && lab_simulator(space, lab).is_none();
+        unused.then(|| format!("`simulator` of lab `{name}` ({}) is checked, but not used yet", at(*span)))
     }));
     notes
 }
@@ -289,9 +280,17 @@ mod tests {
                  through the relay",
                 "monitor `transport` (blocks.sesame:32) is checked, but not used by runners yet",
                 "monitor `conveyor` (blocks.sesame:41) is checked, but not used by runners yet",
-                "`simulator` and `shape` of lab `lab` (blocks.sesame:47) are checked, but not used yet",
+                "`simulator` of lab `lab` (blocks.sesame:47) is checked, but not used yet",
             ]
         );
+    }
+
+    #[test]
+    fn the_shapes_of_a_lab_are_in_its_plans_in_metres() {
+        let text = include_str!("../../sesame-dsl/tests/good/blocks.sesame");
+        let checked = check("blocks.sesame", text, PLAIN);
+        let shapes = serde_json::to_string_pretty(&checked.plans[0].plan.labs[0].shapes).unwrap();
+        insta::assert_snapshot!(shapes);
     }
 
     #[test]

@@ -345,6 +345,7 @@ fn no_circle_of_files_is_larger_than_two() {
         "runtime/rng",
         "runtime/base",
         "runtime/optimise",
+        "runtime/safety",
         "runtime/search",
         "runtime/relay",
         "runtime/results",

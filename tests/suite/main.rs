@@ -27,6 +27,7 @@ mod interruption;
 #[cfg(target_os = "linux")]
 mod killed;
 mod kuka_cell;
+mod lab_safety;
 mod large_results;
 mod latest;
 mod optimisers;

@@ -31,6 +31,9 @@ pub struct Lab {
     pub tolerances: Vec<LabTolerance>,
     /// Metrics of which only the presence is compared: in the lab an interlock ends the test. Each metric once.
     pub interlock: Vec<MetricId>,
+    /// Bodies that are not in the lab, or only there. Names are distinct.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub shapes: Vec<LabShape>,
     /// What of the simulation may be fitted to the lab. Each thing once.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fits: Vec<Fit>,
@@ -120,4 +123,52 @@ pub struct LabTolerance {
     pub metric: MetricId,
     /// The difference, in the metric's unit; 0 or more.
     pub value: f64,
+}
+
+/// A body whose contacts with others are found in recordings.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LabShape {
+    /// Its name in the lab.
+    pub name: String,
+    /// Its doc comment.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub doc: String,
+    /// What it looks like.
+    pub form: ShapeForm,
+    /// Where it is.
+    pub place: ShapePlace,
+    /// How much larger it is taken to be on every side, in metres; 0 or more.
+    pub expand: f64,
+}
+
+/// What a body looks like. Lengths are in metres and positive.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum ShapeForm {
+    /// A sphere around its place.
+    Sphere {
+        /// Its radius.
+        radius: f64,
+    },
+    /// A box with its centre at its place.
+    Box {
+        /// Its whole edges along x, y and z.
+        edges: [f64; 3],
+    },
+}
+
+/// Where a body is.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum ShapePlace {
+    /// It moves with a recorded pose.
+    Pose {
+        /// The pose: a topic, perhaps with a field of its messages, such as `robots/east/pose.position`.
+        pose: String,
+    },
+    /// It does not move.
+    Fixed {
+        /// Its centre, in metres.
+        centre: [f64; 3],
+    },
 }

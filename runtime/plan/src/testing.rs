@@ -115,6 +115,7 @@ pub fn lab(name: &str) -> Lab {
         budget: None,
         tolerances: Vec::new(),
         interlock: Vec::new(),
+        shapes: Vec::new(),
         fits: Vec::new(),
     }
 }

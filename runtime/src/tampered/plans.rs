@@ -5,8 +5,8 @@ use sesame_plan::testing::{field, lab, message, minimal, node, topic};
 use sesame_plan::{
     Activation, ActivationMode, Adjustment, Answer, Bound, CampaignPlan, Clock, Command, Dimension, Domain, Fitted,
     Interface, InterfaceField, KnownTestId, LabBudget, Launch, Lifecycle, MessageId, MessageType, MetricId,
-    MetricSource, Node, NodeId, OperationId, RankOrder, Ready, ReadyWhen, RelayBudget, Ros2, Search, Simulator, StepBy,
-    Stepping, Strategy, Topic, TopicId, Transport, Type, WireType, Wiring,
+    MetricSource, Node, NodeId, OperationId, RankOrder, Ready, ReadyWhen, RelayBudget, Ros2, Search, ShapeForm,
+    ShapePlace, Simulator, StepBy, Stepping, Strategy, Topic, TopicId, Transport, Type, WireType, Wiring,
 };
 use sesame_results::record::sample;
 
@@ -104,6 +104,24 @@ fn each_thing_that_later_code_relies_on_is_asked_for() {
         (|plan| budget(plan).over.push(Dimension::T1), "labs[0].budget.over: T1 is there twice"),
         (|plan| plan.labs[0].tolerances[0].value = -1.0, "labs[0].tolerances[0].value: -1 is below 0"),
         (|plan| plan.labs[0].interlock.push(MetricId(0)), "labs[0].interlock: MetricId(0) is there twice"),
+        (
+            |plan| plan.labs[0].shapes[0].form = ShapeForm::Sphere { radius: 0.0 },
+            "labs[0].shapes[0].form.radius: 0 is not above 0",
+        ),
+        (
+            |plan| plan.labs[0].shapes[1].form = ShapeForm::Box { edges: [1.0, 1.0, f64::NAN] },
+            "labs[0].shapes[1].form.edges[2]: NaN is not above 0",
+        ),
+        (
+            |plan| plan.labs[0].shapes[1].place = ShapePlace::Fixed { centre: [f64::INFINITY, 0.0, 0.0] },
+            "labs[0].shapes[1].place.centre[0]: inf is not finite",
+        ),
+        (
+            |plan| plan.labs[0].shapes[0].place = ShapePlace::Pose { pose: String::new() },
+            "labs[0].shapes[0].place.pose: is empty",
+        ),
+        (|plan| plan.labs[0].shapes[1].expand = -0.1, "labs[0].shapes[1].expand: -0.1 is below 0"),
+        (|plan| plan.labs[0].shapes[1].name = "gripper".to_owned(), "labs[0].shapes: \"gripper\" is there twice"),
         (|plan| plan.labs[0].fits[0].low = -0.1, "labs[0].fits[0].low: -0.1 is below 0"),
         (|plan| plan.labs[0].fits[0].low = 0.6, "labs[0].fits[0]: 0.6 is above 0.5"),
         (

@@ -8,8 +8,9 @@ use sesame_plan::condition::ConditionEnd;
 use sesame_plan::testing::lab;
 use sesame_plan::{
     Adjustment, BoostedChildren, CampaignPlan, Compensation, Confirmation, CoverageGoal, Dimension, Expectation,
-    Exploration, Failing, Fit, Fitted, GridAxis, Lab, LabBudget, LabExclusion, LabTask, LabTest, LabTolerance,
-    MetricId, RankKey, RankOrder, RequirementId, Shrinking, Statistic, StopRule, Task, TopicId,
+    Exploration, Failing, Fit, Fitted, GridAxis, Lab, LabBudget, LabExclusion, LabShape, LabTask, LabTest,
+    LabTolerance, MetricId, RankKey, RankOrder, RequirementId, ShapeForm, ShapePlace, Shrinking, Statistic, StopRule,
+    Task, TopicId,
 };
 use sesame_results::record::{
     DATABASE, Entered, GenerationCoverage, Origin, Provenance, Recorder, Repetition, entered_outcome, sample,
@@ -60,6 +61,22 @@ pub(super) fn rich() -> CampaignPlan {
         budget: Some(LabBudget { limit: 5.0, lambda: 0.5, over: vec![Dimension::T1, Dimension::P1] }),
         tolerances: vec![LabTolerance { metric: MetricId(1), value: 1.0 }],
         interlock: vec![MetricId(0)],
+        shapes: vec![
+            LabShape {
+                name: "gripper".to_owned(),
+                doc: String::new(),
+                form: ShapeForm::Sphere { radius: 0.3 },
+                place: ShapePlace::Pose { pose: "r3200/gripper".to_owned() },
+                expand: 0.0,
+            },
+            LabShape {
+                name: "Z1".to_owned(),
+                doc: String::new(),
+                form: ShapeForm::Box { edges: [0.8, 1.2, 2.0] },
+                place: ShapePlace::Fixed { centre: [1.2, 0.4, 1.0] },
+                expand: 0.15,
+            },
+        ],
         fits: vec![Fit { what: Fitted::Delay { topic: Some(TopicId(0)) }, low: 0.0, high: 0.5 }],
         ..lab("lab")
     }];

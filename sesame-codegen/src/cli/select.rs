@@ -85,7 +85,7 @@ fn cost(text: &str) -> Result<LabCost, String> {
 pub(super) fn selected(shell: Shell, asked: &Selected) -> anyhow::Result<ExitCode> {
     let repository = Repository::open(&asked.file)?;
     let plan = repository.plan();
-    let lab = lab(plan, asked.lab.as_deref())?;
+    let lab = named_lab(plan, asked.lab.as_deref())?;
     let declared = lab.and_then(|lab| lab.budget.as_ref());
     let Some(budget) = asked.budget.or(declared.map(|budget| budget.limit)) else {
         bail!("how much may the tests cost? give `--budget`, or a `budget` in the lab's `physical` block")
@@ -141,7 +141,7 @@ pub(super) fn selected(shell: Shell, asked: &Selected) -> anyhow::Result<ExitCod
 }
 
 /// The lab of this name, or the only one; `None` for results whose space has none.
-fn lab<'a>(plan: &'a CampaignPlan, name: Option<&str>) -> anyhow::Result<Option<&'a Lab>> {
+pub(super) fn named_lab<'a>(plan: &'a CampaignPlan, name: Option<&str>) -> anyhow::Result<Option<&'a Lab>> {
     let known = || plan.labs.iter().map(|lab| format!("`{}`", lab.name)).collect::<Vec<_>>().join(", ");
     match (name, &plan.labs[..]) {
         (None, []) => Ok(None),

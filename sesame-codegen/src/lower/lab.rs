@@ -1,6 +1,6 @@
 //! Labs.
 
-use sesame_dsl::model::physical::{Fit, LabSetting, LabSimulator, Physical};
+use sesame_dsl::model::physical::{Fit, Form, LabSetting, LabSimulator, Physical, Place, Shape};
 use sesame_dsl::model::{self, Space};
 use sesame_plan as plan;
 
@@ -69,8 +69,25 @@ impl Selection {
                 .map(|&(metric, value)| plan::LabTolerance { metric: self.metric(metric), value })
                 .collect(),
             interlock: lab.interlock.iter().map(|&metric| self.metric(metric)).collect(),
+            shapes: lab.shapes.iter().map(shape).collect(),
             fits: lab.fits.iter().map(fit).collect(),
         }
+    }
+}
+
+fn shape(shape: &Shape) -> plan::LabShape {
+    plan::LabShape {
+        name: shape.declaration.name.clone(),
+        doc: shape.declaration.doc.clone(),
+        form: match shape.form {
+            Form::Sphere(radius) => plan::ShapeForm::Sphere { radius },
+            Form::Box(edges) => plan::ShapeForm::Box { edges },
+        },
+        place: match &shape.place {
+            Place::Pose(pose) => plan::ShapePlace::Pose { pose: pose.clone() },
+            Place::Point(centre) => plan::ShapePlace::Fixed { centre: *centre },
+        },
+        expand: shape.expand,
     }
 }
 

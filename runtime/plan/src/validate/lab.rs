@@ -1,6 +1,6 @@
 //! Labs, and what brings a simulation closer to one.
 
-use crate::{CampaignPlan, Compensation, Fitted, Lab, LabCost, RankOrder};
+use crate::{CampaignPlan, Compensation, Fitted, Lab, LabCost, RankOrder, ShapeForm, ShapePlace};
 
 use super::bound;
 use super::check::{Checked, at, at_least_one, distinct, each, filled, finite, name, positive, require, share};
@@ -46,6 +46,19 @@ impl CampaignPlan {
         })?;
         at("interlock", distinct(&lab.interlock))?;
         each("interlock", &lab.interlock, |&metric| self.has_metric(metric))?;
+        at("shapes", distinct(lab.shapes.iter().map(|shape| &shape.name)))?;
+        each("shapes", &lab.shapes, |shape| {
+            at("name", name(&shape.name))?;
+            match &shape.form {
+                ShapeForm::Sphere { radius } => at("form.radius", positive(*radius)),
+                ShapeForm::Box { edges } => each("form.edges", edges, |&edge| positive(edge)),
+            }?;
+            match &shape.place {
+                ShapePlace::Pose { pose } => at("place.pose", name(pose)),
+                ShapePlace::Fixed { centre } => each("place.centre", centre, |&coordinate| finite(coordinate)),
+            }?;
+            at("expand", not_negative(shape.expand))
+        })?;
         at("fits", distinct(lab.fits.iter().map(|fit| &fit.what)))?;
         each("fits", &lab.fits, |fit| {
             at("what", self.sound_fitted(&fit.what))?;

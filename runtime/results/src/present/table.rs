@@ -191,6 +191,14 @@ impl Table {
         Table::with(columns.into_iter().map(column))
     }
 
+    /// A table of data that others have computed: its columns are laid out as their cells are. Each row has a cell for
+    /// each column.
+    pub fn of(columns: impl IntoIterator<Item = String>, rows: impl IntoIterator<Item = Vec<Datum>>) -> Table {
+        let mut table = Table::new(columns);
+        rows.into_iter().for_each(|row| table.row(row));
+        table
+    }
+
     /// A table without rows yet.
     pub(crate) fn with(columns: impl IntoIterator<Item = Column>) -> Table {
         Table { columns: columns.into_iter().collect(), rows: Vec::new() }

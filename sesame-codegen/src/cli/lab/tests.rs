@@ -1,457 +1,304 @@
-//! Forms are printed, filled in, and taken or refused.
+//! Replays against the truth: robots and an object in a simulator that runs behind the real relay, recorded with all of
+//! them there and with one of them missing. The recordings go through the functions of the command.
 
-use std::fs;
-use std::path::PathBuf;
+use std::path::Path;
 
-use clap::Parser;
-use proptest::prelude::*;
-use sesame_plan::testing;
-use sesame_results::analysis::gap::{gap, lab_runs};
-use sesame_results::analysis::{Selection, tests as tests_table};
-use sesame_results::record::{EnteredRun, Origin, Repetition, Repository, sample};
+use sesame_plan::{CampaignPlan, Test};
+use sesame_runtime::evaluate::{Custom, Run, evaluate_tapped};
+use sesame_runtime::metric::MetricTable;
+use sesame_runtime::rng::Stream;
+use sesame_runtime::simulator::{Bus, Port, Progress, Setup, Simulator, SimulatorError};
+use sesame_runtime::trace::{Subject, TraceWriter};
+use sesame_runtime::transport::in_process;
+use sesame_runtime::value::{Fields, Record, Value};
+use sesame_runtime::wire::WireTable;
+use sesame_safety::Vector;
+use sesame_safety::coupling::{Coupling, Evidence};
 
-use super::*;
+use super::contacts::{found, sentences, signals};
+use super::replay::{Alike, Meeting, Recorded, reads_the_other, recorded};
+use crate::frontend::{Look, SESAME};
 
-#[derive(Parser)]
-struct Line {
-    #[command(subcommand)]
-    lab: Lab,
+/// A step of the simulator, in seconds.
+const STEP: f64 = 0.02;
+/// The radius of each robot, in metres.
+const RADIUS: f64 = 0.3;
+/// How fast robots drive, in metres per second.
+const SPEED: f64 = 1.5;
+/// Half of the edges of the object, in metres.
+const HALF: [f64; 3] = [0.4, 0.25, 0.5];
+/// Where a parked robot stands, in metres.
+const PARKED: Vector = Vector::new(40.0, 0.0, 0.0);
+/// A careful robot waits while the other one is nearer than this, in metres.
+const CAREFUL: f64 = 1.2;
+
+/// Who is in a run.
+const BOTH: u8 = 0;
+const ONE_ALONE: u8 = 1;
+const TWO_ALONE: u8 = 2;
+const ONE_AND_OBJECT: u8 = 3;
+
+/// Two robots that drive from goal to goal, and an object in the origin. What touches stands for the rest of the run.
+struct Field<const PRESENT: u8, const IS_CAREFUL: bool> {
+    positions: [Vector; 2],
+    goals: [Vec<Vector>; 2],
+    /// Where the first robot last heard the second one to be.
+    heard: Option<Vector>,
+    touched: bool,
+    poses: [Port; 2],
+    touches: Port,
 }
 
-/// A campaign that has ended, in a lab's space, and files beside it.
-struct Bench {
-    folder: tempfile::TempDir,
+/// Where a robot of this run starts and drives to: the same in every run with this seed.
+fn goals(seed: u64, robot: u64) -> Vec<Vector> {
+    let mut stream = Stream::derive(seed, "robot", &[robot]);
+    let mut between = |most: f64| stream.uniform(-most, most);
+    let mut goals: Vec<Vector> = (0..5).map(|_| Vector::new(between(2.0), between(2.0), between(0.2))).collect();
+    // Nothing touches in the beginning.
+    goals[0] = Vector::new(if robot == 1 { -2.5 } else { 2.5 }, goals[0].y, goals[0].z);
+    goals
 }
 
-impl Bench {
-    fn new() -> Bench {
-        let mut plan = sample::plan();
-        plan.labs = vec![sesame_plan::Lab { repeats: 2, ..testing::lab("hall") }];
-        Bench::of(&plan)
+impl<const PRESENT: u8, const IS_CAREFUL: bool> Field<PRESENT, IS_CAREFUL> {
+    fn moves(robot: usize) -> bool {
+        match PRESENT {
+            BOTH => true,
+            TWO_ALONE => robot == 1,
+            _ => robot == 0,
+        }
     }
 
-    fn of(plan: &CampaignPlan) -> Bench {
-        let folder = tempfile::tempdir().unwrap();
-        sample::campaign(&folder.path().join("42"), plan, 30);
-        Bench { folder }
+    fn publish(&self, bus: &mut Bus<'_>) {
+        let fields = Fields::new(["position"]);
+        for (port, position) in self.poses.iter().zip(self.positions) {
+            let millimetres = (position * 1000.0).to_array();
+            bus.publish(*port, Value::from(Record::new(&fields, vec![Value::Point(millimetres)])));
+        }
     }
+}
 
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    /// `sesamec lab` with words of which those that begin with `@` are names of files; or what it says, without the
-    /// folder.
-    fn lab(&self, words: &[&str]) -> Result<(), String> {
-        let words = words.iter().map(|word| match word.strip_prefix('@') {
-            Some(name) => self.path(name).display().to_string(),
-            None => (*word).to_owned(),
+impl<const PRESENT: u8, const IS_CAREFUL: bool> Simulator for Field<PRESENT, IS_CAREFUL> {
+    fn start(setup: &Setup, bus: &mut Bus<'_>) -> Result<Self, SimulatorError> {
+        let mut all = [1, 2].map(|robot| goals(setup.seed, robot));
+        let positions = [0, 1].map(|robot| {
+            let start = all[robot].remove(0);
+            if Self::moves(robot) { start } else { PARKED }
         });
-        let line = Line::try_parse_from(std::iter::once("lab".to_owned()).chain(words)).unwrap();
-        lab(Shell::silent(), &line.lab).map(drop).map_err(|error| self.said(&error))
+        let poses = ["robots/one/pose", "robots/two/pose"].map(|path| bus.open(path));
+        bus.subscribe(poses[1]);
+        let field = Field { positions, goals: all, heard: None, touched: false, poses, touches: bus.open("touches") };
+        field.publish(bus);
+        Ok(field)
     }
 
-    fn said(&self, error: &anyhow::Error) -> String {
-        let folder = format!("{}/", self.folder.path().display());
-        format!("{error:#}").replace('\u{1e}', "\n").replace(&folder, "")
-    }
-
-    /// The text of a form.
-    fn form(&self, words: &[&str]) -> String {
-        let _ = fs::remove_file(self.path("form"));
-        self.lab(&[&["form", "@42", "-o", "@form"], words].concat()).unwrap();
-        fs::read_to_string(self.path("form")).unwrap()
-    }
-
-    fn write(&self, name: &str, text: impl AsRef<[u8]>) {
-        fs::write(self.path(name), text).unwrap();
-    }
-
-    /// What is said of a file.
-    fn refused(&self, name: &str, text: impl AsRef<[u8]>) -> String {
-        self.write(name, text);
-        let said = self.lab(&["add", "@42", &format!("@{name}")]).unwrap_err();
-        assert!(!self.path("42-hall").exists(), "nothing is taken of a file with mistakes: {said}");
-        said
-    }
-
-    fn recorded(&self) -> Vec<EnteredRun> {
-        Repository::open(&self.path("42-hall")).unwrap().entered_runs().unwrap()
-    }
-}
-
-/// Two tests of the sample that disturb something.
-fn two_tests(bench: &Bench) -> [String; 2] {
-    let repository = Repository::open(&bench.path("42")).unwrap();
-    let rows = repository.tests().unwrap();
-    let mut numbers = rows.iter().filter(|row| row.origin == Origin::Search && row.duplicate_of.is_none());
-    std::array::from_fn(|_| format!("T{}", numbers.next().unwrap().number))
-}
-
-/// The CSV of a form with these lines after its header.
-fn filled(form: &str, rows: &[&str]) -> String {
-    let head: Vec<&str> = form.lines().take_while(|line| line.starts_with('#')).collect();
-    let header = form.lines().find(|line| line.starts_with("test,")).unwrap();
-    [&head[..], &[header], rows].concat().join("\n") + "\n"
-}
-
-#[test]
-fn a_form_has_a_row_for_each_run_and_a_column_for_each_metric() {
-    let bench = Bench::new();
-    let [first, second] = two_tests(&bench);
-    let csv = bench.form(&[&first, &second, &first]);
-    let digest = Repository::open(&bench.path("42")).unwrap().tests_digest().unwrap();
-    insta::assert_snapshot!("form_csv", csv.replace(&digest, "DIGEST"));
-    let json = bench.form(&[&first, "-n", "1", "--format", "json"]);
-    insta::assert_snapshot!("form_json", json.replace(&digest, "DIGEST"));
-    assert_eq!(bench.form(&[&first, "-n", "7"]).lines().filter(|line| line.starts_with('T')).count(), 7);
-    let front = Repository::open(&bench.path("42")).unwrap().latest_result_set().unwrap().unwrap().members;
-    let rows = bench.form(&["-n", "1"]);
-    assert!(front.iter().any(|number| rows.contains(&format!("\nT{number},1,"))), "without tests it is the front");
-}
-
-#[test]
-fn what_a_form_cannot_be_printed_for_is_refused() {
-    let bench = Bench::new();
-    bench.write("form", "filled in");
-    let [first, _] = two_tests(&bench);
-    let refused = |words: &[&str]| bench.lab(&[&["form", "@42"], words].concat()).unwrap_err();
-    insta::assert_snapshot!(
-        "form_refused",
-        [
-            refused(&[&first, "-o", "@form"]),
-            refused(&["T999"]),
-            refused(&["known_jiter"]),
-            refused(&["reference"]),
-            refused(&[&first, "--lab", "hal"]),
-            bench.lab(&["form", "@43", &first]).unwrap_err(),
-        ]
-        .join("\n")
-    );
-    assert_eq!(fs::read_to_string(bench.path("form")).unwrap(), "filled in");
-}
-
-#[test]
-fn runs_are_recorded_appended_and_compared_with_the_campaign() {
-    let bench = Bench::new();
-    let [first, second] = two_tests(&bench);
-    let form = bench.form(&[&first, &second]).replace("# operator:", "# operator: Ada, Ben");
-    let run = |test: &str, run: u32, collisions: &str| format!("{test},{run},completed,{collisions},5,1,60,200");
-    let text = filled(&form, &[&run(&first, 1, "3"), &run(&second, 1, "0"), &format!("{first},2,,,,,,")]);
-    bench.write("monday.csv", text);
-    bench.lab(&["add", "@42", "@monday.csv", "--hardware", "cell 2"]).unwrap();
-    let recorded = bench.recorded();
-    assert_eq!(recorded.iter().map(|it| it.run).collect::<Vec<_>>(), [1, 1], "a blank row is no run");
-    assert_eq!(recorded[0].provenance.texts(), [Some("Ada, Ben"), Some("cell 2"), None, None]);
-
-    // Tests that are run again in simulation leave forms and the folder valid.
-    let number: u32 = first[1..].parse().unwrap();
-    let digest_of = |name: &str| Repository::open(&bench.path(name)).unwrap().digest().unwrap();
-    let unconfirmed = digest_of("42");
-    let mut recorder = Recorder::reopen(&bench.path("42"), 1).unwrap();
-    let observation = recorder.repository().test(number).unwrap().observation;
-    recorder.put_repetition(&Repetition::of(number, 1, 7, &observation), &[]).unwrap();
-    drop(recorder.finish("confirmed").unwrap());
-    assert_ne!(digest_of("42"), unconfirmed);
-
-    // The same again is refused; the next runs go into the same folder.
-    let again = bench.lab(&["add", "@42", "@monday.csv"]).unwrap_err();
-    insta::assert_snapshot!("added_again", again);
-    let before = digest_of("42-hall");
-    let crash = format!("{second},2,crash,,,,,");
-    bench.write("tuesday.csv", filled(&form, &[&run(&first, 2, "4"), &crash]));
-    bench.lab(&["add", "@42", "@tuesday.csv"]).unwrap();
-    assert_eq!(bench.recorded().len(), 4);
-    assert_ne!(digest_of("42-hall"), before);
-
-    let (campaign, lab) =
-        (Repository::open(&bench.path("42")).unwrap(), Repository::open(&bench.path("42-hall")).unwrap());
-    let runs = lab_runs(&campaign, &lab).unwrap();
-    let of: Vec<String> = runs.iter().map(|run| format!("T{}", run.of)).collect();
-    assert_eq!(of, [&first, &second, &first, &second].map(Clone::clone));
-    let found = gap(&campaign, &runs, lab.plan().labs.first()).unwrap();
-    let compared = found.metrics.iter().find(|gap| gap.metric == sesame_plan::MetricId(0)).unwrap();
-    assert_eq!(compared.tests[0].lab, [3.0, 4.0]);
-    let table = tests_table(&lab, &Selection::default()).unwrap().csv();
-    insta::assert_snapshot!("tests_of_the_lab", table);
-
-    // Results that are not of these tests, or not of a lab, are refused.
-    let mut other = sample::plan();
-    other.campaign.seed = 7;
-    sample::campaign(&bench.path("other"), &other, 30);
-    let wrong = bench.lab(&["add", "@42", "@tuesday.csv", "--output", "@other"]).unwrap_err();
-    assert!(wrong.contains("other holds results that were not entered by hand; choose another folder"), "{wrong}");
-    let wrong = bench.lab(&["form", "@42-hall"]).unwrap_err();
-    assert!(wrong.contains("has results of a lab; give the results of the campaign"), "{wrong}");
-}
-
-#[test]
-fn all_mistakes_of_all_files_are_told_at_once_and_nothing_is_recorded() {
-    let bench = Bench::new();
-    let [first, second] = two_tests(&bench);
-    let form = bench.form(&[&first]);
-    let good = format!("{first},1,completed,3,5,1,60,200");
-    bench.write("good.csv", filled(&form, &[&good]));
-    let rows = [
-        format!("{first},1,completed,3,5,1,60,200"),
-        "T99,1,completed,3,5,1,60,200".to_owned(),
-        "known_jiter,1,completed,3,5,1,60,200".to_owned(),
-        format!("{second},0,completed,3,5,1,60,200"),
-        format!("{second},1,complete,3,5,1,60,200"),
-        format!("{second},2,well,3,5,1,60,200"),
-        format!("{second},3,,3,5,1,60,200"),
-        format!("{second},4,completed,3,,1,60,200"),
-        format!("{second},5,completed,3,inf,1,60,200"),
-        format!("{second},6,completed,3,NaN,1,60,1e999"),
-        format!("{second},7,completed,3,\"5,5\",1,60,unmeasurd"),
-        format!("{second},8,completed,3,5 s,1,60,200"),
-        format!("{second},9,completed,3,5,1,60"),
-        format!("{second},10,completed,3,5,5,1,60,200"),
-        format!("{second},10,crash,,,,,"),
-        format!("{second},11,\"completed,3,5,1,60,200"),
-    ];
-    let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
-    bench.write("bad.csv", filled(&form, &rows));
-    bench.write("bytes.csv", b"test,run\xff");
-    let said = bench.lab(&["add", "@42", "@good.csv", "@bad.csv", "@bytes.csv", "@none.csv"]).unwrap_err();
-    assert!(!bench.path("42-hall").exists());
-    insta::assert_snapshot!("mistakes_in_rows", said);
-}
-
-#[test]
-fn mistakes_in_the_head_and_the_header_are_told() {
-    let bench = Bench::new();
-    let [first, _] = two_tests(&bench);
-    let form = bench.form(&[&first]);
-    let row = format!("{first},1,completed,3,5,1,60,200");
-    let good = filled(&form, &[&row]);
-    let swap = |from: &str, to: &str| {
-        assert!(good.contains(from), "{from}");
-        good.replace(from, to)
-    };
-    let digest = Repository::open(&bench.path("42")).unwrap().tests_digest().unwrap();
-    let files = [
-        swap(&format!("# tests: {digest}\n"), ""),
-        swap(&digest, &"0".repeat(64)),
-        swap("# lab: hall", "# lab: attic"),
-        swap("# operator:", "# operater: Ada"),
-        swap("# operator:", "# operator: Ada\n# operator: Ben"),
-        swap("test,run", "tests,runs"),
-        good.replace(',', ";"),
-        swap("[s]", "[m]"),
-        swap("fuzzing_time [s]", "fuzzing_time"),
-        swap("fuzzing_time [s]", "fuzzing_time [sec]"),
-        swap("collision_occurrence", "collision_occurrence [s]"),
-        swap("fuzzing_time", "fuzing_time"),
-        swap("fuzzing_time [s]", "weather"),
-        swap("fuzzing_time [s]", "top_speed [m/s]"),
-        good.lines().filter(|line| line.starts_with('#')).collect::<Vec<_>>().join("\n"),
-        swap(&row, ""),
-        swap(&row, &format!("{first},1,,,,,,")),
-        String::new(),
-    ];
-    let said: Vec<String> = files.iter().map(|text| bench.refused("form.csv", text)).collect();
-    let said = said.join("\n\n").replace("\nnothing was recorded; correct this and add the files again", "");
-    insta::assert_snapshot!("mistakes_in_the_head", said.replace(&digest, "DIGEST"));
-}
-
-#[test]
-fn mistakes_in_json_are_told_with_their_places() {
-    let bench = Bench::new();
-    let [first, _] = two_tests(&bench);
-    let form = bench.form(&[&first, "-n", "1", "--format", "json"]);
-    let digest = Repository::open(&bench.path("42")).unwrap().tests_digest().unwrap();
-    let row = |text: &str| {
-        let head = format!("{{\"tests\": \"{digest}\",\n\"runs\": [\n");
-        let values = "\"collision_occurrence\": 3, \"fuzzing_time\": {\"value\": 5, \"unit\": \"s\"}, \"top_speed\": \
-                      {\"value\": 1, \"unit\": \"m/s\"}, \"cycle_time\": {\"value\": 60, \"unit\": \"s\"}, \
-                      \"arm_distance\": \"unmeasured\"";
-        format!("{head}{}]}}", text.replace("VALUES", values).replace("FIRST", &first))
-    };
-    let run = "{\"test\": \"FIRST\", \"run\": 1, \"outcome\": \"completed\", \"values\": {VALUES}}";
-    let with = |from: &str, to: &str| {
-        assert!(row(run).contains(from), "{from}");
-        row(run).replace(from, to)
-    };
-    let files = [
-        form.clone(),
-        "{".to_owned(),
-        "[]".to_owned(),
-        "{\"runs\": {}, \"operater\": 1, \"operator\": 5}".to_owned(),
-        row("5"),
-        row("{\"test\": \"FIRST\", \"test\": \"FIRST\", \"values\": 7}"),
-        with("\"run\": 1", "\"run\": \"one\""),
-        with("\"run\": 1", "\"run\": 1.5"),
-        with("\"collision_occurrence\": 3", "\"collision_occurrence\": true, \"weather\": 1"),
-        with("\"collision_occurrence\": 3", "\"collision_occurrence\": \"three\""),
-        with("\"value\": 5, \"unit\": \"s\"", "\"value\": 5"),
-        with("\"value\": 5, \"unit\": \"s\"", "\"value\": 5, \"unit\": \"mm\""),
-        with("\"value\": 5, \"unit\": \"s\"", "\"value\": 1e999, \"unit\": \"s\""),
-        with("\"value\": 5, \"unit\": \"s\"", "\"unit\": \"s\", \"vlue\": 5"),
-        with("\"collision_occurrence\": 3, ", ""),
-        row(&[run, run].join(",\n")),
-    ];
-    let said: Vec<String> = files.iter().map(|text| bench.refused("form.json", text)).collect();
-    let said = said.join("\n\n").replace("\nnothing was recorded; correct this and add the files again", "");
-    insta::assert_snapshot!("mistakes_in_json", said.replace(&digest, "DIGEST"));
-    bench.write("form.json", row(run));
-    bench.lab(&["add", "@42", "@form.json"]).unwrap();
-    assert_eq!(bench.recorded().len(), 1);
-}
-
-#[test]
-fn values_in_other_units_are_converted_and_what_spreadsheets_do_is_understood() {
-    let bench = Bench::new();
-    let [first, _] = two_tests(&bench);
-    let form = bench.form(&[&first, "-n", "1"]);
-    let row = format!("{first},1,completed,3,5000,36,unmeasured,0.2");
-    let text = filled(&form, &[&row])
-        .replace("fuzzing_time [s]", "fuzzing_time [ms]")
-        .replace("top_speed [m/s]", "top_speed [km/h]")
-        .replace("arm_distance [mm]", "arm_distance [m]")
-        .replace("# operator:", "\"# operator: Ada, Ben\",,,")
-        .replace("# lab: hall", "# lab: hall,,,,,,,")
-        .replace('\n', "\r\n");
-    bench.write("form.csv", format!("\u{feff}{text}"));
-    bench.lab(&["add", "@42", "@form.csv"]).unwrap();
-    let lab = Repository::open(&bench.path("42-hall")).unwrap();
-    let values: Vec<Option<f64>> = lab.test(1).unwrap().observation.metrics.iter().map(|it| it.value).collect();
-    assert_eq!(values, [Some(3.0), Some(5.0), Some(10.0), None, Some(200.0)]);
-    assert_eq!(bench.recorded()[0].provenance.operator.as_deref(), Some("Ada, Ben"));
-}
-
-#[test]
-fn a_lab_is_named_if_there_are_several_and_may_be_made_up_if_there_is_none() {
-    let mut plan = sample::plan();
-    let bench = Bench::of(&plan);
-    let [first, _] = two_tests(&bench);
-    assert!(bench.form(&[&first]).contains("\n# lab: lab\n"));
-    assert!(bench.form(&[&first, "--lab", "attic"]).contains("\n# lab: attic\n"));
-    let wrong = bench.lab(&["form", "@42", &first, "--lab", "../x"]).unwrap_err();
-    assert!(wrong.contains("`--lab` names a lab as a space would"), "{wrong}");
-    plan.labs = vec![testing::lab("hall"), testing::lab("attic")];
-    let bench = Bench::of(&plan);
-    let wrong = bench.lab(&["form", "@42", &first]).unwrap_err();
-    assert_eq!(wrong, "the space has several labs; name one with `--lab`: `hall`, `attic`");
-}
-
-/// A value as somebody might enter it.
-fn value() -> impl Strategy<Value = Option<f64>> {
-    prop_oneof![4 => any::<f64>().prop_filter("finite", |it| it.is_finite()).prop_map(Some), 1 => Just(None)]
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
-
-    #[test]
-    fn a_form_that_is_filled_in_reads_back_with_the_same_values(
-        json in any::<bool>(),
-        runs in proptest::collection::vec((proptest::collection::vec(value(), 5), 0..ENTERED.len()), 1..8),
-        operator in "[a-z,\" ]{0,8}",
-    ) {
-        let bench = Bench::new();
-        let tests = two_tests(&bench);
-        let times = runs.len().div_ceil(2).to_string();
-        let operator = operator.trim().trim_end_matches([',', ' ']);
-        let name = if json { "form.json" } else { "form.csv" };
-        let word = |at: usize| ENTERED[at];
-        if json {
-            let form = bench.form(&[&tests[0], &tests[1], "-n", &times, "--format", "json"]);
-            let mut form: serde_json::Value = serde_json::from_str(&form).unwrap();
-            form["operator"] = operator.into();
-            for (at, (values, outcome)) in runs.iter().enumerate() {
-                let row = &mut form["runs"][at];
-                row["outcome"] = word(*outcome).into();
-                for (metric, value) in sample::plan().metrics.iter().zip(values) {
-                    let value = value.map_or_else(|| "unmeasured".into(), serde_json::Value::from);
-                    let place = &mut row["values"][&metric.name];
-                    if metric.unit.is_some() { place["value"] = value } else { *place = value }
-                }
+    fn step(&mut self, bus: &mut Bus<'_>) -> Result<Progress, SimulatorError> {
+        while let Some(message) = bus.receive(self.poses[1]) {
+            let Value::Record(record) = message else { return Err(SimulatorError("no pose".to_owned())) };
+            if let [Value::Point(millimetres)] = record.values() {
+                self.heard = Some(Vector::from_array(*millimetres) / 1000.0);
             }
-            bench.write(name, form.to_string());
-        } else {
-            let form = bench.form(&[&tests[0], &tests[1], "-n", &times]);
-            let form = form.replace("# operator:", &format!("# operator: {operator}"));
-            let mut rows = runs.iter().map(|(values, outcome)| {
-                let values = values.iter().map(|it| it.map_or("unmeasured".to_owned(), |it| it.to_string()));
-                format!("{},{}", word(*outcome), values.collect::<Vec<_>>().join(","))
-            });
-            let fill = |line: &str| match line.strip_suffix(",,,,,,") {
-                Some(run) => rows.next().map_or_else(|| line.to_owned(), |row| format!("{run},{row}")),
-                None => line.to_owned(),
-            };
-            bench.write(name, form.lines().map(fill).collect::<Vec<_>>().join("\n"));
         }
-        bench.lab(&["add", "@42", &format!("@{name}")]).unwrap();
-        let repository = Repository::open(&bench.path("42-hall")).unwrap();
-        let recorded = repository.entered_runs().unwrap();
-        prop_assert_eq!(recorded.len(), runs.len());
-        for (at, ((values, outcome), entered)) in runs.iter().zip(&recorded).enumerate() {
-            prop_assert_eq!(&format!("T{}", entered.of), &tests[at % 2]);
-            prop_assert_eq!(entered.run as usize, at / 2 + 1);
-            prop_assert_eq!(entered.provenance.operator.as_deref().unwrap_or(""), operator);
-            let observation = repository.test(entered.test).unwrap().observation;
-            prop_assert_eq!(observation.outcome.word(), word(*outcome));
-            let read: Vec<Option<f64>> = observation.metrics.iter().map(|metric| metric.value).collect();
-            prop_assert_eq!(&read, values);
+        for robot in 0..2 {
+            let near = self.heard.is_some_and(|heard| (heard - self.positions[0]).length() < CAREFUL);
+            let waits = IS_CAREFUL && robot == 0 && near;
+            let Some(&goal) = self.goals[robot].first() else { continue };
+            if self.touched || waits || !Self::moves(robot) {
+                continue;
+            }
+            let way = goal - self.positions[robot];
+            if way.length() <= SPEED * STEP {
+                self.positions[robot] = goal;
+                self.goals[robot].remove(0);
+            } else {
+                self.positions[robot] += way.normalize() * (SPEED * STEP);
+            }
         }
-    }
-
-    #[test]
-    fn a_form_that_is_damaged_is_taken_whole_or_not_at_all(
-        json in any::<bool>(),
-        damage in proptest::collection::vec((any::<proptest::sample::Index>(), 0..6u8, any::<u8>()), 1..4),
-    ) {
-        let bench = Bench::new();
-        let tests = two_tests(&bench);
-        let (name, mut bytes) = if json {
-            let form = bench.form(&[&tests[0], &tests[1], "-n", "1", "--format", "json"]);
-            let form = form.replace("\"outcome\": \"\"", "\"outcome\": \"completed\"").replace("null", "2.5");
-            ("form.json", form.into_bytes())
-        } else {
-            let form = bench.form(&[&tests[0], &tests[1], "-n", "1"]);
-            ("form.csv", form.replace(",,,,,,", ",completed,1,2,3,4,5").into_bytes())
+        self.publish(bus);
+        let [one, other] = self.positions;
+        let half = Vector::from_array(HALF);
+        let into_object = (one - one.clamp(-half, half)).length();
+        let touches = match PRESENT {
+            BOTH => (one - other).length() <= 2.0 * RADIUS,
+            ONE_AND_OBJECT => into_object <= RADIUS,
+            _ => false,
         };
-        for (at, what, byte) in damage {
-            if bytes.is_empty() {
-                break;
-            }
-            let at = at.index(bytes.len());
-            let rest = |of: &[u8]| of[at..].iter().position(|it| b",\n".contains(it)).map_or(of.len(), |n| at + n);
-            let end = rest(&bytes);
-            match what {
-                0 => drop(bytes.drain(at..end)),
-                1 => drop(bytes.drain(at..)),
-                2 => bytes[at] = byte,
-                3 => bytes.insert(at, byte),
-                4 => {
-                    let other = usize::from(byte) % bytes.len();
-                    bytes.swap(at, other);
-                }
-                _ => {
-                    let copy = bytes[at..end].to_vec();
-                    bytes.splice(at..at, copy);
-                }
-            }
+        if touches && !self.touched {
+            self.touched = true;
+            bus.publish(self.touches, bus.now().seconds());
         }
-        bench.write(name, &bytes);
-        match bench.lab(&["add", "@42", &format!("@{name}")]) {
-            Ok(()) => {
-                // Each row that is not empty is a run.
-                let recorded = bench.recorded();
-                prop_assert!((1..=2).contains(&recorded.len()));
-                let repository = Repository::open(&bench.path("42-hall")).unwrap();
-                prop_assert_eq!(repository.evaluated().unwrap(), recorded.len());
-                prop_assert!(repository.digest().is_ok());
-            }
-            Err(said) => {
-                prop_assert!(said.ends_with("nothing was recorded; correct this and add the files again"), "{}", said);
-                prop_assert!(said.lines().next().unwrap().starts_with(&format!("{name}:")), "{}", said);
-                let left = fs::read_dir(bench.folder.path()).unwrap().count();
-                prop_assert_eq!(left, 3, "the campaign, the form, and the file");
-            }
-        }
+        Ok(Progress::Running)
     }
 }
 
-const ENTERED: [&str; 8] = sesame_results::record::ENTERED_OUTCOMES;
+/// A space of the two robots; the first one reads the second one's pose if `careful`.
+fn plan(careful: bool) -> CampaignPlan {
+    let reads = if careful { "subscribes two" } else { "" };
+    let text = format!(
+        "space field\nsystem {{\n  simulator field = in_process \"field::Field\" {{ crate \"field\"  step 20ms }}\n  \
+         message Pose {{ position: point[mm] }}\n  topic one = \"robots/one/pose\" : Pose\n  topic two = \
+         \"robots/two/pose\" : Pose\n  topic touches = \"touches\" : real[s]\n  node first {{ publishes one, touches  \
+         {reads} }}\n  node second {{ publishes two }}\n}}\nmetric first_touch default 999s = last(touches)\n\
+         metric apart maximise default 99m = min(distance(one.position, two.position))\n\
+         requirement R1 \"They keep apart\" = first_touch > 100s\n\
+         campaign watch {{ passive 1 times  observes apart  end after 5s }}\n\
+         physical yard {{\n  shape one = sphere 300mm on pose \"robots/one/pose\"   expand 100mm\n  \
+         shape two = sphere 30cm on pose \"robots/two/pose\"\n  \
+         shape crate_ = box (0.8, 0.5, 1)m at (0, 0, 0)m\n}}\n"
+    );
+    let checked = (SESAME.check)("field.sesame", &text, Look::Human { colour: false });
+    assert_eq!(checked.errors, 0, "{}", checked.diagnostics);
+    checked.plans.into_iter().next().unwrap().plan
+}
+
+/// A run behind the relay, recorded into a file; gives when the simulator saw a touch.
+fn run<S: Simulator + 'static>(plan: &CampaignPlan, seed: u64, file: &Path) -> Option<f64> {
+    let wires = WireTable::new(plan);
+    let table = MetricTable::new(plan, &wires, &[]).unwrap();
+    let test = Test { operations: Vec::new() };
+    let subject = Subject { plan, number: 1, test: &test, simulator_seed: seed };
+    let mut writer = TraceWriter::create(&file.with_extension("part"), subject, &wires).unwrap();
+    let mut transport = in_process::<S>().transport(plan);
+    let run = Run { test: &test, simulator_seed: seed };
+    let transport = transport.as_mut();
+    let observed =
+        evaluate_tapped(plan, &wires, &table, transport, &run, &mut Custom::none(), Some(&mut writer)).unwrap();
+    writer.keep(&observed, file).unwrap();
+    let touch = plan.metrics.iter().position(|metric| metric.name == "first_touch").unwrap();
+    observed.metrics[touch].value.filter(|_| observed.metrics[touch].set)
+}
+
+const ALIKE: Alike = Alike { position: 0.001, angle: 0.001 };
+
+/// The shapes of the lab, those of the second recording from there.
+fn shapes(plan: &CampaignPlan, recordings: &[&Path], names: &[&str], second: &[&str]) -> Vec<Recorded> {
+    let signals: Vec<_> = recordings.iter().map(|file| signals(plan, file).unwrap()).collect();
+    let shapes = plan.labs[0].shapes.iter().filter(|shape| names.contains(&shape.name.as_str()));
+    let of = |name: &str| usize::from(second.contains(&name));
+    shapes.map(|shape| recorded(plan, shape, (of(&shape.name), &signals[of(&shape.name)], 0.0)).unwrap()).collect()
+}
+
+/// A replay agrees with what the simulator saw at its steps: it finds each contact, at most a step before the step
+/// that shows it, unless the contact was a brush between two steps.
+fn agrees(meeting: &Meeting, seen: Option<f64>, seed: u64) {
+    let intervals = &meeting.contacts.intervals;
+    match (intervals.first(), seen) {
+        (Some(first), Some(seen)) => {
+            assert!(first.from <= seen + 1e-6, "{seed}: {} {seen}", first.from);
+            let brush = first.to < seen - 1e-6;
+            assert!(brush || seen - first.from <= STEP + 1e-4, "{seed}: {intervals:?} {seen}");
+        }
+        // Between two steps, robots come nearer by no more than what both drive in half of one.
+        (Some(_), None) => assert!(meeting.contacts.nearest.clearance >= -SPEED * STEP, "{seed}: {meeting:?}"),
+        (None, seen) => assert_eq!(seen, None, "{seed}: {meeting:?}"),
+    }
+}
+
+#[test]
+fn robots_recorded_one_at_a_time_touch_when_they_do_together() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    let plan = plan(false);
+    let mut touched = 0;
+    for seed in 0..100 {
+        let [one, two, both] = ["one.mcap", "two.mcap", "both.mcap"].map(file);
+        assert_eq!(run::<Field<ONE_ALONE, false>>(&plan, seed, &one), None);
+        assert_eq!(run::<Field<TWO_ALONE, false>>(&plan, seed, &two), None);
+        let seen = run::<Field<BOTH, false>>(&plan, seed, &both);
+        touched += usize::from(seen.is_some());
+
+        let alone = shapes(&plan, &[&one, &two], &["one", "two"], &["two"]);
+        let apart = found(&plan, &alone, None, ALIKE).unwrap();
+        let [meeting] = &apart[..] else { panic!("{apart:?}") };
+        assert_eq!(meeting.coupling, Some(Coupling::Independent(Evidence::Messages)), "{seed}");
+        agrees(meeting, seen, seed);
+        // The margin of 100 mm is touched no later.
+        assert!(meeting.contacts.first().is_none_or(|first| meeting.margins_touch.is_some_and(|it| it <= first)));
+
+        let together = shapes(&plan, &[&both], &["one", "two"], &[]);
+        let compared = found(&plan, &alone, Some(&together), ALIKE).unwrap();
+        let coupling = compared[0].coupling.as_ref().unwrap();
+        assert!(coupling.method_holds(), "{seed}: {}", coupling.sentence());
+        assert!(matches!(coupling, Coupling::Independent(Evidence::Motion(_))));
+    }
+    assert!((20..=80).contains(&touched), "{touched} of 100 touch: the test shows little");
+}
+
+#[test]
+fn a_robot_recorded_without_an_object_touches_it_when_it_does_with_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    let plan = plan(false);
+    let mut touched = 0;
+    for seed in 0..100 {
+        let [without, with] = ["without.mcap", "with.mcap"].map(file);
+        run::<Field<ONE_ALONE, false>>(&plan, seed, &without);
+        let seen = run::<Field<ONE_AND_OBJECT, false>>(&plan, seed, &with);
+        touched += usize::from(seen.is_some());
+        let [alone, together] = [&without, &with].map(|file| shapes(&plan, &[file], &["one", "crate_"], &[]));
+        let compared = found(&plan, &alone, Some(&together), ALIKE).unwrap();
+        agrees(&compared[0], seen, seed);
+        let coupling = compared[0].coupling.as_ref().unwrap();
+        assert!(coupling.method_holds(), "{seed}: {}", coupling.sentence());
+        // Without a run in which the object was there, nobody knows.
+        let unknown = found(&plan, &alone, None, ALIKE).unwrap();
+        assert!(matches!(unknown[0].coupling, Some(Coupling::Unknown(_))));
+    }
+    assert!((20..=95).contains(&touched), "{touched} of 100 touch: the test shows little");
+}
+
+#[test]
+fn a_robot_that_waits_for_the_other_is_coupled() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    let plan = plan(true);
+    let mut coupled = 0;
+    for seed in 0..100 {
+        let [one, two, both] = ["one.mcap", "two.mcap", "both.mcap"].map(file);
+        run::<Field<ONE_ALONE, true>>(&plan, seed, &one);
+        run::<Field<TWO_ALONE, true>>(&plan, seed, &two);
+        let seen = run::<Field<BOTH, true>>(&plan, seed, &both);
+        let alone = shapes(&plan, &[&one, &two], &["one", "two"], &["two"]);
+        // By what it reads it is always coupled, and the sentence says so.
+        let apart = found(&plan, &alone, None, ALIKE).unwrap();
+        assert_eq!(apart[0].coupling, Some(Coupling::Coupled(Evidence::Messages)));
+        assert!(sentences(&apart)[0].ends_with("The method does not hold."), "{:?}", sentences(&apart));
+
+        // By how it moves it is coupled exactly if it waited, which is in the recordings.
+        let together = shapes(&plan, &[&both], &["one", "two"], &[]);
+        let until = seen.unwrap_or(f64::INFINITY) - STEP;
+        let [alone_one, together_one] = [&alone, &together].map(|shapes| shapes[0].trace().unwrap());
+        let pairs = together_one.times().iter().zip(alone_one.positions().iter().zip(together_one.positions()));
+        let waited = pairs.into_iter().any(|(&time, (alone, both))| time < until && (*alone - *both).length() > 0.001);
+        let compared = found(&plan, &alone, Some(&together), ALIKE).unwrap();
+        let coupling = compared[0].coupling.as_ref().unwrap();
+        assert_eq!(coupling.method_holds(), !waited, "{seed}: {}", coupling.sentence());
+        if waited {
+            assert!(matches!(coupling, Coupling::Coupled(Evidence::Motion(_))), "{seed}: {coupling:?}");
+            coupled += 1;
+        } else {
+            agrees(&compared[0], seen, seed);
+        }
+    }
+    assert!((10..=95).contains(&coupled), "{coupled} of 100 waited: the test shows little");
+}
+
+#[test]
+fn what_robots_read_through_others_counts_and_a_node_that_publishes_both_says_nothing() {
+    let with_nodes = |nodes: &str| {
+        let text = format!(
+            "space field\nsystem {{\n  simulator field = in_process \"field::Field\" {{ crate \"field\"  step 20ms }}\n  \
+             topic one = \"one\" : point[m]\n  topic two = \"two\" : point[m]\n  topic plan = \"plan\" : real\n  \
+             {nodes}\n}}\nmetric along minimise default 0m = last(one.x)\ncampaign watch {{ passive 1 times  observes along  end \
+             after 5s }}\n"
+        );
+        let checked = (SESAME.check)("field.sesame", &text, Look::Human { colour: false });
+        assert_eq!(checked.errors, 0, "{}", checked.diagnostics);
+        reads_the_other(&checked.plans[0].plan, "one", "two")
+    };
+    let through = "node a { publishes one  subscribes plan }\n  node planner { publishes plan  subscribes two }\n  \
+                   node b { publishes two }";
+    assert_eq!(with_nodes(through), Some(true));
+    assert_eq!(with_nodes("node a { publishes one  subscribes plan }\n  node b { publishes two }"), Some(false));
+    assert_eq!(with_nodes("node tracking { publishes one, two }"), None);
+    assert_eq!(with_nodes("node a { publishes one }"), None, "nobody says who publishes the other");
+}

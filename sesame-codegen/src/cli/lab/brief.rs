@@ -1,0 +1,289 @@
+//! `sesamec lab brief`: sheets for those who run tests in a lab, from the results of the simulation.
+
+use std::fs::OpenOptions;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, ensure};
+use clap::{Args, ValueEnum};
+
+use sesame_plan::{CampaignPlan, Lab, ShapePlace};
+use sesame_results::record::Repository;
+use sesame_results::report::show;
+use sesame_safety::briefing::{Briefing, Person, html, text};
+use sesame_safety::expansion::{Approach, Reaction, Stop, WALKING_SPEED, separation_distance};
+use sesame_safety::speed::greatest_speed;
+
+use super::super::select::named_lab;
+use super::super::shell::{self, Shell};
+use super::briefing::{Facts, RobotSpeed, Traced, briefing};
+use super::contacts::signals;
+use super::replay::{ReplayError, meetings, recorded};
+
+/// The shortest time over which a speed is measured in a recorded pose, in seconds: noise of a millimetre is then less
+/// than 2 cm/s.
+const SPEED_WINDOW: f64 = 0.1;
+
+/// Which sheets, and what the results do not say.
+#[derive(Debug, Args)]
+pub(in crate::cli) struct Brief {
+    /// The results of the campaign: a results file, or the folder of a run.
+    results: PathBuf,
+    /// The tests, for example `T158 T17`.
+    #[arg(required = true, value_name = "TEST")]
+    tests: Vec<String>,
+    /// The lab; the only one of the space if omitted.
+    #[arg(long, value_name = "NAME")]
+    lab: Option<String>,
+    /// Somebody who must be present: the role and what this person does, for example `safety pilot: holds the
+    /// enabling switch`. May be given several times.
+    #[arg(long, value_name = "ROLE: TASK", value_parser = person)]
+    present: Vec<Person>,
+    /// A further condition that people can see, and in which they stop the test. May be given several times.
+    #[arg(long, value_name = "CONDITION")]
+    stop: Vec<String>,
+    /// What passes before a robot begins to stop: detection, response and communication together.
+    #[arg(long, value_name = "SECONDS", requires = "deceleration")]
+    reaction: Option<f64>,
+    /// How strongly a robot brakes, in metres per second squared.
+    #[arg(long, value_name = "M/S2", requires = "reaction")]
+    deceleration: Option<f64>,
+    /// How fast people approach, in metres per second: 1.6 for walking, 2 for reaching, 0 for things that do not move.
+    #[arg(long, value_name = "M/S", default_value_t = WALKING_SPEED)]
+    approach: f64,
+    /// How far a part of a body gets into a zone before it is detected, in metres.
+    #[arg(long, value_name = "METRES", default_value_t = 0.0)]
+    intrusion: f64,
+    /// By how much positions may be wrong, of robots and people together, in metres.
+    #[arg(long, value_name = "METRES", default_value_t = 0.0)]
+    uncertainty: f64,
+    /// As text, or as a page to print, each test on a sheet of its own.
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+    /// Write into this file, which must not exist; if omitted, the sheets are printed.
+    #[arg(short, long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// How sheets are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+enum Format {
+    #[default]
+    Text,
+    Html,
+}
+
+/// `safety pilot: holds the enabling switch`.
+fn person(text: &str) -> Result<Person, String> {
+    match text.split_once(':').map(|(role, task)| (role.trim(), task.trim())) {
+        Some((role, task)) if !role.is_empty() && !task.is_empty() => {
+            Ok(Person { role: role.to_owned(), task: task.to_owned() })
+        }
+        _ => Err("expected a role and a task, such as `safety pilot: holds the enabling switch`".to_owned()),
+    }
+}
+
+/// Prints the sheets, or writes them into a file.
+pub(super) fn brief(shell: Shell, asked: &Brief) -> anyhow::Result<()> {
+    let repository = Repository::open(&asked.results)?;
+    let plan = repository.plan();
+    let lab = named_lab(plan, asked.lab.as_deref())?;
+    // Wrong numbers are refused even if no speed is known.
+    if let Some(approach) = asked.approach(0.0) {
+        separation_distance(&approach)?;
+    }
+    let mut sheets = Vec::new();
+    for name in &asked.tests {
+        sheets.push(sheet(shell, asked, &repository, lab, name)?);
+    }
+    let written = match asked.format {
+        Format::Text => sheets.iter().map(text::text).collect::<Vec<_>>().join("\n\n"),
+        Format::Html => {
+            let title = format!("Briefing: {} of {}", asked.tests.join(", "), plan.campaign.name);
+            html::page(&title, &sheets)
+        }
+    };
+    if asked.reaction.is_none() {
+        shell.note("`--reaction` and `--deceleration` say by how much safety zones must be wider");
+    }
+    match &asked.out {
+        None => shell::asked_for(&written),
+        Some(file) => {
+            write_new(file, &written)?;
+            shell.did("Wrote", file.display());
+            Ok(())
+        }
+    }
+}
+
+/// Writes a file that must not exist.
+fn write_new(file: &Path, text: &str) -> anyhow::Result<()> {
+    let opened = OpenOptions::new().write(true).create_new(true).open(file);
+    let written = opened.and_then(|mut file| file.write_all(text.as_bytes()));
+    written.with_context(|| format!("cannot write {}; choose a file that does not exist", file.display()))
+}
+
+impl Brief {
+    /// The approach of a robot of this speed, if it is said how it stops.
+    fn approach(&self, robot_speed: f64) -> Option<Approach> {
+        Some(Approach {
+            robot_speed,
+            other_speed: self.approach,
+            reaction: Reaction { detection: self.reaction?, response: 0.0, communication: 0.0 },
+            stop: Stop::Deceleration(self.deceleration?),
+            intrusion: self.intrusion,
+            other_uncertainty: 0.0,
+            robot_uncertainty: self.uncertainty,
+        })
+    }
+}
+
+fn sheet(
+    shell: Shell,
+    asked: &Brief,
+    repository: &Repository,
+    lab: Option<&Lab>,
+    name: &str,
+) -> anyhow::Result<Briefing> {
+    let plan = repository.plan();
+    let report = show(repository, name)?;
+    ensure!(!report.operations.is_empty(), "{} disturbs nothing: name a test that does", report.test);
+    let ran = report.duplicate_of.unwrap_or(report.test);
+    let judge = repository.judge()?;
+    let traced = match (&report.trace, lab) {
+        (Some(file), Some(lab)) => traced(shell, plan, lab, file)?,
+        (None, Some(lab)) if !lab.shapes.is_empty() => {
+            shell.note(format!(
+                "{} has no trace, so contacts are not computed; this records it:\n    {} replay FILE {} --record",
+                report.test,
+                shell::command(),
+                report.test
+            ));
+            Traced::default()
+        }
+        _ => Traced::default(),
+    };
+    let facts = Facts { plan, lab, report: &report, repeated: judge.runs(ran.0), traced: &traced };
+    let mut sheet = briefing(&facts, |speed| {
+        let approach = asked.approach(speed)?;
+        Some((approach, separation_distance(&approach).ok()?))
+    });
+    sheet.stop_when.extend(asked.stop.iter().cloned());
+    sheet.present.extend(asked.present.iter().cloned());
+    Ok(sheet)
+}
+
+/// What the trace of a test shows of the lab's shapes. What it does not show is said aside.
+fn traced(shell: Shell, plan: &CampaignPlan, lab: &Lab, file: &Path) -> anyhow::Result<Traced> {
+    if lab.shapes.is_empty() {
+        return Ok(Traced::default());
+    }
+    let signals = signals(plan, file)?;
+    let mut shapes = Vec::new();
+    for shape in &lab.shapes {
+        match recorded(plan, shape, (0, &signals, 0.0)) {
+            Ok(shape) => shapes.push(shape),
+            Err(error @ ReplayError::Shape { .. }) if matches!(shape.place, ShapePlace::Pose { .. }) => {
+                shell.warning(format!("{error}: {}", file.display()));
+            }
+            Err(error) => return Err(error.into()),
+        }
+    }
+    let speed = |shape: &super::replay::Recorded| {
+        let speed = greatest_speed(shape.trace()?, SPEED_WINDOW).ok()?;
+        let of = format!("the recorded pose of {}, from {:.2} s to {:.2} s", shape.name, speed.from, speed.to);
+        Some(RobotSpeed { of, metres_per_second: speed.value })
+    };
+    Ok(Traced { speeds: shapes.iter().filter_map(speed).collect(), meetings: meetings(&shapes)? })
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use sesame_plan::testing;
+    use sesame_plan::{Bound, LabExclusion, LabShape, MetricId, ShapeForm};
+    use sesame_results::record::sample;
+
+    use super::*;
+
+    #[derive(Debug, Parser)]
+    struct Line {
+        #[command(flatten)]
+        brief: Brief,
+    }
+
+    fn asked(arguments: &[&str]) -> Brief {
+        Line::parse_from(["brief", "results"].iter().chain(arguments)).brief
+    }
+
+    /// The sample campaign with a lab, whose shapes are in no trace.
+    fn plan(excluded_above: f64) -> CampaignPlan {
+        let shape = |name: &str, place| LabShape {
+            name: name.to_owned(),
+            doc: String::new(),
+            form: ShapeForm::Sphere { radius: 0.3 },
+            place,
+            expand: 0.5,
+        };
+        let gripper = ShapePlace::Pose { pose: "gripper".to_owned() };
+        let exclusion = LabExclusion { metric: MetricId(0), bound: Bound::Above { value: excluded_above } };
+        let lab = Lab {
+            exclude: vec![exclusion],
+            interlock: vec![MetricId(0), MetricId(1)],
+            shapes: vec![shape("gripper", gripper), shape("Z1", ShapePlace::Fixed { centre: [1.0, 0.0, 0.0] })],
+            ..testing::lab("hall")
+        };
+        CampaignPlan { labs: vec![lab], ..sample::plan() }
+    }
+
+    fn sheets(plan: &CampaignPlan, arguments: &[&str]) -> Vec<String> {
+        let folder = tempfile::tempdir().unwrap();
+        let repository = sample::campaign_with_fronts(folder.path(), plan, 45);
+        let asked = asked(arguments);
+        let lab = plan.labs.first();
+        let sheet = |name: &String| sheet(Shell::silent(), &asked, &repository, lab, name).unwrap();
+        asked.tests.iter().map(sheet).map(|sheet| text::text(&sheet)).collect()
+    }
+
+    #[test]
+    fn a_sheet_says_what_is_disturbed_what_was_seen_and_when_to_stop() {
+        let arguments = [
+            "T17",
+            "--present",
+            "safety pilot: holds the enabling switch",
+            "--stop",
+            "the gripper is lower than the belt",
+            "--reaction",
+            "0.35",
+            "--deceleration",
+            "2",
+        ];
+        insta::assert_snapshot!(sheets(&plan(1000.0), &arguments)[0]);
+    }
+
+    #[test]
+    fn a_test_that_the_lab_excludes_begins_with_a_warning() {
+        let sheet = &sheets(&plan(-1.0), &["T17"])[0];
+        let solid = sheet.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(solid.contains("WARNING: The lab excludes this test: it has collision_occurrence"), "{sheet}");
+        assert!(solid.contains("was not computed: nobody said how robots stop."), "{sheet}");
+    }
+
+    #[test]
+    fn how_a_robot_stops_is_said_completely_or_not_at_all() {
+        assert!(Line::try_parse_from(["brief", "results", "T1", "--reaction", "0.3"]).is_err());
+        assert!(Line::try_parse_from(["brief", "results", "T1", "--present", "pilot"]).is_err());
+        assert!(Line::try_parse_from(["brief", "results"]).is_err());
+    }
+
+    #[test]
+    fn a_file_of_the_user_is_not_overwritten() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("brief.txt");
+        write_new(&file, "one").unwrap();
+        let refused = write_new(&file, "two").unwrap_err().to_string();
+        assert!(refused.ends_with("brief.txt; choose a file that does not exist"), "{refused}");
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), "one");
+    }
+}
