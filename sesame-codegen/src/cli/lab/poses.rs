@@ -125,7 +125,7 @@ fn poses(signals: &Signals) -> Vec<String> {
     // A quaternion has an x, too.
     let positions = positions.filter(|name| !signals.contains_key(&format!("{name}.w")));
     let shortest = |name: &str| {
-        let layouts = LAYOUTS.iter().rev();
+        let mut layouts = LAYOUTS.iter().rev();
         layouts.find_map(|[position, _]| name.strip_suffix(position)).unwrap_or(name).to_owned()
     };
     let names: BTreeSet<String> = positions.map(shortest).collect();
