@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use sesame_tests::{Done, Project, command, done, fresh_folder, sesamec, workspace};
 
-/// The example of two robots, in a lab in which both are spheres: a campaign that runs them together, one in which `north`
-/// does not hear `east` until late, and one of a dangerous test.
+/// The example of two robots, in a lab in which both are spheres: a campaign that runs them together, one in which
+/// `north` does not hear `east` until late, and one of a dangerous test.
 fn two_robots(name: &str) -> Project {
     let folder = fresh_folder(name);
     let example = workspace().join("examples/two_robots");

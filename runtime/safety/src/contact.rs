@@ -16,14 +16,14 @@
 //! - *From below*: f is a maximum over directions n of a gap along n, so it is at least the gap along the direction
 //!   that is best at m. That gap changes by at most |n·d| + r. So f ≥ gap(m, n) − |n·d| − r in the whole cell.
 //! - *From above*: for the same reason f changes by at most |d| + r, so f ≤ f(m) + |d| + r. Moreover, with orientations
-//!   kept as they are at m, each gap is linear in time, and a maximum of linear functions is convex and thus at most the
-//!   greater of its values at both ends; keeping the orientations changes it by at most r. So f ≤ max(f(start), f(end))
-//!   + 2r, which is the better bound of a body that slides along another.
+//!   kept as they are at m, each gap is linear in time, and a maximum of linear functions is convex and thus at most
+//!   the greater of its values at both ends; keeping the orientations changes it by at most r. So f ≤ max(f(start),
+//!   f(end)) + 2r, which is the better bound of a body that slides along another.
 //!
 //! With a tolerance ε, a cell is *clear* if f > ε/2 in all of it, and *in contact* if f ≤ ε in all of it. If neither is
 //! proved, the cell is halved. When |d| + r ≤ ε/4, one of the two is: f(m) ≤ ε/2 + |d| + r if it is not clear, hence
-//! f ≤ ε/2 + 2(|d| + r) ≤ ε. So there are at most 2 cells per ε/4 of motion, and far fewer where bodies are not within ε
-//! of each other for long. The margin of ε/2 is for rounding, which stays below 10⁻⁷ m for permitted coordinates.
+//! f ≤ ε/2 + 2(|d| + r) ≤ ε. So there are at most 2 cells per ε/4 of motion, and far fewer where bodies are not within
+//! ε of each other for long. The margin of ε/2 is for rounding, which stays below 10⁻⁷ m for permitted coordinates.
 
 use parry3d_f64::math::{Pose, Vector};
 
@@ -60,9 +60,9 @@ pub struct Nearest {
 pub struct Contacts {
     /// When both poses are known. Nothing is said about other times.
     pub known: Interval,
-    /// When the bodies are in contact, in the order of time; disjoint. At each instant at which the signed distance is 0
-    /// or less, they are in contact; at each instant of an interval it is at most the tolerance. Thus a contact may be
-    /// found early by the time in which the bodies approach by the tolerance, and never late.
+    /// When the bodies are in contact, in the order of time; disjoint. At each instant at which the signed distance is
+    /// 0 or less, they are in contact; at each instant of an interval it is at most the tolerance. Thus a contact may
+    /// be found early by the time in which the bodies approach by the tolerance, and never late.
     pub intervals: Vec<Interval>,
     /// How near they come: at most the tolerance more than the least signed distance.
     pub nearest: Nearest,

@@ -1,9 +1,9 @@
 //! Whether a recording that was made without another robot or an object says anything about a run with it.
 //!
 //! Virtual objects and multi-robot position integration ([`crate::contact`]) hold only while the recorded motion does
-//! not depend on what was removed. A robot that sees the other one and waits moves differently when the other is parked,
-//! and the contact that is found in its recording is none that would occur. There are two kinds of evidence: what the
-//! robot reads, and a run of both from which its motion can be compared.
+//! not depend on what was removed. A robot that sees the other one and waits moves differently when the other is
+//! parked, and the contact that is found in its recording is none that would occur. There are two kinds of evidence:
+//! what the robot reads, and a run of both from which its motion can be compared.
 
 use crate::contact::Interval;
 use crate::trace::{Trace, angle};
@@ -134,8 +134,8 @@ pub fn by_messages(depends: bool) -> Coupling {
 /// `together`, from a run with both.
 ///
 /// They are compared from the start of `together` up to `until`: the first contact in that run, after which bodies move
-/// differently in any case, or its end. A difference within the tolerance is none. Two recordings that agree, but do not
-/// cover all of that, are no proof.
+/// differently in any case, or its end. A difference within the tolerance is none. Two recordings that agree, but do
+/// not cover all of that, are no proof.
 pub fn by_motion(alone: &Trace, together: &Trace, until: f64, tolerance: Tolerance) -> Coupling {
     let needed = Interval { from: together.start(), to: until.max(together.start()) };
     let common = Interval { from: alone.start().max(needed.from), to: alone.end().min(together.end()).min(needed.to) };

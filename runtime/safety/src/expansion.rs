@@ -6,8 +6,8 @@
 //!
 //! While the system reacts (`t_r`) the robot moves on at `v_r`, and while it reacts and stops (`t_s`) the human
 //! approaches at `v_h`. Stopping takes the robot a distance `S_s`, which is `v_r² / (2a)` with a constant deceleration
-//! `a`. `C` is how far a body intrudes before it is detected, and `Z_d` and `Z_r` are the uncertainties of the positions
-//! of human and robot. With `v_r = 0` it is `S = K T + C` of [ISO 13855].
+//! `a`. `C` is how far a body intrudes before it is detected, and `Z_d` and `Z_r` are the uncertainties of the
+//! positions of human and robot. With `v_r = 0` it is `S = K T + C` of [ISO 13855].
 //!
 //! The speeds must be the greatest that can occur during the approach, including what the robot gains while nobody has
 //! reacted yet. [`crate::speed::greatest_speed`] finds the one that occurred in a recording.

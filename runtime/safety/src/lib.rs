@@ -1,7 +1,7 @@
 //! What makes a physical test safe, as geometry and arithmetic: no files, no plan, no results; callers bring those.
 //!
-//! A test that ends in a collision in simulation must not do so in the lab. [SESAME 2023, Section 4.3] lists ways to run
-//! it nevertheless; each has a module here:
+//! A test that ends in a collision in simulation must not do so in the lab. [SESAME 2023, Section 4.3] lists ways to
+//! run it nevertheless; each has a module here:
 //!
 //! - [`expansion`]: safety zones are widened, so that there is time to respond; [`speed`] finds how fast a robot was.
 //! - [`interlock`]: an interlock ends the test, and stands for the violation that it prevents.

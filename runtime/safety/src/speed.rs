@@ -33,10 +33,11 @@ pub enum SpeedError {
 /// would do: displacement by time.
 ///
 /// A window is what makes this robust. Neighbouring samples that are a millisecond apart turn a millimetre of noise
-/// into a metre per second. If each position is off by at most u metres, the value is off by at most 2u / window. On the
-/// other hand, peaks within a window are averaged. If the acceleration is at most a, the body was nowhere faster than
-/// the value plus a·w/2, where w is the longest window: at a time t its velocity differs from that at the peak by at
-/// most a times the time between, and each instant of the recording is in a window. Add both to the value for a bound.
+/// into a metre per second. If each position is off by at most u metres, the value is off by at most 2u / window. On
+/// the other hand, peaks within a window are averaged. If the acceleration is at most a, the body was nowhere faster
+/// than the value plus a·w/2, where w is the longest window: at a time t its velocity differs from that at the peak by
+/// at most a times the time between, and each instant of the recording is in a window. Add both to the value for a
+/// bound.
 pub fn greatest_speed(trace: &Trace, window: f64) -> Result<Speed, SpeedError> {
     if !(0.0..f64::INFINITY).contains(&window) {
         return Err(SpeedError::Window(window));

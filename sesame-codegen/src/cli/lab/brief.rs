@@ -14,11 +14,11 @@ use sesame_safety::briefing::{Briefing, Person, html, text};
 use sesame_safety::expansion::{Approach, Reaction, Stop, WALKING_SPEED, separation_distance};
 use sesame_safety::speed::greatest_speed;
 
-use super::super::select::named_lab;
-use super::super::shell::{self, Shell};
 use super::briefing::{Facts, RobotSpeed, Traced, briefing};
 use super::contacts::signals;
-use super::replay::{ReplayError, meetings, recorded};
+use super::replay::{Recorded, ReplayError, meetings, recorded};
+use crate::cli::select::named_lab;
+use crate::cli::shell::{self, Shell};
 
 /// The shortest time over which a speed is measured in a recorded pose, in seconds: noise of a millimetre is then less
 /// than 2 cm/s.
@@ -189,7 +189,7 @@ fn traced(shell: Shell, plan: &CampaignPlan, lab: &Lab, file: &Path) -> anyhow::
             Err(error) => return Err(error.into()),
         }
     }
-    let speed = |shape: &super::replay::Recorded| {
+    let speed = |shape: &Recorded| {
         let speed = greatest_speed(shape.trace()?, SPEED_WINDOW).ok()?;
         let of = format!("the recorded pose of {}, from {:.2} s to {:.2} s", shape.name, speed.from, speed.to);
         Some(RobotSpeed { of, metres_per_second: speed.value })

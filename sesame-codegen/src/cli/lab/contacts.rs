@@ -12,12 +12,12 @@ use sesame_runtime::wire::WireTable;
 use sesame_safety::contact::Interval;
 use sesame_safety::coupling::Coupling;
 
-use super::super::commands::check;
-use super::super::results::{Format, Output, print};
-use super::super::select::named_lab;
-use super::super::shell::{self, Format as Diagnostics, Shell};
 use super::poses::{Signals, long_pause};
 use super::replay::{Alike, Meeting, Recorded, judged, meetings, recorded};
+use crate::cli::commands::check;
+use crate::cli::results::{Format, Output, print};
+use crate::cli::select::named_lab;
+use crate::cli::shell::{self, Format as Diagnostics, Shell};
 use crate::frontend::Language;
 
 /// Which recordings, and how they belong together.

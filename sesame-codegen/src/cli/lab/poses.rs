@@ -69,9 +69,9 @@ fn known(there: &[String]) -> String {
 
 /// The motion of a pose, in metres and seconds since the start of the run.
 ///
-/// A pose is named by its topic, perhaps with fields of its messages: its position is in the fields `x`, `y` and `z`, or
-/// in a point, and its orientation, if there is one, in a quaternion with the fields `x`, `y`, `z` and `w`, or in the
-/// fields `qx`, `qy`, `qz` and `qw` beside a position. Coordinates without a unit are metres.
+/// A pose is named by its topic, perhaps with fields of its messages: its position is in the fields `x`, `y` and `z`,
+/// or in a point, and its orientation, if there is one, in a quaternion with the fields `x`, `y`, `z` and `w`, or in
+/// the fields `qx`, `qy`, `qz` and `qw` beside a position. Coordinates without a unit are metres.
 pub(super) fn pose(plan: &CampaignPlan, signals: &Signals, name: &str) -> Result<Trace, PoseError> {
     let found = LAYOUTS.iter().find_map(|[position, orientation]| {
         let position = format!("{name}{position}");
@@ -172,8 +172,8 @@ fn field_of<'a>(plan: &'a CampaignPlan, ty: &Type, field: &str) -> Option<&'a Ty
     plan.message(id).fields.iter().find(|known| known.name == field).map(|known| &known.ty)
 }
 
-/// The topic on which a signal or pose of this name is, and what follows the topic's path in the name. Of topics of which
-/// one continues the path of another, it is the one with the longest path.
+/// The topic on which a signal or pose of this name is, and what follows the topic's path in the name. Of topics of
+/// which one continues the path of another, it is the one with the longest path.
 pub(super) fn topic_of<'a, 'n>(plan: &'a CampaignPlan, name: &'n str) -> Option<(&'a Topic, &'n str)> {
     let rest = |path: &str| name.strip_prefix(path).filter(|rest| rest.is_empty() || rest.starts_with(['.', '[']));
     let topics = plan.topics.iter().flat_map(|topic| topic.paths.iter().map(move |path| (topic, path)));

@@ -1,7 +1,8 @@
 //! The shapes of a lab in recordings: when they touch, how near they come, and whether that may be concluded from
 //! recordings in which something was missing.
 //!
-//! *Virtual objects* and *multi-robot position integration* [SESAME 2023, Section 4.3]. Nothing is read or written here.
+//! *Virtual objects* and *multi-robot position integration* [SESAME 2023, Section 4.3]. Nothing is read or written
+//! here.
 
 use std::collections::BTreeSet;
 
