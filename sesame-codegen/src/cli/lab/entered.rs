@@ -1,4 +1,5 @@
-//! `sesamec lab form` and `sesamec lab add`: results of a lab in which people ran the tests by hand. A form is printed, filled in, and recorded.
+//! `sesamec lab form` and `sesamec lab add`: results of a lab in which people ran the tests by hand. A form is printed,
+//! filled in, and recorded.
 
 mod campaign;
 mod check;
@@ -27,8 +28,8 @@ use sesame_runtime::cli::Caller;
 use self::campaign::Campaign;
 use self::check::Taken;
 use self::form::Wanted;
-use super::super::commands::all;
-use super::super::shell::{self, Shell};
+use crate::cli::commands::all;
+use crate::cli::shell::{self, Shell};
 use crate::input;
 use crate::output::FreshFolder;
 
