@@ -75,6 +75,13 @@ class Study:
         self.sesamec("gap", *sides, shown=True)
         return self.json("gap", *sides, "--extents")
 
+    def most_unlike(self, run, everywhere):
+        """The test whose gap stands out most, of metrics whose gap is not the same everywhere; None without one."""
+        varying = {row["of"] for row in everywhere if row["quantity"] == "metric" and row["extent"] != "systematic"}
+        rows = self.json("gap", f"{self.results}/{run}", f"{self.results}/{run}-hall")
+        rows = [row for row in rows if row["metric"] in varying and row["verdict"] == "different"]
+        return max(rows, key=lambda row: abs(row["difference"]) / row["tolerance"])["test"] if rows else None
+
     def carry_out(self, compensates):
         """The whole way; gives what was found."""
         self.sesamec("run", "study.sesame", "--", "--seed", self.seed, shown=True)
@@ -82,10 +89,11 @@ class Study:
         chosen = [row["test"] for row in self.json("select", f"{self.results}/{run}")]
         self.sesamec("select", f"{self.results}/{run}", shown=True)
         everywhere = self.in_lab(run, chosen)
-        # Whether a gap is in a part of the space shows along a dimension, around a test that the lab has run.
-        self.sesamec("explore", "study.sesame", chosen[-1], "--vary", "P1", "-n", 9, "--results", run)
-        around = self.in_lab(f"{run}-{chosen[-1]}-P1", [f"T{at}" for at in range(1, 10)])
-        found = {"seed": self.seed, "tests": chosen, "around": chosen[-1]}
+        # Whether a gap is in a part of the space shows along a dimension, around a test that has it.
+        middle = self.most_unlike(run, everywhere) or chosen[0]
+        self.sesamec("explore", "study.sesame", middle, "--vary", "P1", "-n", 9, "--results", run)
+        around = self.in_lab(f"{run}-{middle}-P1", [f"T{at}" for at in range(1, 10)])
+        found = {"seed": self.seed, "tests": chosen, "around": middle}
         found["gaps"] = [row for row in everywhere if row["extent"] in FOUND]
         found["gaps_around"] = [row for row in around if row["extent"] in FOUND]
         if compensates:

@@ -13,10 +13,11 @@ use sesame_gap::equivalence::{self, Equivalence, Reason, Verdict as Equal, lab_r
 use sesame_gap::holm::adjusted;
 use sesame_gap::localise::{self, Extent, Words, localise};
 use sesame_gap::next::{Next, Tried, Why, next};
-use sesame_gap::samples::{Samples, Side, Undefined, hedges_g, moments};
-use sesame_gap::split::{Located, Split};
+use sesame_gap::pooled::Pooled;
+use sesame_gap::samples::{Samples, Side, Undefined, Welch, hedges_g, moments};
+use sesame_gap::split::{Located, Range, Split};
 use sesame_gap::violations::{Confusion, Frequencies, Occurrence, Occurrences, frequencies};
-use sesame_plan::{CampaignPlan, Dimension, Lab, LabTask, MetricId, Requirement};
+use sesame_plan::{CampaignPlan, Dimension, Lab, LabTask, MetricId, Requirement, Task};
 use sesame_search::sspr::Convention;
 
 use crate::analysis::Datum;
@@ -211,7 +212,12 @@ fn compare(
     for run in runs {
         by_test.entry(run.of).or_default().push(&run.row);
     }
-    let dimensions = dimensions(lab);
+    let variations = match campaign.task() {
+        Task::Variations(variations) => Some(variations.dimension),
+        _ => None,
+    };
+    // Variations differ in one dimension only.
+    let dimensions = variations.map_or_else(|| dimensions(lab), |dimension| vec![dimension]);
     let judge = campaign.judge()?;
     let points = points(campaign, &by_test.keys().copied().collect(), &dimensions)?;
     let mut reference = None;
@@ -254,6 +260,11 @@ fn compare(
     adjust(&mut metrics);
     for gap in &mut metrics {
         locate(gap, &points);
+        if variations.is_some()
+            && let Some(extent) = separated(gap, &points)
+        {
+            gap.extent = extent;
+        }
     }
     let requirements = plan.requirements.iter().map(|requirement| {
         let occurrence = |said: Verdict| match said {
@@ -396,6 +407,41 @@ fn locate(gap: &mut MetricGap, points: &BTreeMap<u32, Vec<Option<f64>>>) {
     }
     let settings = localise::Settings { tolerance: gap.tolerance, alpha: ALPHA, permutations: PERMUTATIONS, seed: 0 };
     gap.extent = localise(&located, settings);
+}
+
+/// Where the gap of variations of one test is: between those that differ and those that agree, if a range divides them.
+///
+/// Other coordinates of variations are equal, so nothing else can explain it. That some differ at all is more than
+/// chance already, since verdicts are those of all comparisons together.
+fn separated(gap: &MetricGap, points: &BTreeMap<u32, Vec<Option<f64>>>) -> Option<Extent> {
+    let mut decided: Vec<(f64, bool, Welch)> = Vec::new();
+    for compared in &gap.tests {
+        let (Ok(tests), Some([Some(at)])) =
+            (&compared.equivalence.tests, points.get(&compared.test).map(Vec::as_slice))
+        else {
+            continue;
+        };
+        match compared.equivalence.verdict {
+            Equal::Different => decided.push((*at, true, tests.welch)),
+            Equal::Equivalent => decided.push((*at, false, tests.welch)),
+            Equal::Undecided(_) => {}
+        }
+    }
+    decided.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let first = decided.iter().position(|(_, differs, _)| *differs)?;
+    let last = decided.iter().rposition(|(_, differs, _)| *differs)?;
+    let inside = &decided[first..=last];
+    let outside = || decided[..first].iter().chain(&decided[last + 1..]);
+    if inside.iter().any(|(_, differs, _)| !differs) || inside.len() < 2 || outside().count() < 2 {
+        return None;
+    }
+    let end = |below: usize| Some(f64::midpoint(decided.get(below)?.0, decided.get(below + 1)?.0));
+    let range = Range { dimension: 0, low: first.checked_sub(1).and_then(end), high: end(last) };
+    let inside = Pooled::of(inside.iter().map(|(_, _, difference)| difference))?;
+    let outside = Pooled::of(outside().map(|(_, _, difference)| difference))?;
+    let apart = inside.estimate - outside.estimate;
+    let q = apart * apart / (inside.standard_error.powi(2) + outside.standard_error.powi(2));
+    Some(Extent::Range { split: Split { range, q, p: ALPHA }, inside, outside })
 }
 
 fn event(name: &str, sides: &[Sides<'_>], of: impl Fn(&Sides<'_>) -> (Occurrences, Occurrences)) -> EventGap {
@@ -839,6 +885,24 @@ mod tests {
         let names: Vec<&str> = gap.events.iter().map(|event| event.name.as_str()).collect();
         assert_eq!(names, ["R1", "R2", "R3", "R4", "fuzzing_time"]);
         assert_eq!(gap.events[4].confusion.both, 24);
+    }
+
+    #[test]
+    fn the_gap_of_variations_is_where_those_that_differ_are_divided_from_those_that_agree() {
+        let (runs, repository, _folder) =
+            study(|value, t1| if t1 > 0.5 { value - 30.0 * (t1 - 0.5) - 3.0 } else { value }, |value, _| value);
+        let found = gap(&repository, &runs, Some(&tolerant())).unwrap();
+        let own = of(&found, COLLISIONS);
+        let along = |of: &dyn Fn(f64) -> f64| -> BTreeMap<u32, Vec<Option<f64>>> {
+            found.points.iter().map(|(test, at)| (*test, vec![at[0].map(of)])).collect()
+        };
+        let Some(Extent::Range { split, inside, outside }) = separated(own, &along(&|t1| t1)) else {
+            panic!("late tests differ, early ones agree")
+        };
+        assert!((split.range.low.unwrap() - 0.5).abs() < 0.1 && split.range.high.is_none(), "{split:?}");
+        assert!(inside.estimate < -3.0 && outside.estimate.abs() < 0.5, "{inside:?} {outside:?}");
+        // In another order of the tests nothing divides them.
+        assert_eq!(separated(own, &along(&|t1| libm::sin(40.0 * t1))), None);
     }
 
     #[test]
