@@ -27,8 +27,8 @@ pub(crate) enum LabError {
     },
     /// Runners do not reach it.
     #[error(
-        "lab `{name}` has no simulator that a runner reaches; `process` and `ros2` are, and results of others are \
-         entered by hand"
+        "lab `{name}` has no simulator that a runner reaches; `process` and `ros2` are. If people run the tests, \
+         `sesamec lab form` prints a form for the results"
     )]
     Unreachable {
         /// Its name.

@@ -126,7 +126,7 @@ enum Command {
     /// Compare the results of a lab with those of the campaign that its tests come from: where simulation and reality
     /// differ, and by how much.
     Gap(gap::Compared),
-    /// Brief those who run tests in a lab, and find contacts in recordings.
+    /// Brief those who run tests in a lab, record what they saw, and find contacts in recordings.
     #[command(subcommand)]
     Lab(lab::Lab),
     /// Import a testing space of the original SESAME platform (an EMF file, `.model`), with the tests that it

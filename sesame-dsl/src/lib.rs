@@ -12,7 +12,7 @@ pub mod interfaces;
 pub mod model;
 pub mod place;
 mod resolve;
-mod similar;
+pub mod similar;
 pub mod source;
 pub mod span;
 mod synonyms;

@@ -8,7 +8,7 @@ const LONGEST: usize = 200;
 /// Near enough is an edit distance (insertions, deletions, replacements, swaps; case is ignored) of at most a third of
 /// the longer word's letters, and at least one, at most three. One word must keep a letter of the other: between names
 /// of one letter nothing tells a slip from another name.
-pub(crate) fn most_similar<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) -> Option<&'c str> {
+pub fn most_similar<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) -> Option<&'c str> {
     // The time grows with the product of both lengths, and a name of this length is not a typing mistake.
     if word.len() > LONGEST {
         return None;

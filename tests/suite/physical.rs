@@ -1,4 +1,5 @@
-//! Tests of a campaign in a stand-in for a lab: they are run there, recorded apart, and compared with the campaign.
+//! Tests of a campaign in a lab: run in a stand-in for one, or entered by hand, recorded apart, and compared with the
+//! campaign.
 
 use std::fs;
 use std::path::PathBuf;
@@ -82,6 +83,49 @@ fn recorded_tests_are_run_in_a_lab_and_a_gap_shows_where_one_was_built_in() {
     assert!(!different.is_empty(), "{compared:?}");
     // The metric of what is disturbed does not depend on where it is disturbed.
     assert!(!different.contains(&"fuzzing_time"), "{different:?}");
+}
+
+#[test]
+fn tests_that_people_ran_are_entered_in_a_form_and_compared_like_those_of_a_runner() {
+    let runner = project("entered").build("study");
+    runner.run(&["--results", "results"]).expect(0);
+    let said = |arguments: &[&str]| {
+        let mut sesamec = command(sesamec());
+        done(sesamec.current_dir(&runner.folder).args(arguments)).expect(0)
+    };
+    said(&["lab", "form", "results/5", "T1", "T2", "--lab", "hall", "-o", "form.csv"]);
+    let form = fs::read_to_string(runner.folder.join("form.csv")).unwrap();
+    assert_eq!(form.lines().filter(|line| line.starts_with('T')).count(), 6, "3 repeats of 2 tests: {form}");
+    let plan = Repository::open(&runner.folder.join("results/5")).unwrap().plan().clone();
+    let blank = ",".repeat(plan.metrics.len());
+    let mut runs = 0;
+    let fill = |line: &str| match line.strip_suffix(&format!(",{blank}")) {
+        Some(run) => {
+            runs += 1;
+            let values = plan.metrics.iter().map(|metric| match metric.name.as_str() {
+                "collision_occurrence" => format!("{}", 1000 + runs % 2),
+                _ => "unmeasured".to_owned(),
+            });
+            format!("{run},completed,{}", values.collect::<Vec<_>>().join(","))
+        }
+        None => line.replace("# operator:", "# operator: Ada"),
+    };
+    let filled: Vec<String> = form.lines().map(fill).collect();
+    fs::write(runner.folder.join("form.csv"), filled.join("\n")).unwrap();
+    let added = said(&["lab", "add", "results/5", "form.csv", "--lab", "hall"]).err;
+    assert!(added.contains("results/5-hall: 6 runs of 2 tests in lab `hall`"), "{added}");
+
+    let tests = said(&["results", "tests", "results/5-hall", "--format", "csv"]).out;
+    assert!(tests.starts_with("test,run_of,run,origin"), "{tests}");
+    assert!(tests.lines().nth(3).unwrap().starts_with("T3,T1,2,search") && tests.contains(",Ada"), "{tests}");
+    let compared = gap(&runner, &runner.folder.join("results/5-hall"));
+    let metrics: Vec<_> = compared.iter().filter_map(|row| row["metric"].as_str()).collect();
+    assert_eq!(metrics, ["collision_occurrence"; 2], "only what was measured is compared");
+    let digest = Repository::open(&runner.folder.join("results/5-hall")).unwrap().digest().unwrap();
+    assert!(runner.run(&["digest", "--results", "results/5-hall"]).expect(0).out.contains(&digest));
+    runner.run(&["report", "--results", "results/5-hall"]).expect(0);
+    let page = fs::read_to_string(runner.folder.join("results/5-hall/report.html")).unwrap();
+    assert!(page.contains("Operator") && page.contains("Ada"));
 }
 
 #[test]

@@ -29,7 +29,7 @@ use sesame_search::sspr::Convention;
 
 use crate::analysis::confirmed::confirmed_tests;
 use crate::analysis::statistics::Sample;
-use crate::record::{Origin, RecordError, Repository, ScannedTest};
+use crate::record::{EnteredRun, Origin, Provenance, RecordError, Repository, ScannedTest};
 
 pub use crate::present::table::{Datum, Table, TextOptions};
 pub use candidates::{Candidate, Candidates, LeftOut, Terms, candidates, qualities};
@@ -110,18 +110,24 @@ pub fn campaigns(repositories: &[Repository], readers: Readers) -> Result<Table,
 }
 
 /// All tests but the reference runs: where each comes from, how it ended, and the value of each metric; of imported
-/// ones also what they were called, and of runs in a lab the test of the campaign (`run_of`).
+/// ones also what they were called, and of runs in a lab the test of the campaign (`run_of`). Of runs that were entered
+/// by hand there is also which run of that test it is, and who made it, with what and when, if anybody said so.
 pub fn tests(repository: &Repository, selection: &Selection) -> Result<Table, RecordError> {
     let plan = repository.plan();
     let originals = repository.original_names()?;
     let original = (!originals.is_empty()).then(|| "original_name".to_owned());
     let run_of = runs_in_a_lab(repository)?;
     let lab = (!run_of.is_empty()).then(|| "run_of".to_owned());
+    let entered: BTreeMap<u32, EnteredRun> = repository.entered_runs()?.into_iter().map(|it| (it.test, it)).collect();
+    let run = (!entered.is_empty()).then(|| "run".to_owned());
+    let said: Vec<usize> = (0..Provenance::NAMES.len())
+        .filter(|&at| entered.values().any(|run| run.provenance.texts()[at].is_some()))
+        .collect();
     let columns = ["origin", "generation", "outcome", "duplicate_of", "operations"].map(str::to_owned);
     let metrics = plan.metrics.iter().map(|metric| metric.name.clone());
-    let mut dataset = Table::new(
-        std::iter::once("test".to_owned()).chain(original.clone()).chain(lab.clone()).chain(columns).chain(metrics),
-    );
+    let provenance = said.iter().map(|&at| Provenance::NAMES[at].to_owned());
+    let head = std::iter::once("test".to_owned()).chain(original.clone()).chain(lab.clone()).chain(run.clone());
+    let mut dataset = Table::new(head.chain(columns).chain(metrics).chain(provenance));
     repository.scan(&mut |test| {
         if test.origin == Origin::Reference || !selection.holds(test.number) {
             return;
@@ -129,6 +135,8 @@ pub fn tests(repository: &Repository, selection: &Selection) -> Result<Table, Re
         let called =
             original.is_some().then(|| originals.get(&test.number).cloned().map_or(Datum::Missing, Datum::Text));
         let of = lab.is_some().then(|| run_of.get(&test.number).copied().map_or(Datum::Missing, Datum::test));
+        let entered = entered.get(&test.number);
+        let of_run = run.is_some().then(|| entered.map_or(Datum::Missing, |it| Datum::Whole(i64::from(it.run))));
         let head = [
             Datum::Text(test.origin.word().to_owned()),
             test.generation.map_or(Datum::Missing, |generation| Datum::Whole(i64::from(generation))),
@@ -137,7 +145,12 @@ pub fn tests(repository: &Repository, selection: &Selection) -> Result<Table, Re
             Datum::Text(operations(plan, &test)),
         ];
         let values = (0u32..).map(MetricId).take(plan.metrics.len()).map(|id| Datum::real(test.value(id).value));
-        dataset.row(std::iter::once(Datum::test(test.number)).chain(called).chain(of).chain(head).chain(values));
+        let said = said.iter().map(|&at| {
+            let text = entered.and_then(|it| it.provenance.texts()[at]);
+            text.map_or(Datum::Missing, Datum::text)
+        });
+        let first = std::iter::once(Datum::test(test.number)).chain(called).chain(of).chain(of_run);
+        dataset.row(first.chain(head).chain(values).chain(said));
     })?;
     Ok(dataset)
 }

@@ -12,10 +12,12 @@ mod cursor;
 mod difference;
 mod digest;
 mod earlier_plans;
+mod entered;
 mod error;
 mod files;
 mod folder;
 mod fresh;
+mod lab_runs;
 mod quarantine;
 mod read_tests;
 mod recognise;
@@ -35,10 +37,11 @@ mod write_tests;
 
 use serde::Serialize;
 
-use sesame_base::observation::{Observation, Outcome};
+use sesame_base::observation::Observation;
 use sesame_plan::{KnownTestId, Requirement, Test};
 
 pub use difference::{Difference, differences};
+pub use entered::{ENTERED_OUTCOMES, Entered, EnteredRun, Provenance, entered_outcome};
 pub use error::RecordError;
 pub use files::{DATABASE, LOCK, TRACES, trace_file};
 pub use folder::{Claim, claim_folder, latest_folder, latest_unfinished};
@@ -49,7 +52,7 @@ pub use repetitions::{Judge, confirmed_fitness, confirming_runs};
 pub use repository::{CampaignFacts, Repository, digest};
 pub use scan::{ScannedOperation, ScannedTest};
 pub use schema::SCHEMA;
-pub use sesame_base::observation::MetricValue;
+pub use sesame_base::observation::{MetricValue, Outcome};
 pub use sesame_base::verdict::{Verdict, fails, verdict, violation_spans};
 pub use split_operations::SplitOperation;
 

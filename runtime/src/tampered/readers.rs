@@ -55,6 +55,7 @@ pub(super) fn read_all(folder: &Path) -> Read {
     let shown = |dataset: analysis::Table| (dataset.text(options), dataset.csv(), dataset.json());
     ask!(repository.digest(), |digest| digest);
     ask!(repository.sessions(), |sessions| sessions);
+    ask!(repository.entered_runs(), |runs| runs);
     ask!(analysis::campaigns(std::slice::from_ref(&repository), analysis::Readers::Programs), shown);
     ask!(tests_of(&repository, &all), shown);
     ask!(front(&repository, &all), shown);

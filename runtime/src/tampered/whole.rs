@@ -12,7 +12,9 @@ use sesame_plan::{
     LabTolerance, MetricId, RankKey, RankOrder, RequirementId, ShapeForm, ShapePlace, Shrinking, Statistic, StopRule,
     Task, TopicId,
 };
-use sesame_results::record::{DATABASE, GenerationCoverage, Origin, Recorder, Repetition, sample};
+use sesame_results::record::{
+    DATABASE, Entered, GenerationCoverage, Origin, Provenance, Recorder, Repetition, entered_outcome, sample,
+};
 use sesame_search as search;
 
 /// The contents of a results folder before any change: the database, and its log if there is one.
@@ -191,6 +193,25 @@ pub(super) fn wholes() -> Vec<Whole> {
         }
         recorder.finish("all tests are done").unwrap();
         wholes.push(taken("lab", folder.path()));
+    }
+    {
+        let folder = tempfile::tempdir().unwrap();
+        let plan = rich();
+        let tests = vec![LabTest { number: 7, test: plan.tests[0].test.clone() }];
+        let task = LabTask { lab: "lab".to_owned(), results: "0".repeat(64), tests, repeats: 3 };
+        let plan = Task::Lab(task.clone()).plan(&plan);
+        let mut recorder = Recorder::create_for(folder.path(), &plan, &Task::Lab(task.clone()), 1, 0).unwrap();
+        let run = |(run, word)| Entered {
+            of: 7,
+            run,
+            outcome: entered_outcome(word, &plan).unwrap(),
+            values: (0..).take(plan.metrics.len()).map(|at: u32| (at != 2).then(|| f64::from(at))).collect(),
+            provenance: Provenance { operator: Some("Ada".to_owned()), ..Provenance::default() },
+        };
+        let runs: Vec<Entered> = (1..).zip(["completed", "unknown", "timeout"]).map(run).collect();
+        recorder.put_entered_runs(task, &runs).unwrap();
+        recorder.finish("entered by hand").unwrap();
+        wholes.push(taken("entered", folder.path()));
     }
     wholes
 }

@@ -1,8 +1,10 @@
-//! `sesamec lab`: what a lab needs to know before tests are run there, and what its recordings show.
+//! `sesamec lab`: what a lab needs to know before tests are run there, what people saw in it, and what its recordings
+//! show.
 
 mod brief;
 mod briefing;
 mod contacts;
+mod entered;
 mod poses;
 mod replay;
 #[cfg(test)]
@@ -21,6 +23,10 @@ pub(super) enum Lab {
     /// Print a briefing for those who run tests in a lab: what is disturbed, what the simulation showed, and when to
     /// stop.
     Brief(brief::Brief),
+    /// Print a form for runs in a lab, to be filled in: a row for each run of each test.
+    Form(entered::Form),
+    /// Check filled-in forms, and record their runs as results of the lab.
+    Add(entered::Add),
     /// Find contacts between the shapes of a lab in recordings: of a robot with objects that were not there, and of
     /// robots that were recorded one at a time.
     Contacts(contacts::Asked),
@@ -30,6 +36,8 @@ pub(super) enum Lab {
 pub(super) fn lab(shell: Shell, language: &Language, asked: &Lab) -> anyhow::Result<ExitCode> {
     match asked {
         Lab::Brief(asked) => brief::brief(shell, asked)?,
+        Lab::Form(asked) => entered::print_form(shell, asked)?,
+        Lab::Add(asked) => entered::add(shell, asked)?,
         Lab::Contacts(asked) => contacts::print_contacts(shell, language, asked)?,
     }
     Ok(ExitCode::SUCCESS)

@@ -49,7 +49,7 @@ pub enum GapError {
     #[error(transparent)]
     Record(#[from] RecordError),
     /// They are no results of a lab.
-    #[error("{} has no results of a lab: `physical` runs tests in one", path.display())]
+    #[error("{} has no results of a lab: `physical` runs tests in one, and `lab add` records those that people ran", path.display())]
     NotOfALab {
         /// The file.
         path: PathBuf,

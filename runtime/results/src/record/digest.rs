@@ -4,11 +4,11 @@ use std::fmt::Write as _;
 
 use rusqlite::Connection;
 use rusqlite::types::ValueRef;
-use sesame_plan::CampaignPlan;
+use sesame_plan::{CampaignPlan, Test};
 use sha2::{Digest as _, Sha256};
 
 use crate::record::schema::{self, MEANING_SINCE, PIECES_SINCE, STANDARD_WORDS_SINCE};
-use crate::record::split_operations;
+use crate::record::{lab_runs, split_operations};
 
 /// What is hashed, in this order: a name, and a query whose order of rows depends on nothing but the content. The
 /// meaning of the plan is `?1`.
@@ -118,7 +118,8 @@ const PORTION: usize = 1 << 16;
 ///
 /// The task of a run that is not the campaign is hashed with the plan, which it follows.
 ///
-/// Operations that were one operation in an imported file are hashed last, if there are any.
+/// Operations that were one operation in an imported file are hashed last, if there are any, and so are runs of a lab
+/// that were entered by hand: which run of its test each is, but not who made it.
 ///
 /// Results of an earlier schema have the digest that their release computed, over all of the plan's JSON, the sentences
 /// of requirements, and the name of the `.sesame` file. Names of columns and verdicts are not hashed.
@@ -130,7 +131,9 @@ pub(super) fn of_connection(connection: &Connection, version: i64, plan: &Campai
     let mut portion = Vec::with_capacity(2 * PORTION);
     let split = version >= STANDARD_WORDS_SINCE && split_operations::are_in(&transaction)?;
     let split = split.then_some((split_operations::TABLE, split_operations::QUERY));
-    for content in CONTENT.iter().copied().chain(split) {
+    let entered = version >= STANDARD_WORDS_SINCE && lab_runs::are_in(&transaction)?;
+    let entered = entered.then_some((lab_runs::TABLE, lab_runs::QUERY));
+    for content in CONTENT.iter().copied().chain(split).chain(entered) {
         let earlier = EARLIER.iter().find(|(since, name, _)| version < *since && *name == content.0);
         let (name, sql) = earlier.map_or(content, |&(.., earlier)| earlier);
         feed(&mut portion, ValueRef::Text(name.as_bytes()));
@@ -151,11 +154,27 @@ pub(super) fn of_connection(connection: &Connection, version: i64, plan: &Campai
         portion.push(b';');
     }
     hash.update(&portion);
+    Ok(digits(hash))
+}
+
+/// SHA-256 over which tests results have, as 64 hexadecimal digits: over the names of the space and the campaign, the
+/// seed, and each test with its number, as JSON.
+pub(super) fn of_tests<'t>(plan: &CampaignPlan, seed: u64, tests: impl IntoIterator<Item = (u32, &'t Test)>) -> String {
+    let mut hash = Sha256::new();
+    let mut feed = |json: serde_json::Result<Vec<u8>>| hash.update(json.expect("a test is plain data with text keys"));
+    feed(serde_json::to_vec(&(&plan.space, &plan.campaign.name, seed)));
+    for numbered in tests {
+        feed(serde_json::to_vec(&numbered));
+    }
+    digits(hash)
+}
+
+fn digits(hash: Sha256) -> String {
     let mut digits = String::with_capacity(64);
     for byte in hash.finalize() {
         write!(digits, "{byte:02x}").expect("a string takes all that is written");
     }
-    Ok(digits)
+    digits
 }
 
 fn feed(portion: &mut Vec<u8>, value: ValueRef<'_>) {

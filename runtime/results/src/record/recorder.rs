@@ -192,8 +192,13 @@ impl Recorder {
             .map_err(|e| RecordError::database("record the operations of tests", &self.repository.path, e))
     }
 
+    /// The recorded task is another from now on.
+    pub(super) fn now_has(&mut self, task: Task) {
+        self.repository.facts.task = task;
+    }
+
     /// What would be refused when it is read is never written.
-    fn recordable(&self, record: &TestRecord) -> Result<(), RecordError> {
+    pub(super) fn recordable(&self, record: &TestRecord) -> Result<(), RecordError> {
         let unfit = || self.repository.facts.plan.validate_test(&record.test).err().map(|error| error.to_string());
         match unrecordable(record).or_else(unfit) {
             Some(what) => {

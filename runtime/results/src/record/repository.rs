@@ -130,12 +130,23 @@ impl Repository {
     /// out, and so is what a plan says to people only: of the plan, its [meaning](CampaignPlan::meaning) is hashed.
     /// Everything is read from the file each time: no stored hash is used.
     ///
-    /// Operations that were one operation in an imported file are hashed last, if there are any.
+    /// Operations that were one operation in an imported file are hashed last, if there are any, and so are runs of a
+    /// lab that were entered by hand: which run of its test each is, but not who made it.
     ///
     /// Results of an earlier schema have the digest that their release computed.
     pub fn digest(&self) -> Result<String, RecordError> {
         super::digest::of_connection(&self.connection, self.schema, self.plan())
             .map_err(|e| RecordError::database("read the results", &self.path, e))
+    }
+
+    /// SHA-256 over which tests there are, as 64 hexadecimal digits: over the names of the space and the campaign, the
+    /// seed, and each test with its number.
+    ///
+    /// Unlike the [digest](Self::digest) it stays as it is when tests are run again.
+    pub fn tests_digest(&self) -> Result<String, RecordError> {
+        let rows = self.tests()?;
+        let tests = rows.iter().map(|row| (row.number, &row.test));
+        Ok(super::digest::of_tests(self.plan(), self.campaign().seed, tests))
     }
 
     /// How many tests there are, without reference runs.

@@ -10,7 +10,7 @@ use sesame_results::record::{Repository, trace_file};
 use sesame_runtime::trace;
 use sesame_runtime::wire::WireTable;
 
-use super::super::shell;
+use crate::cli::shell;
 
 /// The runs in a folder of results.
 pub(super) type Runs = (PathBuf, Vec<LabRun>);

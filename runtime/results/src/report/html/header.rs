@@ -53,7 +53,7 @@ pub(super) fn header(
     let wall: f64 = sessions.iter().filter_map(|session| Some(session.ended_at? - session.started_at)).sum();
     let workers = sessions.last().map_or(0, |session| session.workers);
     let workers = plural(usize::try_from(workers).unwrap_or(usize::MAX), "worker", "workers");
-    let rows = [
+    let mut rows = vec![
         ("Search", search),
         ("Seed", facts.seed.to_string()),
         ("One test", format!("{} of simulation", number::quantity(plan.campaign.end_after, Some("s")))),
@@ -61,12 +61,13 @@ pub(super) fn header(
         ("Made by", format!("{}, sesame-runtime {}", plan.generator, facts.runtime)),
         ("Source", plan.source.clone()),
         ("Ended", facts.stop.clone().unwrap_or_else(|| "unfinished".to_owned())),
-        ("Digest", digest.to_owned()),
     ];
+    rows.extend(entered(repository)?);
+    rows.push(("Digest", digest.to_owned()));
     let compensation = plan.compensation.as_ref();
-    let compensation = compensation.map(|it| ("Compensated", crate::analysis::compensation::in_words(plan, it)));
+    rows.extend(compensation.map(|it| ("Compensated", crate::analysis::compensation::in_words(plan, it))));
     body.open("dl", &[]);
-    for (name, value) in rows.iter().chain(&compensation) {
+    for (name, value) in &rows {
         body.open("div", &[("class", if *name == "Digest" { "digest" } else { "fact" })]);
         body.element("dt", &[], name);
         body.element("dd", &[], value);
@@ -80,4 +81,19 @@ pub(super) fn header(
     }
     body.close();
     Ok(())
+}
+
+/// Who made runs that were entered by hand, with what and when: what was said, once each.
+fn entered(repository: &Repository) -> Result<Vec<(&'static str, String)>, RecordError> {
+    let runs = repository.entered_runs()?;
+    let rows = ["Operator", "Hardware", "Software", "Date"].into_iter().enumerate().map(|(at, name)| {
+        let mut texts: Vec<&str> = Vec::new();
+        for text in runs.iter().filter_map(|run| run.provenance.texts()[at]) {
+            if !texts.contains(&text) {
+                texts.push(text);
+            }
+        }
+        (name, texts.join(", "))
+    });
+    Ok(rows.filter(|(_, texts)| !texts.is_empty()).collect())
 }
