@@ -126,8 +126,7 @@ enum Command {
     /// Compare the results of a lab with those of the campaign that its tests come from: where simulation and reality
     /// differ, and by how much.
     Gap(gap::Compared),
-    /// Prepare tests in a lab so that nobody gets hurt, record what people saw who ran them there, and find contacts in
-    /// its recordings.
+    /// Brief those who run tests in a lab, record what they saw, and find contacts in recordings.
     #[command(subcommand)]
     Lab(lab::Lab),
     /// Import a testing space of the original SESAME platform (an EMF file, `.model`), with the tests that it
