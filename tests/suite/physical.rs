@@ -139,6 +139,8 @@ fn what_cannot_be_run_in_a_lab_or_compared_is_refused_with_what_to_do() {
     assert!(refused(&["T1"]).contains(labs), "{}", refused(&["T1"]));
     assert!(refused(&["T1", "--lab", "attic"]).contains("there is no lab `attic`, there is `twin`, `hall`"));
     assert!(refused(&["T1", "T1", "--lab", "twin"]).contains("T1 is named twice"));
+    let said = refused(&["--lab", "twin"]);
+    assert!(said.contains("lab `twin` has no `budget` by which tests are chosen; name the tests"), "{said}");
     assert!(refused(&["reference", "--lab", "twin"]).contains("T0 disturbs nothing"));
 
     let mut sesamec = command(sesamec());

@@ -2,24 +2,31 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::{Duration, Instant};
 
 use clap::Args;
 
 use sesame_base::test_number::TestNumber;
-use sesame_plan::{LabTask, LabTest, Task};
+use sesame_plan::{Lab, LabTask, LabTest, Task};
+use sesame_results::analysis::choice::choice_for;
+use sesame_results::record::Repository;
 use sesame_rng::derive_seed;
 
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled};
 use crate::cli::failure::Failure;
 use crate::cli::results_folder::{open, refuse_changed};
 use crate::cli::session::Session;
+use crate::cli::terminal::say;
 use crate::lab::find;
+
+/// How long a choice may be looked for until the best so far is taken.
+const CHOICE_LIMIT: Duration = Duration::from_secs(60);
 
 /// Which tests are run in a lab, and how often.
 #[derive(Debug, Args)]
 pub struct Options {
-    /// Recorded tests, for example `T158 T17`
-    #[arg(required = true, value_name = "TEST")]
+    /// Recorded tests, for example `T158 T17`; by default those that the lab's `budget` chooses from the front
+    #[arg(value_name = "TEST")]
     tests: Vec<String>,
     /// The lab; by default the only one of the space
     #[arg(long, value_name = "NAME")]
@@ -43,7 +50,8 @@ pub(super) fn physical(session: &Session, options: &Options) -> Result<ExitCode,
     let lab = find(&session.plan, options.lab.as_deref())?;
     let repository = open(&session.results, options.results.as_deref())?;
     let mut numbers = Vec::new();
-    for name in &options.tests {
+    let chosen = if options.tests.is_empty() { chosen(&repository, lab)? } else { Vec::new() };
+    for name in options.tests.iter().chain(&chosen) {
         let number = repository.find(name)?;
         refuse_changed(session, &repository, number)?;
         // A duplicate is what its original is.
@@ -88,4 +96,19 @@ pub(super) fn physical(session: &Session, options: &Options) -> Result<ExitCode,
     let execution = options.execution.one_at_a_time();
     let (recorder, folder) = begin(&session, &results, &name, &plan, &task, seed, &execution)?;
     execute(&session, recorder, &folder, &execution, &options.output, files)
+}
+
+/// The names of the tests that a lab's budget chooses, which is said.
+fn chosen(repository: &Repository, lab: &Lab) -> Result<Vec<String>, Failure> {
+    let until = Instant::now() + CHOICE_LIMIT;
+    let Some(choice) = choice_for(repository, lab, &mut || Instant::now() >= until)? else {
+        return Err(Failure(format!(
+            "lab `{}` has no `budget` by which tests are chosen; name the tests, or add one to its `physical` block, for \
+             example\n    budget 5 lambda 0.5 over T1, T2, P1",
+            lab.name
+        )));
+    };
+    let names: Vec<String> = choice.tests.iter().map(|&number| TestNumber(number).to_string()).collect();
+    say(format_args!("    Chosen {} for {} of {}: {}", names.join(" "), choice.cost, choice.budget, choice.proof()));
+    Ok(names)
 }

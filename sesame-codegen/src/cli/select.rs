@@ -1,6 +1,6 @@
 //! `sesamec select`: which tests of a campaign are run in a lab.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -9,15 +9,12 @@ use anyhow::{bail, ensure};
 use clap::Args;
 
 use sesame_plan::{CampaignPlan, Dimension, Lab, LabBudget, LabCost, MetricId, RankKey, RankOrder};
-use sesame_results::analysis::choice::{Choice, Choosing, sweep_table};
+use sesame_results::analysis::choice::{Choice, Choosing};
 use sesame_results::analysis::{Selection, Terms, candidates};
 use sesame_results::record::Repository;
 
 use super::results::{Compat, Format, Output, dimension, print};
 use super::shell::{self, Shell};
-
-/// The weights of a sweep.
-const SWEEP: [f64; 11] = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0];
 
 /// What is chosen from, and by what.
 #[derive(Debug, Args)]
@@ -46,9 +43,10 @@ pub(super) struct Selected {
     /// number, tests close to it come first: `clearance:0.5`.
     #[arg(long, value_delimiter = ',', value_name = "METRIC:ORDER")]
     rank: Vec<String>,
-    /// What a test costs, for example `1`, or `1+0.5` with what each of its operations costs besides.
-    #[arg(long, value_name = "COST", value_parser = cost)]
-    cost: Option<LabCost>,
+    /// What a test costs, for example `1`, or `1+0.5` with what each of its operations costs besides; `T5=3` for one
+    /// test. May be given several times.
+    #[arg(long, value_delimiter = ',', value_name = "COST", value_parser = cost)]
+    cost: Vec<Cost>,
     /// Tests that must not be run, for example `T5,T9`.
     #[arg(long, value_delimiter = ',', value_name = "TESTS")]
     exclude: Vec<String>,
@@ -58,7 +56,7 @@ pub(super) struct Selected {
     /// Only tests of which fresh runs have confirmed a finding.
     #[arg(long)]
     confirmed: bool,
-    /// Show the choices for eleven weights from 0 to 1 instead, and which tests enter and leave.
+    /// Show all weights at which the choice changes instead, and which tests enter and leave.
     #[arg(long)]
     sweep: bool,
     /// Wall time after which the best choice so far is taken, with what is known of a better one.
@@ -71,14 +69,42 @@ pub(super) struct Selected {
     output: Output,
 }
 
-/// `1` or `1+0.5`.
-fn cost(text: &str) -> Result<LabCost, String> {
+/// What tests cost.
+#[derive(Debug, Clone)]
+enum Cost {
+    /// All that are not named.
+    Any(LabCost),
+    /// The test of this name.
+    Of(String, f64),
+}
+
+/// `1`, `1+0.5`, or `T5=3`.
+fn cost(text: &str) -> Result<Cost, String> {
     let number = |text: &str| text.trim().parse::<f64>().ok().filter(|number| number.is_finite() && *number >= 0.0);
+    if let Some((name, one)) = text.split_once('=') {
+        let one = number(one).ok_or_else(|| format!("`{one}` is no cost of {name}; expected a number such as 3"))?;
+        return Ok(Cost::Of(name.trim().to_owned(), one));
+    }
     let (base, each) = text.split_once('+').unwrap_or((text, "0"));
     match number(base).zip(number(each)) {
-        Some((base, per_operation)) if base + per_operation > 0.0 => Ok(LabCost { base, per_operation }),
-        _ => Err("expected a cost such as 1, or 1+0.5".to_owned()),
+        Some((base, per_operation)) if base + per_operation > 0.0 => Ok(Cost::Any(LabCost { base, per_operation })),
+        _ => Err("expected a cost such as 1, 1+0.5, or T5=3".to_owned()),
     }
+}
+
+/// What a test costs, if it was said for all, and what single tests cost, by number.
+fn costs(repository: &Repository, asked: &[Cost]) -> anyhow::Result<(Option<LabCost>, BTreeMap<u32, f64>)> {
+    let (mut any, mut single) = (None, BTreeMap::new());
+    for cost in asked {
+        let twice = match cost {
+            Cost::Any(cost) => any.replace(*cost).is_some().then_some("of all tests"),
+            Cost::Of(name, cost) => single.insert(repository.find(name)?, *cost).is_some().then_some(name.as_str()),
+        };
+        if let Some(what) = twice {
+            bail!("the cost {what} is given twice with `--cost`")
+        }
+    }
+    Ok((any, single))
 }
 
 /// Chooses, and says what was chosen.
@@ -96,10 +122,12 @@ pub(super) fn selected(shell: Shell, asked: &Selected) -> anyhow::Result<ExitCod
         names.iter().map(|name| Ok(repository.find(name)?)).collect()
     };
     let (excluded, run) = (numbers_of(&asked.exclude)?, numbers_of(&asked.run)?);
+    let (cost, costs) = costs(&repository, &asked.cost)?;
     let terms = Terms {
         over: dimensions(&asked.dims, declared),
         rank: rank(plan, &asked.rank, lab)?,
-        cost: asked.cost.or(lab.map(|lab| lab.cost)).unwrap_or_default(),
+        cost: cost.or(lab.map(|lab| lab.cost)).unwrap_or_default(),
+        costs,
         exclude: lab.map_or_else(Vec::new, |lab| lab.exclude.clone()),
         budget,
         confirmed: asked.confirmed,
@@ -113,7 +141,13 @@ pub(super) fn selected(shell: Shell, asked: &Selected) -> anyhow::Result<ExitCod
     let until = Instant::now() + Duration::from_secs_f64(asked.limit.min(1e6));
     let mut stop = || Instant::now() >= until;
     if asked.sweep {
-        print(&sweep_table(&choosing.sweep(&SWEEP, &mut stop)?), &asked.output)?;
+        let sweep = choosing.sweep(&mut stop);
+        print(&choosing.sweep_table(&sweep), &asked.output)?;
+        if !sweep.proved {
+            shell.note(
+                "not all of it is proved within `--limit`: there may be better choices, and more changes".to_owned(),
+            );
+        }
         return Ok(ExitCode::SUCCESS);
     }
     let choice = choosing.best(&mut stop);
@@ -133,7 +167,7 @@ pub(super) fn selected(shell: Shell, asked: &Selected) -> anyhow::Result<ExitCod
     for (number, reason) in &found.left_out {
         shell.note(format!("T{number} is no candidate: {}", reason.words(plan)));
     }
-    if let Some(more) = choosing.next_budget(&choice, &mut stop)? {
+    if let Some(more) = choosing.next_budget(&choice, &mut stop) {
         let names: Vec<String> = more.tests.iter().map(|number| format!("T{number}")).collect();
         shell.note(format!("a budget of {} would buy a value of {}: {}", more.budget, more.value, names.join(" ")));
     }

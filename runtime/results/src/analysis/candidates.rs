@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use sesame_base::observation::Outcome;
 use sesame_base::test_number::TestNumber;
-use sesame_plan::{CampaignPlan, Dimension, Direction, LabCost, LabExclusion, MetricId, RankKey, RankOrder};
+use sesame_plan::{CampaignPlan, Dimension, Direction, Lab, LabCost, LabExclusion, MetricId, RankKey, RankOrder};
 use sesame_search::sspr::{Convention, Point};
 use sesame_search::test_key::TestKey;
 use sesame_select::ranking::{self, Better, Key, Scale};
@@ -24,6 +24,8 @@ pub struct Terms {
     pub rank: Vec<RankKey>,
     /// What running a test costs.
     pub cost: LabCost,
+    /// What running these tests costs instead, by number; 0 or more.
+    pub costs: BTreeMap<u32, f64>,
     /// Tests of which one of these holds must not be run.
     pub exclude: Vec<LabExclusion>,
     /// What all tests together may cost; positive.
@@ -35,6 +37,21 @@ pub struct Terms {
 }
 
 impl Terms {
+    /// As a lab says; `None` for one without a budget.
+    pub fn of_lab(plan: &CampaignPlan, lab: &Lab) -> Option<Terms> {
+        let budget = lab.budget.as_ref()?;
+        Some(Terms {
+            over: budget.over.clone(),
+            rank: if lab.rank.is_empty() { Terms::rank_by_objectives(plan) } else { lab.rank.clone() },
+            cost: lab.cost,
+            costs: BTreeMap::new(),
+            exclude: lab.exclude.clone(),
+            budget: budget.limit,
+            confirmed: false,
+            convention: Convention::Ours,
+        })
+    }
+
     /// By the objectives of a campaign, each in its direction: what a lab says that says nothing of its own.
     pub fn rank_by_objectives(plan: &CampaignPlan) -> Vec<RankKey> {
         let order = |metric: MetricId| match plan.metric(metric).direction {
@@ -191,7 +208,7 @@ fn candidate(
             return Err(LeftOut::Excluded { by, value });
         }
     }
-    let cost = terms.cost.of(test.operations.len());
+    let cost = terms.costs.get(&test.number).copied().unwrap_or_else(|| terms.cost.of(test.operations.len()));
     if cost > terms.budget {
         return Err(LeftOut::TooExpensive { cost });
     }
@@ -252,6 +269,7 @@ mod tests {
             over: vec![Dimension::T1, Dimension::T2, Dimension::O0],
             rank: vec![RankKey { metric: COLLISIONS, order: RankOrder::Descending }],
             cost: LabCost { base: 1.0, per_operation: 0.5 },
+            costs: BTreeMap::new(),
             exclude: Vec::new(),
             budget: 100.0,
             confirmed: false,

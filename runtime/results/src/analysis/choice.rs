@@ -2,13 +2,17 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use sesame_plan::{CampaignPlan, Dimension};
+use sesame_base::test_number::TestNumber;
+use sesame_plan::{CampaignPlan, Dimension, Lab};
 use sesame_search::sspr::Convention;
-use sesame_select::{Invalid, Pairs, Problem, Selection, State, Test, choose};
+use sesame_select::sweep::{Stretch, Sweep, sweep};
+use sesame_select::{Invalid, Marginal, Pairs, Problem, Selection, State, Test, choose, marginal};
 
 use crate::analysis::Datum;
-use crate::analysis::candidates::{Candidate, Candidates, Terms, qualities};
+use crate::analysis::Selection as Looked;
+use crate::analysis::candidates::{Candidate, Candidates, Terms, candidates, qualities};
 use crate::present::table::Table;
+use crate::record::{RecordError, Repository};
 
 /// Why nothing is chosen.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -31,6 +35,31 @@ impl From<Invalid> for ChoiceError {
     fn from(invalid: Invalid) -> Self {
         ChoiceError::Invalid(invalid.to_string())
     }
+}
+
+/// Why no tests are chosen for a lab.
+#[derive(Debug, thiserror::Error)]
+pub enum LabChoiceError {
+    /// The results cannot be read.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// There is nothing to choose.
+    #[error(transparent)]
+    Choice(#[from] ChoiceError),
+}
+
+/// The tests of the latest front that are chosen for a lab as its `budget` says, of all tests if there is no front;
+/// `None` for a lab without a budget.
+pub fn choice_for(
+    repository: &Repository,
+    lab: &Lab,
+    stop: &mut dyn FnMut() -> bool,
+) -> Result<Option<Choice>, LabChoiceError> {
+    let (Some(terms), Some(budget)) = (Terms::of_lab(repository.plan(), lab), &lab.budget) else { return Ok(None) };
+    let set = repository.latest_result_set()?.map(|set| set.name);
+    let found = candidates(repository, &Looked::of(repository, set.as_deref())?, &terms)?;
+    let none = BTreeSet::new();
+    Ok(Some(Choosing::new(&found, &terms, budget.lambda, &none)?.best(stop)))
 }
 
 /// A choice among candidates.
@@ -96,39 +125,52 @@ impl<'a> Choosing<'a> {
 
     /// The best choice, or the best that was found until `stop` said yes.
     pub fn best(&self, stop: &mut dyn FnMut() -> bool) -> Choice {
-        self.choice(&self.problem, stop)
+        self.of(choose(&self.problem, stop), self.problem.lambda(), self.problem.budget())
     }
 
-    /// The best choices for these weights.
-    pub fn sweep(&self, lambdas: &[f64], stop: &mut dyn FnMut() -> bool) -> Result<Vec<Choice>, ChoiceError> {
-        let choices = lambdas.iter().map(|&lambda| {
-            let problem = self.problem.clone().with_lambda(lambda)?;
-            Ok(self.choice(&problem, stop))
-        });
-        choices.collect()
+    /// All weights of difference at which the choice changes, and the choices between them.
+    pub fn sweep(&self, stop: &mut dyn FnMut() -> bool) -> Sweep {
+        sweep(&self.problem, stop)
     }
 
-    /// What the smallest greater budget would buy with which another choice is affordable: the budget and one more test
-    /// of the least cost. `None` if all tests are chosen.
-    pub fn next_budget(&self, best: &Choice, stop: &mut dyn FnMut() -> bool) -> Result<Option<Choice>, ChoiceError> {
-        let others = self.candidates.tests.iter().filter(|candidate| !best.tests.contains(&candidate.number));
-        let Some(least) = others.map(|candidate| candidate.cost).min_by(f64::total_cmp) else { return Ok(None) };
-        let problem = self.problem.clone().with_budget(best.cost + least)?;
-        Ok(Some(self.choice(&problem, stop)))
+    /// The stretches of a sweep, a row each: the weights, the chosen tests, and which enter and leave from one stretch
+    /// to the next.
+    pub fn sweep_table(&self, sweep: &Sweep) -> Table {
+        let mut table = Table::new(["lambda_from", "lambda_to", "tests", "enter", "leave"].map(str::to_owned));
+        let names = |tests: &[usize]| {
+            let name = |&at: &usize| TestNumber(self.candidates.tests[at].number).to_string();
+            let names: Vec<String> = tests.iter().map(name).collect();
+            if names.is_empty() { Datum::Missing } else { Datum::Text(names.join(" ")) }
+        };
+        for (at, Stretch { from, to, chosen, enter, leave }) in sweep.stretches.iter().enumerate() {
+            // Nothing enters the first choice.
+            let enter = if at == 0 { &[][..] } else { enter };
+            table.row([Datum::Real(*from), Datum::Real(*to), names(chosen), names(enter), names(leave)]);
+        }
+        table
     }
 
-    fn choice(&self, problem: &Problem, stop: &mut dyn FnMut() -> bool) -> Choice {
-        let selection = choose(problem, stop);
+    /// What the smallest greater budget would buy with which another test can be added to a choice. `None` if all tests
+    /// are chosen.
+    pub fn next_budget(&self, best: &Choice, stop: &mut dyn FnMut() -> bool) -> Option<Choice> {
+        let chosen = |at: &usize| best.tests.contains(&self.candidates.tests[*at].number);
+        let chosen = (0..self.candidates.tests.len()).filter(chosen).collect();
+        let best = Selection { chosen, value: best.value, state: best.state };
+        let Marginal { budget, selection, .. } = marginal(&self.problem, &best, None, stop)?;
+        Some(self.of(selection, self.problem.lambda(), budget))
+    }
+
+    fn of(&self, selection: Selection, lambda: f64, budget: f64) -> Choice {
         let gap = selection.gap();
         let Selection { chosen, value, state } = selection;
         Choice {
-            lambda: problem.lambda(),
-            budget: problem.budget(),
+            lambda,
+            budget,
             tests: chosen.iter().map(|&at| self.candidates.tests[at].number).collect(),
             value,
             state,
             gap,
-            cost: problem.cost(&chosen),
+            cost: self.problem.cost(&chosen),
         }
     }
 
@@ -165,36 +207,12 @@ impl Choice {
     }
 }
 
-/// Choices side by side, a row each: the weight, the value, and which tests enter and leave from one to the next.
-pub fn sweep_table(choices: &[Choice]) -> Table {
-    let mut table = Table::new(["lambda", "value", "tests", "enter", "leave", "proved"].map(str::to_owned));
-    let names = |tests: &mut dyn Iterator<Item = &u32>| {
-        let names: Vec<String> = tests.map(|number| format!("T{number}")).collect();
-        if names.is_empty() { Datum::Missing } else { Datum::Text(names.join(" ")) }
-    };
-    for (at, choice) in choices.iter().enumerate() {
-        let before = at.checked_sub(1).map(|before| &choices[before].tests);
-        let new = |number: &&u32| before.is_some_and(|before| !before.contains(number));
-        let gone = |number: &&u32| !choice.tests.contains(number);
-        table.row([
-            Datum::Real(choice.lambda),
-            Datum::Real(choice.value),
-            names(&mut choice.tests.iter()),
-            names(&mut choice.tests.iter().filter(new)),
-            names(&mut before.into_iter().flatten().filter(gone)),
-            Datum::Truth(matches!(choice.state, State::Proved | State::TiesOpen)),
-        ]);
-    }
-    table
-}
-
 #[cfg(test)]
 mod tests {
     use sesame_plan::{LabCost, MetricId, RankKey, RankOrder};
 
     use super::*;
-    use crate::analysis::Selection as Looked;
-    use crate::analysis::candidates::candidates;
+    use crate::analysis::candidates::LeftOut;
     use crate::record::sample;
 
     fn terms(budget: f64) -> Terms {
@@ -202,6 +220,7 @@ mod tests {
             over: vec![Dimension::T1, Dimension::T2],
             rank: vec![RankKey { metric: MetricId(0), order: RankOrder::Descending }],
             cost: LabCost { base: 1.0, per_operation: 0.5 },
+            costs: BTreeMap::new(),
             exclude: Vec::new(),
             budget,
             confirmed: false,
@@ -267,18 +286,47 @@ mod tests {
         let found = found(&terms);
         let run = BTreeSet::new();
         let choosing = Choosing::new(&found, &terms, 0.5, &run).unwrap();
-        let sweep = choosing.sweep(&[0.0, 0.5, 1.0], &mut never()).unwrap();
-        let table = sweep_table(&sweep);
-        let Datum::Text(entered) = &table.rows()[2][3] else { panic!("{:?}", table.rows()) };
-        for number in entered.split(' ').map(|name| name[1..].parse::<u32>().unwrap()) {
-            assert!(!sweep[1].tests.contains(&number) && sweep[2].tests.contains(&number));
+        let sweep = choosing.sweep(&mut never());
+        assert!(sweep.proved && sweep.stretches.len() > 1, "{sweep:?}");
+        let table = choosing.sweep_table(&sweep);
+        assert_eq!(table.columns(), ["lambda_from", "lambda_to", "tests", "enter", "leave"]);
+        for pair in sweep.stretches.windows(2) {
+            let [Stretch { to, chosen: before, .. }, Stretch { from, chosen: after, .. }] = pair else { continue };
+            assert_eq!(to, from);
+            // Where they meet, both are the best.
+            let at = choosing.problem.clone().with_lambda(*to).unwrap();
+            assert!((at.value(before) - at.value(after)).abs() < 1e-9);
         }
-        let more = choosing.next_budget(&sweep[1], &mut never()).unwrap().unwrap();
-        assert!(more.value >= sweep[1].value && more.budget > sweep[1].cost);
+        let Datum::Text(entered) = &table.rows()[1][3] else { panic!("{:?}", table.rows()) };
+        let at = |name: &str| found.tests.iter().position(|test| format!("T{}", test.number) == name).unwrap();
+        for entered in entered.split(' ').map(at) {
+            assert!(!sweep.stretches[0].chosen.contains(&entered) && sweep.stretches[1].chosen.contains(&entered));
+        }
+        let middle = choosing.best(&mut never());
+        let more = choosing.next_budget(&middle, &mut never()).unwrap();
+        assert!(more.value >= middle.value && more.budget > middle.cost);
         // Stopped at once, it is still a choice, and says that it is not proved.
         let stopped = choosing.best(&mut || true);
         assert!(stopped.cost <= 6.0 && !stopped.tests.is_empty());
-        assert!(stopped.value <= sweep[1].value + 1e-9 && stopped.value * (1.0 + stopped.gap) >= sweep[1].value - 1e-9);
+        assert!(stopped.value <= middle.value + 1e-9 && stopped.value * (1.0 + stopped.gap) >= middle.value - 1e-9);
+    }
+
+    #[test]
+    fn a_test_may_have_a_cost_of_its_own() {
+        let mut terms = terms(6.0);
+        let found = found(&terms);
+        let none = BTreeSet::new();
+        let before = Choosing::new(&found, &terms, 0.5, &none).unwrap().best(&mut never());
+        let dear = before.tests[0];
+        terms.costs = BTreeMap::from([(dear, 100.0)]);
+        let found = self::found(&terms);
+        assert!(
+            found.left_out.iter().any(|(number, why)| *number == dear && *why == LeftOut::TooExpensive { cost: 100.0 })
+        );
+        terms.costs = BTreeMap::from([(dear, 0.0)]);
+        let found = self::found(&terms);
+        let after = Choosing::new(&found, &terms, 0.5, &none).unwrap().best(&mut never());
+        assert!(after.tests.contains(&dear) && after.value >= before.value);
     }
 
     #[test]

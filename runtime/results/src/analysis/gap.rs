@@ -440,7 +440,8 @@ fn separated(gap: &MetricGap, points: &BTreeMap<u32, Vec<Option<f64>>>) -> Optio
     let inside = Pooled::of(inside.iter().map(|(_, _, difference)| difference))?;
     let outside = Pooled::of(outside().map(|(_, _, difference)| difference))?;
     let apart = inside.estimate - outside.estimate;
-    let q = apart * apart / (inside.standard_error.powi(2) + outside.standard_error.powi(2));
+    let squared = |of: &Pooled| of.standard_error * of.standard_error;
+    let q = apart * apart / (squared(&inside) + squared(&outside));
     Some(Extent::Range { split: Split { range, q, p: ALPHA }, inside, outside })
 }
 
