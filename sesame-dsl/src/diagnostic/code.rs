@@ -57,7 +57,7 @@ codes! {
     NOT_SUPPORTED = "E0104": "The language has the construct, but this version of the compiler does not support it.",
     TOO_LARGE = "E0105": "The file is too large or too deeply nested.",
     NOT_A_NAME = "E0106": "A name contains characters that are not allowed.",
-    BAD_TEXT = "E0107": "A quoted text does not end, is empty, or contains an unknown escape.",
+    BAD_TEXT = "E0107": "A quoted text does not end, is empty, or contains an unknown escape or a control character.",
     BAD_NUMBER = "E0108": "A number is out of range, or not whole where it must be.",
     DEFINED_TWICE = "E0201": "A name is defined twice.",
     MISSING_DECLARATION = "E0202": "A space lacks a required declaration, or has it twice.",

@@ -312,8 +312,7 @@ impl<'a> Resolver<'a> {
             written::Form::Box(edges) => self.vector(edges, true).map(Form::Box),
         };
         let place = match &shape.place {
-            // An empty text was reported where it was read.
-            written::ShapePlace::Carried(pose) => Some(Place::Pose(pose.text.clone())),
+            written::ShapePlace::Carried(pose) => self.plain_text(pose).map(Place::Pose),
             written::ShapePlace::Fixed(point) => self.vector(point, false).map(Place::Point),
         };
         let expand = match &shape.expand {
@@ -321,6 +320,17 @@ impl<'a> Resolver<'a> {
             None => Some(0.0),
         };
         Some(Shape { declaration: self.declaration(&shape.head), form: form?, place: place?, expand: expand? })
+    }
+
+    /// A text that is shown on terminals and compared with names in recordings: no control characters.
+    fn plain_text(&mut self, text: &'a ast::Text) -> Option<String> {
+        // An empty text was reported where it was read.
+        let Some(c) = text.text.chars().find(|c| c.is_control()) else { return Some(text.text.clone()) };
+        let diagnostic =
+            Diagnostic::new(Code::BAD_TEXT, text.span, format!("this text contains the control character {c:?}"))
+                .label("expected visible characters and spaces");
+        self.report(diagnostic);
+        None
     }
 
     /// Three lengths, in metres.
@@ -357,8 +367,9 @@ impl<'a> Resolver<'a> {
                 }
             }
             written::Fit::Parameter(name, range) => {
+                let plain = self.plain_text(name);
                 let permitted = self.range(range, None, &format!("parameter \"{}\"", name.text))?;
-                Some(Fit::Parameter(name.text.clone(), permitted))
+                Some(Fit::Parameter(plain?, permitted))
             }
         }
     }

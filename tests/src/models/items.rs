@@ -599,7 +599,9 @@ impl Space {
             1 => "descending".to_owned(),
             _ => format!("closest to 2{unit}"),
         };
-        let [pose, parameter] = [(); 2].map(|()| quoted(&text(&mut self.draw)));
+        // They must not contain control characters.
+        let [pose, parameter] =
+            [(); 2].map(|()| quoted(&format!("a{}", text(&mut self.draw).replace(char::is_control, ""))));
         Some(format!(
             "{}physical {name} {{\n  simulator {} = simlog \"http://lab:8089\" {{ step 20ms }}\n  repeats 3\n  \
              exclude when {metric} {bound}\n  rank by {metric} {order}\n  tolerance {metric} 2{unit}\n  \

@@ -74,11 +74,17 @@ fn holds_nothing(folder: &Path) -> Result<bool, RecordError> {
     Ok(true)
 }
 
-/// The folder of the campaign's run whose results were written last, if there is any: the first of those that
-/// [`latest_unfinished`] goes through. Its name begins with its seed: what else was run on the side (regression tests,
-/// repetitions) is looked at when it is asked for.
+/// The folder of the campaign's run whose results were written last, if there is any.
+///
+/// Its name is its seed, perhaps with a number after it, such as `42-2`. What else was run on the side (regression
+/// tests, repetitions, runs in a lab such as `42-hall`) is looked at when it is asked for, or when there is nothing
+/// else.
 pub fn latest_folder(results: &Path) -> Result<Option<PathBuf>, RecordError> {
-    Ok(latest_first(results)?.into_iter().next())
+    let folders = latest_first(results)?;
+    let search = folders.iter().find(|folder| {
+        folder.file_name().is_some_and(|name| name.to_string_lossy().chars().all(|c| c.is_ascii_digit() || c == '-'))
+    });
+    Ok(search.or(folders.first()).cloned())
 }
 
 /// The folder of the campaign's run whose results were written last, of those that are not finished and that no process

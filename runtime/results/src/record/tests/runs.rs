@@ -221,6 +221,18 @@ fn a_killed_run_whose_log_was_written_last_is_the_latest_and_the_one_to_go_on_wi
 }
 
 #[test]
+fn runs_in_a_lab_are_not_the_campaigns_latest_run_though_written_later() {
+    let results = folder();
+    let [search, lab] = ["7-2", "7-2-hall"].map(|name| results.path().join(name));
+    commit_all(&lab, &[]).interrupt().unwrap();
+    assert_eq!(latest_folder(results.path()).unwrap(), Some(lab.clone()), "there is nothing else");
+    commit_all(&search, &[]).finish("done").unwrap();
+    age(&search, 500);
+    assert_eq!(latest_folder(results.path()).unwrap(), Some(search));
+    assert_eq!(latest_unfinished(results.path()).unwrap(), Some(lab), "it is what `resume` goes on with");
+}
+
+#[test]
 fn reading_an_older_run_does_not_make_it_the_latest() {
     let results = folder();
     let [older, newer] = ["7", "8"].map(|name| results.path().join(name));
