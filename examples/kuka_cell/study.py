@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The way of tests from simulation to a lab and back, on the stand-in for the gearbox cell (`study.sesame`):
 
-    campaign -> confirm -> select 5 -> lab -> gap -> explore -> compensate -> campaign again
+    campaign -> confirm -> select 5 -> lab -> gap -> explore -> compensate -> campaign again -> page
 
     examples/kuka_cell/study.py                     one study, with what it says
     examples/kuka_cell/study.py --seeds 10          how often each gap that was built in is found, over 10 seeds
@@ -100,6 +100,9 @@ class Study:
             lab = f"{self.results}/{run}-hall"
             if self.talks:
                 self.sesamec("compensate", "study.sesame", lab, shown=True)
+                page = ["study", f"{self.results}/{run}", lab, "--simulation", f"{lab}-compensated", "--svg", "figures"]
+                self.sesamec(*page)
+                print(f"\nThe page of the study is {self.folder / 'study.html'}")
             else:
                 found["compensated"] = self.json("compensate", "study.sesame", lab, "--no-campaign")
         return found

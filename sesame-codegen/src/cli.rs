@@ -16,6 +16,7 @@ mod scan_ros2;
 mod search_space;
 mod select;
 mod shell;
+mod study;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -126,6 +127,9 @@ enum Command {
     /// Compare the results of a lab with those of the campaign that its tests come from: where simulation and reality
     /// differ, and by how much.
     Gap(gap::Compared),
+    /// Write the page of a study: the chosen tests in the reduced space, the gap between simulation and lab, traces of
+    /// both, what a compensation changed, and briefing sheets.
+    Study(study::Asked),
     /// Brief those who run tests in a lab, record what they saw, and find contacts in recordings.
     #[command(subcommand)]
     Lab(lab::Lab),
@@ -216,6 +220,7 @@ pub fn run(
         Command::Results(asked) => results::results(shell, asked),
         Command::Select(asked) => select::selected(shell, &asked),
         Command::Gap(asked) => gap::compared(shell, &asked),
+        Command::Study(asked) => study::write(shell, &asked),
         Command::Lab(asked) => lab::lab(shell, language, &asked),
         Command::Import { file, out } => import::import(shell, language, &file, &out),
         Command::Scan(asked) => scan::scan(shell, language, &asked),

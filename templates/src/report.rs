@@ -1,16 +1,30 @@
-//! The shell of a campaign's results page.
+//! The shells of pages: of a campaign's results, and of a study with a lab.
 
 /// The page as plain text with placeholders `{{policy}}`, `{{title}}` and `{{body}}`, each filled in with
 /// finished markup. Style and script are included, so the page needs no other file.
 pub fn page() -> String {
-    let script: String = SCRIPT.concat();
-    PAGE.replace("{{style}}", STYLE)
+    shell(STYLE, &SCRIPT)
+}
+
+/// The page of a study, with the same placeholders. `figures` is the style of its figures.
+pub fn study(figures: &str) -> String {
+    shell(&[STYLE, STUDY_STYLE, figures].concat(), &STUDY_SCRIPT)
+}
+
+fn shell(style: &str, script: &[&str]) -> String {
+    let script: String = script.concat();
+    PAGE.replace("{{style}}", style)
         .replace("{{script}}", &format!("(function () {{\n\"use strict\";\n{script}}})();\n"))
 }
 
 const PAGE: &str = include_str!("../report/page.html");
 
 const STYLE: &str = include_str!("../report/page.css");
+
+const STUDY_STYLE: &str = include_str!("../report/study.css");
+
+/// The parts of the script of a study's page.
+const STUDY_SCRIPT: [&str; 2] = [include_str!("../report/script/marks.js"), include_str!("../report/script/space.js")];
 
 /// The parts of the script, in one scope: later ones use what earlier ones define.
 const SCRIPT: [&str; 7] = [

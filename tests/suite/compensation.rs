@@ -101,10 +101,32 @@ fn a_lag_shows_in_traces_and_a_fitted_delay_closes_the_gap() {
     let like = Repository::open(study.results("42-like-hall").as_ref()).unwrap();
     assert_eq!(like.plan().compensation, again.plan().compensation);
     assert_ne!(like.digest().unwrap(), campaign.digest().unwrap());
+    page_of(&study, &run, &hall);
     study.sesamec(&["replay", "study.sesame", "T2", "--results", "42-like-hall"]).expect(0);
     let folder = study.results("42-hall-compensated");
     let run = ["run", "study.sesame", "--", "--compensation", &folder];
     assert_eq!(study.sesamec(&run).expect(0).digest(), like.digest().unwrap(), "by hand it is the same");
+}
+
+/// The page of the study has all parts, and no file of the user's is overwritten by it.
+fn page_of(study: &Study, run: &str, hall: &str) {
+    let again = study.results("42-hall-compensated");
+    let all = ["study", run, hall, "--simulation", &again, "--reaction", "0.3", "--deceleration", "2", "--svg", "svg"];
+    let said = study.sesamec(&all).expect(0).err;
+    assert!(said.contains("Wrote study.html") && said.contains("figures into svg"), "{said}");
+    let page = fs::read_to_string(study.folder.join("study.html")).unwrap();
+    for part in ["id=\"space-data\"", "id=\"gap\"", "id=\"traces\"", "id=\"compensation\"", "class=\"briefing\""] {
+        assert!(page.contains(part), "{part}");
+    }
+    assert!(page.contains("Safety zones must be wider by"), "the conditions are on the sheets");
+    for figure in ["space.svg", "gap-zone_distance-T1.svg", "compensation-zone_distance.svg"] {
+        assert!(study.folder.join("svg").join(figure).is_file(), "{figure}");
+    }
+    study.sesamec(&["study", run]).expect(0);
+    fs::write(study.folder.join("notes.html"), "mine").unwrap();
+    let said = study.sesamec(&["study", run, "-o", "notes.html"]).expect(1).err;
+    assert!(said.contains("notes.html is no page of a study; name another file with `--out`"), "{said}");
+    assert_eq!(fs::read_to_string(study.folder.join("notes.html")).unwrap(), "mine");
 }
 
 #[test]

@@ -3,5 +3,6 @@
 pub(crate) mod axis;
 pub(crate) mod chart;
 pub(crate) mod markup;
+pub(crate) mod names;
 pub(crate) mod number;
 pub(crate) mod table;

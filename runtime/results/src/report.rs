@@ -10,6 +10,7 @@ mod file;
 mod html;
 mod junit;
 mod sentences;
+pub mod study;
 mod tables;
 mod text;
 

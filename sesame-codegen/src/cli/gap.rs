@@ -1,5 +1,6 @@
 //! `sesamec gap`: the results of a lab beside those of the campaign that its tests come from.
 
+mod sides;
 mod traces;
 
 use std::path::PathBuf;
@@ -8,14 +9,13 @@ use std::process::ExitCode;
 use anyhow::bail;
 use clap::Args;
 
-use sesame_plan::Lab;
 use sesame_results::analysis::extents;
-use sesame_results::analysis::gap::{Gap, GapError, compensated_runs, gap, gap_after, lab_runs};
+use sesame_results::analysis::gap::Gap;
 use sesame_results::analysis::traces::TraceGap;
-use sesame_results::record::Repository;
 
 use super::results::{Format, Output, print};
 use super::shell::{self, Shell};
+pub(super) use sides::Sides;
 
 /// What is compared.
 #[derive(Debug, Args)]
@@ -44,45 +44,22 @@ pub(super) struct Compared {
 
 /// Says how simulation and lab differ.
 pub(super) fn compared(shell: Shell, asked: &Compared) -> anyhow::Result<ExitCode> {
-    let campaign = Repository::open(&asked.campaign)?;
-    let mut runs = Vec::new();
-    let mut lab: Option<Lab> = None;
-    let mut in_lab = Vec::new();
-    for file in &asked.labs {
-        let repository = Repository::open(file)?;
-        let own = lab_runs(&campaign, &repository)?;
-        in_lab.push((repository.folder().to_owned(), own.clone()));
-        runs.extend(own);
-        let Some(task) = repository.task().in_lab() else { continue };
-        match &lab {
-            Some(lab) if lab.name != task.lab => {
-                bail!(
-                    "{} is of lab `{}`, and others are of lab `{}`; compare them apart",
-                    file.display(),
-                    task.lab,
-                    lab.name
-                )
-            }
-            // Tolerances and interlocks are those of the day on which the lab ran.
-            _ => lab = repository.plan().labs.iter().find(|lab| lab.name == task.lab).cloned(),
-        }
-    }
+    let sides = Sides::read(&asked.campaign, &asked.labs, asked.simulation.as_deref())?;
+    let campaign = &sides.campaign;
     let plan = campaign.plan();
-    let again = asked.simulation.as_deref().map(Repository::open).transpose()?;
-    let again = again.map(|it| Ok::<_, GapError>((it.folder().to_owned(), compensated_runs(&campaign, &it)?)));
-    let again = again.transpose()?;
-    let traced = traces::compared(&campaign, again.as_ref(), &in_lab, lab.as_ref())?;
+    let tests = if sides.again.is_some() { sides.traces_after()? } else { sides.traces()? };
+    let traced = sides.compared(&tests);
     if asked.traces {
-        let Some(traced) = traced else { bail!("{}", traces::missing(&campaign, &runs)) };
+        let Some(traced) = traced else { bail!("{}", traces::missing(campaign, &sides.runs())) };
         print(&traced.table(), &asked.output)?;
         if asked.output.format() == Format::Table {
             shell::asked_for(&format!("\n{}\n", traced.sentences().join("\n")))?;
         }
         return Ok(ExitCode::SUCCESS);
     }
-    let found = match &again {
-        Some((_, again)) => gap_after(&campaign, again, &runs, lab.as_ref())?,
-        None => gap(&campaign, &runs, lab.as_ref())?,
+    let found = match sides.gap_after()? {
+        Some(after) => after,
+        None => sides.gap()?,
     };
     let for_people = asked.output.format() == Format::Table;
     let table = match () {
@@ -95,7 +72,7 @@ pub(super) fn compared(shell: Shell, asked: &Compared) -> anyhow::Result<ExitCod
     if for_people && !asked.events && !asked.extents {
         let mut sentences = found.sentences(plan);
         sentences.extend(traced.iter().flat_map(TraceGap::sentences));
-        sentences.extend(found.next_test(&campaign)?.map(|(_, why)| why));
+        sentences.extend(found.next_test(campaign)?.map(|(_, why)| why));
         shell::asked_for(&format!("\n{}\n", sentences.join("\n")))?;
     }
     advise(shell, &found);

@@ -16,6 +16,7 @@ use clap::Subcommand;
 
 use super::shell::Shell;
 use crate::frontend::Language;
+pub(super) use brief::{Conditions, sheet};
 
 /// What is done for a lab.
 #[derive(Debug, Subcommand)]

@@ -151,7 +151,7 @@ pub(super) fn selected(shell: Shell, asked: &Selected) -> anyhow::Result<ExitCod
         return Ok(ExitCode::SUCCESS);
     }
     let choice = choosing.best(&mut stop);
-    print(&choosing.table(plan, &terms, &choice), &asked.output)?;
+    print(&choosing.table(plan, &terms, &choice, &run), &asked.output)?;
     let Choice { tests, value, cost, .. } = &choice;
     let said = format!(
         "{} of {} candidates for {cost} of {budget}, λ {lambda}: value {value}, {}",

@@ -86,7 +86,6 @@ pub struct Choice {
 pub struct Choosing<'a> {
     candidates: &'a Candidates,
     qualities: BTreeMap<u32, f64>,
-    run: &'a BTreeSet<u32>,
     problem: Problem,
 }
 
@@ -97,7 +96,7 @@ impl<'a> Choosing<'a> {
         candidates: &'a Candidates,
         terms: &Terms,
         lambda: f64,
-        run: &'a BTreeSet<u32>,
+        run: &BTreeSet<u32>,
     ) -> Result<Self, ChoiceError> {
         if candidates.tests.is_empty() {
             return Err(ChoiceError::NoCandidates);
@@ -120,7 +119,12 @@ impl<'a> Choosing<'a> {
         let pairs = if terms.convention == Convention::Ours { Pairs::Unordered } else { Pairs::Ordered };
         let tests = candidates.tests.iter().map(test).collect();
         let problem = Problem::new(tests, lambda, terms.budget, pairs)?;
-        Ok(Choosing { candidates, qualities, run, problem })
+        Ok(Choosing { candidates, qualities, problem })
+    }
+
+    /// What is chosen from; positions in a [`Sweep`] are positions in it.
+    pub fn candidates(&self) -> &'a Candidates {
+        self.candidates
     }
 
     /// The best choice, or the best that was found until `stop` said yes.
@@ -174,8 +178,9 @@ impl<'a> Choosing<'a> {
         }
     }
 
-    /// The chosen tests: their cost, the values that they are ranked by, their quality (0 to 1), and where they are.
-    pub fn table(&self, plan: &CampaignPlan, terms: &Terms, choice: &Choice) -> Table {
+    /// The chosen tests: their cost, whether they are among those that the lab has run, the values that they are ranked
+    /// by, their quality (0 to 1), and where they are.
+    pub fn table(&self, plan: &CampaignPlan, terms: &Terms, choice: &Choice, run: &BTreeSet<u32>) -> Table {
         let mut columns = vec!["test".to_owned(), "cost".to_owned(), "run".to_owned()];
         columns.extend(terms.rank.iter().map(|key| plan.metric(key.metric).name.clone()));
         columns.push("quality".to_owned());
@@ -185,7 +190,7 @@ impl<'a> Choosing<'a> {
             let head = [
                 Datum::test(candidate.number),
                 Datum::Real(candidate.cost),
-                Datum::Truth(self.run.contains(&candidate.number)),
+                Datum::Truth(run.contains(&candidate.number)),
             ];
             let values = candidate.values.iter().map(|&value| Datum::Real(value));
             let quality = Datum::real(self.qualities.get(&candidate.number).copied());
@@ -258,7 +263,7 @@ mod tests {
                 assert!(!fits || choosing.problem.value(&exchanged) <= best.value + 1e-9);
             }
         }
-        let table = choosing.table(&sample::plan(), &terms, &best);
+        let table = choosing.table(&sample::plan(), &terms, &best, &run);
         assert_eq!(table.columns(), ["test", "cost", "run", "collision_occurrence", "quality", "T1", "T2"]);
         assert_eq!(table.rows().len(), best.tests.len());
     }

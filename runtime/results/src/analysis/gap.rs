@@ -19,6 +19,7 @@ use sesame_gap::split::{Located, Range, Split};
 use sesame_gap::violations::{Confusion, Frequencies, Occurrence, Occurrences, frequencies};
 use sesame_plan::{CampaignPlan, Dimension, Lab, LabTask, MetricId, Requirement, Task};
 use sesame_search::sspr::Convention;
+use sesame_search::vary;
 
 use crate::analysis::Datum;
 use crate::present::number::{fixed, plural, quantity};
@@ -303,12 +304,22 @@ pub fn dimensions(lab: Option<&Lab>) -> Vec<Dimension> {
 }
 
 /// The coordinates of these tests in these dimensions, by number.
+///
+/// Those of variations are as planned: they rise from one to the next, also where operations of some had no effect.
 pub fn points(
     campaign: &Repository,
     tests: &BTreeSet<u32>,
     dimensions: &[Dimension],
 ) -> Result<BTreeMap<u32, Vec<Option<f64>>>, RecordError> {
     let mut points = BTreeMap::new();
+    if matches!(campaign.task(), Task::Variations(_)) {
+        for &number in tests {
+            let test = campaign.row(number)?.test;
+            let at = dimensions.iter().map(|&dimension| vary::coordinate(campaign.plan(), &test, dimension));
+            points.insert(number, at.collect());
+        }
+        return Ok(points);
+    }
     campaign.scan(&mut |test| {
         if tests.contains(&test.number) {
             let point = test.point(campaign.plan(), Convention::Ours);
@@ -719,7 +730,7 @@ fn constant(metric: &str, [low, high]: [f64; 2], tests: usize, value: &dyn Fn(f6
 }
 
 /// One word for tables.
-fn word(verdict: Equal) -> &'static str {
+pub(crate) fn word(verdict: Equal) -> &'static str {
     match verdict {
         Equal::Equivalent => "equivalent",
         Equal::Different => "different",
@@ -754,7 +765,7 @@ impl Compared {
 const SELECTED: &str = "run once in the simulation: `confirm` runs it again";
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use sesame_base::observation::Observation;
     use sesame_plan::LabTolerance;
     use sesame_plan::testing::lab;
@@ -767,11 +778,11 @@ mod tests {
     const FUZZING_TIME: MetricId = MetricId(1);
 
     /// What a lab makes of a value of the simulation, given the T1 of its test.
-    type Made = fn(f64, f64) -> f64;
+    pub(crate) type Made = fn(f64, f64) -> f64;
 
     /// A campaign of which 24 tests were run again five times, and as many runs of them in a lab. Collisions are about
     /// 5, fuzzing times as in the sample.
-    fn study(collisions: Made, fuzzing_time: Made) -> (Vec<LabRun>, Repository, tempfile::TempDir) {
+    pub(crate) fn study(collisions: Made, fuzzing_time: Made) -> (Vec<LabRun>, Repository, tempfile::TempDir) {
         let folder = tempfile::tempdir().unwrap();
         let plan = sample::plan();
         drop(sample::campaign(folder.path(), &plan, 60));
@@ -813,7 +824,7 @@ mod tests {
         (runs, repository, folder)
     }
 
-    fn tolerant() -> Lab {
+    pub(crate) fn tolerant() -> Lab {
         let tolerance = |metric, value| LabTolerance { metric, value };
         Lab { tolerances: vec![tolerance(COLLISIONS, 1.0), tolerance(FUZZING_TIME, 1.0)], ..lab("lab") }
     }

@@ -170,6 +170,13 @@ impl Compared {
         (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
     }
 
+    /// How far both sides are apart, in standard deviations of the signal in the simulation; `None` for a signal that
+    /// does not move there.
+    pub(crate) fn apart(&self) -> Option<f64> {
+        let spread = self.spread().filter(|spread| *spread > 0.0)?;
+        Some(self.mean(|run| Some(run.rms))? / spread)
+    }
+
     /// The standard deviation of the signal in the simulation.
     fn spread(&self) -> Option<f64> {
         self.mean(|run| Some(run.spread))

@@ -6,7 +6,7 @@
 use std::fmt::Write as _;
 
 /// Markup in the making.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Markup {
     text: String,
     open: Vec<&'static str>,
@@ -79,6 +79,11 @@ impl Markup {
             }
         }
         self.close();
+    }
+
+    /// Appends other markup, in which every element must be closed.
+    pub(crate) fn append(&mut self, other: Markup) {
+        self.text.push_str(&other.finish());
     }
 
     /// A line end, where markup is to be read as a file.

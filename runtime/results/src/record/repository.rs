@@ -304,6 +304,13 @@ impl Repository {
         })
     }
 
+    /// The days on which the campaign was worked on, in UTC, and the hosts, once each: `2026-03-01 on bench-2`.
+    pub fn days(&self) -> Result<Vec<String>, RecordError> {
+        let sql = "SELECT DISTINCT date(started_at, 'unixepoch') || ' on ' || host FROM sessions ORDER BY id";
+        let days = self.read(sql, [], |row| row.get::<_, Option<String>>(0))?;
+        Ok(days.into_iter().flatten().collect())
+    }
+
     pub(super) fn seed(&self, text: &str) -> Result<u64, RecordError> {
         text.parse().map_err(|_| RecordError::damaged(&self.path, format!("`{text}` is not a seed")))
     }

@@ -17,3 +17,4 @@ mod test;
 mod timeline;
 
 pub use page::{page, write_page, write_page_with};
+pub(crate) use policy::policy;

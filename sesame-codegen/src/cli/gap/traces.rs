@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use sesame_plan::{CampaignPlan, Lab};
 use sesame_results::analysis::gap::{LabRun, dimensions, points};
-use sesame_results::analysis::traces::{Signal, Signals, TraceGap, TracedTest, compare};
+use sesame_results::analysis::traces::{Signal, Signals, TracedTest};
 use sesame_results::record::{Repository, trace_file};
 use sesame_runtime::trace;
 use sesame_runtime::wire::WireTable;
@@ -15,15 +15,15 @@ use crate::cli::shell;
 /// The runs in a folder of results.
 pub(super) type Runs = (PathBuf, Vec<LabRun>);
 
-/// Compares the traces of tests that have some on both sides; `None` if there are none.
+/// The traces of tests that have some on both sides.
 ///
 /// The simulation's trace of a test is that of the recorded test, or of the first run in which it was simulated again.
-pub(super) fn compared(
+pub(super) fn read(
     campaign: &Repository,
     again: Option<&Runs>,
     labs: &[Runs],
     lab: Option<&Lab>,
-) -> anyhow::Result<Option<TraceGap>> {
+) -> anyhow::Result<Vec<TracedTest>> {
     let plan = campaign.plan();
     let tests: BTreeSet<u32> = labs.iter().flat_map(|(_, runs)| runs).map(|run| run.of).collect();
     let dimensions = dimensions(lab);
@@ -49,7 +49,7 @@ pub(super) fn compared(
         let at = points.get(&test).cloned().unwrap_or_else(|| vec![None; dimensions.len()]);
         traced.push(TracedTest { test, at, simulation: signals(plan, &simulated)?, lab });
     }
-    Ok((!traced.is_empty()).then(|| compare(&traced, &dimensions)))
+    Ok(traced)
 }
 
 fn signals(plan: &CampaignPlan, file: &Path) -> anyhow::Result<Signals> {

@@ -35,6 +35,19 @@ pub(in crate::cli) struct Brief {
     /// The lab; the only one of the space if omitted.
     #[arg(long, value_name = "NAME")]
     lab: Option<String>,
+    #[command(flatten)]
+    conditions: Conditions,
+    /// As text, or as a page to print, each test on a sheet of its own.
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+    /// Write into this file, which must not exist; if omitted, the sheets are printed.
+    #[arg(short, long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// What a sheet says that results do not.
+#[derive(Debug, Args)]
+pub(in crate::cli) struct Conditions {
     /// Somebody who must be present: the role and what this person does, for example `safety pilot: holds the
     /// enabling switch`. May be given several times.
     #[arg(long, value_name = "ROLE: TASK", value_parser = person)]
@@ -57,12 +70,6 @@ pub(in crate::cli) struct Brief {
     /// By how much positions may be wrong, of robots and people together, in metres.
     #[arg(long, value_name = "METRES", default_value_t = 0.0)]
     uncertainty: f64,
-    /// As text, or as a page to print, each test on a sheet of its own.
-    #[arg(long, value_enum, default_value_t)]
-    format: Format,
-    /// Write into this file, which must not exist; if omitted, the sheets are printed.
-    #[arg(short, long, value_name = "FILE")]
-    out: Option<PathBuf>,
 }
 
 /// How sheets are written.
@@ -89,12 +96,12 @@ pub(super) fn brief(shell: Shell, asked: &Brief) -> anyhow::Result<()> {
     let plan = repository.plan();
     let lab = named_lab(plan, asked.lab.as_deref())?;
     // Wrong numbers are refused even if no speed is known.
-    if let Some(approach) = asked.approach(0.0) {
+    if let Some(approach) = asked.conditions.approach(0.0) {
         separation_distance(&approach)?;
     }
     let mut sheets = Vec::new();
     for name in &asked.tests {
-        sheets.push(sheet(shell, asked, &repository, lab, name)?);
+        sheets.push(sheet(shell, &asked.conditions, &repository, lab, name)?);
     }
     let written = match asked.format {
         Format::Text => sheets.iter().map(text::text).collect::<Vec<_>>().join("\n\n"),
@@ -103,7 +110,7 @@ pub(super) fn brief(shell: Shell, asked: &Brief) -> anyhow::Result<()> {
             html::page(&title, &sheets)
         }
     };
-    if asked.reaction.is_none() {
+    if asked.conditions.reaction.is_none() {
         shell.note("`--reaction` and `--deceleration` say by how much safety zones must be wider");
     }
     match &asked.out {
@@ -123,7 +130,7 @@ fn write_new(file: &Path, text: &str) -> anyhow::Result<()> {
     written.with_context(|| format!("cannot write {}; choose a file that does not exist", file.display()))
 }
 
-impl Brief {
+impl Conditions {
     /// The approach of a robot of this speed, if it is said how it stops.
     fn approach(&self, robot_speed: f64) -> Option<Approach> {
         Some(Approach {
@@ -138,9 +145,10 @@ impl Brief {
     }
 }
 
-fn sheet(
+/// The sheet of a test.
+pub(in crate::cli) fn sheet(
     shell: Shell,
-    asked: &Brief,
+    asked: &Conditions,
     repository: &Repository,
     lab: Option<&Lab>,
     name: &str,
@@ -242,7 +250,7 @@ mod tests {
         let repository = sample::campaign_with_fronts(folder.path(), plan, 45);
         let asked = asked(arguments);
         let lab = plan.labs.first();
-        let sheet = |name: &String| sheet(Shell::silent(), &asked, &repository, lab, name).unwrap();
+        let sheet = |name: &String| sheet(Shell::silent(), &asked.conditions, &repository, lab, name).unwrap();
         asked.tests.iter().map(sheet).map(|sheet| text::text(&sheet)).collect()
     }
 

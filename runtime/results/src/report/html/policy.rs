@@ -4,7 +4,7 @@ use sha2::{Digest as _, Sha256};
 
 /// The Content-Security-Policy of a page with this text: styles and scripts that are written in it, by their hashes.
 /// The page loads nothing, even if someone injects markup: no image, no font, nothing from a network.
-pub(super) fn policy(page: &str) -> String {
+pub(crate) fn policy(page: &str) -> String {
     let permitted = |kind: &str, element: &str| {
         let hashes = contents(page, element).map(|text| format!(" 'sha256-{}'", base64(&Sha256::digest(text))));
         format!("{kind}{}", hashes.collect::<String>())

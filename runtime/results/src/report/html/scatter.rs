@@ -11,6 +11,7 @@ use sesame_plan::{CampaignPlan, Direction};
 use crate::present::axis::Axis;
 use crate::present::chart;
 use crate::present::markup::{Markup, coordinate, percent};
+use crate::present::names::{Screen, place_names};
 use crate::present::number::{self, with_unit};
 use crate::record::{Origin, TestRow};
 use crate::report::facts::summary::{Objective, Summary, shown_value};
@@ -85,8 +86,8 @@ pub(crate) fn scatter(markup: &mut Markup, x: &Dimension, y: &Dimension, points:
     }
     if detail.named {
         let occupied: Vec<(f64, f64)> = front.iter().map(|point| place(point)).collect();
-        names(markup, &front, &occupied, Screen { width: 980.0, height: 400.0, class: "name wide" });
-        names(markup, &front, &occupied, Screen { width: 300.0, height: 280.0, class: "name narrow" });
+        names(markup, &front, &occupied, Screen { width: 980.0, height: 400.0 }, "name wide");
+        names(markup, &front, &occupied, Screen { width: 300.0, height: 280.0 }, "name narrow");
     }
     markup.close();
     markup.element("p", &[("class", "axis-title below")], &x.axis_title());
@@ -182,87 +183,21 @@ fn thin<'a>(points: &[&'a Point], limit: usize, place: impl Fn(&Point) -> (f64, 
     kept
 }
 
-/// The size for which names are placed.
-#[derive(Debug, Clone, Copy)]
-struct Screen {
-    width: f64,
-    height: f64,
-    class: &'static str,
-}
-
 /// Writes the names of points where they cover no other name and no point of the front; a name without such a place
 /// is left out (the dot still tells it when pointed at).
-fn names(markup: &mut Markup, points: &[&Point], places: &[(f64, f64)], screen: Screen) {
+fn names(markup: &mut Markup, points: &[&Point], places: &[(f64, f64)], screen: Screen, class: &str) {
     let lengths: Vec<f64> = points.iter().map(|point| point.test.to_string().len() as f64 * 7.5).collect();
     for ((point, (x, y)), placed) in points.iter().zip(places).zip(place_names(places, &lengths, screen)) {
         let Some(placed) = placed else { continue };
-        let class = format!("{}{}", screen.class, placed.anchor);
+        let class = format!("{class}{}", placed.anchor);
         let (x, y, dx, dy) = (percent(*x), percent(*y), coordinate(placed.dx), coordinate(placed.dy));
         let attributes = [("class", class.as_str()), ("x", &x), ("y", &y), ("dx", &dx), ("dy", &dy)];
         markup.element("text", &attributes, &point.test.to_string());
     }
 }
 
-/// Where a name stands beside its dot.
-#[derive(Debug, Clone, Copy)]
-struct Placed {
-    dx: f64,
-    dy: f64,
-    anchor: &'static str,
-    frame: Frame,
-}
-
-/// A place for each name, in order of importance, earlier ones first; names have these lengths in pixels.
-fn place_names(places: &[(f64, f64)], lengths: &[f64], screen: Screen) -> Vec<Option<Placed>> {
-    let dots = places.iter().map(|(x, y)| Frame::around(x * screen.width, y * screen.height, 7.0));
-    let mut frames: Vec<Frame> = dots.collect();
-    // Above, to the left, to the right, below: a step line leaves its points to the sides. The share is that of the
-    // name's length which lies left of where it is anchored.
-    let sides =
-        [(0.0, -11.0, 0.5, " middle"), (-10.0, 4.0, 1.0, " end"), (10.0, 4.0, 0.0, ""), (0.0, 20.0, 0.5, " middle")];
-    places
-        .iter()
-        .zip(lengths)
-        .map(|((x, y), length)| {
-            let found = sides.iter().find_map(|&(dx, dy, share, anchor)| {
-                let left = x * screen.width + dx - share * length;
-                let base = y * screen.height + dy;
-                let frame = Frame { left, right: left + length, top: base - 11.0, bottom: base + 3.0 };
-                let inside = left >= -24.0
-                    && frame.right <= screen.width + 10.0
-                    && frame.top >= -16.0
-                    && frame.bottom <= screen.height + 8.0;
-                let free = inside && frames.iter().all(|other| !frame.overlaps(*other));
-                free.then_some(Placed { dx, dy, anchor, frame })
-            });
-            frames.extend(found.map(|placed| placed.frame));
-            found
-        })
-        .collect()
-}
-
-#[derive(Debug, Clone, Copy)]
-struct Frame {
-    left: f64,
-    right: f64,
-    top: f64,
-    bottom: f64,
-}
-
-impl Frame {
-    fn around(x: f64, y: f64, radius: f64) -> Frame {
-        Frame { left: x - radius, right: x + radius, top: y - radius, bottom: y + radius }
-    }
-
-    fn overlaps(self, other: Frame) -> bool {
-        self.left < other.right && other.left < self.right && self.top < other.bottom && other.top < self.bottom
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use proptest::prelude::*;
-
     use super::*;
 
     fn point(x: f64, y: f64, kind: Kind, number: u32) -> Point {
@@ -301,27 +236,5 @@ mod tests {
         let text = markup.finish();
         assert_eq!(text.matches("\"dot front\"").count(), 50);
         assert!((300..=800).contains(&text.matches("\"dot\"").count()));
-    }
-
-    proptest! {
-        #[test]
-        fn names_cover_neither_each_other_nor_a_point(
-            places in prop::collection::vec((0.0f64..=1.0, 0.0f64..=1.0), 1..40), length in 10.0f64..60.0,
-        ) {
-            let screen = Screen { width: 300.0, height: 280.0, class: "" };
-            let placed = place_names(&places, &vec![length; places.len()], screen);
-            prop_assert!(placed.iter().any(Option::is_some), "one name at least finds a place");
-            for (at, name) in placed.iter().enumerate() {
-                let Some(name) = name else { continue };
-                for other in placed[..at].iter().flatten() {
-                    prop_assert!(!name.frame.overlaps(other.frame));
-                }
-                for (x, y) in &places {
-                    let (x, y) = (x * screen.width, y * screen.height);
-                    let inside = (name.frame.left..name.frame.right).contains(&x) && (name.frame.top..name.frame.bottom).contains(&y);
-                    prop_assert!(!inside, "a dot lies under a name");
-                }
-            }
-        }
     }
 }

@@ -11,6 +11,7 @@ use serde_json::Value;
 
 use super::page::full_page;
 use crate::present::number;
+use crate::report::study;
 
 /// Whether the browser prefers light or dark pages.
 #[derive(Debug, Clone, Copy)]
@@ -116,7 +117,11 @@ fn a_narrow_screen_shows_the_page_without_scrolling_sideways() {
 
 /// Runs a script that uses the page and says of each of its checks whether it holds.
 fn assert_checks(browser: &str, script: &str, more_than: usize) {
-    let found = findings(browser, &full_page(), script, 1280, Scheme::Light);
+    assert_checks_of(browser, &full_page(), script, 1280, more_than);
+}
+
+fn assert_checks_of(browser: &str, html: &str, script: &str, width: u32, more_than: usize) {
+    let found = findings(browser, html, script, width, Scheme::Light);
     let checks = found["checks"].as_object().unwrap();
     for (what, seen) in checks {
         assert_eq!(seen, &Value::Bool(true), "{what}: {found:#}");
@@ -134,6 +139,33 @@ fn the_table_of_tests_sorts_filters_and_selects_everywhere() {
 fn timelines_have_a_cursor_a_zoom_and_a_second_test() {
     let Some(browser) = browser() else { return };
     assert_checks(browser, include_str!("browser/timelines.js"), 10);
+}
+
+#[test]
+fn a_study_chooses_anew_at_each_weight_and_can_be_turned_on_wide_and_narrow_screens() {
+    let Some(browser) = browser() else { return };
+    let (html, _) = study::tests::page();
+    for width in [1280, 390] {
+        assert_checks_of(browser, &html, include_str!("browser/space.js"), width, 12);
+    }
+}
+
+#[test]
+fn a_study_can_be_read_on_any_screen_and_its_policy_forbids_nothing_on_it() {
+    let Some(browser) = browser() else { return };
+    let (html, _) = study::tests::page();
+    let (shown, log) = opened(browser, &html, 1280, Scheme::Light);
+    assert!(shown.contains("type=\"range\""), "the script did its work");
+    assert!(!log.contains("Content Security Policy") && !log.contains("Uncaught"), "{log}");
+    for scheme in [Scheme::Light, Scheme::Dark] {
+        let found = findings(browser, &html, include_str!("browser/contrast.js"), 1280, scheme);
+        assert!(found["measured"].as_u64().unwrap() > 200, "{found}");
+        let low = found["low"].as_array().unwrap();
+        assert!(low.is_empty(), "{scheme:?}: {low:#?}");
+    }
+    let found = findings(browser, &html, include_str!("browser/narrow.js"), 390, Scheme::Light);
+    assert!(found["width"].as_u64().unwrap() <= 500, "{found}");
+    assert_eq!(found["beyond"], Value::Array(Vec::new()), "what is wider than the screen");
 }
 
 #[test]

@@ -3,7 +3,7 @@ leave(() => {
   all("details").forEach(details => { details.open = true; });
   document.documentElement.style.scrollBehavior = "auto";
   const first = document.querySelector(".timeline");
-  first.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowRight" }));
+  if (first) first.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowRight" }));
   const context = document.createElement("canvas").getContext("2d", { willReadFrequently: true });
   // Any colour as red, green, blue and opacity.
   const known = new Map();
