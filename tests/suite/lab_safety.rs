@@ -71,8 +71,18 @@ fn a_robot_that_waits_is_found_to_be_coupled_and_a_sheet_warns_of_it() {
     assert!(rows[0]["least_distance_m"].as_f64().unwrap() < 0.0 && rows[0]["first_contact_s"].is_number(), "{rows}");
     assert!(rows[0]["margins_touch_s"].as_f64() < rows[0]["first_contact_s"].as_f64(), "{rows}");
 
-    // The sheet of a dangerous test, as text and as a page.
+    // An interlock 20 cm around `north` acts where they would touch, too late for robots that need half an hour.
     let results = ran(&project, "dangerous");
+    let folder = results.display().to_string();
+    project.sesamec("replay", &["T1", "--record", "--campaign", "dangerous", "--results", &folder]).expect(0);
+    let found = lab(&["interlocks", "--format", "json"], &[&results]).expect(0);
+    let rows: serde_json::Value = serde_json::from_str(&found.out).unwrap();
+    assert_eq!((&rows[1]["test"], &rows[1]["interlock"]), (&"T1".into(), &"prevents".into()), "{rows}");
+    assert!(rows[1]["lead_s"].as_f64().unwrap() > 0.0, "{rows}");
+    let late = solid(&lab(&["interlocks", "T1", "--lead", "1800"], &[&results]).expect(0).out);
+    assert!(late.contains("an interlock acts too late or not at all in T1."), "{late}");
+
+    // The sheet of a dangerous test, as text and as a page.
     let sheet = ["brief", "T1", "--reaction", "0.3", "--deceleration", "1.5", "--present", "pilot: drives north"];
     let said = solid(&lab(&sheet, &[&results]).expect(0).out);
     for part in [

@@ -5,6 +5,7 @@ mod brief;
 mod briefing;
 mod contacts;
 mod entered;
+mod interlocks;
 mod poses;
 mod replay;
 #[cfg(test)]
@@ -31,6 +32,9 @@ pub(super) enum Lab {
     /// Find contacts between the shapes of a lab in recordings: of a robot with objects that were not there, and of
     /// robots that were recorded one at a time.
     Contacts(contacts::Asked),
+    /// Judge by recordings whether an interlock on expanded shapes acts early enough, and in exactly the tests in which
+    /// shapes would touch.
+    Interlocks(interlocks::Asked),
 }
 
 /// Does what is asked.
@@ -40,6 +44,7 @@ pub(super) fn lab(shell: Shell, language: &Language, asked: &Lab) -> anyhow::Res
         Lab::Form(asked) => entered::print_form(shell, asked)?,
         Lab::Add(asked) => entered::add(shell, asked)?,
         Lab::Contacts(asked) => contacts::print_contacts(shell, language, asked)?,
+        Lab::Interlocks(asked) => interlocks::print_interlocks(shell, asked)?,
     }
     Ok(ExitCode::SUCCESS)
 }
