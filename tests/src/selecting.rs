@@ -18,6 +18,23 @@ pub enum Points {
     Uniform,
     /// Near thirty centres, with qualities near those of their centre: near-duplicates, as fronts have them.
     Clustered,
+    /// Tests of the gearbox cell in T1, T2 and P1, front by front, ranked by how deep a zone was entered; at most
+    /// [`FRONTS`] of them. They are the first of 1,200 tests that NSGA-II with a population of 40 made of campaign
+    /// `study` in `examples/kuka_cell/study.sesame`.
+    Fronts,
+}
+
+/// How many tests there are in the fronts.
+pub const FRONTS: usize = 1000;
+
+/// The points of the fronts, each with its quality: from 0 to 1 by rank among as many.
+fn fronts(tests: usize) -> Vec<([f64; 3], f64)> {
+    let rows = include_str!("../data/kuka_cell_fronts.csv").lines().skip(1).take(tests);
+    let rows = rows.map(|row| -> Vec<f64> { row.split(',').map(|number| number.parse().expect("a number")).collect() });
+    let rows: Vec<Vec<f64>> = rows.collect();
+    let depth = |row: &Vec<f64>| rows.iter().filter(|other| other[3] > row[3]).count() as f64;
+    let most = (rows.len() - 1) as f64;
+    rows.iter().map(|row| ([row[0], row[1], row[2]], depth(row) / most)).collect()
 }
 
 /// A choice to be made.
@@ -42,8 +59,17 @@ impl Choice {
     pub fn problem(self) -> Problem {
         let mut stream = Stream::derive(self.seed, "choice of tests", &[self.tests as u64]);
         let centres: Vec<[f64; 4]> = (0..30).map(|_| std::array::from_fn(|_| stream.unit())).collect();
+        let mut fronts = match self.points {
+            Points::Fronts => fronts(self.tests),
+            Points::Uniform | Points::Clustered => Vec::new(),
+        }
+        .into_iter();
         let mut test = || {
             let (point, quality) = match self.points {
+                Points::Fronts => {
+                    let (point, quality) = fronts.next().expect("a choice has at most as many tests as the fronts");
+                    (point.to_vec(), quality)
+                }
                 Points::Uniform => ((0..3).map(|_| stream.unit()).collect(), stream.unit()),
                 Points::Clustered => {
                     let centre = centres[stream.below(centres.len())];
@@ -61,7 +87,7 @@ impl Choice {
     }
 }
 
-/// A choice with costs of 1, as Python is asked for it.
+/// A choice, as Python is asked for it.
 #[derive(Debug, Clone, Serialize)]
 pub struct Request {
     /// `cp-sat` or `highs`.
@@ -70,8 +96,10 @@ pub struct Request {
     pub points: Vec<Vec<f64>>,
     /// Their qualities.
     pub qualities: Vec<f64>,
-    /// How many are chosen.
-    pub size: u32,
+    /// Their costs.
+    pub costs: Vec<f64>,
+    /// What the chosen ones may cost together.
+    pub budget: f64,
     /// The weight of diversity.
     pub lambda: f64,
     /// Wall time after which the solver stops.
@@ -81,13 +109,13 @@ pub struct Request {
 impl Request {
     /// The request for a choice.
     pub fn of(choice: Choice, solver: &'static str, seconds: f64) -> Self {
-        assert!(!choice.uneven, "Python is asked for choices of one size");
         let problem = choice.problem();
         Request {
             solver,
             points: problem.tests().iter().map(|test| test.point.clone()).collect(),
             qualities: problem.tests().iter().map(|test| test.quality).collect(),
-            size: choice.budget,
+            costs: problem.tests().iter().map(|test| test.cost).collect(),
+            budget: problem.budget(),
             lambda: choice.lambda,
             seconds,
         }

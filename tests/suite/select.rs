@@ -80,9 +80,17 @@ fn table_four_of_the_paper_is_chosen_from_its_data() {
 #[test]
 #[ignore = "long: needs Python's ortools and highspy"]
 fn other_solvers_prove_the_same_values_and_find_no_better_ones() {
-    for (tests, budget, points) in [(30, 5, Points::Clustered), (30, 10, Points::Uniform), (60, 5, Points::Uniform)] {
+    let some = [
+        (30, 5, Points::Clustered, false),
+        (30, 10, Points::Uniform, false),
+        (60, 5, Points::Uniform, false),
+        (30, 5, Points::Fronts, false),
+        (20, 4, Points::Uniform, true),
+        (20, 4, Points::Fronts, true),
+    ];
+    for (tests, budget, points, uneven) in some {
         for lambda in [0.25, 0.5, 0.75] {
-            let choice = Choice { tests, budget, lambda, points, uneven: false, seed: 1 };
+            let choice = Choice { tests, budget, lambda, points, uneven, seed: 1 };
             let ours = choose(&choice.problem(), &mut || false);
             assert_eq!(ours.state, State::Proved);
             for solver in ["cp-sat", "highs"] {
