@@ -1,6 +1,8 @@
 //! Fitting a simulation to a lab (system identification) [SESAME 2023, Section 4.7]: tests that the lab ran are
 //! simulated with adjustments, until what they publish is as close to the traces of the lab as can be.
 
+mod journal;
+
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,6 +20,8 @@ use sesame_results::record::{RecordError, Repository, trace_file};
 use sesame_rng::derive_seed;
 
 use crate::campaign::{Executor, ExecutorError, Job, TraceRequest};
+
+pub(crate) use journal::Journal;
 
 /// The numbers in the messages of one run over time, by name.
 type Signals = BTreeMap<String, Signal>;
@@ -43,6 +47,9 @@ pub(crate) enum FitError {
     /// A trace that was read cannot be removed.
     #[error("cannot remove a trace that was read: {0}")]
     Leftover(#[from] io::Error),
+    /// What was tried cannot be kept.
+    #[error("cannot keep what was tried: {0}")]
+    NotKept(io::Error),
     /// A run says nothing about the adjustments.
     #[error("{test} broke off when it was simulated again: {why}")]
     BrokeOff {
@@ -140,9 +147,11 @@ pub(crate) struct Simulations<'a> {
     pub(crate) interrupted: &'a AtomicBool,
 }
 
-/// Fits a simulation to a lab. `tests` are fitted to, `held_out` are judged by only. `None` when the user stopped it.
+/// Fits a simulation to a lab. `tests` are fitted to, `held_out` are judged by only. What `journal` knows is not tried
+/// again. `None` when the user stopped it.
 pub(crate) fn fit(
     simulations: &mut Simulations<'_>,
+    journal: &mut Journal,
     tests: &[&LabTraces],
     held_out: &[&LabTraces],
     settings: Settings<'_>,
@@ -160,7 +169,7 @@ pub(crate) fn fit(
             .collect(),
     };
     let of_values = |values: &[f64]| compensation(values.iter().map(|&value| vec![value]).collect());
-    let mut runner = Evaluations { simulations, repeats, seed, failure: None };
+    let mut runner = Evaluations { simulations, journal, repeats, seed, failure: None };
 
     let total = evaluations + noises.len() * tests.len() * EVALUATIONS_OF_A_LEVEL;
     let (mut done, mut best) = (0, f64::INFINITY);
@@ -211,6 +220,7 @@ enum Stopped {
 /// Sets of values, one after the other.
 struct Evaluations<'a, 's> {
     simulations: &'a mut Simulations<'s>,
+    journal: &'a mut Journal,
     repeats: u32,
     seed: u64,
     /// Once it is there, every evaluation is infinite.
@@ -223,22 +233,28 @@ impl Evaluations<'_, '_> {
         if self.failure.is_some() {
             return f64::INFINITY;
         }
-        match self.simulations.run(tests, with, self.repeats, self.seed) {
+        let numbers: Vec<u32> = tests.iter().map(|test| test.number).collect();
+        let key = serde_json::json!([numbers, with]).to_string();
+        if let Some(known) = self.journal.find(&key) {
+            return known;
+        }
+        let stopped = match self.simulations.run(tests, with, self.repeats, self.seed) {
             Ok(Some(simulated)) => {
                 let of_tests = tests.iter().zip(&simulated);
                 let found: Vec<f64> =
                     of_tests.flat_map(|(lab, simulated)| discrepancies(simulated, &lab.runs)).collect();
-                if found.is_empty() { f64::INFINITY } else { found.iter().sum::<f64>() / found.len() as f64 }
+                let value =
+                    if found.is_empty() { f64::INFINITY } else { found.iter().sum::<f64>() / found.len() as f64 };
+                match self.journal.keep(key, value) {
+                    Ok(()) => return value,
+                    Err(error) => Stopped::Failed(FitError::NotKept(error)),
+                }
             }
-            Ok(None) => {
-                self.failure = Some(Stopped::Interrupted);
-                f64::INFINITY
-            }
-            Err(failure) => {
-                self.failure = Some(Stopped::Failed(failure));
-                f64::INFINITY
-            }
-        }
+            Ok(None) => Stopped::Interrupted,
+            Err(failure) => Stopped::Failed(failure),
+        };
+        self.failure = Some(stopped);
+        f64::INFINITY
     }
 }
 

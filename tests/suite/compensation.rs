@@ -136,11 +136,32 @@ fn noise_is_fitted_by_how_much_runs_differ_and_varied_from_run_to_run() {
         Study::new("compensation_noise", "\"--as-modelled\" \"--noise\" \"8\"", "relay noise on link1 [0rad, 0.2rad]");
     let study = study.carried_out();
     let hall = study.results("42-hall");
-    let compensated = study.json(&["compensate", "study.sesame", &hall, "--evaluations", "5", "--no-campaign"]);
+    let asked = ["compensate", "study.sesame", &hall, "--evaluations", "5", "--no-campaign"];
+    let compensated = study.json(&asked);
     let levels = compensated["compensation"]["adjustments"][0]["levels"].as_array().unwrap();
     assert_eq!(levels.len(), 2, "one of each test that it was fitted to: {compensated}");
     assert!(levels.iter().all(|level| level.as_f64().unwrap() > 0.0), "{levels:?}");
     assert_eq!(compensated["held_out"]["tests"].as_array().unwrap().len(), 1);
+
+    // Killed and started again, it goes on with what was tried, and comes to the same.
+    let asked = [&asked[..3], &["--evaluations", "2", "--no-campaign", "--hold-out", "T1,T2"]].concat();
+    let compensated = study.json(&asked);
+    let tried = PathBuf::from(&hall).join("fit.jsonl");
+    assert!(!tried.exists(), "a fit that is complete leaves nothing behind");
+    let mut child = command(sesamec()).args(&asked).current_dir(&study.folder).spawn().unwrap();
+    let lines = || fs::read_to_string(&tried).map_or(0, |text| text.lines().count());
+    while lines() < 4 {
+        assert!(child.try_wait().unwrap().is_none(), "it ended before it was killed");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let again = study.sesamec(&[&asked[..], &["--format", "json"]].concat()).expect(0);
+    assert!(again.err.contains("Going on with a fit of which"), "{}", again.err);
+    let again: serde_json::Value = serde_json::from_str(&again.out).unwrap();
+    assert_eq!(again["compensation"], compensated["compensation"]);
+    assert_eq!(again["held_out"], compensated["held_out"]);
+    assert!(!tried.exists());
 }
 
 #[test]

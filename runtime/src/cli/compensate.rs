@@ -29,11 +29,14 @@ use crate::cli::run::compensated_name;
 use crate::cli::scratch::Scratch;
 use crate::cli::session::Session;
 use crate::cli::terminal::{Format, print, print_json, say, text_options};
-use crate::fitting::{self, Judged, LabTraces, Progress, Settings, Simulations};
+use crate::fitting::{self, Journal, Judged, LabTraces, Progress, Settings, Simulations};
 use crate::lab::find;
 
 /// How often it is said how far the fit is.
 const LINE_EVERY: Duration = Duration::from_secs(10);
+
+/// What a fit has tried, in the folder of the lab's results, until it is complete.
+const TRIED: &str = "fit.jsonl";
 
 /// Of so many tests one is kept aside to judge by.
 const ONE_IN: usize = 3;
@@ -122,10 +125,19 @@ pub(super) fn compensate(session: &Session, options: &Options) -> Result<ExitCod
     refuse_unfilled(&session.runner, &session.plan, true)?;
     let interrupted = interruptible()?;
     let seed = derive_seed(campaign.campaign().seed, &format!("compensate {}", found.name), &[]);
-    let fit = fitted(session, options, &campaign, (&found, &task), (&fitted_to, &held_out), seed, &interrupted);
+    let tried = lab.folder().join(TRIED);
+    // All that decides what comes of a set of values.
+    let of = serde_json::json!([seed, task.repeats, lab.digest()?, session.plan]).to_string();
+    let cannot = |error| Failure(format!("cannot keep what is tried in {}: {error}", shown(&tried)));
+    let mut journal = Journal::open(&tried, &of).map_err(cannot)?;
+    if journal.known() > 0 {
+        say(format_args!("   Going on with a fit of which {} sets of values were tried", journal.known()));
+    }
+    let of = (&found, &task, seed);
+    let fit = fitted(session, options, &campaign, of, (&fitted_to, &held_out), &mut journal, &interrupted);
     files.finish()?;
     let Some(outcome) = fit? else {
-        say(format_args!("stopped; nothing was recorded"));
+        say(format_args!("stopped; the same command goes on with what was tried, which is in {}", shown(&tried)));
         return Ok(ExitCode::from(STOPPED));
     };
     let for_people = options.output.format() == Format::Text;
@@ -145,6 +157,8 @@ pub(super) fn compensate(session: &Session, options: &Options) -> Result<ExitCod
     let Some((simulated, simulated_folder)) = again.run(&name, &of_lab, seed)? else {
         return Ok(ExitCode::from(STOPPED));
     };
+    // From here on, what was found is recorded with results.
+    journal.done().map_err(cannot)?;
     let before = gap(&campaign, &runs_in_lab, Some(&found))?;
     let after = gap_after(&campaign, &compensated_runs(&campaign, &simulated)?, &runs_in_lab, Some(&found))?;
     if for_people {
@@ -239,9 +253,9 @@ fn fitted(
     session: &Session,
     options: &Options,
     campaign: &Repository,
-    (lab, task): (&Lab, &LabTask),
+    (lab, task, seed): (&Lab, &LabTask, u64),
     (fitted_to, held_out): (&[&LabTraces], &[&LabTraces]),
-    seed: u64,
+    journal: &mut Journal,
     interrupted: &AtomicBool,
 ) -> Result<Option<fitting::Outcome>, Failure> {
     let scratch = Scratch::new("compensate")?;
@@ -264,13 +278,20 @@ fn fitted(
     };
     let started = Instant::now();
     let mut said = Instant::now();
-    let found = fitting::fit(&mut simulations, fitted_to, held_out, settings, &mut |Progress { done, total, best }| {
-        if said.elapsed() >= LINE_EVERY {
-            said = Instant::now();
-            let left = started.elapsed().as_secs_f64() / done as f64 * (total - done) as f64;
-            say(format_args!("   Fitting {done}/{total}  discrepancy {best:.4}  {} left", wait(left)));
-        }
-    });
+    let found = fitting::fit(
+        &mut simulations,
+        journal,
+        fitted_to,
+        held_out,
+        settings,
+        &mut |Progress { done, total, best }| {
+            if said.elapsed() >= LINE_EVERY {
+                said = Instant::now();
+                let left = started.elapsed().as_secs_f64() / done as f64 * (total - done) as f64;
+                say(format_args!("   Fitting {done}/{total}  discrepancy {best:.4}  {} left", wait(left)));
+            }
+        },
+    );
     Ok(found?)
 }
 
