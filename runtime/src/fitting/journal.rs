@@ -17,8 +17,8 @@ pub(crate) struct Journal {
 }
 
 impl Journal {
-    /// Opens a journal. What is in it counts only if it is of the same fit: same tests, simulator, and everything random.
-    /// Otherwise it begins anew.
+    /// Opens a journal. What is in it counts only if it is of the same fit: same tests, simulator, and everything
+    /// random. Otherwise it begins anew.
     pub(crate) fn open(path: &Path, of: &str) -> io::Result<Journal> {
         let text = match std::fs::read(path) {
             Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
