@@ -9,12 +9,14 @@ received so far, and answers after all messages of that period are published; `/
 zero. Without it, the world runs by the wall clock, `--speed` times as fast.
 
 With `--hall DOMAIN` the node is also the stand-in for a lab: in this ROS domain the engine is PyBullet, and the world
-runs by the wall clock, whatever the other options say.
+runs by the wall clock, whatever the other options say. It begins only when both controllers have been there for a
+moment: nobody resets a hall, so a test that began later would meet the arms somewhere on their way.
 """
 
 import argparse
 import os
 import sys
+import time
 
 import numpy as np
 import rclpy
@@ -34,6 +36,7 @@ FEEDER = np.array([0.0, 0.0, 0.22])  # where parts are fetched
 BOX = {"left": np.array([-0.16, -0.3, 0.3]), "right": np.array([0.16, 0.3, 0.3])}  # where they are put down
 AT = 0.06  # metres within which a tool has reached a place
 SHARED = 0.28  # metres around the feeder, as seen from above, that only one arm may enter
+GATHERING = 2.0  # seconds after which nobody else is expected in the hall; the runner waits for half a second
 WORKERS = {  # the places of the workers: two opposite corners
     "a": (np.array([-1.0, -1.5, 0.0]), np.array([0.2, -0.5, 2.0])),
     "b": (np.array([-0.2, 0.5, 0.0]), np.array([1.0, 1.5, 2.0])),
@@ -107,11 +110,12 @@ class Cell:
 class CellNode(Node):
     """The cell as a node. Messages that read the world are published before those that controllers answer."""
 
-    def __init__(self, physics: Physics, lock_step: bool, speed: float) -> None:
+    def __init__(self, physics: Physics, lock_step: bool, speed: float, hall: bool) -> None:
         super().__init__("cell", enable_rosout=False)
         self.cell = Cell(physics)
         self.torques: dict[str, np.ndarray] = {}
         self.enabled = True
+        self.here_since: float | None = None  # when both controllers were first seen
         deep = QoSProfile(depth=200)  # a relay may release many delayed messages at once
         self.clock = self.create_publisher(Clock, "/clock", 10)
         self.distance = self.create_publisher(Float64, "/cell/distance", deep)
@@ -133,6 +137,8 @@ class CellNode(Node):
         self.add_on_set_parameters_callback(self.set)
         if lock_step:
             self.create_service(Trigger, "/cell/step", self.step)
+        elif hall:
+            self.create_timer(PERIOD * 1e-9 / speed, self.gather)
         else:
             self.create_timer(PERIOD * 1e-9 / speed, self.advance)
 
@@ -192,15 +198,28 @@ class CellNode(Node):
         response.success = True
         return response
 
+    def gather(self) -> None:
+        """Advances as soon as everybody is there; until then it is time zero."""
+        if self.here_since is None and {f"{arm}_controller" for arm in ARMS} <= set(self.get_node_names()):
+            self.here_since = time.monotonic()
+        if self.here_since is not None and time.monotonic() - self.here_since >= GATHERING:
+            self.advance()
+        else:
+            self.tell_time()
+
+    def tell_time(self) -> Clock:
+        """Publishes the simulation time."""
+        clock = Clock()
+        clock.clock.sec, clock.clock.nanosec = divmod(self.cell.now, 1_000_000_000)
+        self.clock.publish(clock)
+        return clock
+
     def advance(self) -> None:
         """Advances by one period and publishes what is new."""
         cell = self.cell
         parts = cell.advance(self.torques, self.enabled)
         self.torques.clear()
-        seconds, nanos = divmod(cell.now, 1_000_000_000)
-        clock = Clock()
-        clock.clock.sec, clock.clock.nanosec = seconds, nanos
-        self.clock.publish(clock)
+        clock = self.tell_time()
         self.distance.publish(Float64(data=cell.physics.distance()))
         for worker, publisher in self.workers.items():
             publisher.publish(Float64(data=cell.distance_to_worker(worker)))
@@ -245,10 +264,11 @@ def main() -> None:
     parser.add_argument("--hall", type=int, metavar="DOMAIN", help="in this ROS domain, be the stand-in for a lab")
     own = rclpy.utilities.remove_ros_args(sys.argv)[1:]
     options = parser.parse_args(own)
-    if options.hall is not None and os.environ.get("ROS_DOMAIN_ID") == str(options.hall):
+    hall = options.hall is not None and os.environ.get("ROS_DOMAIN_ID") == str(options.hall)
+    if hall:
         options.engine, options.lock_step = "pybullet", False
     rclpy.init(args=sys.argv)
-    node = CellNode(physics(options.engine), options.lock_step, options.speed)
+    node = CellNode(physics(options.engine), options.lock_step, options.speed, hall)
     try:
         rclpy.spin(node)
     except KeyboardInterrupt:
