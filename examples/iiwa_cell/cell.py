@@ -1,4 +1,4 @@
-"""A cell with two KUKA iiwa arms, simulated by MuJoCo, as a ROS 2 node.
+"""A cell with two KUKA iiwa arms, simulated by MuJoCo or PyBullet, as a ROS 2 node.
 
 The arms face each other over a table and fetch parts from the same feeder in its middle. Each takes torques and
 reports its joints; the node also reports how close the arms are to each other, and the tools to the places of two
@@ -7,14 +7,17 @@ workers.
 In lock-step (`--lock-step`) the service `/cell/step` advances the world by one control period, with the torques
 received so far, and answers after all messages of that period are published; `/cell/reset` sets the world to time
 zero. Without it, the world runs by the wall clock, `--speed` times as fast.
+
+With `--hall DOMAIN` the node is also the stand-in for a lab: in this ROS domain the engine is PyBullet, and the world
+runs by the wall clock, whatever the other options say. It begins only when both controllers have been there for a
+moment: nobody resets a hall, so a test that began later would meet the arms somewhere on their way.
 """
 
 import argparse
-import importlib.util
-import pathlib
+import os
 import sys
+import time
 
-import mujoco
 import numpy as np
 import rclpy
 from geometry_msgs.msg import PointStamped
@@ -26,20 +29,14 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool, Trigger
 
-ARMS = ("left", "right")
-JOINTS = 7
+from arms import ARMS, JOINTS, PERIOD, Physics
+
 NAMES = [f"joint_{i + 1}" for i in range(JOINTS)]
-PERIOD = 20_000_000  # nanoseconds of a control period
-PHYSICS = 0.002  # seconds of a step of the physics
-ROTOR = 0.15  # kg m² that a drive adds to its joint
-FRICTION = np.array([20.0, 20.0, 12.0, 14.0, 5.0, 3.0, 2.0])  # Nm s/rad of the drives
-FAR = 2.0  # metres beyond which a distance is not measured exactly
-BASE = {"left": (-0.62, 0.0, 0.0), "right": (0.62, 0.0, np.pi)}  # x, y and rotation, on the table
-PARKED = (-0.6571, 0.467, 0.1091, -1.4969, -0.053, 1.1806, -0.3854)  # joints of both arms at time zero, in rad
 FEEDER = np.array([0.0, 0.0, 0.22])  # where parts are fetched
 BOX = {"left": np.array([-0.16, -0.3, 0.3]), "right": np.array([0.16, 0.3, 0.3])}  # where they are put down
 AT = 0.06  # metres within which a tool has reached a place
 SHARED = 0.28  # metres around the feeder, as seen from above, that only one arm may enter
+GATHERING = 2.0  # seconds after which nobody else is expected in the hall; the runner waits for half a second
 WORKERS = {  # the places of the workers: two opposite corners
     "a": (np.array([-1.0, -1.5, 0.0]), np.array([0.2, -0.5, 2.0])),
     "b": (np.array([-0.2, 0.5, 0.0]), np.array([1.0, 1.5, 2.0])),
@@ -49,32 +46,17 @@ WORKERS = {  # the places of the workers: two opposite corners
 class Cell:
     """The world: its physics, and what can be measured in it."""
 
-    def __init__(self) -> None:
-        self.model = build()
-        self.data = mujoco.MjData(self.model)
-        self.state = {
-            arm: np.array([self.model.joint(f"{arm}_joint_{i + 1}").qposadr[0] for i in range(JOINTS)]) for arm in ARMS
-        }
-        self.speed = {
-            arm: np.array([self.model.joint(f"{arm}_joint_{i + 1}").dofadr[0] for i in range(JOINTS)]) for arm in ARMS
-        }
-        self.motors = {
-            arm: np.array([self.model.actuator(f"{arm}_torq_j{i + 1}").id for i in range(JOINTS)]) for arm in ARMS
-        }
-        self.site = {arm: self.model.site(f"{arm}_tool").id for arm in ARMS}
-        self.payload = {arm: self.model.body(f"{arm}_payload").id for arm in ARMS}
-        moving = {arm: solid(self.model, arm) for arm in ARMS}
-        self.pairs = np.array([(a, b) for a in moving["left"] for b in moving["right"]])
-        self.reach = self.model.geom_rbound[self.pairs].sum(axis=1)
-        self.set_friction(1.0)
-        self.reset()
+    def __init__(self, physics: Physics) -> None:
+        self.physics = physics
+        self.start()
 
     def reset(self) -> None:
         """Sets the world to time zero: both arms rest above their boxes."""
-        mujoco.mj_resetData(self.model, self.data)
-        for arm in ARMS:
-            self.data.qpos[self.state[arm]] = PARKED
-        mujoco.mj_forward(self.model, self.data)
+        self.physics.reset()
+        self.start()
+
+    def start(self) -> None:
+        """Nothing was fetched yet."""
         self.periods = 0
         self.fetched = {arm: False for arm in ARMS}
         self.last_part = {arm: 0 for arm in ARMS}
@@ -84,28 +66,17 @@ class Cell:
         """The simulation time in nanoseconds."""
         return self.periods * PERIOD
 
-    def set_payload(self, mass: float) -> None:
-        """Hangs a weight on both tools of which the arms know nothing."""
-        for body in self.payload.values():
-            self.model.body_mass[body] = max(mass, 1e-4)
-            self.model.body_inertia[body] = max(mass, 1e-4) * 0.03**2
-
-    def set_friction(self, factor: float) -> None:
-        """Makes the friction of all drives this many times as strong."""
-        self.model.dof_damping[:] = np.tile(FRICTION, len(ARMS)) * factor
-
     def advance(self, torques: dict[str, np.ndarray], enabled: bool = True) -> dict[str, float]:
         """Advances by a control period and returns the arms that put down a part, with the seconds it took them.
 
         An arm without new torques keeps its last ones. Without `enabled` no arm moves.
         """
         for arm, wanted in torques.items():
-            self.data.ctrl[self.motors[arm]] = wanted
+            self.physics.push(arm, wanted)
         if enabled:
-            mujoco.mj_step(self.model, self.data, round(PERIOD * 1e-9 / PHYSICS))
+            self.physics.step()
         else:
-            self.data.qvel[:] = 0.0
-        mujoco.mj_forward(self.model, self.data)
+            self.physics.hold()
         self.periods += 1
         parts = {}
         for arm in ARMS:
@@ -119,22 +90,7 @@ class Cell:
 
     def tool(self, arm: str) -> np.ndarray:
         """Where the tip of a tool is, from the middle of the table."""
-        return self.data.site_xpos[self.site[arm]]
-
-    def distance(self) -> float:
-        """The smallest distance between the arms; negative if they penetrate each other.
-
-        Spheres around the bodies tell which pairs can be the closest; the exact distance is computed only for those.
-        """
-        middles = self.data.geom_xpos[self.pairs]
-        at_least = np.linalg.norm(middles[:, 0] - middles[:, 1], axis=1) - self.reach
-        smallest = FAR
-        for pair in np.argsort(at_least, kind="stable"):
-            if at_least[pair] >= smallest:
-                break
-            a, b = self.pairs[pair]
-            smallest = min(smallest, mujoco.mj_geomDistance(self.model, self.data, a, b, smallest, None))
-        return smallest
+        return self.physics.tool(arm)
 
     def distance_to_worker(self, worker: str) -> float:
         """The distance of the nearest tool from a worker's place; negative inside of it."""
@@ -151,48 +107,15 @@ class Cell:
         return bool(np.linalg.norm((self.tool(other) - FEEDER)[:2]) > SHARED)
 
 
-def build() -> mujoco.MjModel:
-    """The model of the cell, from the arm that the robosuite package carries."""
-    found = importlib.util.find_spec("robosuite")
-    if found is None:
-        sys.exit("cell.py: the package robosuite, which has the model of the arm, is not installed: run set_up.py")
-    arm_file = pathlib.Path(found.submodule_search_locations[0]) / "models/assets/robots/iiwa/robot.xml"
-    world = mujoco.MjSpec()
-    world.option.timestep = PHYSICS
-    world.worldbody.add_geom(name="table", type=mujoco.mjtGeom.mjGEOM_BOX, pos=[0, 0, -0.02], size=[0.9, 0.5, 0.02])
-    for arm in ARMS:
-        spec = mujoco.MjSpec.from_file(str(arm_file))
-        hand = spec.body("right_hand")
-        hand.add_geom(
-            name="tool_collision", type=mujoco.mjtGeom.mjGEOM_CYLINDER, pos=[0, 0, 0.06], size=[0.03, 0.06, 0], mass=0.6
-        )
-        hand.add_site(name="tool", pos=[0, 0, 0.12])
-        payload = hand.add_body(name="payload", pos=[0, 0, 0.1])
-        payload.mass, payload.inertia, payload.explicitinertial = 1e-4, [1e-7] * 3, True
-        x, y, turned = BASE[arm]
-        frame = world.worldbody.add_frame(pos=[x, y, 0], quat=[np.cos(turned / 2), 0, 0, np.sin(turned / 2)])
-        frame.attach_body(spec.worldbody.first_body(), f"{arm}_", "")
-    for body in world.bodies:
-        # The drives of a real iiwa carry the arm's own weight; not that of the payload.
-        body.gravcomp = 0.0 if body.name.endswith("payload") else 1.0
-    for joint in world.joints:
-        joint.armature = ROTOR
-    for geom in world.geoms:
-        # An arm touches the other one and the table, not itself; what is only for the eye touches nothing.
-        drawn = geom.name.endswith("_visual")
-        geom.contype = 0 if drawn else 2 if geom.name.startswith("right") else 1
-        geom.conaffinity = 0 if drawn else 1 if geom.name.startswith("right") else 2
-    return world.compile()
-
-
 class CellNode(Node):
     """The cell as a node. Messages that read the world are published before those that controllers answer."""
 
-    def __init__(self, lock_step: bool, speed: float) -> None:
+    def __init__(self, physics: Physics, lock_step: bool, speed: float, hall: bool) -> None:
         super().__init__("cell", enable_rosout=False)
-        self.cell = Cell()
+        self.cell = Cell(physics)
         self.torques: dict[str, np.ndarray] = {}
         self.enabled = True
+        self.here_since: float | None = None  # when both controllers were first seen
         deep = QoSProfile(depth=200)  # a relay may release many delayed messages at once
         self.clock = self.create_publisher(Clock, "/clock", 10)
         self.distance = self.create_publisher(Float64, "/cell/distance", deep)
@@ -214,6 +137,8 @@ class CellNode(Node):
         self.add_on_set_parameters_callback(self.set)
         if lock_step:
             self.create_service(Trigger, "/cell/step", self.step)
+        elif hall:
+            self.create_timer(PERIOD * 1e-9 / speed, self.gather)
         else:
             self.create_timer(PERIOD * 1e-9 / speed, self.advance)
 
@@ -227,9 +152,9 @@ class CellNode(Node):
         """Takes new values of parameters; they hold until they are set again, also after a reset."""
         for parameter in parameters:
             if parameter.name == "payload":
-                self.cell.set_payload(parameter.value)
+                self.cell.physics.set_payload(parameter.value)
             elif parameter.name == "friction":
-                self.cell.set_friction(parameter.value)
+                self.cell.physics.set_friction(parameter.value)
         return SetParametersResult(successful=True)
 
     def take(self, arm: str, message: JointState) -> None:
@@ -273,16 +198,29 @@ class CellNode(Node):
         response.success = True
         return response
 
+    def gather(self) -> None:
+        """Advances as soon as everybody is there; until then it is time zero."""
+        if self.here_since is None and {f"{arm}_controller" for arm in ARMS} <= set(self.get_node_names()):
+            self.here_since = time.monotonic()
+        if self.here_since is not None and time.monotonic() - self.here_since >= GATHERING:
+            self.advance()
+        else:
+            self.tell_time()
+
+    def tell_time(self) -> Clock:
+        """Publishes the simulation time."""
+        clock = Clock()
+        clock.clock.sec, clock.clock.nanosec = divmod(self.cell.now, 1_000_000_000)
+        self.clock.publish(clock)
+        return clock
+
     def advance(self) -> None:
         """Advances by one period and publishes what is new."""
         cell = self.cell
         parts = cell.advance(self.torques, self.enabled)
         self.torques.clear()
-        seconds, nanos = divmod(cell.now, 1_000_000_000)
-        clock = Clock()
-        clock.clock.sec, clock.clock.nanosec = seconds, nanos
-        self.clock.publish(clock)
-        self.distance.publish(Float64(data=cell.distance()))
+        clock = self.tell_time()
+        self.distance.publish(Float64(data=cell.physics.distance()))
         for worker, publisher in self.workers.items():
             publisher.publish(Float64(data=cell.distance_to_worker(worker)))
         for arm, seconds_taken in parts.items():
@@ -296,8 +234,8 @@ class CellNode(Node):
         for arm in ARMS:
             joints = JointState(name=NAMES)
             joints.header.stamp = clock.clock
-            joints.position = cell.data.qpos[cell.state[arm]].tolist()
-            joints.velocity = cell.data.qvel[cell.speed[arm]].tolist()
+            joints.position = cell.physics.position(arm)
+            joints.velocity = cell.physics.velocity(arm)
             self.joints[arm].publish(joints)
 
 
@@ -306,21 +244,31 @@ def nanoseconds(message: JointState) -> int:
     return message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
 
 
-def solid(model: mujoco.MjModel, arm: str) -> list[int]:
-    """The bodies of an arm that can be hit: all but its base, which does not move."""
-    names = [f"{arm}_link_{i}_collision" for i in range(1, JOINTS + 1)] + [f"{arm}_tool_collision"]
-    return [model.geom(name).id for name in names]
+def physics(engine: str) -> Physics:
+    """The arms in an engine. Only this engine is loaded."""
+    if engine == "pybullet":
+        from with_pybullet import PyBullet
+
+        return PyBullet()
+    from with_mujoco import MuJoCo
+
+    return MuJoCo()
 
 
 def main() -> None:
     """Reads the options and runs the node until it is interrupted."""
     parser = argparse.ArgumentParser(description="Two KUKA iiwa arms, simulated, as a ROS 2 node.")
+    parser.add_argument("--engine", choices=["mujoco", "pybullet"], default="mujoco", help="what simulates the arms")
     parser.add_argument("--lock-step", action="store_true", help="advance only when /cell/step is called")
     parser.add_argument("--speed", type=float, default=1.0, help="simulated seconds per second, without --lock-step")
+    parser.add_argument("--hall", type=int, metavar="DOMAIN", help="in this ROS domain, be the stand-in for a lab")
     own = rclpy.utilities.remove_ros_args(sys.argv)[1:]
     options = parser.parse_args(own)
+    hall = options.hall is not None and os.environ.get("ROS_DOMAIN_ID") == str(options.hall)
+    if hall:
+        options.engine, options.lock_step = "pybullet", False
     rclpy.init(args=sys.argv)
-    node = CellNode(options.lock_step, options.speed)
+    node = CellNode(physics(options.engine), options.lock_step, options.speed, hall)
     try:
         rclpy.spin(node)
     except KeyboardInterrupt:

@@ -177,6 +177,37 @@ fn repeating_a_test_of_a_system_that_runs_freely_states_its_spread() {
 }
 
 #[test]
+fn a_known_test_is_run_in_the_hall_on_another_engine_and_the_gap_is_reported() {
+    let hall = Domain::free();
+    let (domain, argument) = (format!("domain {}", hall.number), format!("\"--hall\" \"{}\"", hall.number));
+    let short = "right_bias 2 times\n  observes arm_distance, worker_distance\n  end      after 5s";
+    let changes = [
+        ("domain 100", domain.as_str()),
+        ("\"--hall\" \"100\"", argument.as_str()),
+        ("right_bias 5 times\n  observes arm_distance, worker_distance\n  end      after 14s", short),
+    ];
+    let Some(cell) = iiwa_cell("iiwa_hall", &changes) else { return };
+    cell.sesamec("run", "repeated", &WORKERS).expect(0);
+    cell.sesamec("physical", "repeated", &["T1", "--times", "1"]).expect(0);
+
+    let results = cell.folder().join("runners/repeated/results");
+    let [simulated, in_hall] = ["1", "1-hall"].map(|folder| results.join(folder));
+    let mut gap = command(sesamec());
+    gap.arg("gap").args([simulated, in_hall]);
+    let json = done(gap.args(["--format", "json"])).expect(0).out;
+    let rows: Vec<Value> = serde_json::from_str(&json).expect("it is JSON");
+    let row = |metric: &str| rows.iter().find(|row| row["metric"] == metric).unwrap_or_else(|| panic!("{rows:?}"));
+    let number = |metric: &str, field: &str| row(metric)[field].as_f64().unwrap_or_else(|| panic!("{}", row(metric)));
+    assert_eq!(["simulation_runs", "lab_runs"].map(|field| number("arm_distance", field)), [1.0, 1.0]);
+    let means = ["simulation_mean", "lab_mean"].map(|field| number("arm_distance", field));
+    // Undisturbed, it is more than twice as much.
+    assert!(means.iter().all(|&mean| mean < 0.06), "the disturbance acts on either side: {means:?}");
+    // The arm of the hall is longer, so a tool that rests above its box is 5 mm closer to a worker.
+    let closer = -number("worker_distance", "difference");
+    assert!((0.003..0.02).contains(&closer), "{rows:?}");
+}
+
+#[test]
 fn robots_that_believe_old_poses_collide_in_the_fleet() {
     let Some(fleet) = Example::new("fleet", Vendor::Fleet, "fleet_repeated", &[("5 times", "2 times")]) else { return };
     fleet.sesamec("run", "repeated", &WORKERS).expect(0);
