@@ -205,6 +205,17 @@ fn a_known_test_is_run_in_the_hall_on_another_engine_and_the_gap_is_reported() {
     // The arm of the hall is longer, so a tool that rests above its box is 5 mm closer to a worker.
     let closer = -number("worker_distance", "difference");
     assert!((0.003..0.02).contains(&closer), "{rows:?}");
+
+    // With a trace of the simulation, too, signals are compared: those of the service, whose two topics have one name,
+    // and those that neither metrics nor operations read.
+    cell.sesamec("replay", "repeated", &["T1", "--record", "--results", "1"]).expect(0);
+    let mut traces = command(sesamec());
+    traces.arg("gap").args([results.join("1"), results.join("1-hall")]);
+    let json = done(traces.args(["--traces", "--format", "json"])).expect(0).out;
+    let signals: Vec<Value> = serde_json::from_str(&json).expect("it is JSON");
+    let signal = |name: &str| signals.iter().find(|row| row["signal"] == name).unwrap_or_else(|| panic!("{signals:?}"));
+    let apart = signal("/left/tool.point.z")["rms"].as_f64().unwrap();
+    assert!((0.02..0.1).contains(&apart), "the hall's tools are 3.5 cm higher: {apart}");
 }
 
 #[test]

@@ -41,6 +41,9 @@ const RUN: &str = "sesame.run";
 
 /// Key of a channel's metadata for its contents: one of the `ROLE_…`.
 const ROLE: &str = "sesame_role";
+/// The topic of the plan; recordings of earlier versions do not say it.
+const TOPIC: &str = "sesame_topic";
+
 const ROLE_PUBLISHED: &str = "published";
 const ROLE_DELIVERED: &str = "delivered";
 const ROLE_OPERATIONS: &str = "operations";
@@ -101,7 +104,7 @@ fn how_it_ended(outcome: &Outcome) -> BTreeMap<String, String> {
     entries
 }
 
-fn owned<const N: usize>(entries: [(&str, String); N]) -> BTreeMap<String, String> {
+fn owned<'a>(entries: impl IntoIterator<Item = (&'a str, String)>) -> BTreeMap<String, String> {
     entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
 }
 

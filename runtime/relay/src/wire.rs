@@ -82,6 +82,14 @@ impl WireTable {
         self.by_path.get(path).copied()
     }
 
+    /// The wire of a name that is a topic's, matched exactly. A service's request and reply have one name, but are two
+    /// topics.
+    pub fn find_of(&self, plan: &CampaignPlan, path: &str, topic: &str) -> Option<Wire> {
+        let is_it = |wire: &Wire| plan.topic(self.topic(*wire)).name == topic;
+        let usual = self.find(path).filter(is_it);
+        usual.or_else(|| self.iter().find(|wire| self.path(*wire) == path && is_it(wire)))
+    }
+
     /// The name of a wire.
     pub fn path(&self, wire: Wire) -> &str {
         self.link(wire).map_or_else(|| self.paths[wire.index()].0.as_str(), |link| &link.path)

@@ -14,25 +14,33 @@ pub struct WorkerProgram {
     interpreted: Option<String>,
     /// The lab in which it runs tests, instead of the simulator.
     lab: Option<String>,
+    /// Whether it may be asked for traces, also if the campaign records none.
+    records: bool,
 }
 
 impl WorkerProgram {
     /// A compiled runner contains all that its workers have to know.
     pub fn compiled() -> io::Result<Self> {
-        Ok(WorkerProgram { executable: std::env::current_exe()?, interpreted: None, lab: None })
+        Ok(WorkerProgram { executable: std::env::current_exe()?, interpreted: None, lab: None, records: false })
     }
 
     /// A program that interprets a runner reads it from a file.
     #[cfg(feature = "process")]
     pub fn interpreted(runner: &crate::interpreted::Interpreted) -> io::Result<Self> {
         let text = serde_json::to_string(runner)?;
-        Ok(WorkerProgram { executable: std::env::current_exe()?, interpreted: Some(text), lab: None })
+        Ok(WorkerProgram { executable: std::env::current_exe()?, interpreted: Some(text), lab: None, records: false })
     }
 
     /// The same program as a worker that runs tests in this lab.
     #[cfg(feature = "process")]
     pub(crate) fn in_lab(self, name: &str) -> Self {
         WorkerProgram { lab: Some(name.to_owned()), ..self }
+    }
+
+    /// The same program as a worker that may be asked for traces: it reads messages whole, not only what metrics and
+    /// operations need.
+    pub(crate) fn recording(self, records: bool) -> Self {
+        WorkerProgram { records, ..self }
     }
 
     /// The command that starts a worker with this folder of its own.
@@ -50,6 +58,9 @@ impl WorkerProgram {
         }
         if let Some(lab) = &self.lab {
             command.arg("--lab").arg(lab);
+        }
+        if self.records {
+            command.arg("--record");
         }
         Ok(command)
     }

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Subcommand;
 #[cfg(feature = "process")]
-use sesame_plan::CampaignPlan;
+use sesame_plan::{CampaignPlan, Recorded};
 
 use crate::campaign;
 #[cfg(all(feature = "process", feature = "mcap"))]
@@ -80,6 +80,9 @@ pub enum Internal {
         #[cfg(feature = "process")]
         #[arg(long, value_name = "NAME")]
         lab: Option<String>,
+        /// It may be asked for traces, also if the campaign records none
+        #[arg(long)]
+        record: bool,
         /// Where the supervisor is
         #[command(flatten)]
         supervisor: campaign::Address,
@@ -151,21 +154,21 @@ impl Internal {
     pub(super) fn carry_out(&self, compiled: Option<&Session>) -> Result<ExitCode, Failure> {
         match self {
             #[cfg(feature = "process")]
-            Internal::Worker { runner: Some(file), lab, supervisor } => {
+            Internal::Worker { runner: Some(file), lab, record, supervisor } => {
                 let runner = crate::interpreted::Interpreted::read(file)
                     .map_err(|error| Failure(format!("cannot read {}: {error}", file.display())))?
                     .runner();
                 let plan = serde_json::from_str(&runner.plan)?;
-                serve(runner, plan, lab.as_deref(), supervisor)
+                serve(runner, recorded(plan, *record), lab.as_deref(), supervisor)
             }
             #[cfg(feature = "process")]
-            Internal::Worker { lab: Some(lab), supervisor, .. } => {
+            Internal::Worker { lab: Some(lab), record, supervisor, .. } => {
                 let session = of_its_own(compiled)?;
-                serve(session.runner.clone(), session.plan.clone(), Some(lab), supervisor)
+                serve(session.runner.clone(), recorded(session.plan.clone(), *record), Some(lab), supervisor)
             }
-            Internal::Worker { supervisor, .. } => {
+            Internal::Worker { record, supervisor, .. } => {
                 let session = of_its_own(compiled)?;
-                campaign::serve(&session.runner, &session.plan, supervisor)?;
+                campaign::serve(&session.runner, &recorded(session.plan.clone(), *record), supervisor)?;
                 Ok(ExitCode::SUCCESS)
             }
             #[cfg(all(feature = "process", target_os = "linux"))]
@@ -185,6 +188,15 @@ impl Internal {
 /// The session of a runner that contains its own plan.
 fn of_its_own(compiled: Option<&Session>) -> Result<&Session, Failure> {
     compiled.ok_or_else(|| Failure("`worker` is started by `run`, not by hand".to_owned()))
+}
+
+/// A plan whose tests are recorded whole if that may be asked for.
+fn recorded(plan: CampaignPlan, record: bool) -> CampaignPlan {
+    let mut plan = plan;
+    if record {
+        plan.campaign.record = Some(Recorded::All);
+    }
+    plan
 }
 
 /// Serves a supervisor, in a lab if one is named.

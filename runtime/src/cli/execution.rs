@@ -266,7 +266,8 @@ pub(super) fn perform(
 ) -> Result<Option<Repository>, Failure> {
     let campaign = recorder.repository().campaign();
     let (plan, seed) = (campaign.plan.clone(), campaign.seed);
-    let settings = execution.settings(session, seed, &files);
+    let mut settings = execution.settings(session, seed, &files);
+    settings.program = settings.program.recording(plan.campaign.record.is_some());
     let mut display = Display::new(&plan, seed, execution.workers());
     let end = run_campaign(&plan, recorder, &settings, &folder.join("workers"), interrupted, &mut |event, progress| {
         display.update(event, progress);

@@ -52,7 +52,7 @@ pub(super) fn replay(session: &Session, options: &Options) -> Result<ExitCode, F
     let recorded = folder.path().join("recorded.mcap");
     let trace = options.record.then(|| TraceRequest { file: recorded.clone(), keep: Recorded::All });
     let settings = SingleSettings {
-        program: session.program.clone(),
+        program: session.program.clone().recording(options.record),
         directory: folder.path().to_owned(),
         timeout: options.timeout.unwrap_or_else(|| limit(&record)),
     };

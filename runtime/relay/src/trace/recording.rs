@@ -20,7 +20,7 @@ use crate::json::{Shapes, decode};
 use crate::message::Mismatch;
 use crate::metric::{MetricTable, Metrics};
 use crate::trace::records::records;
-use crate::trace::{ROLE, ROLE_DELIVERED, ROLE_PUBLISHED, RUN, SUBJECT};
+use crate::trace::{ROLE, ROLE_DELIVERED, ROLE_PUBLISHED, RUN, SUBJECT, TOPIC};
 use crate::value::Value;
 use crate::wire::{Wire, WireTable};
 
@@ -291,7 +291,12 @@ impl Feeder<'_> {
             Some(_) => None,
             None => Some(&channel.topic),
         };
-        let Some(wire) = name.and_then(|name| self.wires.find(name)) else {
+        let topic = channel.metadata.get(TOPIC);
+        let found = name.and_then(|name| match topic {
+            Some(topic) => self.wires.find_of(self.plan, name, topic),
+            None => self.wires.find(name),
+        });
+        let Some(wire) = found else {
             if self.other_topics.len() < REMEMBERED {
                 self.other_topics.insert(channel.topic.clone());
             }

@@ -10,7 +10,7 @@ use sesame_plan::CampaignPlan;
 
 use crate::json::Shapes;
 use crate::trace::recording::{RecordingError, payload, read};
-use crate::trace::{ROLE, ROLE_PUBLISHED, SUBJECT};
+use crate::trace::{ROLE, ROLE_PUBLISHED, SUBJECT, TOPIC};
 use crate::value::Value;
 use crate::wire::{Wire, WireTable};
 
@@ -74,7 +74,12 @@ impl Collector<'_> {
                     Some(_) => None,
                     None => Some(&channel.topic),
                 };
-                if let Some(wire) = name.and_then(|name| self.wires.find(name)) {
+                let topic = channel.metadata.get(TOPIC);
+                let found = name.and_then(|name| match topic {
+                    Some(topic) => self.wires.find_of(self.plan, name, topic),
+                    None => self.wires.find(name),
+                });
+                if let Some(wire) = found {
                     self.channels.insert(channel.id, wire);
                 }
             }

@@ -18,8 +18,8 @@ use sesame_plan::{CampaignPlan, Test, TopicId, Type};
 use crate::json::{encode, number, quoted};
 use crate::relay::{Listener, MessageRef, OperationEvent};
 use crate::trace::{
-    ROLE, ROLE_DELIVERED, ROLE_METRIC, ROLE_OPERATIONS, ROLE_PUBLISHED, Subject, TraceError, ending, owned, publish,
-    schema,
+    ROLE, ROLE_DELIVERED, ROLE_METRIC, ROLE_OPERATIONS, ROLE_PUBLISHED, Subject, TOPIC, TraceError, ending, owned,
+    publish, schema,
 };
 use crate::value::Value;
 use crate::wire::{Wire, WireTable};
@@ -219,27 +219,32 @@ impl Channels {
             metrics: Vec::with_capacity(plan.metrics.len()),
             objects: Vec::with_capacity(wires.len()),
         };
-        let mut add = |(name, schema): (String, Vec<u8>), topic: &str, role: [(&str, String); 2]| {
+        let mut add = |(name, schema): (String, Vec<u8>), topic: &str, role: &[(&str, String)]| {
             let schema = writer.add_schema(&name, "jsonschema", &schema)?;
-            writer.add_channel(schema, topic, "json", &owned(role))
+            writer.add_channel(schema, topic, "json", &owned(role.iter().cloned()))
         };
         let role = |role: &str, name: &str| [(ROLE, role.to_owned()), ("sesame_name", name.to_owned())];
         for wire in wires.iter() {
             let topic = plan.topic(wires.topic(wire));
+            // A service's request and reply have one name.
+            let of_topic = |kind: &str, path: &str| {
+                let [role, name] = role(kind, path);
+                [role, name, (TOPIC, topic.name.clone())]
+            };
             let (schema, path) = (schema::of_messages(plan, &topic.ty), wires.path(wire));
             channels.objects.push(matches!(topic.ty, Type::Message { .. }));
-            channels.published.push(add(schema.clone(), path, role(ROLE_PUBLISHED, path))?);
+            channels.published.push(add(schema.clone(), path, &of_topic(ROLE_PUBLISHED, path))?);
             channels.delivered.push(if disturbed.contains(&wires.topic(wire)) {
-                Some(add(schema, &format!("{path}/delivered"), role(ROLE_DELIVERED, path))?)
+                Some(add(schema, &format!("{path}/delivered"), &of_topic(ROLE_DELIVERED, path))?)
             } else {
                 None
             });
         }
-        channels.operations = add(schema::of_operations(), "sesame/operations", role(ROLE_OPERATIONS, ""))?;
+        channels.operations = add(schema::of_operations(), "sesame/operations", &role(ROLE_OPERATIONS, ""))?;
         for metric in &plan.metrics {
             let schema = schema::of_metric(metric.unit.as_deref());
             let topic = format!("sesame/metrics/{}", metric.name);
-            channels.metrics.push(add(schema, &topic, role(ROLE_METRIC, &metric.name))?);
+            channels.metrics.push(add(schema, &topic, &role(ROLE_METRIC, &metric.name))?);
         }
         Ok(channels)
     }
