@@ -604,17 +604,16 @@ impl Gap {
         let mut sentences = Vec::new();
         for EventGap { name, confusion, .. } in &self.events {
             let Confusion { misses, false_alarms, .. } = *confusion;
-            let tests = |count| plural(count, "test", "tests");
             if misses > 0 {
                 sentences.push(format!(
-                    "`{name}` is missed: {} violate it in the lab and not in the simulation.",
-                    tests(misses)
+                    "`{name}` is missed: {} it in the lab and not in the simulation.",
+                    plural(misses, "test violates", "tests violate")
                 ));
             }
             if false_alarms > 0 {
                 sentences.push(format!(
-                    "`{name}` is a false alarm in {}, which violate it in the simulation and not in the lab.",
-                    tests(false_alarms)
+                    "`{name}` is a false alarm: {} it in the simulation and not in the lab.",
+                    plural(false_alarms, "test violates", "tests violate")
                 ));
             }
         }
