@@ -4,7 +4,6 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use clap::Subcommand;
-#[cfg(feature = "process")]
 use sesame_plan::{CampaignPlan, Recorded};
 
 use crate::campaign;
