@@ -125,7 +125,7 @@ fn page_of(study: &Study, run: &str, hall: &str) {
     study.sesamec(&["study", run]).expect(0);
     fs::write(study.folder.join("notes.html"), "mine").unwrap();
     let said = study.sesamec(&["study", run, "-o", "notes.html"]).expect(1).err;
-    assert!(said.contains("notes.html is no page of a study; name another file with `--out`"), "{said}");
+    assert!(said.contains("notes.html is not the page of a study; name another file with `--out`"), "{said}");
     assert_eq!(fs::read_to_string(study.folder.join("notes.html")).unwrap(), "mine");
 }
 
@@ -143,7 +143,7 @@ fn noise_is_fitted_by_how_much_runs_differ_and_varied_from_run_to_run() {
     assert!(levels.iter().all(|level| level.as_f64().unwrap() > 0.0), "{levels:?}");
     assert_eq!(compensated["held_out"]["tests"].as_array().unwrap().len(), 1);
 
-    // Killed and started again, it goes on with what was tried, and comes to the same.
+    // Killed and started again, it goes on with what was tried, and reaches the same result.
     let asked = [&asked[..3], &["--evaluations", "2", "--no-campaign", "--hold-out", "T1,T2"]].concat();
     let compensated = study.json(&asked);
     let tried = PathBuf::from(&hall).join("fit.jsonl");

@@ -82,9 +82,10 @@ impl WireTable {
         self.by_path.get(path).copied()
     }
 
-    /// The wire of a name that is a topic's, matched exactly. A service's request and reply have one name, but are two
-    /// topics.
-    pub fn find_of(&self, plan: &CampaignPlan, path: &str, topic: &str) -> Option<Wire> {
+    /// The wire of a name, matched exactly, and of this topic where one is named: a service's request and reply have
+    /// one name, but are two topics.
+    pub fn find_of(&self, plan: &CampaignPlan, path: &str, topic: Option<&str>) -> Option<Wire> {
+        let Some(topic) = topic else { return self.find(path) };
         let is_it = |wire: &Wire| plan.topic(self.topic(*wire)).name == topic;
         let usual = self.find(path).filter(is_it);
         usual.or_else(|| self.iter().find(|wire| self.path(*wire) == path && is_it(wire)))

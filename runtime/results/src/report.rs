@@ -33,6 +33,7 @@ pub use facts::summary::{
     Counts, ExpectationSummary, Failure, FrontTest, NotFinite, Objective, Quarantined, RequirementSummary, Spread,
     Summary, Worst, summary,
 };
+pub use file::write_aside;
 pub use html::{page, write_page, write_page_with};
 pub use junit::{junit, write_junit};
 pub use sentences::headline;

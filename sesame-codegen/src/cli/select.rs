@@ -82,7 +82,8 @@ enum Cost {
 fn cost(text: &str) -> Result<Cost, String> {
     let number = |text: &str| text.trim().parse::<f64>().ok().filter(|number| number.is_finite() && *number >= 0.0);
     if let Some((name, one)) = text.split_once('=') {
-        let one = number(one).ok_or_else(|| format!("`{one}` is no cost of {name}; expected a number such as 3"))?;
+        let one =
+            number(one).ok_or_else(|| format!("`{one}` is not a valid cost of {name}; expected a number such as 3"))?;
         return Ok(Cost::Of(name.trim().to_owned(), one));
     }
     let (base, each) = text.split_once('+').unwrap_or((text, "0"));

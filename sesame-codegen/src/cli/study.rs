@@ -1,8 +1,6 @@
 //! `sesamec study`: the page of a campaign and its lab.
 
 use std::collections::BTreeSet;
-use std::fs::OpenOptions;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -16,6 +14,7 @@ use sesame_results::analysis::gap::{Gap, dimensions, points};
 use sesame_results::analysis::{Candidates, Selection, Terms, candidates};
 use sesame_results::record::Repository;
 use sesame_results::report::study::{Space, Study, Traces};
+use sesame_results::report::write_aside;
 use sesame_safety::briefing::html::section;
 
 use super::gap::Sides;
@@ -93,14 +92,14 @@ pub(super) fn write(shell: Shell, asked: &Asked) -> anyhow::Result<ExitCode> {
         gap: gap.as_ref(),
         after: after.as_ref(),
         traces: traces.as_ref(),
-        traces_after: &sides.traces_after()?,
+        simulated_after: &sides.simulated_after()?,
         sheets: &sheets,
     };
-    replace_page(&asked.out, &study.page()?)?;
+    let (page, figures) = study.page()?;
+    replace_page(&asked.out, &page)?;
     shell.did("Wrote", asked.out.display());
     if let Some(folder) = &asked.svg {
         std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
-        let figures = study.figures();
         for figure in &figures {
             let file = folder.join(format!("{}.svg", figure.name));
             std::fs::write(&file, figure.svg()).with_context(|| format!("cannot write {}", file.display()))?;
@@ -156,7 +155,7 @@ impl Chosen {
     }
 }
 
-/// The points of tests that are no candidates.
+/// The points of tests that are not candidates.
 fn others(campaign: &Repository, chosen: &Chosen) -> anyhow::Result<Vec<Vec<f64>>> {
     let candidates: BTreeSet<u32> = chosen.found.tests.iter().map(|candidate| candidate.number).collect();
     let others: BTreeSet<u32> = campaign.numbers()?.into_iter().filter(|number| !candidates.contains(number)).collect();
@@ -169,12 +168,7 @@ fn others(campaign: &Repository, chosen: &Chosen) -> anyhow::Result<Vec<Vec<f64>
 fn replace_page(file: &Path, page: &str) -> anyhow::Result<()> {
     if let Ok(earlier) = std::fs::read(file) {
         let own = String::from_utf8_lossy(&earlier).contains(Study::MARK);
-        ensure!(own, "{} is no page of a study; name another file with `--out`", file.display());
+        ensure!(own, "{} is not the page of a study; name another file with `--out`", file.display());
     }
-    let mut aside = file.as_os_str().to_owned();
-    aside.push(".tmp");
-    let aside = PathBuf::from(aside);
-    let written = OpenOptions::new().write(true).create(true).truncate(true).open(&aside);
-    let written = written.and_then(|mut opened| opened.write_all(page.as_bytes()));
-    written.and_then(|()| std::fs::rename(&aside, file)).with_context(|| format!("cannot write {}", file.display()))
+    write_aside(file, page).with_context(|| format!("cannot write {}", file.display()))
 }

@@ -291,12 +291,8 @@ impl Feeder<'_> {
             Some(_) => None,
             None => Some(&channel.topic),
         };
-        let topic = channel.metadata.get(TOPIC);
-        let found = name.and_then(|name| match topic {
-            Some(topic) => self.wires.find_of(self.plan, name, topic),
-            None => self.wires.find(name),
-        });
-        let Some(wire) = found else {
+        let topic = channel.metadata.get(TOPIC).map(String::as_str);
+        let Some(wire) = name.and_then(|name| self.wires.find_of(self.plan, name, topic)) else {
             if self.other_topics.len() < REMEMBERED {
                 self.other_topics.insert(channel.topic.clone());
             }

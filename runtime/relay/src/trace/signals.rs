@@ -74,12 +74,8 @@ impl Collector<'_> {
                     Some(_) => None,
                     None => Some(&channel.topic),
                 };
-                let topic = channel.metadata.get(TOPIC);
-                let found = name.and_then(|name| match topic {
-                    Some(topic) => self.wires.find_of(self.plan, name, topic),
-                    None => self.wires.find(name),
-                });
-                if let Some(wire) = found {
+                let topic = channel.metadata.get(TOPIC).map(String::as_str);
+                if let Some(wire) = name.and_then(|name| self.wires.find_of(self.plan, name, topic)) {
                     self.channels.insert(channel.id, wire);
                 }
             }

@@ -48,6 +48,14 @@ pub(crate) fn with_unit(number: String, unit: Option<&str>) -> String {
     }
 }
 
+/// A name with its unit in brackets, as in `fuzzing_time [s]`.
+pub(crate) fn titled(name: &str, unit: Option<&str>) -> String {
+    match unit {
+        Some(unit) => format!("{name} [{unit}]"),
+        None => name.to_owned(),
+    }
+}
+
 /// A bound as in `≤ 70 s`.
 pub(crate) fn bound(bound: Bound, unit: Option<&str>) -> String {
     match bound {

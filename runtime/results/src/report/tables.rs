@@ -2,7 +2,7 @@
 
 use crate::analysis::confirmed::{ConfirmedTest, FindingAgain, tally_words};
 use crate::analysis::regions::Rule;
-use crate::present::number::{self, plural};
+use crate::present::number::{self, plural, titled};
 use crate::present::table::{Cell, Column, Datum, Table};
 use crate::record::{Difference, MetricValue, Verdict};
 use crate::report::facts::readable::short_numbers;
@@ -196,10 +196,12 @@ pub(super) fn not_finite(found: &[NotFinite]) -> Table {
 pub(super) fn list(list: &TestList) -> Table {
     let mut columns =
         vec![Column::heading("test"), Column::words("origin"), Column::number("gen"), Column::words("outcome")];
-    columns.extend(list.metrics.iter().zip(&list.units).map(|(metric, unit)| match unit {
-        Some(unit) => Column::metric(&format!("{metric} [{unit}]"), None),
-        None => Column::metric(metric, None),
-    }));
+    columns.extend(
+        list.metrics
+            .iter()
+            .zip(&list.units)
+            .map(|(metric, unit)| Column::metric(&titled(metric, unit.as_deref()), None)),
+    );
     columns.extend([Column::line("violates"), Column::sentence("operations")]);
     let mut table = Table::with(columns);
     for test in &list.tests {

@@ -1,12 +1,13 @@
 //! The two sides that are compared: results of a campaign, and of a lab in which its tests were run.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 
 use sesame_plan::Lab;
 use sesame_results::analysis::gap::{Gap, LabRun, compensated_runs, dimensions, gap, gap_after, lab_runs};
-use sesame_results::analysis::traces::{TraceGap, TracedTest, compare};
+use sesame_results::analysis::traces::{Signals, TraceGap, TracedTest, compare};
 use sesame_results::record::{RecordError, Repository};
 
 use super::traces::{self, Runs};
@@ -84,6 +85,12 @@ impl Sides {
             Some(again) => traces::read(&self.campaign, Some(again), &self.in_lab, self.lab.as_ref()),
             None => Ok(Vec::new()),
         }
+    }
+
+    /// What the compensated simulation of each test published; nothing without one.
+    pub(in crate::cli) fn simulated_after(&self) -> anyhow::Result<BTreeMap<u32, Signals>> {
+        let again = self.simulated.as_ref();
+        again.map_or_else(|| Ok(BTreeMap::new()), |again| traces::read_again(self.campaign.plan(), again))
     }
 
     /// How traces differ; `None` if there are none.

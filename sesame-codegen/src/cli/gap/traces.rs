@@ -31,13 +31,10 @@ pub(super) fn read(
     let mut traced = Vec::new();
     for test in tests {
         let simulated = match again {
-            Some((folder, runs)) => {
-                let run = runs.iter().find(|run| run.of == test);
-                run.map(|run| trace_file(folder, run.row.number))
-            }
-            None => Some(trace_file(campaign.folder(), test)),
+            Some(runs) => simulated_again(runs, test),
+            None => Some(trace_file(campaign.folder(), test)).filter(|file| file.is_file()),
         };
-        let Some(simulated) = simulated.filter(|file| file.is_file()) else { continue };
+        let Some(simulated) = simulated else { continue };
         let runs = labs.iter().flat_map(|(folder, runs)| runs.iter().map(move |run| (folder, run)));
         let of_test = runs.filter(|(_, run)| run.of == test);
         let files: Vec<PathBuf> =
@@ -50,6 +47,19 @@ pub(super) fn read(
         traced.push(TracedTest { test, at, simulation: signals(plan, &simulated)?, lab });
     }
     Ok(traced)
+}
+
+/// What the compensated simulation of each test published, of tests that have a trace of it.
+pub(super) fn read_again(plan: &CampaignPlan, again: &Runs) -> anyhow::Result<BTreeMap<u32, Signals>> {
+    let tests: BTreeSet<u32> = again.1.iter().map(|run| run.of).collect();
+    let files = tests.into_iter().filter_map(|test| Some((test, simulated_again(again, test)?)));
+    files.map(|(test, file)| Ok((test, signals(plan, &file)?))).collect()
+}
+
+/// The trace of the first run in which a test was simulated again.
+fn simulated_again((folder, runs): &Runs, test: u32) -> Option<PathBuf> {
+    let run = runs.iter().find(|run| run.of == test)?;
+    Some(trace_file(folder, run.row.number)).filter(|file| file.is_file())
 }
 
 fn signals(plan: &CampaignPlan, file: &Path) -> anyhow::Result<Signals> {

@@ -12,7 +12,7 @@ use crate::present::axis::Axis;
 use crate::present::chart;
 use crate::present::markup::{Markup, coordinate, percent};
 use crate::present::names::{Screen, place_names};
-use crate::present::number::{self, with_unit};
+use crate::present::number::{self, titled, with_unit};
 use crate::record::{Origin, TestRow};
 use crate::report::facts::summary::{Objective, Summary, shown_value};
 use crate::report::facts::wording::operations;
@@ -111,10 +111,7 @@ pub(crate) fn dot_title(plan: &CampaignPlan, summary: &Summary, row: &TestRow) -
 
 /// The axis of an objective.
 pub(crate) fn dimension(objective: &Objective) -> Dimension {
-    let title = match &objective.unit {
-        Some(unit) => format!("{} [{unit}]", objective.metric),
-        None => objective.metric.clone(),
-    };
+    let title = titled(&objective.metric, objective.unit.as_deref());
     Dimension { title, direction: Some(objective.direction) }
 }
 

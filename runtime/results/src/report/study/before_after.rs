@@ -1,15 +1,13 @@
 //! The gap before and after a compensation: of each metric, how far the lab was from the simulation and how far it is
 //! from the simulation that was fitted to it.
 
-use std::collections::BTreeSet;
-
 use sesame_base::test_number::TestNumber;
 use sesame_plan::CampaignPlan;
 
-use crate::analysis::gap::Gap;
+use crate::analysis::gap::{Compared, Gap, MetricGap};
 use crate::present::axis::Axis;
 use crate::present::markup::Markup;
-use crate::present::number::quantity;
+use crate::present::number::{quantity, titled};
 use crate::report::study::differences::difference;
 use crate::report::study::figure::{Figure, Plot, dot, line, rectangle, text};
 
@@ -19,26 +17,25 @@ const LINE: f64 = 22.0;
 
 /// A figure for each metric that was compared on both occasions.
 pub(super) fn figures(plan: &CampaignPlan, before: &Gap, after: &Gap) -> Vec<Figure> {
-    before.metrics.iter().filter_map(|metric| figure(plan, before, after, metric.metric)).collect()
+    let both = before.metrics.iter().filter_map(|old| {
+        let new = after.metrics.iter().find(|new| new.metric == old.metric)?;
+        figure(plan, old, new)
+    });
+    both.collect()
 }
 
-fn figure(plan: &CampaignPlan, before: &Gap, after: &Gap, metric: sesame_plan::MetricId) -> Option<Figure> {
-    let of = |gap: &Gap| gap.metrics.iter().find(|it| it.metric == metric).cloned();
-    let (old, new) = (of(before)?, of(after)?);
-    let tests: BTreeSet<u32> = old.tests.iter().map(|it| it.test).collect();
-    let rows: Vec<(u32, f64, f64)> = tests
-        .into_iter()
-        .filter_map(|test| {
-            let found = |gap: &crate::analysis::gap::MetricGap| {
-                difference(gap.tests.iter().find(|it| it.test == test)?).map(|(difference, _)| difference)
-            };
-            Some((test, found(&old)?, found(&new)?))
-        })
-        .collect();
+fn figure(plan: &CampaignPlan, old: &MetricGap, new: &MetricGap) -> Option<Figure> {
+    let rows = old.tests.iter().filter_map(|before| {
+        let after = new.tests.iter().find(|after| after.test == before.test)?;
+        let [before_it, after_it] =
+            [before, after].map(|it: &Compared| difference(it).map(|(difference, _)| difference));
+        Some((before.test, before_it?, after_it?))
+    });
+    let rows: Vec<(u32, f64, f64)> = rows.collect();
     if rows.iter().all(|(_, old, new)| *old == 0.0 && *new == 0.0) {
         return None;
     }
-    let declared = plan.metric(metric);
+    let declared = plan.metric(old.metric);
     let unit = declared.unit.as_deref();
     let tolerance = old.tolerance;
     let bottom = 26.0 + LINE * rows.len() as f64;
@@ -49,8 +46,7 @@ fn figure(plan: &CampaignPlan, before: &Gap, after: &Gap, metric: sesame_plan::M
     };
     let mut drawn = Markup::default();
     rectangle(&mut drawn, "tolerated", [plot.x(-tolerance), 26.0], [plot.x(tolerance), bottom]);
-    let title = unit.map_or_else(|| declared.name.clone(), |unit| format!("{} [{unit}]", declared.name));
-    plot.frame(&mut drawn, "lab − simulation", &title);
+    plot.frame(&mut drawn, "lab − simulation", &titled(&declared.name, unit));
     line(&mut drawn, "zero", [plot.x(0.0), 26.0], [plot.x(0.0), bottom]);
     for (at, (test, old, new)) in rows.iter().enumerate() {
         let y = 26.0 + LINE * (at as f64 + 0.5);

@@ -10,9 +10,8 @@ use sesame_plan::CampaignPlan;
 use crate::analysis::gap::{Compared, Gap, MetricGap, word};
 use crate::present::axis::Axis;
 use crate::present::markup::Markup;
-use crate::present::names::{Placed, Screen, place_names};
-use crate::present::number::quantity;
-use crate::report::study::figure::{Figure, Plot, dot, line, rectangle, text};
+use crate::present::number::{quantity, titled};
+use crate::report::study::figure::{Figure, Plot, dot, line, names, rectangle};
 
 /// The size of a figure, in pixels.
 const SIZE: [f64; 2] = [340.0, 240.0];
@@ -77,7 +76,7 @@ fn figure(plan: &CampaignPlan, gap: &Gap, metric: &MetricGap, dimension: usize) 
     }
     plot.band(&mut drawn, "tolerated", [-tolerance, tolerance]);
     let name = gap.dimensions[dimension].name();
-    let title = unit.map_or_else(|| declared.name.clone(), |unit| format!("{} [{unit}]", declared.name));
+    let title = titled(&declared.name, unit);
     plot.frame(&mut drawn, name, &format!("{title}, lab − simulation"));
     line(&mut drawn, "zero", [EDGES[0], plot.y(0.0)], [EDGES[2], plot.y(0.0)]);
     for (compared, at, difference, interval) in &marks {
@@ -90,18 +89,10 @@ fn figure(plan: &CampaignPlan, gap: &Gap, metric: &MetricGap, dimension: usize) 
         let tip = format!("{test}, {name} {at:.2}: {} ({})", quantity(*difference, unit), word(verdict));
         mark(&mut drawn, verdict, place, &tip);
     }
-    let [left, top, right, bottom] = EDGES;
-    let (width, height) = (right - left, bottom - top);
-    let shares =
-        marks.iter().map(|(_, at, difference, _)| ((plot.x(*at) - left) / width, (plot.y(*difference) - top) / height));
-    let shares: Vec<(f64, f64)> = shares.collect();
-    let names: Vec<String> = marks.iter().map(|(compared, ..)| TestNumber(compared.test).to_string()).collect();
-    let lengths: Vec<f64> = names.iter().map(|name| name.len() as f64 * 7.0).collect();
-    let placed = place_names(&shares, &lengths, Screen { width, height });
-    for ((name, (x, y)), placed) in names.iter().zip(shares).zip(placed) {
-        let Some(Placed { dx, dy, anchor, .. }) = placed else { continue };
-        text(&mut drawn, &format!("test{anchor}"), [left + x * width + dx, top + y * height + dy], name);
-    }
+    let named = marks.iter().map(|(compared, at, difference, _)| {
+        ([plot.x(*at), plot.y(*difference)], TestNumber(compared.test).to_string())
+    });
+    names(&mut drawn, EDGES, &named.collect::<Vec<_>>(), 1.0);
     let title = format!("Difference of {} over {name}", declared.name);
     Some(Figure::new(&format!("gap-{}-{name}", declared.name), title, SIZE, drawn))
 }

@@ -4,6 +4,7 @@
 
 use crate::present::axis::Axis;
 use crate::present::markup::{Markup, coordinate};
+use crate::present::names::{Placed, Screen, place_names};
 
 /// What figures look like, in the colours of the page.
 const STYLE: &str = include_str!("figure.css");
@@ -21,6 +22,9 @@ const COLOURS: [(&str, &str); 9] = [
     ("var(--bad)", "#c2410c"),
     ("var(--satisfied)", "#b9c6d3"),
 ];
+
+/// About the width of a letter of a name, in pixels.
+const LETTER: f64 = 7.0;
 
 /// The style of figures on the page.
 pub(super) fn style() -> &'static str {
@@ -160,6 +164,19 @@ pub(super) fn dot(drawn: &mut Markup, class: &str, place: [f64; 2], radius: f64,
     drawn.open("circle", &[("class", class), ("cx", &x), ("cy", &y), ("r", &r)]);
     drawn.element("title", &[], tip);
     drawn.close();
+}
+
+/// Writes names beside their dots, within these edges, where they cover neither each other nor a dot. `apart` is how
+/// many times further from the middle of a dot they stand than usual.
+pub(super) fn names(drawn: &mut Markup, [left, top, right, bottom]: [f64; 4], dots: &[([f64; 2], String)], apart: f64) {
+    let screen = Screen { width: right - left, height: bottom - top };
+    let shares = dots.iter().map(|([x, y], _)| ((x - left) / screen.width, (y - top) / screen.height));
+    let lengths: Vec<f64> = dots.iter().map(|(_, name)| name.len() as f64 * LETTER).collect();
+    let placed = place_names(&shares.collect::<Vec<_>>(), &lengths, screen);
+    for (([x, y], name), placed) in dots.iter().zip(placed) {
+        let Some(Placed { dx, dy, anchor, .. }) = placed else { continue };
+        text(drawn, &format!("test{anchor}"), [x + apart * dx, y + apart * dy], name);
+    }
 }
 
 /// Draws a line through points.

@@ -1,10 +1,12 @@
 //! The page, and all its figures as files.
 
+use std::collections::BTreeMap;
+
 use sesame_plan::Lab;
 
 use crate::analysis::compensation;
 use crate::analysis::gap::Gap;
-use crate::analysis::traces::{TraceGap, TracedTest};
+use crate::analysis::traces::{Signals, TraceGap, TracedTest};
 use crate::present::markup::{Markup, fill};
 use crate::present::number::plural;
 use crate::present::table::Table;
@@ -46,8 +48,8 @@ pub struct Study<'a> {
     pub after: Option<&'a Gap>,
     /// Traces of simulation and lab.
     pub traces: Option<&'a Traces>,
-    /// Traces of the compensated simulation.
-    pub traces_after: &'a [TracedTest],
+    /// What the compensated simulation of each test published, by number.
+    pub simulated_after: &'a BTreeMap<u32, Signals>,
     /// Finished markup of a briefing sheet for each chosen test: a `section` of the class `briefing`.
     pub sheets: &'a [String],
 }
@@ -60,16 +62,17 @@ struct Figures {
     traces: Vec<(u32, Vec<Figure>)>,
 }
 
-impl Study<'_> {
-    /// What every page of a study holds and no other file: a page may be replaced.
-    pub const MARK: &'static str = "id=\"space-data\"";
-
-    /// Each figure as a file of its own, with its name.
-    pub fn figures(&self) -> Vec<Figure> {
-        let Figures { space, differences, compensation, traces } = self.drawn();
+impl Figures {
+    fn all(self) -> Vec<Figure> {
+        let Figures { space, differences, compensation, traces } = self;
         let traces = traces.into_iter().flat_map(|(_, figures)| figures);
         std::iter::once(space).chain(differences).chain(compensation).chain(traces).collect()
     }
+}
+
+impl Study<'_> {
+    /// What every page of a study holds and no other file: a page may be replaced.
+    pub const MARK: &'static str = "id=\"space-data\"";
 
     fn drawn(&self) -> Figures {
         let plan = self.campaign.plan();
@@ -80,12 +83,12 @@ impl Study<'_> {
                 .gap
                 .zip(self.after)
                 .map_or_else(Vec::new, |(before, after)| before_after::figures(plan, before, after)),
-            traces: self.traces.map_or_else(Vec::new, |it| signals::figures(&it.tests, self.traces_after, &it.gap)),
+            traces: self.traces.map_or_else(Vec::new, |it| signals::figures(&it.tests, self.simulated_after, &it.gap)),
         }
     }
 
-    /// The page: one file that needs nothing but itself.
-    pub fn page(&self) -> Result<String, RecordError> {
+    /// The page, one file that needs nothing but itself; and its figures, which can be files of their own.
+    pub fn page(&self) -> Result<(String, Vec<Figure>), RecordError> {
         let plan = self.campaign.plan();
         let figures = self.drawn();
         let mut body = Markup::default();
@@ -115,7 +118,8 @@ impl Study<'_> {
         let body = format!("{}{}{}", body.finish(), sheets.finish(), self.sheets.concat());
         let shell = sesame_templates::report::study(figure::style());
         let policy = policy(&shell);
-        Ok(fill(&shell, &[("policy", &policy), ("title", &title.finish()), ("body", &body)]))
+        let page = fill(&shell, &[("policy", &policy), ("title", &title.finish()), ("body", &body)]);
+        Ok((page, figures.all()))
     }
 
     fn header(&self, body: &mut Markup) {
@@ -186,7 +190,7 @@ impl Study<'_> {
             "Of each test, the signals that are furthest apart, and below them their difference. Black: simulation; \
              orange: runs of the lab"
                 .to_owned();
-        said.push_str(if self.traces_after.is_empty() { "." } else { "; blue, dashed: compensated simulation." });
+        said.push_str(if self.simulated_after.is_empty() { "." } else { "; blue, dashed: compensated simulation." });
         body.element("p", &[("class", "quiet")], &said);
         for (test, figures) in drawn {
             body.element("h3", &[], &format!("T{test}"));

@@ -1,8 +1,10 @@
 //! Traces of the simulation and of the lab above each other.
 
+use std::collections::BTreeMap;
+
 use sesame_base::test_number::TestNumber;
 
-use crate::analysis::traces::{Signal, TraceGap, TracedTest};
+use crate::analysis::traces::{Signal, Signals, TraceGap, TracedTest};
 use crate::present::axis::Axis;
 use crate::present::markup::Markup;
 use crate::report::study::figure::{Figure, Plot, path};
@@ -26,12 +28,16 @@ const RUNS: usize = 5;
 /// Columns into which a line is divided; of each, the least and the greatest value are drawn.
 const COLUMNS: usize = 150;
 
-/// The signals that differ most, of each test. `again` are the traces of the same tests after a compensation.
-pub(super) fn figures(traced: &[TracedTest], again: &[TracedTest], gap: &TraceGap) -> Vec<(u32, Vec<Figure>)> {
-    traced.iter().take(TESTS).map(|test| (test.test, of_test(test, again, gap))).collect()
+/// The signals that differ most, of each test. `after` is what the compensated simulation published, by test.
+pub(super) fn figures(
+    traced: &[TracedTest],
+    after: &BTreeMap<u32, Signals>,
+    gap: &TraceGap,
+) -> Vec<(u32, Vec<Figure>)> {
+    traced.iter().take(TESTS).map(|test| (test.test, of_test(test, after.get(&test.test), gap))).collect()
 }
 
-fn of_test(test: &TracedTest, again: &[TracedTest], gap: &TraceGap) -> Vec<Figure> {
+fn of_test(test: &TracedTest, after: Option<&Signals>, gap: &TraceGap) -> Vec<Figure> {
     let mut signals: Vec<(f64, &str)> = gap
         .comparisons
         .iter()
@@ -39,14 +45,13 @@ fn of_test(test: &TracedTest, again: &[TracedTest], gap: &TraceGap) -> Vec<Figur
         .filter_map(|compared| Some((compared.apart()?, compared.signal.as_str())))
         .collect();
     signals.sort_by(|one, other| other.0.total_cmp(&one.0).then_with(|| one.1.cmp(other.1)));
-    let again = again.iter().find(|it| it.test == test.test);
     signals
         .into_iter()
         .take(SIGNALS)
         .filter_map(|(_, name)| {
             let simulation = test.simulation.get(name)?;
             let lab: Vec<&Signal> = test.lab.iter().filter_map(|run| run.get(name)).take(RUNS).collect();
-            let after = again.and_then(|again| again.simulation.get(name));
+            let after = after.and_then(|after| after.get(name));
             Some(figure(test.test, name, simulation, &lab, after))
         })
         .collect()

@@ -11,11 +11,10 @@ use crate::analysis::{Candidate, Terms};
 use crate::present::axis::Axis;
 use crate::present::chart::evenly;
 use crate::present::markup::Markup;
-use crate::present::names::{Placed, Screen, place_names};
 use crate::present::number::{number, quantity, with_unit};
-use crate::report::study::figure::{Figure, dot, line, text};
+use crate::report::study::figure::{Figure, dot, line, names, text};
 
-/// Tests that are no candidates are drawn at most so often; evenly chosen ones of more.
+/// How many tests that are not candidates are drawn at most; of more, evenly chosen ones.
 const OTHERS: usize = 1500;
 
 /// How the cube is seen at first: turned about the vertical axis, and from above, in radians.
@@ -53,7 +52,7 @@ struct Drawn {
 }
 
 impl Space {
-    /// The candidates of a choice in the first three of its dimensions. `others` are the points of tests that are no
+    /// The candidates of a choice in the first three of its dimensions. `others` are the points of tests that are not
     /// candidates; `ran` are the numbers of those that the lab ran.
     pub fn new(
         plan: &CampaignPlan,
@@ -158,28 +157,15 @@ impl Space {
                 dot(&mut drawn, "ran", place(test.at), radius + 3.0, &test.tip);
             }
         }
-        self.name(&mut drawn, chosen);
+        let named = chosen.iter().map(|&at| {
+            let test = &self.tests[at];
+            (place(test.at), TestNumber(test.number).to_string())
+        });
+        let [width, height] = SIZE;
+        // Dots are larger than those that names are placed for.
+        names(&mut drawn, [0.0, 0.0, width, height], &named.collect::<Vec<_>>(), 1.4);
         let title = format!("The tests that are chosen at λ = {}, among the candidates", number(self.lambda));
         Figure::new("space", title, SIZE, drawn)
-    }
-
-    /// Writes the names of tests.
-    fn name(&self, drawn: &mut Markup, tests: &[usize]) {
-        let [width, height] = SIZE;
-        let share = |&at: &usize| {
-            let [x, y] = place(self.tests[at].at);
-            (x / width, y / height)
-        };
-        let shares: Vec<(f64, f64)> = tests.iter().map(share).collect();
-        let names: Vec<String> = tests.iter().map(|&at| TestNumber(self.tests[at].number).to_string()).collect();
-        let lengths: Vec<f64> = names.iter().map(|name| name.len() as f64 * 7.0).collect();
-        let placed = place_names(&shares, &lengths, Screen { width, height });
-        for ((name, (x, y)), placed) in names.iter().zip(shares).zip(placed) {
-            let Some(Placed { dx, dy, anchor, .. }) = placed else { continue };
-            // Dots are larger than those that names are placed for.
-            let place = [x * width + 1.4 * dx, y * height + 1.4 * dy];
-            text(drawn, &format!("test{anchor}"), place, name);
-        }
     }
 
     /// The edges of the cube, and the names of its axes.

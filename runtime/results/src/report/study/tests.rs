@@ -50,6 +50,7 @@ pub(crate) fn page() -> (String, Vec<Figure>) {
             .collect()
     };
     let tests = traced(0.1);
+    let simulated_after = tests.iter().map(|test| (test.test, test.simulation.clone())).collect();
     let traces = Traces { gap: compare(&tests, &over), tests };
     let sheet = "<section class=\"briefing\">\n<h1>T1 of cell</h1>\n<h2>Stop when</h2>\n<p class=\"empty\">Never.</p>\n</section>\n";
     let study = Study {
@@ -63,10 +64,10 @@ pub(crate) fn page() -> (String, Vec<Figure>) {
         gap: Some(&before),
         after: Some(&after),
         traces: Some(&traces),
-        traces_after: &traced(0.0),
+        simulated_after: &simulated_after,
         sheets: &[sheet.to_owned()],
     };
-    (study.page().unwrap(), study.figures())
+    study.page().unwrap()
 }
 
 fn tests_of(gap: &crate::analysis::gap::Gap) -> BTreeSet<u32> {
