@@ -16,7 +16,7 @@ mod text;
 
 use std::collections::BTreeMap;
 
-use quote::quote;
+use quote::{format_ident, quote};
 use serde::Serialize;
 use sesame_plan::Transport;
 use sha2::{Digest as _, Sha256};
@@ -102,7 +102,17 @@ pub fn emit(plans: &[RunnerPlan], environment: &Environment) -> Result<Vec<Tree>
 pub fn simulator_path(transport: &Transport) -> Option<Vec<&str>> {
     match transport {
         Transport::InProcess { path, .. } => Some(path.split("::").collect()),
-        Transport::Process { .. } | Transport::Ros2(_) => None,
+        _ => None,
+    }
+}
+
+/// The feature of the runtime for a transport that not every runner has: its libraries take long to compile.
+fn feature(transport: &Transport) -> Option<&'static str> {
+    match transport {
+        Transport::InProcess { .. } | Transport::Process { .. } => None,
+        Transport::Ros2(_) | Transport::Rosbridge(_) | Transport::Ros1(_) | Transport::Mqtt(_) => {
+            Some(transport.word())
+        }
     }
 }
 
@@ -256,7 +266,7 @@ fn runner(runner: &RunnerPlan, environment: &Environment) -> Result<Tree, Proble
     let header = format!("// {note}\n");
 
     let mut features = FEATURES.to_vec();
-    features.extend(matches!(plan.simulator.transport, Transport::Ros2(_)).then_some("ros2"));
+    features.extend(feature(&plan.simulator.transport));
     let dependencies = package::with_features(&environment.dependencies, &features);
     tree.add(
         "Cargo.toml",
@@ -283,7 +293,7 @@ fn runner(runner: &RunnerPlan, environment: &Environment) -> Result<Tree, Proble
         seed: plan.campaign.seed,
         wiring: match plan.simulator.transport {
             Transport::Ros2(_) => doc_lines(&crate::wiring::text(plan)),
-            Transport::InProcess { .. } | Transport::Process { .. } => Vec::new(),
+            _ => Vec::new(),
         },
     };
     tree.add("README.md", Owner::Machine, environment.templates.render("runner/runner_readme.md.tera", &readme)?);
@@ -372,10 +382,7 @@ fn campaign(runner: &RunnerPlan, environment: &Environment, header: &str) -> Str
             /// The folder that the simulator runs in, as seen from this crate's.
             const SIMULATOR: &str = #folder;
         };
-        let transport = match plan.simulator.transport {
-            Transport::Ros2(_) => quote! { ros2 },
-            Transport::InProcess { .. } | Transport::Process { .. } => quote! { process },
-        };
+        let transport = format_ident!("{}", plan.simulator.transport.word());
         let connect = quote! {
             ::sesame_runtime::transport::#transport(::std::path::Path::new(::core::env!("CARGO_MANIFEST_DIR")).join(SIMULATOR))
         };

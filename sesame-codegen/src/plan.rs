@@ -101,6 +101,9 @@ impl RunnerPlan {
             Transport::InProcess { .. } => true,
             Transport::Process { .. } => false,
             Transport::Ros2(_) => !cfg!(feature = "ros2"),
+            Transport::Rosbridge(_) => !cfg!(feature = "rosbridge"),
+            Transport::Ros1(_) => !cfg!(feature = "ros1"),
+            Transport::Mqtt(_) => !cfg!(feature = "mqtt"),
         };
         transport
             || self.hooks.iter().any(|hook| self.uses(hook))

@@ -9,6 +9,7 @@
 //! every other quantity is in the unit its field, metric or topic declares (the unit on the wire), probabilities are in
 //! `0..=1`.
 
+mod bus;
 mod campaign;
 mod compensation;
 pub mod condition;
@@ -37,6 +38,7 @@ pub mod testing;
 mod validate;
 mod wiring;
 
+pub use bus::*;
 pub use campaign::*;
 pub use compensation::*;
 pub use confirmation::*;

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Launch, Lifecycle, MessageId, Ros2, TopicId};
+use crate::{Launch, Lifecycle, MessageId, Mqtt, Ros1, Ros2, Rosbridge, TopicId, Wiring};
 
 /// The simulator, and how the runner reaches it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -41,6 +41,37 @@ pub enum Transport {
     },
     /// Nodes of ROS 2.
     Ros2(Ros2),
+    /// Nodes of ROS behind a server that speaks the rosbridge protocol.
+    Rosbridge(Rosbridge),
+    /// Nodes of ROS 1.
+    Ros1(Ros1),
+    /// A system whose messages go over brokers of MQTT.
+    Mqtt(Mqtt),
+}
+
+impl Transport {
+    /// The keyword of its kind.
+    pub fn word(&self) -> &'static str {
+        match self {
+            Transport::InProcess { .. } => "in_process",
+            Transport::Process { .. } => "process",
+            Transport::Ros2(_) => "ros2",
+            Transport::Rosbridge(_) => "rosbridge",
+            Transport::Ros1(_) => "ros1",
+            Transport::Mqtt(_) => "mqtt",
+        }
+    }
+
+    /// How each topic of the plan is cut, in their order; empty where the simulator itself brings all messages.
+    pub fn wiring(&self) -> &[Wiring] {
+        match self {
+            Transport::InProcess { .. } | Transport::Process { .. } => &[],
+            Transport::Ros2(ros2) => &ros2.wiring,
+            Transport::Rosbridge(rosbridge) => &rosbridge.wiring,
+            Transport::Ros1(ros1) => &ros1.wiring,
+            Transport::Mqtt(mqtt) => &mqtt.wiring,
+        }
+    }
 }
 
 /// A named message type.

@@ -1,6 +1,6 @@
 //! Who is remapped, so that the messages of topics that are cut pass through the relay.
 
-use crate::{CampaignPlan, Channel, Node, NodeId, Topic, TopicId, Transport, Wiring};
+use crate::{CampaignPlan, Channel, Node, NodeId, Topic, TopicId, Wiring};
 
 /// A name of a topic or service that a node knows under another name.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -85,11 +85,7 @@ impl CampaignPlan {
 
     /// The topics that are cut.
     fn cut(&self) -> impl Iterator<Item = (TopicId, &Topic, &Wiring)> {
-        let wiring = match &self.simulator.transport {
-            Transport::Ros2(ros2) => &ros2.wiring[..],
-            Transport::InProcess { .. } | Transport::Process { .. } => &[],
-        };
-        let topics = (0..).map(TopicId).zip(&self.topics).zip(wiring);
+        let topics = (0..).map(TopicId).zip(&self.topics).zip(self.simulator.transport.wiring());
         topics.filter(|(_, wiring)| wiring.cut).map(|((id, topic), wiring)| (id, topic, wiring))
     }
 }
@@ -124,7 +120,7 @@ fn is_source(node: &Node, topic: TopicId, channel: Channel) -> bool {
 mod tests {
     use super::*;
     use crate::testing::{self, minimal, topic};
-    use crate::{Clock, Ros2, Type};
+    use crate::{Clock, Ros2, Transport, Type};
 
     fn plan() -> CampaignPlan {
         let mut plan = minimal();

@@ -3,6 +3,8 @@
 //! A transport is a thin adapter: it advances the simulation, passes every message and every moment of time to the
 //! relay, and carries out the relay's deliveries. It decides nothing.
 
+#[cfg(feature = "process")]
+pub mod bus;
 #[cfg(feature = "in-process")]
 mod in_process;
 #[cfg(feature = "process")]

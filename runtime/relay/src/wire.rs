@@ -1,9 +1,13 @@
 //! Topics as they are on the wire: every member of a topic group is a wire of its own, and so is the way of its
 //! messages to a subscriber that operations distinguish.
 
+mod line;
+
 use std::collections::BTreeMap;
 
-use sesame_plan::{CampaignPlan, NodeId, Operation, TopicId, Transport};
+use sesame_plan::{CampaignPlan, NodeId, Operation, TopicId};
+
+pub use self::line::{Line, Sink, Source, lines, service_lines};
 
 /// A single topic on the wire: position in [`WireTable`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -47,18 +51,17 @@ impl WireTable {
             .collect();
         let by_path = (0u32..).zip(&paths).map(|(at, (path, _))| (path.clone(), Wire(at))).collect();
         let mut table = WireTable { paths, by_path, links: Vec::new() };
-        if let Transport::Ros2(ros2) = &plan.simulator.transport {
-            let mut links = Vec::new();
-            for of in table.iter() {
-                let distinguished = ros2.wiring.get(table.topic(of).index()).into_iter().flat_map(|it| &it.subscribers);
-                for &to in distinguished {
-                    let wire = Wire(u32::try_from(table.len() + links.len()).unwrap_or(u32::MAX));
-                    let path = format!("{}/to/{}", table.path(of), plan.node(to).name);
-                    links.push(Link { wire, of, to, path });
-                }
+        let wiring = plan.simulator.transport.wiring();
+        let mut links = Vec::new();
+        for of in table.iter() {
+            let distinguished = wiring.get(table.topic(of).index()).into_iter().flat_map(|it| &it.subscribers);
+            for &to in distinguished {
+                let wire = Wire(u32::try_from(table.len() + links.len()).unwrap_or(u32::MAX));
+                let path = format!("{}/to/{}", table.path(of), plan.node(to).name);
+                links.push(Link { wire, of, to, path });
             }
-            table.links = links;
         }
+        table.links = links;
         table
     }
 

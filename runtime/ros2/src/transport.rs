@@ -28,7 +28,6 @@ use sesame_relay::lifecycle::launch::{Launched, Part, Place};
 use sesame_relay::relay::{Delivery, Exchange};
 use sesame_relay::simulator::Progress;
 use sesame_relay::transport::{Capabilities, Connect, Incidents, Transport, TransportError};
-use sesame_relay::wire::WireTable;
 
 use self::domain::Domain;
 use self::orders::Change;
@@ -71,7 +70,6 @@ struct System {
     ticked: Instant,
     deliveries: Vec<Delivery>,
     incidents: Incidents,
-    wires: WireTable,
     /// What operations have changed and not yet restored.
     changes: Vec<Change>,
     /// Answers that nodes owe which are stopped: they come when the nodes go on.
@@ -114,7 +112,6 @@ impl System {
             ..place
         };
         System {
-            wires: WireTable::new(&plan),
             changes: Vec::new(),
             postponed: BTreeMap::new(),
             spoilt: false,
@@ -152,7 +149,7 @@ impl System {
             let session = Session::join(&self.plan, &self.ros2, relay.wires(), self.domain)?;
             let session = self.session.insert(session);
             self.launched.start(seed)?;
-            session.assemble(&self.plan, relay.wires(), &mut self.launched, COMPLETE_WITHIN)?;
+            session.assemble(&self.plan, &mut self.launched, COMPLETE_WITHIN)?;
         }
         let Some(session) = &mut self.session else { return Ok(()) };
         session.call_reset(&mut self.launched, now() + SILENCE)?;

@@ -245,7 +245,7 @@ fn arm() -> CampaignPlan {
 fn ros(plan: &mut CampaignPlan) -> &mut Ros2 {
     match &mut plan.simulator.transport {
         Transport::Ros2(ros2) => ros2,
-        Transport::InProcess { .. } | Transport::Process { .. } => panic!("it is a system of ROS"),
+        other => panic!("it is a system of ROS 2, not {}", other.word()),
     }
 }
 

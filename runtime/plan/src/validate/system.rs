@@ -18,10 +18,34 @@ impl CampaignPlan {
             Transport::InProcess { step_ns, .. } => Some(*step_ns),
             Transport::Process { step_ns, .. } => *step_ns,
             Transport::Ros2(ros2) => ros2.step.as_ref().map(|step| step.step_ns),
+            Transport::Rosbridge(_) | Transport::Ros1(_) | Transport::Mqtt(_) => None,
         };
         at("transport.step_ns", require(step_ns != Some(0), || "must be positive".to_owned()))?;
-        if let Transport::Ros2(ros2) = &simulator.transport {
-            at("transport", self.sound_ros2(ros2))?;
+        match &simulator.transport {
+            Transport::InProcess { .. } | Transport::Process { .. } => {}
+            Transport::Ros2(Ros2 { domain, interfaces, .. }) => {
+                let beyond = || format!("is {domain}, more than {MOST_DOMAIN}");
+                at("transport.domain", require(*domain <= MOST_DOMAIN, beyond))?;
+                at("transport", sound_interfaces(interfaces))?;
+                at("transport", self.sound_wiring(&simulator.transport))?;
+            }
+            Transport::Rosbridge(rosbridge) => {
+                at("transport.remote.url", name(&rosbridge.remote.url))?;
+                at("transport", self.sound_wiring(&simulator.transport))?;
+            }
+            Transport::Ros1(ros1) => {
+                at("transport.master", name(&ros1.master))?;
+                at("transport", sound_interfaces(&ros1.interfaces))?;
+                at("transport", self.sound_wiring(&simulator.transport))?;
+            }
+            Transport::Mqtt(mqtt) => {
+                at("transport.broker.remote.url", name(&mqtt.broker.remote.url))?;
+                each("transport.brokers", &mqtt.brokers, |(node, broker)| {
+                    self.has_node(*node)?;
+                    name(&broker.remote.url)
+                })?;
+                at("transport", self.sound_wiring(&simulator.transport))?;
+            }
         }
         let Lifecycle { launch, terminate: _, relay_budget } = &simulator.lifecycle;
         at("lifecycle.launch", launch.as_ref().map_or(Ok(()), |launch| self.sound_launch(launch)))?;
@@ -30,25 +54,10 @@ impl CampaignPlan {
         at("lifecycle.relay_budget.jitter", budget.jitter.map_or(Ok(()), positive))
     }
 
-    fn sound_ros2(&self, ros2: &Ros2) -> Checked {
-        at("domain", require(ros2.domain <= MOST_DOMAIN, || format!("is {}, more than {MOST_DOMAIN}", ros2.domain)))?;
-        let mut known: BTreeSet<&str> = BTreeSet::new();
-        each("interfaces", &ros2.interfaces, |interface| {
-            let contained = |ty: &WireType| match interface_of(ty) {
-                Some(inner) => require(known.contains(inner), || format!("`{inner}` is not before it")),
-                None => Ok(()),
-            };
-            at("name", name(&interface.name))?;
-            each("fields", &interface.fields, |field| {
-                at("name", name(&field.name))?;
-                at("type", contained(&field.ty))
-            })?;
-            let new = known.insert(&interface.name);
-            at("name", require(new, || format!("`{}` is there twice", interface.name)))
-        })?;
-        let (topics, wiring) = (self.topics.len(), ros2.wiring.len());
+    fn sound_wiring(&self, transport: &Transport) -> Checked {
+        let (topics, wiring) = (self.topics.len(), transport.wiring().len());
         at("wiring", require(topics == wiring, || format!("there are {wiring} for {topics} topics")))?;
-        each("wiring", &ros2.wiring, |Wiring { cut, publishers, subscribers }| {
+        each("wiring", transport.wiring(), |Wiring { cut, publishers, subscribers }| {
             each("publishers", publishers, |&id| self.has_node(id))?;
             each("subscribers", subscribers, |&id| self.has_node(id))?;
             let distinguishes = !publishers.is_empty() || !subscribers.is_empty();
@@ -81,26 +90,51 @@ impl CampaignPlan {
     }
 
     fn has_a_clock(&self) -> bool {
-        matches!(&self.simulator.transport, Transport::Ros2(ros2) if matches!(ros2.clock, Clock::Topic { .. }))
+        let clock = match &self.simulator.transport {
+            Transport::InProcess { .. } | Transport::Process { .. } | Transport::Mqtt(_) => return false,
+            Transport::Ros2(ros2) => &ros2.clock,
+            Transport::Rosbridge(rosbridge) => &rosbridge.clock,
+            Transport::Ros1(ros1) => &ros1.clock,
+        };
+        matches!(clock, Clock::Topic { .. })
     }
 
     pub(super) fn has_node(&self, node: NodeId) -> Checked {
         id("node", node.index(), self.nodes.len())
     }
 
-    /// A topic of ROS has a layout, and others have none.
+    /// A topic of ROS has a type there, and its layout where the transport needs it; others have none.
     pub(super) fn has_interface(&self, interface: Option<&str>) -> Checked {
-        match (&self.simulator.transport, interface) {
-            (Transport::Ros2(_), None) => require(false, || "there is none".to_owned()),
-            (Transport::Ros2(ros2), Some(wanted)) => {
-                let known = ros2.interfaces.iter().any(|Interface { name, .. }| name == wanted);
-                require(known, || format!("there is no interface `{wanted}`"))
+        let interfaces = match &self.simulator.transport {
+            Transport::Ros2(ros2) => Some(&ros2.interfaces),
+            Transport::Ros1(ros1) => Some(&ros1.interfaces),
+            Transport::Rosbridge(_) => None,
+            Transport::InProcess { .. } | Transport::Process { .. } | Transport::Mqtt(_) => {
+                return require(interface.is_none(), || "the transport has none".to_owned());
             }
-            (Transport::InProcess { .. } | Transport::Process { .. }, interface) => {
-                require(interface.is_none(), || "the transport has none".to_owned())
-            }
-        }
+        };
+        let Some(wanted) = interface else { return require(false, || "there is none".to_owned()) };
+        let known = interfaces.is_none_or(|known| known.iter().any(|Interface { name, .. }| name == wanted));
+        require(known, || format!("there is no interface `{wanted}`"))
     }
+}
+
+/// Each interface is there once, after those that it contains.
+fn sound_interfaces(interfaces: &[Interface]) -> Checked {
+    let mut known: BTreeSet<&str> = BTreeSet::new();
+    each("interfaces", interfaces, |interface| {
+        let contained = |ty: &WireType| match interface_of(ty) {
+            Some(inner) => require(known.contains(inner), || format!("`{inner}` is not before it")),
+            None => Ok(()),
+        };
+        at("name", name(&interface.name))?;
+        each("fields", &interface.fields, |field| {
+            at("name", name(&field.name))?;
+            at("type", contained(&field.ty))
+        })?;
+        let new = known.insert(&interface.name);
+        at("name", require(new, || format!("`{}` is there twice", interface.name)))
+    })
 }
 
 /// The interface that values of a type are or hold.

@@ -228,6 +228,16 @@ impl Launched {
         std::mem::take(&mut self.notes)
     }
 
+    /// The number of the worker that it runs for.
+    pub fn worker(&self) -> u32 {
+        self.place.worker
+    }
+
+    /// A text with its placeholders replaced by what this worker has.
+    pub fn fill(&self, text: &str) -> String {
+        self.own().fill(text)
+    }
+
     /// The port that `{port}` stands for, once programs were started that ask for it.
     pub fn port(&self) -> Option<u16> {
         self.port.as_ref().map(Port::number)

@@ -5,7 +5,6 @@ use std::time::Duration;
 use sesame_plan::CampaignPlan;
 use sesame_relay::lifecycle::launch::{Launched, Probe};
 use sesame_relay::transport::TransportError;
-use sesame_relay::wire::WireTable;
 
 use super::now;
 use super::service::Client;
@@ -34,20 +33,20 @@ impl Session {
         let (publishers, subscribers) = (self.publishers(), self.subscribers());
         let mut found = false;
         for connected in &mut self.lines {
-            let Connected { line, readers, writers, qos, .. } = connected;
+            let Connected { line, type_name, readers, writers, qos, .. } = connected;
             for (source, reader) in line.sources.iter().zip(readers.iter_mut()) {
                 let topic = names::topic(&source.path);
                 let of_topic = publishers.iter().filter(|endpoint| endpoint.topic == topic);
-                let fitting: Vec<&Endpoint> = of_topic.filter(|it| it.type_name == line.type_name).collect();
+                let fitting: Vec<&Endpoint> = of_topic.filter(|it| it.type_name == *type_name).collect();
                 if reader.is_none() && !fitting.is_empty() {
                     *qos = mirrored(fitting.iter().map(|endpoint| &endpoint.qos));
-                    *reader = Some(self.dds.read(&topic, &line.type_name, qos)?);
+                    *reader = Some(self.dds.read(&topic, type_name, qos)?);
                     found = true;
                 }
             }
             if readers.iter().any(Option::is_some) {
                 for (sink, writer) in line.sinks.iter().zip(writers.iter_mut()).filter(|(_, writer)| writer.is_none()) {
-                    *writer = Some(self.dds.publish(&names::topic(&sink.path), &line.type_name, qos)?);
+                    *writer = Some(self.dds.publish(&names::topic(&sink.path), type_name, qos)?);
                     found = true;
                 }
             }
@@ -109,7 +108,6 @@ impl Session {
     pub(super) fn assemble(
         &mut self,
         plan: &CampaignPlan,
-        wires: &WireTable,
         launched: &mut Launched,
         within: Duration,
     ) -> Result<(), TransportError> {
@@ -128,7 +126,7 @@ impl Session {
                 ready_since = Some(now());
             }
             launched.check()?;
-            let missing = self.missing(plan, wires);
+            let missing = self.missing(plan);
             if let Some(since) = ready_since {
                 if missing.is_empty() && changed.elapsed() >= SETTLE {
                     break;

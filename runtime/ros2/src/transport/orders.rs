@@ -168,7 +168,7 @@ impl System {
     /// Waits until a system of which a part was started again is complete.
     fn complete(&mut self) -> Result<(), TransportError> {
         let Some(session) = &mut self.session else { return Ok(()) };
-        session.assemble(&self.plan, &self.wires, &mut self.launched, COMPLETE_WITHIN)
+        session.assemble(&self.plan, &mut self.launched, COMPLETE_WITHIN)
     }
 
     /// Stops slowed nodes and lets them go on; returns after how long the next of them is to be looked at.

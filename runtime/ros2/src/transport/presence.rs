@@ -7,7 +7,6 @@ use std::time::{Duration, Instant};
 use rustdds::GUID;
 use sesame_plan::{CampaignPlan, NodeId, TopicId};
 use sesame_relay::transport::TransportError;
-use sesame_relay::wire::WireTable;
 
 use super::now;
 use super::served::Served;
@@ -66,8 +65,8 @@ impl Session {
         let mut place = |role, path: &str, topic: String, most| {
             places.push(Place { role, path: path.to_owned(), topic, most });
         };
-        for Connected { line, topic, .. } in &self.lines {
-            let declared = declared(plan, *topic);
+        for Connected { line, .. } in &self.lines {
+            let declared = declared(plan, line.topic);
             for source in &line.sources {
                 let most = if source.publisher.is_some() { 1 } else { declared };
                 place(Role::Publishes, &line.path, names::topic(&source.path), Some(most));
@@ -127,7 +126,7 @@ impl Session {
     }
 
     /// What is still missing before time zero, each in a phrase; empty if nothing is.
-    pub(super) fn missing(&self, plan: &CampaignPlan, wires: &WireTable) -> Vec<String> {
+    pub(super) fn missing(&self, plan: &CampaignPlan) -> Vec<String> {
         let subscribers = self.subscribers();
         let mut missing = Vec::new();
         for Connected { line, readers, .. } in &self.lines {
@@ -139,7 +138,7 @@ impl Session {
                     missing.push(format!("{who} `{}`", source.path));
                 }
             }
-            let topic = wires.topic(line.wire);
+            let topic = line.topic;
             let declared = (0u32..).map(NodeId).zip(&plan.nodes).filter(|(_, node)| node.subscribes.contains(&topic));
             for sink in &line.sinks {
                 let expected: Vec<&str> = declared
@@ -229,8 +228,8 @@ impl Session {
     pub(super) fn crowded(&self, plan: &CampaignPlan, name: Name<'_>) -> Vec<String> {
         let publishers = self.publishers();
         let mut crowded = Vec::new();
-        for Connected { line, topic, .. } in &self.lines {
-            let declared = declared(plan, *topic);
+        for Connected { line, .. } in &self.lines {
+            let declared = declared(plan, line.topic);
             for source in &line.sources {
                 let topic = names::topic(&source.path);
                 let there: Vec<&Endpoint> = publishers.iter().filter(|endpoint| endpoint.topic == topic).collect();
@@ -251,18 +250,13 @@ impl Session {
     pub(super) fn wrong_types(&self, alone: bool, name: Name<'_>) -> Vec<String> {
         let publishers = self.publishers();
         let mut wrong = Vec::new();
-        for Connected { line, readers, .. } in &self.lines {
+        for Connected { line, interface, type_name, readers, .. } in &self.lines {
             for (source, _) in line.sources.iter().zip(readers).filter(|(_, reader)| !alone || reader.is_none()) {
                 let topic = names::topic(&source.path);
-                let others = publishers.iter().filter(|it| it.topic == topic && it.type_name != line.type_name);
+                let others = publishers.iter().filter(|it| it.topic == topic && it.type_name != *type_name);
                 wrong.extend(others.map(|other| {
                     let found = names::interface(&other.type_name).unwrap_or_else(|| other.type_name.clone());
-                    format!(
-                        "`{}` publishes `{found}` on `{}`; expected `{}`",
-                        name(other.guid),
-                        source.path,
-                        line.interface
-                    )
+                    format!("`{}` publishes `{found}` on `{}`; expected `{}`", name(other.guid), source.path, interface)
                 }));
             }
         }

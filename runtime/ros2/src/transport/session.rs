@@ -8,18 +8,19 @@ use rustdds::QosPolicies;
 use rustdds::policy::{Durability, History, Reliability};
 use rustdds::rpc::SampleIdentity;
 use sesame_plan::{CampaignPlan, Clock, Fitted, NodeId, OperationKind, Ros2, StepBy, TopicId};
-use sesame_relay::wire::{Wire, WireTable};
+use sesame_relay::wire::{Line, Wire, WireTable};
 
 use crate::cdr::Codec;
 use crate::dds::{DdsError, Endpoint, Participant, ReaderId, Received, Sample, WriterId, mirrored};
 use crate::graph::{DISCOVERY_TOPIC, DISCOVERY_TYPE, Gid, NodeInfo, Nodes};
+use crate::names;
 use crate::parameters::Parameters;
 use crate::transport::added::Added;
 use crate::transport::served::{Direction, Served, services};
 use crate::transport::service::{self, Client};
 use crate::transport::wanted::wanted;
 use crate::transport::watch::Watch;
-use crate::transport::wires::{Line, absolute, lines};
+use crate::transport::wires::{absolute, lines_in_ros};
 
 /// A node of our own in the domain, with what it reads and writes.
 pub(super) struct Session {
@@ -60,7 +61,10 @@ pub(super) struct Session {
 /// A line with what stands for it in DDS.
 pub(super) struct Connected {
     pub(super) line: Line,
-    pub(super) topic: TopicId,
+    /// The interface of its messages.
+    pub(super) interface: String,
+    /// The name of its type in DDS.
+    pub(super) type_name: String,
     pub(super) codec: Codec,
     /// One per source; `None` until somebody publishes there.
     pub(super) readers: Vec<Option<ReaderId>>,
@@ -135,16 +139,17 @@ impl Session {
         let info_reader = dds.read(DISCOVERY_TOPIC, DISCOVERY_TYPE, &latched(1000))?;
         let info_writer = dds.publish(DISCOVERY_TOPIC, DISCOVERY_TYPE, &latched(1))?;
         let mut connected = Vec::new();
-        for line in lines(plan, ros2, wires) {
-            let wanted = wanted(plan, wires.topic(line.wire));
+        for (line, interface) in lines_in_ros(plan, wires) {
+            let wanted = wanted(plan, line.topic);
             let codec =
-                Codec::new(&ros2.interfaces, &line.interface, &wanted).map_err(|error| DdsError(error.to_string()))?;
+                Codec::new(&ros2.interfaces, &interface, &wanted).map_err(|error| DdsError(error.to_string()))?;
             connected.push(Connected {
                 codec,
                 readers: vec![None; line.sources.len()],
                 writers: vec![None; line.sinks.len()],
                 qos: mirrored([]),
-                topic: wires.topic(line.wire),
+                type_name: names::type_name(&interface),
+                interface,
                 line,
             });
         }

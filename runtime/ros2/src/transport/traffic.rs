@@ -91,10 +91,10 @@ impl Session {
         for (at, connected) in self.lines.iter().enumerate() {
             if let Some(source) = connected.readers.iter().position(|&reader| reader == Some(received.reader)) {
                 let publisher = connected.line.sources[source].publisher;
-                self.heard.insert(connected.topic);
+                self.heard.insert(connected.line.topic);
                 return Some(Incoming::Message(Message {
                     wire: connected.line.wire,
-                    topic: connected.topic,
+                    topic: connected.line.topic,
                     origin: Origin::Line(at, publisher),
                     sample: received.sample,
                     arrived,

@@ -1,0 +1,151 @@
+//! A system whose messages go over a bus: a server of rosbridge, a broker of MQTT, a ROS 1 master.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Clock, Interface, NodeId, Wiring};
+
+/// Where a bus is, and what a runner shows to be let in.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Remote {
+    /// Its address, for example `ws://127.0.0.1:9090`. It may contain `{port}`, `{worker}` and `{domain}`, for which each
+    /// worker has its own; without them the bus can serve one worker only.
+    pub url: String,
+    /// What it wants to be shown; `None` for one that lets everybody in.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub token: Option<Secret>,
+    /// A file with the certificates of authorities that are trusted instead of those that the system trusts, relative to
+    /// the folder of the `.sesame` file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trust: Option<String>,
+}
+
+/// Where a secret is kept. The secret itself is in no plan, no results and no log.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Secret {
+    /// In a variable of the environment.
+    Environment {
+        /// Its name.
+        name: String,
+    },
+    /// In a file, relative to the folder of the `.sesame` file. Space at its end is not part of the secret.
+    File {
+        /// The file.
+        path: String,
+    },
+}
+
+/// A server that speaks the rosbridge protocol.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Rosbridge {
+    /// Where it is.
+    pub remote: Remote,
+    /// Which ROS is behind it.
+    #[serde(default, skip_serializing_if = "Dialect::is_default")]
+    pub dialect: Dialect,
+    /// How it is asked to send messages.
+    #[serde(default, skip_serializing_if = "Compression::is_default")]
+    pub compression: Compression,
+    /// What simulation time is.
+    pub clock: Clock,
+    /// The service that sets the simulator to time zero, of type `std_srvs/srv/Empty` or `std_srvs/srv/Trigger`; `None`
+    /// for one that is launched again for each test.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reset: Option<String>,
+    /// How each topic of the plan is cut, in their order.
+    pub wiring: Vec<Wiring>,
+}
+
+/// Which ROS is behind a bridge: they differ in the names of types and of the parts of a time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Dialect {
+    /// ROS 1: `std_msgs/Header`, `secs` and `nsecs`.
+    Ros1,
+    /// ROS 2: `std_msgs/msg/Header`, `sec` and `nanosec`.
+    #[default]
+    Ros2,
+}
+
+impl Dialect {
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference")]
+    fn is_default(&self) -> bool {
+        *self == Dialect::default()
+    }
+}
+
+/// How a bridge is asked to send messages.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Compression {
+    /// As texts in JSON.
+    #[default]
+    None,
+    /// As bytes in CBOR.
+    Cbor,
+    /// As pictures that hold texts in JSON.
+    Png,
+}
+
+impl Compression {
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference")]
+    fn is_default(&self) -> bool {
+        *self == Compression::default()
+    }
+}
+
+/// A system whose messages go over brokers of MQTT.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Mqtt {
+    /// The broker of all nodes that have none of their own.
+    pub broker: Broker,
+    /// Brokers of nodes. A message goes from the broker of its publisher to those of its subscribers, under the same name
+    /// where these differ; where they do not, publishers of topics that are cut publish on `TOPIC/undisturbed`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub brokers: Vec<(NodeId, Broker)>,
+    /// How surely messages arrive.
+    pub quality: Quality,
+    /// How each topic of the plan is cut, in their order.
+    pub wiring: Vec<Wiring>,
+}
+
+/// A broker of MQTT.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Broker {
+    /// Where it is; its token is the password.
+    pub remote: Remote,
+    /// The name with which the password goes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub user: Option<String>,
+}
+
+/// How surely a message of MQTT arrives: its quality of service.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Quality {
+    /// Quality 0: if nothing goes wrong.
+    AtMostOnce,
+    /// Quality 1: perhaps several times.
+    #[default]
+    AtLeastOnce,
+    /// Quality 2.
+    ExactlyOnce,
+}
+
+/// Nodes of ROS 1.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Ros1 {
+    /// The address of the master, for example `http://127.0.0.1:11311`. It may contain placeholders as that of a
+    /// [`Remote`].
+    pub master: String,
+    /// What simulation time is.
+    pub clock: Clock,
+    /// The service that sets the simulator to time zero, of type `std_srvs/Empty` or `std_srvs/Trigger`; `None` for one
+    /// that is launched again for each test.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reset: Option<String>,
+    /// The layouts of all messages, each after those that it contains.
+    pub interfaces: Vec<Interface>,
+    /// How each topic of the plan is cut, in their order.
+    pub wiring: Vec<Wiring>,
+}

@@ -1,0 +1,354 @@
+//! Runs of a system on a bus.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::mem;
+use std::time::{Duration, Instant};
+
+use sesame_base::time::SimTime;
+use sesame_plan::{CampaignPlan, TopicId};
+
+use crate::lifecycle::launch::{Launched, Place, Probe};
+use crate::relay::{Delivery, Exchange};
+use crate::simulator::Progress;
+use crate::transport::bus::{Bus, Event, Settings};
+use crate::transport::{Capabilities, Incidents, Transport, TransportError};
+use crate::wire::{Line, Wire, lines, service_lines};
+
+/// How long a system may take until it is complete, where nothing else is declared.
+const COMPLETE_WITHIN: Duration = Duration::from_secs(30);
+
+/// How long the clock may stand still.
+const SILENCE: Duration = Duration::from_secs(10);
+
+/// How often it is looked whether launched programs still run, while nothing comes in.
+const WATCH: Duration = Duration::from_millis(100);
+
+/// How many messages that belong to calls are remembered; the oldest are forgotten.
+const CALLS: usize = 10_000;
+
+pub(super) struct System {
+    plan: CampaignPlan,
+    settings: Settings,
+    // Disconnected before the programs are ended: they may want to say goodbye.
+    bus: Box<dyn Bus>,
+    launched: Launched,
+    connected: bool,
+    lines: Vec<Line>,
+    now: SimTime,
+    zero: Zero,
+    /// When the clock went on last.
+    ticked: Instant,
+    deliveries: Vec<Delivery>,
+    /// How many messages each wire was given in this run, and to which calls some of them belong.
+    counts: BTreeMap<Wire, u64>,
+    calls: BTreeMap<(Wire, u64), u64>,
+    incidents: Incidents,
+    /// What was noted in this run: each note is said once.
+    said: BTreeSet<String>,
+}
+
+/// Where simulation time is counted from.
+#[derive(Debug, Clone, Copy)]
+enum Zero {
+    /// From this moment of wall time.
+    Wall(Instant),
+    /// From this time of the clock, in nanoseconds.
+    Clock(i64),
+}
+
+/// What was heard since the programs were launched.
+#[derive(Debug, Default)]
+struct Heard {
+    topics: BTreeSet<TopicId>,
+    /// The first and the latest time of the clock.
+    ticks: Option<(i64, i64)>,
+}
+
+impl Heard {
+    fn shows(&self, probe: Probe) -> bool {
+        match probe {
+            Probe::Topic(topic) => self.topics.contains(&topic),
+            Probe::Clock => self.ticks.is_some_and(|(first, latest)| latest > first),
+        }
+    }
+}
+
+impl System {
+    pub(super) fn new(plan: &CampaignPlan, bus: Box<dyn Bus>, settings: Settings, place: Place) -> Self {
+        System {
+            launched: Launched::new(plan, place),
+            plan: plan.clone(),
+            settings,
+            bus,
+            connected: false,
+            lines: Vec::new(),
+            now: SimTime::ZERO,
+            zero: Zero::Wall(Instant::now()),
+            ticked: Instant::now(),
+            deliveries: Vec::new(),
+            counts: BTreeMap::new(),
+            calls: BTreeMap::new(),
+            incidents: Incidents::default(),
+            said: BTreeSet::new(),
+        }
+    }
+
+    /// Connects to the system, which is started if the plan says how.
+    fn begin(&mut self, seed: u64, relay: &mut dyn Exchange) -> Result<(), TransportError> {
+        if !self.connected || !self.settings.resets {
+            self.end();
+            self.is_own()?;
+            self.lines = lines(&self.plan, relay.wires());
+            self.lines.extend(service_lines(&self.plan, relay.wires()));
+            self.launched.start(seed)?;
+            self.assemble()?;
+        }
+        self.bus.reset(SILENCE)?;
+        self.counts.clear();
+        self.calls.clear();
+        self.said.clear();
+        for (at, line) in self.lines.iter().enumerate() {
+            if self.bus.is_heard(at) {
+                relay.subscribed(line.wire);
+                line.sinks.iter().for_each(|sink| relay.subscribed(sink.wire));
+            }
+        }
+        self.zero = if self.settings.has_clock { Zero::Clock(self.first_tick()?) } else { Zero::Wall(Instant::now()) };
+        self.ticked = Instant::now();
+        match relay.parameters() {
+            [] => Ok(()),
+            [(name, _), ..] => {
+                let problem = format!(
+                    "the parameter `{name}` cannot be set over this transport; remove its `fit`, or take `process` or \
+                     `ros2`"
+                );
+                Err(TransportError::Wiring(problem))
+            }
+        }
+    }
+
+    /// A bus without placeholders in its address serves one worker.
+    fn is_own(&self) -> Result<(), TransportError> {
+        let worker = self.launched.worker();
+        let shared = |address: &&String| !["{port}", "{worker}", "{domain}"].iter().any(|own| address.contains(own));
+        match self.settings.addresses.iter().find(shared) {
+            Some(address) if worker > 1 => {
+                let problem = format!(
+                    "all workers would use the one system at `{address}`, and worker {worker} is not the first; give \
+                     each worker its own with `{{port}}` or `{{worker}}` in the address, or use `--workers 1`"
+                );
+                Err(TransportError::Wiring(problem))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Waits until the launched programs are ready, the bus is connected, and everything is there. Messages from before
+    /// go on unchanged.
+    fn assemble(&mut self) -> Result<(), TransportError> {
+        let limit = Instant::now() + COMPLETE_WITHIN;
+        let mut heard = Heard::default();
+        loop {
+            let ready = self.launched.poll_ready(&mut |probe| heard.shows(probe))?;
+            if !self.connected {
+                let launched = &self.launched;
+                self.connected = self.bus.connect(&self.lines, &|address| launched.fill(address))?;
+            }
+            let missing = if self.connected { self.bus.missing() } else { vec![self.unreachable()] };
+            if ready && missing.is_empty() {
+                return Ok(());
+            }
+            if Instant::now() >= limit && !missing.is_empty() {
+                let problem = format!("the system is not complete after {} s: ", COMPLETE_WITHIN.as_secs());
+                return Err(TransportError::Wiring(problem + &missing.join("; ")));
+            }
+            if !self.connected {
+                std::thread::sleep(Duration::from_millis(20));
+            } else if let Some(event) = self.bus.receive(Duration::from_millis(20))? {
+                self.pass_on(event, &mut heard)?;
+            }
+        }
+    }
+
+    fn unreachable(&self) -> String {
+        let addresses: Vec<String> = self.settings.addresses.iter().map(|it| self.launched.fill(it)).collect();
+        format!("nothing answers at `{}`", addresses.join("`, `"))
+    }
+
+    /// Passes something on that belongs to no run.
+    fn pass_on(&mut self, event: Event, heard: &mut Heard) -> Result<(), TransportError> {
+        match event {
+            Event::Message { line, value, call, .. } => {
+                heard.topics.insert(self.lines[line].topic);
+                for sink in 0..self.lines[line].sinks.len() {
+                    self.bus.publish(line, sink, &value, call)?;
+                }
+            }
+            Event::Clock(nanos) => {
+                let (first, latest) = heard.ticks.get_or_insert((nanos, nanos));
+                (*first, *latest) = ((*first).min(nanos), (*latest).max(nanos));
+            }
+            Event::Note(note) => self.note(note),
+        }
+        Ok(())
+    }
+
+    /// What the clock shows when it ticks next; messages that come before are passed on.
+    fn first_tick(&mut self) -> Result<i64, TransportError> {
+        let limit = Instant::now() + SILENCE;
+        let mut heard = Heard::default();
+        while Instant::now() < limit {
+            match self.bus.receive(WATCH)? {
+                Some(Event::Clock(nanos)) => return Ok(nanos),
+                Some(event) => self.pass_on(event, &mut heard)?,
+                None => self.launched.check()?,
+            }
+        }
+        Err(no_tick())
+    }
+
+    /// Waits for what comes next: a message, a tick of the clock, or the moment at which the relay has something to do.
+    fn run(&mut self, until: SimTime, relay: &mut dyn Exchange) -> Result<Progress, TransportError> {
+        if let Zero::Wall(zero) = self.zero {
+            self.now = SimTime::from_nanos(i64::try_from(zero.elapsed().as_nanos()).unwrap_or(i64::MAX)).min(until);
+        }
+        relay.advance(self.now, &mut self.deliveries);
+        self.deliver()?;
+        if self.now >= until {
+            return Ok(Progress::Ended);
+        }
+        let timeout = match self.zero {
+            Zero::Wall(_) => {
+                let due = relay.next_due().map_or(until, |due| due.min(until));
+                Duration::from_nanos(u64::try_from((due - self.now).nanos()).unwrap_or(0))
+            }
+            Zero::Clock(_) => SILENCE.saturating_sub(self.ticked.elapsed()),
+        };
+        match self.bus.receive(timeout.min(WATCH))? {
+            None => self.launched.check()?,
+            Some(Event::Note(note)) => self.note(note),
+            Some(Event::Clock(nanos)) => self.tick(nanos, until, relay)?,
+            Some(Event::Message { line, source, value, call, .. }) => self.message(line, source, value, call, relay)?,
+        }
+        if matches!(self.zero, Zero::Clock(_)) && self.ticked.elapsed() >= SILENCE {
+            return Err(no_tick());
+        }
+        Ok(Progress::Running)
+    }
+
+    fn tick(&mut self, nanos: i64, until: SimTime, relay: &mut dyn Exchange) -> Result<(), TransportError> {
+        let Zero::Clock(zero) = self.zero else { return Ok(()) };
+        let time = SimTime::from_nanos(nanos.saturating_sub(zero));
+        if time < self.now {
+            return Err(TransportError::ClockBack { from: self.now, to: time });
+        }
+        // A simulator that is paused may go on to publish the time at which it was.
+        if time > self.now {
+            self.ticked = Instant::now();
+        }
+        self.now = time.min(until);
+        relay.advance(self.now, &mut self.deliveries);
+        self.deliver()
+    }
+
+    fn message(
+        &mut self,
+        line: usize,
+        source: usize,
+        value: crate::value::Value,
+        call: Option<u64>,
+        relay: &mut dyn Exchange,
+    ) -> Result<(), TransportError> {
+        let (wire, publisher) = (self.lines[line].wire, self.lines[line].sources[source].publisher);
+        let index = self.counts.entry(wire).or_insert(0);
+        if let Some(call) = call {
+            self.calls.insert((wire, *index), call);
+            if self.calls.len() > CALLS {
+                self.calls.pop_first();
+            }
+        }
+        *index += 1;
+        relay.message_from(self.now, wire, publisher, value, &mut self.deliveries);
+        self.deliver()
+    }
+
+    /// Publishes what is delivered; what was only listened to stays where it is.
+    fn deliver(&mut self) -> Result<(), TransportError> {
+        for Delivery { wire, index, value } in mem::take(&mut self.deliveries) {
+            let sinks = self.lines.iter().enumerate().filter_map(|(at, line)| {
+                line.sinks.iter().position(|sink| sink.wire == wire).map(|sink| (at, sink, line.wire))
+            });
+            for (line, sink, of) in sinks {
+                let call = self.calls.get(&(of, index)).copied();
+                self.bus.publish(line, sink, &value, call)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn note(&mut self, note: String) {
+        if self.said.insert(note.clone()) {
+            self.incidents.notes.push(note);
+        }
+    }
+
+    /// Ends the connection, and all that was started.
+    fn end(&mut self) {
+        if mem::take(&mut self.connected) {
+            self.bus.disconnect();
+        }
+        self.launched.end();
+        self.incidents.notes.append(&mut self.launched.take_notes());
+    }
+
+    fn fail(&mut self, error: TransportError) -> TransportError {
+        // The outcome of a run that was stopped says for how long nothing came, and has no room for what it was.
+        if matches!(error, TransportError::Silent { .. }) {
+            self.incidents.notes.push(error.to_string());
+        }
+        // The connection may have been lost because a program has ended: then that is what happened.
+        let error = match (&error, self.launched.check()) {
+            (TransportError::ConnectionLost { .. } | TransportError::Silent { .. }, Err(ended)) => ended,
+            _ => error,
+        };
+        self.incidents.killed |= self.launched.was_killed();
+        self.end();
+        error
+    }
+}
+
+impl Transport for System {
+    fn capabilities(&self) -> Capabilities {
+        Capabilities { lock_stepped: false, resets: self.settings.resets }
+    }
+
+    fn reset(&mut self, seed: u64, relay: &mut dyn Exchange) -> Result<(), TransportError> {
+        self.now = SimTime::ZERO;
+        self.deliveries.clear();
+        self.begin(seed, relay).map_err(|error| self.fail(error))
+    }
+
+    fn advance(&mut self, until: SimTime, relay: &mut dyn Exchange) -> Result<Progress, TransportError> {
+        if !self.connected {
+            return Err(TransportError::Simulator("it was advanced before it was started".to_owned()));
+        }
+        self.run(until, relay).map_err(|error| self.fail(error))
+    }
+
+    fn now(&self) -> SimTime {
+        self.now
+    }
+
+    fn close(&mut self) {
+        self.end();
+    }
+
+    fn incidents(&mut self) -> Incidents {
+        mem::take(&mut self.incidents)
+    }
+}
+
+/// That the clock stands still.
+fn no_tick() -> TransportError {
+    TransportError::Silent { awaited: "a tick of the clock of the simulator".to_owned(), limit: SILENCE.as_secs_f64() }
+}

@@ -1,0 +1,102 @@
+//! Wires as they are in a middleware: from which names their messages come, and to which they go.
+
+use sesame_plan::{CampaignPlan, Channel, NodeId, TopicId, Wiring};
+
+use super::{Wire, WireTable};
+
+/// A name in the middleware on which a transport listens.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Source {
+    /// The wire that its messages take.
+    pub wire: Wire,
+    /// Its name in the middleware.
+    pub path: String,
+    /// The only node that publishes there; `None` for all that are not told apart.
+    pub publisher: Option<NodeId>,
+}
+
+/// A name in the middleware on which a transport publishes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Sink {
+    /// The wire whose deliveries go there: a wire of a topic, or a link.
+    pub wire: Wire,
+    /// Its name in the middleware.
+    pub path: String,
+    /// The only node that subscribes there; `None` for all that are not told apart.
+    pub subscriber: Option<NodeId>,
+}
+
+/// A wire with its names in the middleware.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Line {
+    /// Which.
+    pub wire: Wire,
+    /// The topic that it belongs to.
+    pub topic: TopicId,
+    /// Whether it is a topic, or one direction of a service.
+    pub channel: Channel,
+    /// Its own name.
+    pub path: String,
+    /// Whether its messages pass through the relay, or are only listened to.
+    pub cut: bool,
+    /// Where its messages come from.
+    pub sources: Vec<Source>,
+    /// Where they go; none if it is not cut.
+    pub sinks: Vec<Sink>,
+}
+
+/// The lines of a plan's topics, in the order of the wires; those of services are not among them.
+///
+/// Of a topic that is cut, publishers are on `TOPIC/undisturbed`, or on `TOPIC/from/NODE` where operations tell them
+/// apart; subscribers are on `TOPIC`, or on `TOPIC/to/NODE`.
+pub fn lines(plan: &CampaignPlan, wires: &WireTable) -> Vec<Line> {
+    let topics = wires.iter().filter(|&wire| plan.topic(wires.topic(wire)).channel == Channel::Topic);
+    topics.map(|wire| line(plan, wires, wire)).collect()
+}
+
+/// The lines of a plan's services that are cut, in the order of the wires: two for each service. Its clients are on
+/// `SERVICE`, its server is on `SERVICE/undisturbed`. One direction is cut if the other one is.
+pub fn service_lines(plan: &CampaignPlan, wires: &WireTable) -> Vec<Line> {
+    let is_of_service = |&wire: &Wire| plan.topic(wires.topic(wire)).channel != Channel::Topic;
+    let services: Vec<Wire> = wires.iter().filter(is_of_service).collect();
+    let is_cut = |wire: Wire| {
+        let both = services.iter().filter(|&&other| wires.path(other) == wires.path(wire));
+        both.into_iter().any(|&other| wiring(plan, wires.topic(other)).cut)
+    };
+    let line = |wire: Wire| {
+        let (topic, path) = (wires.topic(wire), wires.path(wire).to_owned());
+        let channel = plan.topic(topic).channel;
+        let server = format!("{path}/undisturbed");
+        let [from, to] = if channel == Channel::Request { [&path, &server] } else { [&server, &path] };
+        let sources = vec![Source { wire, path: from.clone(), publisher: None }];
+        let sinks = vec![Sink { wire, path: to.clone(), subscriber: None }];
+        Line { wire, topic, channel, path, cut: true, sources, sinks }
+    };
+    services.iter().copied().filter(|&wire| is_cut(wire)).map(line).collect()
+}
+
+fn wiring(plan: &CampaignPlan, topic: TopicId) -> Wiring {
+    plan.simulator.transport.wiring().get(topic.index()).cloned().unwrap_or_default()
+}
+
+fn line(plan: &CampaignPlan, wires: &WireTable, wire: Wire) -> Line {
+    let (topic, channel, path) = (wires.topic(wire), Channel::Topic, wires.path(wire).to_owned());
+    let Wiring { cut, publishers, .. } = wiring(plan, topic);
+    let source = |path: String, publisher| Source { wire, path, publisher };
+    if !cut {
+        return Line { wire, topic, channel, cut, sources: vec![source(path.clone(), None)], sinks: Vec::new(), path };
+    }
+    let from = |&node: &NodeId| source(format!("{path}/from/{}", plan.node(node).name), Some(node));
+    let mut sources: Vec<Source> = publishers.iter().map(from).collect();
+    let distinguished = |node: NodeId| publishers.contains(&node) || !plan.node(node).publishes.contains(&topic);
+    let mut nodes = (0u32..).map(NodeId).take(plan.nodes.len());
+    // Whoever is not named, if only because no node is declared to publish it.
+    if publishers.is_empty() || !nodes.all(distinguished) {
+        sources.push(source(format!("{path}/undisturbed"), None));
+    }
+    let mut sinks = vec![Sink { wire, path: path.clone(), subscriber: None }];
+    for link in wires.links().iter().filter(|link| link.of == wire) {
+        sinks.push(Sink { wire: link.wire, path: wires.path(link.wire).to_owned(), subscriber: Some(link.to) });
+    }
+    Line { wire, topic, channel, path, cut, sources, sinks }
+}
