@@ -4,6 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use sesame_rng::Stream;
+use sesame_select::ranking::{Better, Key, Scale, qualities};
 use sesame_select::{Pairs, Problem, Test};
 
 use crate::python::asked;
@@ -18,23 +19,25 @@ pub enum Points {
     Uniform,
     /// Near thirty centres, with qualities near those of their centre: near-duplicates, as fronts have them.
     Clustered,
-    /// Tests of the gearbox cell in T1, T2 and P1, front by front, ranked by how deep a zone was entered; at most
-    /// [`FRONTS`] of them. They are the first of 1,200 tests that NSGA-II with a population of 40 made of campaign
-    /// `study` in `examples/kuka_cell/study.sesame`.
-    Fronts,
+    /// Those of a campaign of the gearbox cell: first its front, then the front of the other tests, and so on. Beyond
+    /// the recorded tests come others near them, since a longer campaign has more of the same.
+    Front,
 }
 
-/// How many tests there are in the fronts.
-pub const FRONTS: usize = 1000;
+/// A campaign's tests: T1, T2 and P1, and the distance to a safety zone, which is better if it is smaller.
+const FRONT: &str = include_str!("../bench/data/kuka_cell_front.csv");
 
-/// The points of the fronts, each with its quality: from 0 to 1 by rank among as many.
-fn fronts(tests: usize) -> Vec<([f64; 3], f64)> {
-    let rows = include_str!("../data/kuka_cell_fronts.csv").lines().skip(1).take(tests);
-    let rows = rows.map(|row| -> Vec<f64> { row.split(',').map(|number| number.parse().expect("a number")).collect() });
-    let rows: Vec<Vec<f64>> = rows.collect();
-    let depth = |row: &Vec<f64>| rows.iter().filter(|other| other[3] > row[3]).count() as f64;
-    let most = (rows.len() - 1) as f64;
-    rows.iter().map(|row| ([row[0], row[1], row[2]], depth(row) / most)).collect()
+/// How far a test beyond the recorded ones is at most from one of them, on each axis.
+const BESIDE: f64 = 0.005;
+
+/// Points and qualities of the recorded tests. A test is ranked among all of them, as `sesamec select` does it.
+fn front() -> Vec<(Vec<f64>, f64)> {
+    let number = |text: &str| -> f64 { text.parse().expect("the data are numbers") };
+    let rows: Vec<Vec<f64>> = FRONT.lines().skip(1).map(|line| line.split(',').map(number).collect()).collect();
+    let distances: Vec<f64> = rows.iter().map(|row| row[3]).collect();
+    let key = Key { values: &distances, better: Better::Lower };
+    let ranked = qualities(&[key], Scale::Average).expect("every test has a distance");
+    rows.into_iter().zip(ranked).map(|(row, quality)| (row[..3].to_vec(), quality)).collect()
 }
 
 /// A choice to be made.
@@ -59,28 +62,26 @@ impl Choice {
     pub fn problem(self) -> Problem {
         let mut stream = Stream::derive(self.seed, "choice of tests", &[self.tests as u64]);
         let centres: Vec<[f64; 4]> = (0..30).map(|_| std::array::from_fn(|_| stream.unit())).collect();
-        let mut fronts = match self.points {
-            Points::Fronts => fronts(self.tests),
-            Points::Uniform | Points::Clustered => Vec::new(),
-        }
-        .into_iter();
-        let mut test = || {
+        let recorded = if self.points == Points::Front { front() } else { Vec::new() };
+        let test = |at: usize| {
             let (point, quality) = match self.points {
-                Points::Fronts => {
-                    let (point, quality) = fronts.next().expect("a choice has at most as many tests as the fronts");
-                    (point.to_vec(), quality)
-                }
                 Points::Uniform => ((0..3).map(|_| stream.unit()).collect(), stream.unit()),
                 Points::Clustered => {
                     let centre = centres[stream.below(centres.len())];
                     let point = centre[..3].iter().map(|x| (x + 0.01 * stream.normal()).clamp(0.0, 1.0)).collect();
                     (point, (centre[3] + stream.uniform(-0.05, 0.05)).clamp(0.0, 1.0))
                 }
+                Points::Front if at < recorded.len() => recorded[at].clone(),
+                Points::Front => {
+                    let (point, quality) = &recorded[at % recorded.len()];
+                    let beside = |x: &f64| (x + stream.uniform(-BESIDE, BESIDE)).clamp(0.0, 1.0);
+                    (point.iter().map(beside).collect(), (quality + stream.uniform(-BESIDE, BESIDE)).clamp(0.0, 1.0))
+                }
             };
             let cost = if self.uneven { 1.0 + stream.below(9) as f64 } else { 1.0 };
             Test { point, quality, cost, forced: false }
         };
-        let tests = (0..self.tests).map(|_| test()).collect();
+        let tests = (0..self.tests).map(test).collect();
         // The cheapest ones are chosen more often than others.
         let budget = f64::from(self.budget) * if self.uneven { 2.0 } else { 1.0 };
         Problem::new(tests, self.lambda, budget, Pairs::Unordered).expect("it is valid")
@@ -98,7 +99,7 @@ pub struct Request {
     pub qualities: Vec<f64>,
     /// Their costs.
     pub costs: Vec<f64>,
-    /// What the chosen ones may cost together.
+    /// What the costs of those that are chosen add up to at most.
     pub budget: f64,
     /// The weight of diversity.
     pub lambda: f64,
@@ -125,7 +126,7 @@ impl Request {
 /// What a solver made of a choice.
 #[derive(Debug, Clone, Deserialize)]
 pub struct Solved {
-    /// Wall time, with the construction of its model and without that of distances.
+    /// Wall time, with the construction of its models.
     pub seconds: f64,
     /// The value of what it chose; 0 if it found nothing.
     pub value: f64,
@@ -135,8 +136,9 @@ pub struct Solved {
     pub proved: bool,
 }
 
-/// The answer to a request; `None` where nobody named a Python that has the packages. One that is named has to work.
-pub fn ask(request: &Request) -> Option<Solved> {
+/// The answer to a request, or why there is none; `None` where nobody named a Python that has the packages. One that is
+/// named has to work.
+pub fn ask(request: &Request) -> Option<Result<Solved, String>> {
     let mut line = serde_json::to_vec(request).expect("a request is data");
     line.push(b'\n');
     let said = asked(PYTHON, "selecting.py", line)?;
