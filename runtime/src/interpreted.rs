@@ -4,8 +4,11 @@
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
+use sesame_base::time::SimTime;
 use sesame_plan::CampaignPlan;
-use sesame_relay::transport::{self, Connect, Transport};
+use sesame_relay::relay::Exchange;
+use sesame_relay::simulator::Progress;
+use sesame_relay::transport::{self, Capabilities, Connect, Transport, TransportError};
 
 use crate::runner::Runner;
 
@@ -22,14 +25,46 @@ pub struct Interpreted {
     pub simulator: PathBuf,
 }
 
-/// The transport to the simulator of a plan, which is a program or a system of ROS 2 nodes.
+/// The transport to the simulator of a plan, which is no part of the runner.
 pub(crate) fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
     let connect = match &plan.simulator.transport {
         #[cfg(feature = "ros2")]
         sesame_plan::Transport::Ros2(_) => sesame_ros2::ros2(folder.to_owned()),
-        _ => transport::process(folder.to_owned()),
+        #[cfg(feature = "rosbridge")]
+        sesame_plan::Transport::Rosbridge(_) => sesame_rosbridge::rosbridge(folder.to_owned()),
+        sesame_plan::Transport::Process { .. } => transport::process(folder.to_owned()),
+        other => return Box::new(Unavailable(other.word())),
     };
     connect.transport(plan)
+}
+
+/// In place of a transport that this program was built without. A campaign's own transport is always there: the
+/// generator asks for it. That of a lab may not be.
+struct Unavailable(&'static str);
+
+impl Transport for Unavailable {
+    fn capabilities(&self) -> Capabilities {
+        Capabilities { lock_stepped: false, resets: false }
+    }
+
+    fn reset(&mut self, _: u64, _: &mut dyn Exchange) -> Result<(), TransportError> {
+        let problem = format!(
+            "this runner was built without `{0}`; build it with that feature of `sesame-runtime`, or run the campaign \
+             with a `sesamec` that was built with `--features {0}`",
+            self.0
+        );
+        Err(TransportError::Wiring(problem))
+    }
+
+    fn advance(&mut self, _: SimTime, relay: &mut dyn Exchange) -> Result<Progress, TransportError> {
+        self.reset(0, relay).map(|()| Progress::Ended)
+    }
+
+    fn now(&self) -> SimTime {
+        SimTime::ZERO
+    }
+
+    fn close(&mut self) {}
 }
 
 impl Interpreted {

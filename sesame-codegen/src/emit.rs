@@ -292,8 +292,8 @@ fn runner(runner: &RunnerPlan, environment: &Environment) -> Result<Tree, Proble
         evaluations: plan.campaign.search.evaluations(),
         seed: plan.campaign.seed,
         wiring: match plan.simulator.transport {
-            Transport::Ros2(_) => doc_lines(&crate::wiring::text(plan)),
-            _ => Vec::new(),
+            Transport::InProcess { .. } | Transport::Process { .. } => Vec::new(),
+            _ => doc_lines(&crate::wiring::text(plan)),
         },
     };
     tree.add("README.md", Owner::Machine, environment.templates.render("runner/runner_readme.md.tera", &readme)?);

@@ -10,6 +10,7 @@
 //!   and of the conditions and expectations of these tests;
 //! - all labs of the space.
 
+mod bus;
 mod condition;
 mod formula;
 mod id;
@@ -23,6 +24,7 @@ mod system;
 use sesame_dsl::model::{self, CampaignId, Space};
 use sesame_plan as plan;
 
+use self::bus::bus;
 use self::id::topic_id;
 pub(crate) use self::lab::lab_simulator;
 use self::operation::custom_operations;
@@ -45,6 +47,7 @@ pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str)
             (plan::Transport::Process { program, arguments, step_ns: *step_ns }, None)
         }
         model::Transport::Ros2 { .. } => (plan::Transport::Ros2(ros2(space)), None),
+        _ => (bus(space).expect("all other simulators are on a bus"), None),
     };
     let system_file = space.file_of(&space.simulator.declaration).to_owned();
     let plan = plan::CampaignPlan {

@@ -3,13 +3,17 @@
 
 use std::fmt::Write as _;
 
-use sesame_plan::{CampaignPlan, Channel, NodeId, Transport};
+use sesame_plan::{CampaignPlan, Channel, Dialect, NodeId, Remapping, Rosbridge, Transport};
 
 /// A line to paste for each node, and for each program that the plan does not know.
 pub fn text(plan: &CampaignPlan) -> String {
     const STRING: &str = "a string takes all text";
-    if !matches!(plan.simulator.transport, Transport::Ros2(_)) {
-        return format!("`{}` is not a system of ROS 2: nothing is remapped\n", plan.simulator.name);
+    match &plan.simulator.transport {
+        Transport::Ros2(_) | Transport::Rosbridge(Rosbridge { dialect: Dialect::Ros2, .. }) => {}
+        Transport::Rosbridge(_) | Transport::Ros1(_) | Transport::Mqtt(_) => return names(plan),
+        Transport::InProcess { .. } | Transport::Process { .. } => {
+            return format!("`{}` brings all messages itself: nothing is remapped\n", plan.simulator.name);
+        }
     }
     let mut out = String::new();
     for (id, node) in (0..).map(NodeId).zip(&plan.nodes) {
@@ -27,6 +31,28 @@ pub fn text(plan: &CampaignPlan) -> String {
         };
         writeln!(out, "# {programs} {}", remapping.from).expect(STRING);
         writeln!(out, "ros2 run … --ros-args -r {}", remapping.rule()).expect(STRING);
+    }
+    if out.is_empty() {
+        out.push_str("# no operation acts on a topic: nothing is remapped\n");
+    }
+    out
+}
+
+/// The names under which publishers and distinguished subscribers are, for middleware without `ros2 run`.
+fn names(plan: &CampaignPlan) -> String {
+    const STRING: &str = "a string takes all text";
+    let mut out = String::new();
+    for (id, node) in (0..).map(NodeId).zip(&plan.nodes) {
+        let remappings = plan.remappings(id);
+        if !remappings.is_empty() {
+            writeln!(out, "# node {}", node.name).expect(STRING);
+        }
+        for Remapping { from, to } in remappings {
+            writeln!(out, "{from} → {to}").expect(STRING);
+        }
+    }
+    for (_, Remapping { from, to }) in plan.unclaimed() {
+        writeln!(out, "# every program that publishes or offers {from}\n{from} → {to}").expect(STRING);
     }
     if out.is_empty() {
         out.push_str("# no operation acts on a topic: nothing is remapped\n");

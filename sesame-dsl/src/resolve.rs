@@ -2,7 +2,7 @@
 //!
 //! 1. [`collect`] collects names, and reports duplicates and missing declarations
 //! 2. [`system`] resolves message types (ordered so that each follows those it contains), topics, nodes, the simulator;
-//!    [`ros2`], [`ros_types`] and [`services`] those of ROS
+//!    [`ros2`], [`ros_types`] and [`services`] those of ROS, [`bus`] addresses
 //! 3. [`metrics`] resolves metrics and requirements; [`formula`] resolves formulas, with [`function`], [`geometry`],
 //!    [`region`] and [`members`]
 //! 4. [`fuzz`] resolves operations ([`disturbance`] their targets and parameters, [`custom`] those in the user's code)
@@ -15,6 +15,7 @@
 //! reported again: one mistake is one diagnostic.
 
 mod boolean;
+mod bus;
 mod campaign;
 mod collect;
 mod condition;

@@ -14,6 +14,8 @@ pub(crate) enum Vendor {
     Cyclone,
     /// ROS 2 Kilted with a simulator of mobile robots: `examples/fleet`.
     Fleet,
+    /// A server and a client of rosbridge.
+    Rosbridge,
 }
 
 impl Vendor {
@@ -23,6 +25,7 @@ impl Vendor {
             Vendor::Jazzy => "SESAME_ROS2_JAZZY",
             Vendor::Cyclone => "SESAME_ROS2_CYCLONE",
             Vendor::Fleet => "SESAME_ROS2_FLEET",
+            Vendor::Rosbridge => "SESAME_ROSBRIDGE",
         }
     }
 

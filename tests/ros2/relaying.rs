@@ -78,7 +78,12 @@ pub(crate) struct System {
 
 impl System {
     pub(crate) fn new(plan: CampaignPlan) -> Self {
-        let transport = sesame_ros2::ros2(workspace().join("tests/ros2")).transport(&plan);
+        let folder = workspace().join("tests/ros2");
+        let connect = match &plan.simulator.transport {
+            sesame_plan::Transport::Rosbridge(_) => sesame_rosbridge::rosbridge(folder),
+            _ => sesame_ros2::ros2(folder),
+        };
+        let transport = connect.transport(&plan);
         System { plan, transport }
     }
 

@@ -40,6 +40,9 @@ pub enum Secret {
 pub struct Rosbridge {
     /// Where it is.
     pub remote: Remote,
+    /// The domain (`ROS_DOMAIN_ID`) of what the first worker launches; each further one has the next.
+    #[serde(default)]
+    pub domain: u16,
     /// Which ROS is behind it.
     #[serde(default, skip_serializing_if = "Dialect::is_default")]
     pub dialect: Dialect,
@@ -52,6 +55,8 @@ pub struct Rosbridge {
     /// for one that is launched again for each test.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reset: Option<String>,
+    /// The layouts of all messages, each after those that it contains.
+    pub interfaces: Vec<Interface>,
     /// How each topic of the plan is cut, in their order.
     pub wiring: Vec<Wiring>,
 }

@@ -1,16 +1,26 @@
-//! The rosbridge protocol, version 2, without its sockets: what peers say to each other, and how it is written.
+//! Systems of ROS behind a bridge that speaks the rosbridge protocol, version 2.
 //!
-//! A peer sends [`Operation`]s, each in a frame of its own: as a text in JSON, or, for messages of topics on request, as
-//! bytes in CBOR ([`cbor`]). What is too long for a frame is sent in pieces ([`fragment`]), and what is to be small as a
-//! picture ([`png`]). [`Reader`] makes operations of frames, whatever way they come.
+//! The protocol itself has no sockets: a peer sends [`Operation`]s, each in a frame of its own: as a text in JSON, or,
+//! for messages of topics on request, as bytes in CBOR ([`cbor`]). What is too long for a frame is sent in pieces
+//! ([`fragment`]), and what is to be small as a picture ([`png`]). [`Reader`] makes operations of frames, whatever way
+//! they come. No input makes it panic or keep more than [`Limits`] says.
 //!
-//! Pure: the caller has the sockets and the clock. No input makes it panic or keep more than [`Limits`] says.
+//! With the feature `client`, [`client`] is a connection to a bridge, [`payload`] turns messages into values, and
+//! [`rosbridge`] is the transport to the nodes behind it.
 
 pub mod cbor;
+#[cfg(feature = "client")]
+pub mod client;
 pub mod fragment;
 mod operation;
+#[cfg(feature = "client")]
+pub mod payload;
 pub mod png;
 mod reader;
+#[cfg(feature = "client")]
+mod transport;
 
 pub use operation::{Compression, Level, Operation};
 pub use reader::{FrameError, Limits, Reader};
+#[cfg(feature = "client")]
+pub use transport::rosbridge;

@@ -19,12 +19,17 @@ pub(super) fn ros2(space: &Space) -> plan::Ros2 {
         step: step.clone(),
         reset: reset.clone(),
         interfaces: interfaces(space),
-        wiring: space.topics.iter().map(|(topic, _)| wiring(space, topic, step.is_some())).collect(),
+        wiring: wirings(space, step.is_some()),
     }
 }
 
+/// How the topics of a space are cut, in their order.
+pub(super) fn wirings(space: &Space, stepped: bool) -> Vec<plan::Wiring> {
+    space.topics.iter().map(|(topic, _)| wiring(space, topic, stepped)).collect()
+}
+
 /// The layouts of all topics and what these contain, each after those it contains.
-fn interfaces(space: &Space) -> Vec<plan::Interface> {
+pub(super) fn interfaces(space: &Space) -> Vec<plan::Interface> {
     let mut used: BTreeSet<&str> = BTreeSet::new();
     for topic in space.topics.values() {
         if let model::Type::Message(id) = topic.ty {

@@ -4,7 +4,7 @@ use super::declaration::Declaration;
 use super::ids::{MessageId, TopicId};
 use crate::span::Span;
 use crate::units::Unit;
-use sesame_plan::{Channel, Clock, Stepping};
+use sesame_plan::{Broker, Channel, Clock, Compression, Dialect, Quality, Remote, Stepping};
 
 /// The simulator under test.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,6 +47,37 @@ pub enum Transport {
         step: Option<Stepping>,
         /// The service that resets it, absolute; `None` for one that is launched again.
         reset: Option<String>,
+    },
+    /// Nodes of ROS behind a server that speaks the rosbridge protocol.
+    Rosbridge {
+        /// Where it is.
+        remote: Remote,
+        /// The domain of worker 1, at most 232. Default 0.
+        domain: u16,
+        /// Which ROS is behind it. Default ROS 2.
+        dialect: Dialect,
+        /// How it is asked to send messages. Default JSON.
+        compression: Compression,
+        /// What simulation time is; its topic is absolute. Default wall time.
+        clock: Clock,
+        /// The service that resets it, absolute; `None` for one that is launched again.
+        reset: Option<String>,
+    },
+    /// Nodes of ROS 1.
+    Ros1 {
+        /// The address of the master.
+        master: String,
+        /// What simulation time is; its topic is absolute. Default wall time.
+        clock: Clock,
+        /// The service that resets it, absolute; `None` for one that is launched again.
+        reset: Option<String>,
+    },
+    /// A system whose messages go over brokers of MQTT.
+    Mqtt {
+        /// The broker of all nodes that have none of their own.
+        broker: Broker,
+        /// How surely messages arrive. Default at least once.
+        quality: Quality,
     },
 }
 
@@ -186,6 +217,8 @@ pub struct Node {
     pub answers: Vec<(TopicId, TopicId)>,
     /// On which topics it publishes one message in every step of the simulator.
     pub every_step: Vec<TopicId>,
+    /// The address of its broker, where it is not that of the simulator.
+    pub broker: Option<String>,
 }
 
 /// A value inside the messages of a topic.

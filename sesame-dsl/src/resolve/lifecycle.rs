@@ -15,6 +15,7 @@ pub(super) struct RestOfNode {
     pub(super) launch: Option<model::Launch>,
     pub(super) answers: Vec<(TopicId, TopicId)>,
     pub(super) every_step: Vec<TopicId>,
+    pub(super) broker: Option<String>,
 }
 
 impl<'a> Resolver<'a> {
@@ -77,11 +78,11 @@ impl<'a> Resolver<'a> {
         subscribes: Option<&[TopicId]>,
     ) -> Option<RestOfNode> {
         let named = match &node.named {
-            Some(written) => match self.other_than_ros2() {
+            Some(written) => match self.other_than_ros() {
                 Some((kind, simulator)) => {
                     let title = format!("simulator kind `{kind}` has no names of nodes");
                     let diagnostic = Diagnostic::new(Code::NOT_ROS, written.span, title)
-                        .label("only nodes of a `ros2` simulator have a name beside their own; remove it")
+                        .label("only nodes of a simulator of ROS have a name beside their own; remove it")
                         .secondary(simulator, "the simulator is declared here");
                     self.report(diagnostic);
                     None
@@ -114,7 +115,14 @@ impl<'a> Resolver<'a> {
                 _ => every_step = None,
             }
         }
-        Some(RestOfNode { named: named?, launch: launch?, answers: answers?, every_step: every_step? })
+        let broker = self.broker_of(node);
+        Some(RestOfNode {
+            named: named?,
+            launch: launch?,
+            answers: answers?,
+            every_step: every_step?,
+            broker: broker.ok()?,
+        })
     }
 
     /// A topic of an answer, which is among those that the node says it publishes or subscribes to.
@@ -164,13 +172,11 @@ impl<'a> Resolver<'a> {
 
     /// The clock of the simulator, which only some have.
     fn clock(&mut self, span: Span) -> Option<ReadyWhen> {
-        let has_a_clock = |ros2: &ast::Ros2| ros2.clocks.iter().any(|(_, clock)| matches!(clock, ast::Clock::Topic(_)));
-        if self.ast_ros2().is_some_and(has_a_clock) || self.simulators().next().is_none_or(|it| it.transport.is_none())
-        {
+        if self.has_a_clock() || self.simulators().next().is_none_or(|it| it.transport.is_none()) {
             return Some(ReadyWhen::Clock);
         }
         let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, span, "the simulator has no clock that could advance")
-            .label("only a `ros2` simulator with a `clock \"TOPIC\"` has one")
+            .label("only a simulator of ROS with a `clock \"TOPIC\"` has one")
             .note("wait for a `topic`, a `port` or a `line` instead");
         self.report(diagnostic);
         None

@@ -62,7 +62,7 @@ impl<'a> Resolver<'a> {
     }
 
     fn tells_nodes_apart(&mut self, span: Span, from: bool) -> bool {
-        let Some((word, simulator)) = self.other_than_ros2() else { return true };
+        let Some((word, simulator)) = self.one_for_all() else { return true };
         let who = if from { "which node publishes a message" } else { "which node receives a message" };
         let title = format!("simulator kind `{word}` does not report {who}");
         let diagnostic = Diagnostic::new(Code::WHICH_NODES, span, title)

@@ -48,12 +48,12 @@ impl Resolver<'_> {
                 self.report(diagnostic);
                 sound = false;
             } else if matches!(word, "ros-args" | "domain")
-                && let Some((kind, simulator)) = self.other_than_ros2()
+                && let Some((kind, simulator)) = self.other_than_ros()
             {
                 let what = if word == "domain" { "domains" } else { "remappings" };
                 let title = format!("simulator kind `{kind}` has no {what}");
                 let diagnostic = Diagnostic::new(Code::PLACEHOLDER, span, title)
-                    .label("only a `ros2` simulator has this placeholder")
+                    .label("only a simulator of ROS has this placeholder")
                     .secondary(simulator, "the simulator is declared here");
                 self.report(diagnostic);
                 sound = false;

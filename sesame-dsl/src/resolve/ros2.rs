@@ -4,7 +4,7 @@ use super::Resolver;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{Clock, StepBy, Stepping, Transport};
 use crate::span::Span;
-use crate::syntax::ast::{self, Name, StepChannel, Text};
+use crate::syntax::ast::{self, BusKind, Name, StepChannel, Text};
 
 /// The highest domain whose ports exist on every system.
 const MOST_DOMAIN: u64 = 232;
@@ -18,13 +18,65 @@ impl<'a> Resolver<'a> {
         }
     }
 
+    /// The settings of a simulator on a bus, if the simulator is one.
+    pub(super) fn ast_bus(&self) -> Option<&'a ast::Bus> {
+        match &self.simulators().next()?.transport {
+            Some(ast::Transport::Bus(bus)) => Some(bus),
+            _ => None,
+        }
+    }
+
+    /// Whether the simulator's messages are those of ROS, whichever way they come.
+    pub(super) fn is_of_ros(&self) -> bool {
+        self.ast_ros2().is_some() || self.ast_bus().is_some_and(|bus| bus.kind != BusKind::Mqtt)
+    }
+
+    /// The folders with definitions of messages that the simulator names.
+    pub(super) fn ast_types(&self) -> &'a [(Span, Vec<Text>)] {
+        match (self.ast_ros2(), self.ast_bus()) {
+            (Some(ros2), _) => &ros2.types,
+            (None, Some(bus)) => &bus.types,
+            (None, None) => &[],
+        }
+    }
+
+    /// Whether the simulator has a clock of its own.
+    pub(super) fn has_a_clock(&self) -> bool {
+        let clocks = match (self.ast_ros2(), self.ast_bus()) {
+            (Some(ros2), _) => &ros2.clocks[..],
+            (None, Some(bus)) => &bus.clocks,
+            (None, None) => &[],
+        };
+        clocks.iter().any(|(_, clock)| matches!(clock, ast::Clock::Topic(_)))
+    }
+
     /// The word of the simulator's kind, and where it is declared, if the kind is known and not ROS 2.
     pub(super) fn other_than_ros2(&self) -> Option<(&'static str, Span)> {
+        self.kind().filter(|(word, _)| *word != "ros2")
+    }
+
+    /// The same if its messages are not those of ROS.
+    pub(super) fn other_than_ros(&self) -> Option<(&'static str, Span)> {
+        self.kind().filter(|_| !self.is_of_ros())
+    }
+
+    /// The same if the simulator itself brings all messages, so that nobody is told apart.
+    pub(super) fn one_for_all(&self) -> Option<(&'static str, Span)> {
+        self.kind().filter(|(word, _)| matches!(*word, "in_process" | "process"))
+    }
+
+    /// The word of the simulator's kind, if that is known, and where it is declared.
+    pub(super) fn kind(&self) -> Option<(&'static str, Span)> {
         let simulator = self.simulators().next()?;
         let word = match simulator.transport.as_ref()? {
             ast::Transport::InProcess(_) => "in_process",
             ast::Transport::Process(_) => "process",
-            ast::Transport::Ros2(_) => return None,
+            ast::Transport::Ros2(_) => "ros2",
+            ast::Transport::Bus(bus) => match bus.kind {
+                BusKind::Rosbridge => "rosbridge",
+                BusKind::Ros1 => "ros1",
+                BusKind::Mqtt => "mqtt",
+            },
         };
         Some((word, simulator.head.name.span))
     }
@@ -35,22 +87,31 @@ impl<'a> Resolver<'a> {
             None => Some(0),
         };
         self.single(&ros2.types, "types");
-        let clock = match self.single(&ros2.clocks, "clock") {
-            Some(ast::Clock::Topic(path)) => self.ros_name(path, "topic").map(|path| Clock::Topic { path }),
-            Some(ast::Clock::Wall) | None => Some(Clock::Wall),
-        };
+        let clock = self.simulator_clock(&ros2.clocks);
         let step = match self.single(&ros2.steps, "step") {
             Some(step) => self.stepping(name, step, ros2).map(Some),
             None => Some(None),
         };
-        let reset = match self.single(&ros2.resets, "reset") {
-            Some(path) => self.ros_name(path, "service").map(Some),
-            None => Some(None),
-        };
-        Some(Transport::Ros2 { domain: domain?, clock: clock?, step: step?, reset: reset? })
+        let reset = self.reset_service(&ros2.resets);
+        Some(Transport::Ros2 { domain: domain?, clock: clock?, step: step?, reset: reset.ok()? })
     }
 
-    fn domain_id(&mut self, domain: ast::Count) -> Option<u16> {
+    pub(super) fn simulator_clock(&mut self, clocks: &'a [(Span, ast::Clock)]) -> Option<Clock> {
+        match self.single(clocks, "clock") {
+            Some(ast::Clock::Topic(path)) => self.ros_name(path, "topic").map(|path| Clock::Topic { path }),
+            Some(ast::Clock::Wall) | None => Some(Clock::Wall),
+        }
+    }
+
+    /// The service that resets the simulator, if there is one. An error was reported.
+    pub(super) fn reset_service(&mut self, resets: &'a [(Span, Text)]) -> Result<Option<String>, ()> {
+        match self.single(resets, "reset") {
+            Some(path) => self.ros_name(path, "service").map(Some).ok_or(()),
+            None => Ok(None),
+        }
+    }
+
+    pub(super) fn domain_id(&mut self, domain: ast::Count) -> Option<u16> {
         let value = domain.value?;
         if value > MOST_DOMAIN {
             let title = format!("`{}` is not a domain", self.text(domain.span));

@@ -53,13 +53,13 @@ impl<'a> Resolver<'a> {
                 continue;
             };
             let Some(name) = self.ros_type(written, "msg") else { continue };
-            if let Some((kind, simulator)) = self.other_than_ros2() {
+            if let Some((kind, simulator)) = self.other_than_ros() {
                 let title = format!(
                     "message `{}` has a ROS type, but simulator kind `{kind}` is not ROS",
                     message.head.name.text
                 );
                 let diagnostic = Diagnostic::new(Code::NOT_ROS, written.span, title)
-                    .label("only messages of a `ros2` simulator have one; remove it and declare the fields in a block")
+                    .label("only messages of a simulator of ROS have one; remove it and declare the fields in a block")
                     .secondary(simulator, "the simulator is declared here");
                 self.report(diagnostic);
                 continue;
@@ -112,10 +112,9 @@ impl<'a> Resolver<'a> {
         if let Some(known) = interfaces::known(name) {
             return Ok(Some(known));
         }
-        let ros2 = self.ast_ros2();
-        let types = ros2
-            .into_iter()
-            .flat_map(|ros2| &ros2.types)
+        let types = self
+            .ast_types()
+            .iter()
             .flat_map(|(span, folders)| folders.iter().map(move |folder| (*span, folder.text.clone())));
         let (spans, written): (Vec<Span>, Vec<String>) = types.unzip();
         let file = spans.first().map_or("", |span| self.sources.file(span.file).name());
@@ -131,7 +130,7 @@ impl<'a> Resolver<'a> {
     }
 
     pub(super) fn not_found(&mut self, name: &str, at: Span, remedy: &str) {
-        let folders = self.ast_ros2().map_or(0, |ros2| ros2.types.len());
+        let folders = self.ast_types().len();
         let title = format!("no folder has a definition of `{name}`");
         let diagnostic = Diagnostic::new(Code::NO_LAYOUT, at, title);
         let diagnostic = if folders == 0 {

@@ -43,10 +43,10 @@ impl<'a> Resolver<'a> {
     /// The messages of a service: its requests, then its replies.
     fn directions(&mut self, service: &'a ast::Service) -> Option<[Type; 2]> {
         let name = self.ros_type(&service.ros_type, "srv");
-        if let Some((kind, simulator)) = self.other_than_ros2() {
+        if let Some((kind, simulator)) = self.other_than_ros() {
             let title = format!("simulator kind `{kind}` has no services");
             let diagnostic = Diagnostic::new(Code::NOT_ROS, service.head.name.span, title)
-                .label("only a `ros2` simulator has services; declare a topic instead")
+                .label("only a simulator of ROS has services; declare a topic instead")
                 .secondary(simulator, "the simulator is declared here");
             self.report(diagnostic);
             return None;

@@ -38,6 +38,7 @@ impl<'a> Resolver<'a> {
                 Transport::Process { program: program?, arguments, step_ns }
             }
             ast::Transport::Ros2(ros2) => self.ros2(name, ros2)?,
+            ast::Transport::Bus(bus) => self.bus(bus)?,
         };
         Some(Simulator { declaration: self.declaration(&simulator.head), transport })
     }

@@ -67,7 +67,7 @@ impl<'a> Resolver<'a> {
 
     /// Whether a topic carries what its simulator can: in ROS a message with a ROS type.
     fn has_a_layout(&mut self, topic: &ast::Topic, ty: &Type) -> bool {
-        if self.ast_ros2().is_none() {
+        if !self.is_of_ros() {
             return true;
         }
         let diagnostic = Diagnostic::new(
@@ -113,9 +113,7 @@ impl<'a> Resolver<'a> {
             return None;
         }
         match expand_group(&path.text) {
-            Ok(paths) if self.ast_ros2().is_some() => {
-                paths.iter().map(|name| self.absolute(name, path.span, what)).collect()
-            }
+            Ok(paths) if self.is_of_ros() => paths.iter().map(|name| self.absolute(name, path.span, what)).collect(),
             Ok(paths) => Some(paths),
             Err(why) => {
                 let title = format!("`{}` is not the path of a {what}", path.text);
@@ -144,6 +142,7 @@ impl<'a> Resolver<'a> {
                 launch: rest.launch,
                 answers: rest.answers,
                 every_step: rest.every_step,
+                broker: rest.broker,
             });
             self.system.nodes.push(resolved);
         }

@@ -170,6 +170,39 @@ pub(super) const BLOCKS: &[Block] = &[
             Member::like(Rule::setting_reset, "reset", "reset by service"),
         ],
     ),
+    Block::settings(
+        Rule::rosbridge_settings,
+        "rosbridge",
+        &[
+            Member::new(Rule::setting_domain, "domain"),
+            Member::new(Rule::setting_types, "types"),
+            Member::new(Rule::setting_clock, "clock"),
+            Member::like(Rule::setting_reset, "reset", "reset by service"),
+            Member::new(Rule::setting_dialect, "dialect"),
+            Member::new(Rule::setting_compression, "compression"),
+            Member::like(Rule::setting_token, "token", "token from"),
+            Member::new(Rule::setting_trust, "trust"),
+        ],
+    ),
+    Block::settings(
+        Rule::ros1_settings,
+        "ros1",
+        &[
+            Member::new(Rule::setting_types, "types"),
+            Member::new(Rule::setting_clock, "clock"),
+            Member::like(Rule::setting_reset, "reset", "reset by service"),
+        ],
+    ),
+    Block::settings(
+        Rule::mqtt_settings,
+        "mqtt",
+        &[
+            Member::new(Rule::setting_quality, "quality"),
+            Member::new(Rule::setting_user, "user"),
+            Member::like(Rule::setting_password, "password", "password from"),
+            Member::new(Rule::setting_trust, "trust"),
+        ],
+    ),
     Block::settings(Rule::launch_settings, "launch", &[Member::like(Rule::ready, "ready", "ready when")]),
     Block::settings(
         Rule::budget_settings,
@@ -194,6 +227,7 @@ pub(super) const BLOCKS: &[Block] = &[
             Member::new(Rule::launch, "launch"),
             Member::new(Rule::answers, "answers"),
             Member::like(Rule::every_step, "every", "every step"),
+            Member::new(Rule::broker, "broker"),
         ],
     },
     Block {

@@ -24,6 +24,7 @@ def main() -> None:
     parser.add_argument("--rate", type=float, help="samples per second; as fast as possible by default")
     parser.add_argument("--seed", type=int, default=1, help="of the samples (default: 1)")
     parser.add_argument("--subscribers", type=int, default=1, help="how many to wait for (default: 1)")
+    parser.add_argument("--short", action="store_true", help="numbers of a few digits, as JSON has them")
     parser.add_argument("--hold", action="store_true", help="wait for a line on standard input before the first sample")
     parser.add_argument("--linger", type=float, default=1.0, help="seconds to stay after the last sample (default: 1)")
     options = parser.parse_args()
@@ -42,7 +43,7 @@ def main() -> None:
     digest, content, due = hashlib.sha256(), hashlib.sha256(), time.monotonic()
     begin = due
     for number in range(options.count):
-        raw = serialize_message(common.fill(kind(), sample(options.type, options.seed, number)))
+        raw = serialize_message(common.fill(kind(), sample(options.type, options.seed, number, options.short)))
         digest.update(raw)
         content.update(canonical(options.type, raw))
         publisher.publish(raw)

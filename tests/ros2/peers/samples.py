@@ -14,14 +14,20 @@ def text(luck: random.Random) -> str:
     return "".join(luck.choice("abcxyz_/0129 äß€𝄞") for _ in range(luck.randrange(13)))
 
 
-def number(luck: random.Random) -> float:
+def any_number(luck: random.Random) -> float:
     """Any finite or infinite number."""
     return luck.choice([luck.uniform(-1e3, 1e3), luck.gauss(0, 1), 0.0, -0.0, 1e300, 5e-324, float("inf")])
 
 
-def sample(kind: str, seed: int, count: int) -> dict:
+def short_number(luck: random.Random) -> float:
+    """A number of a few digits, which every reader of JSON reads exactly."""
+    return luck.choice([round(luck.uniform(-1e3, 1e3), 3), round(luck.gauss(0, 1), 5), 0.0, -0.0])
+
+
+def sample(kind: str, seed: int, count: int, short: bool = False) -> dict:
     """The fields of a sample, nested as in its `.msg` file."""
     luck = random.Random(f"{kind} {seed} {count}")
+    number = short_number if short else any_number
     header = {
         "stamp": {"sec": luck.randrange(-(2**31), 2**31), "nanosec": luck.randrange(10**9)},
         "frame_id": text(luck),

@@ -31,6 +31,7 @@ impl CampaignPlan {
             }
             Transport::Rosbridge(rosbridge) => {
                 at("transport.remote.url", name(&rosbridge.remote.url))?;
+                at("transport", sound_interfaces(&rosbridge.interfaces))?;
                 at("transport", self.sound_wiring(&simulator.transport))?;
             }
             Transport::Ros1(ros1) => {
@@ -103,18 +104,18 @@ impl CampaignPlan {
         id("node", node.index(), self.nodes.len())
     }
 
-    /// A topic of ROS has a type there, and its layout where the transport needs it; others have none.
+    /// A topic of ROS has a layout, and others have none.
     pub(super) fn has_interface(&self, interface: Option<&str>) -> Checked {
         let interfaces = match &self.simulator.transport {
-            Transport::Ros2(ros2) => Some(&ros2.interfaces),
-            Transport::Ros1(ros1) => Some(&ros1.interfaces),
-            Transport::Rosbridge(_) => None,
+            Transport::Ros2(ros2) => &ros2.interfaces,
+            Transport::Rosbridge(rosbridge) => &rosbridge.interfaces,
+            Transport::Ros1(ros1) => &ros1.interfaces,
             Transport::InProcess { .. } | Transport::Process { .. } | Transport::Mqtt(_) => {
                 return require(interface.is_none(), || "the transport has none".to_owned());
             }
         };
         let Some(wanted) = interface else { return require(false, || "there is none".to_owned()) };
-        let known = interfaces.is_none_or(|known| known.iter().any(|Interface { name, .. }| name == wanted));
+        let known = interfaces.iter().any(|Interface { name, .. }| name == wanted);
         require(known, || format!("there is no interface `{wanted}`"))
     }
 }

@@ -9,6 +9,7 @@
 
 #![expect(clippy::disallowed_methods, reason = "an adapter: it waits for other processes")]
 
+pub mod secret;
 mod system;
 
 use std::time::{Duration, Instant};

@@ -3,6 +3,7 @@
 use super::lifecycle::{Command, Launch, RelayBudget};
 use super::words::{Count, Head, Name, Quantity, Text, UnitName};
 use crate::span::Span;
+use sesame_plan::{Compression, Dialect, Quality};
 
 #[derive(Debug)]
 pub(crate) struct System {
@@ -31,6 +32,7 @@ pub(crate) enum Transport {
     InProcess(InProcess),
     Process(Process),
     Ros2(Ros2),
+    Bus(Bus),
 }
 
 #[derive(Debug)]
@@ -62,6 +64,38 @@ pub(crate) struct Ros2 {
     /// The service that resets the simulator.
     pub(crate) resets: Vec<(Span, Text)>,
     pub(crate) has_errors: bool,
+}
+
+/// A system whose messages go over a bus. Which settings there can be is the grammar's: each kind has its own.
+#[derive(Debug)]
+pub(crate) struct Bus {
+    pub(crate) kind: BusKind,
+    pub(crate) address: Text,
+    pub(crate) domains: Vec<(Span, Count)>,
+    pub(crate) types: Vec<(Span, Vec<Text>)>,
+    pub(crate) clocks: Vec<(Span, Clock)>,
+    pub(crate) resets: Vec<(Span, Text)>,
+    pub(crate) dialects: Vec<(Span, Dialect)>,
+    pub(crate) compressions: Vec<(Span, Compression)>,
+    pub(crate) qualities: Vec<(Span, Quality)>,
+    pub(crate) users: Vec<(Span, Text)>,
+    /// A token or a password.
+    pub(crate) secrets: Vec<(Span, Secret)>,
+    pub(crate) trusts: Vec<(Span, Text)>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum BusKind {
+    Rosbridge,
+    Ros1,
+    Mqtt,
+}
+
+/// Where a secret is kept.
+#[derive(Debug)]
+pub(crate) enum Secret {
+    Environment(Text),
+    File(Text),
 }
 
 #[derive(Debug)]
@@ -157,6 +191,8 @@ pub(crate) struct Node {
     pub(crate) launches: Vec<(Span, Launch)>,
     pub(crate) answers: Vec<(Span, Vec<Answer>)>,
     pub(crate) every_step: Vec<(Span, Vec<Name>)>,
+    /// Where it is connected, if not where the simulator is.
+    pub(crate) brokers: Vec<(Span, Text)>,
 }
 
 /// What a node publishes for each message that it receives.

@@ -5,9 +5,10 @@ use sesame_grammar::Rule;
 use super::reader::{Pair, Reader, child, children, expect_child, first_of};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::syntax::ast::{
-    Answer, Clock, Field, Head, InProcess, Message, Name, Node, Process, Ros2, Service, Simulator, StepBy, StepChannel,
-    Stepping, System, Topic, Transport, Type, TypeKind,
+    Answer, Bus, BusKind, Clock, Field, Head, InProcess, Message, Name, Node, Process, Ros2, Secret, Service,
+    Simulator, StepBy, StepChannel, Stepping, System, Text, Topic, Transport, Type, TypeKind,
 };
+use sesame_plan::{Compression, Dialect, Quality};
 
 impl Reader<'_> {
     pub(super) fn system(&mut self, pair: &Pair<'_>) -> System {
@@ -47,11 +48,14 @@ impl Reader<'_> {
             self.unsupported(&unsupported);
             return Simulator { head, transport: None };
         }
-        let kinds = [Rule::in_process, Rule::process, Rule::ros2];
+        let kinds = [Rule::in_process, Rule::process, Rule::ros2, Rule::rosbridge, Rule::ros1, Rule::mqtt];
         let kind = first_of(pair, &kinds).expect("a simulator has a kind");
         let transport = match kind.as_rule() {
             Rule::process => Transport::Process(self.process(&kind)),
             Rule::ros2 => Transport::Ros2(self.ros2(&kind)),
+            Rule::rosbridge => Transport::Bus(self.bus(&kind, BusKind::Rosbridge, Rule::rosbridge_settings)),
+            Rule::ros1 => Transport::Bus(self.bus(&kind, BusKind::Ros1, Rule::ros1_settings)),
+            Rule::mqtt => Transport::Bus(self.bus(&kind, BusKind::Mqtt, Rule::mqtt_settings)),
             _ => Transport::InProcess(self.in_process(&kind)),
         };
         Simulator { head, transport: Some(transport) }
@@ -97,15 +101,8 @@ impl Reader<'_> {
             let text = |reader: &mut Self| reader.text_of(&expect_child(&setting, Rule::text));
             match setting.as_rule() {
                 Rule::setting_domain => ros2.domains.push((span, reader.count(&expect_child(&setting, Rule::number)))),
-                Rule::setting_types => {
-                    let texts = expect_child(&setting, Rule::texts);
-                    ros2.types
-                        .push((span, children(&texts, Rule::text).map(|folder| reader.text_of(&folder)).collect()));
-                }
-                Rule::setting_clock => {
-                    let wall = child(&setting, Rule::k_wall).is_some();
-                    ros2.clocks.push((span, if wall { Clock::Wall } else { Clock::Topic(text(reader)) }));
-                }
+                Rule::setting_types => ros2.types.push((span, reader.folders(&setting))),
+                Rule::setting_clock => ros2.clocks.push((span, reader.clock(&setting))),
                 Rule::step_by => {
                     let time = reader.signed(&expect_child(&setting, Rule::signed));
                     let by = first_of(&setting, &[Rule::k_service, Rule::k_topic]).map(|channel| {
@@ -122,6 +119,73 @@ impl Reader<'_> {
             }
         });
         ros2
+    }
+
+    fn bus(&mut self, pair: &Pair<'_>, kind: BusKind, settings: Rule) -> Bus {
+        let address = self.text_of(&expect_child(pair, Rule::text));
+        let mut bus = Bus {
+            kind,
+            address,
+            domains: vec![],
+            types: vec![],
+            clocks: vec![],
+            resets: vec![],
+            dialects: vec![],
+            compressions: vec![],
+            qualities: vec![],
+            users: vec![],
+            secrets: vec![],
+            trusts: vec![],
+        };
+        let Some(settings) = child(pair, settings) else { return bus };
+        self.members(&settings, |reader, setting| {
+            let span = reader.keyword_span(&setting);
+            let text = |reader: &mut Self| reader.text_of(&expect_child(&setting, Rule::text));
+            let has = |rule| child(&setting, rule).is_some();
+            match setting.as_rule() {
+                Rule::setting_domain => bus.domains.push((span, reader.count(&expect_child(&setting, Rule::number)))),
+                Rule::setting_types => bus.types.push((span, reader.folders(&setting))),
+                Rule::setting_clock => bus.clocks.push((span, reader.clock(&setting))),
+                Rule::setting_reset => bus.resets.push((span, text(reader))),
+                Rule::setting_dialect => {
+                    bus.dialects.push((span, if has(Rule::k_ros1) { Dialect::Ros1 } else { Dialect::Ros2 }));
+                }
+                Rule::setting_compression => {
+                    bus.compressions.push((span, if has(Rule::k_cbor) { Compression::Cbor } else { Compression::Png }));
+                }
+                Rule::setting_quality => {
+                    let quality = if has(Rule::k_at_most_once) {
+                        Quality::AtMostOnce
+                    } else if has(Rule::k_at_least_once) {
+                        Quality::AtLeastOnce
+                    } else {
+                        Quality::ExactlyOnce
+                    };
+                    bus.qualities.push((span, quality));
+                }
+                Rule::setting_user => bus.users.push((span, text(reader))),
+                Rule::setting_trust => bus.trusts.push((span, text(reader))),
+                _ => bus.secrets.push((span, reader.secret(&expect_child(&setting, Rule::secret)))),
+            }
+        });
+        bus
+    }
+
+    fn folders(&mut self, setting: &Pair<'_>) -> Vec<Text> {
+        let texts = expect_child(setting, Rule::texts);
+        children(&texts, Rule::text).map(|folder| self.text_of(&folder)).collect()
+    }
+
+    fn clock(&mut self, setting: &Pair<'_>) -> Clock {
+        match child(setting, Rule::text) {
+            Some(topic) => Clock::Topic(self.text_of(&topic)),
+            None => Clock::Wall,
+        }
+    }
+
+    fn secret(&mut self, pair: &Pair<'_>) -> Secret {
+        let text = self.text_of(&expect_child(pair, Rule::text));
+        if child(pair, Rule::k_env).is_some() { Secret::Environment(text) } else { Secret::File(text) }
     }
 
     fn service(&mut self, pair: &Pair<'_>) -> Service {
@@ -197,6 +261,7 @@ impl Reader<'_> {
             launches: vec![],
             answers: vec![],
             every_step: vec![],
+            brokers: vec![],
         };
         self.members(pair, |reader, member| {
             let span = reader.keyword_span(&member);
@@ -205,6 +270,7 @@ impl Reader<'_> {
                 Rule::subscribes => node.subscribes.push((span, reader.names(&member))),
                 Rule::launch => node.launches.push((span, reader.launch(&member))),
                 Rule::every_step => node.every_step.push((span, reader.names(&member))),
+                Rule::broker => node.brokers.push((span, reader.text_of(&expect_child(&member, Rule::text)))),
                 _ => {
                     let answers = children(&member, Rule::answer).map(|answer| {
                         let mut names = children(&answer, Rule::name).map(|name| reader.name(&name));

@@ -1,0 +1,145 @@
+//! Nodes of ROS behind a real server of rosbridge: the runner is one of its clients.
+
+use std::io::{BufRead as _, BufReader, Read as _};
+use std::net::{Ipv4Addr, TcpListener};
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use sesame_plan::Test;
+use sesame_tests::workspace;
+
+use crate::environment::{Domain, Vendor};
+use crate::peer::Peer;
+use crate::relaying::{System, plan, space};
+
+const JOINTS: &str = "sensor_msgs/msg/JointState";
+
+/// A server of rosbridge. Dropping it ends it.
+struct Server {
+    child: Child,
+}
+
+impl Server {
+    fn start(pythons: &Pythons, domain: &Domain, port: u16) -> Self {
+        let mut child = Command::new(&pythons.bridge)
+            .arg(workspace().join("tests/ros2/peers/bridge.py"))
+            .arg("--ros")
+            .arg(Vendor::environment(&pythons.jazzy))
+            .args(["--port", &port.to_string()])
+            .env("ROS_DOMAIN_ID", domain.number.to_string())
+            .env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+            .env("PYTHONDONTWRITEBYTECODE", "1")
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the Python of the server starts");
+        let mut said = BufReader::new(child.stdout.take().expect("its output is a pipe"));
+        let mut line = String::new();
+        while !line.contains("listening\n") || line.contains("INFO") {
+            line.clear();
+            assert!(said.read_line(&mut line).expect("it speaks UTF-8") > 0, "the server has ended");
+        }
+        // What it logs is read, so that it never waits for that.
+        std::thread::spawn(move || said.read_to_end(&mut Vec::new()));
+        Server { child }
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        drop(self.child.stdin.take());
+        self.child.wait().expect("a child can be awaited");
+    }
+}
+
+struct Pythons {
+    jazzy: PathBuf,
+    bridge: PathBuf,
+}
+
+impl Pythons {
+    fn find() -> Option<Self> {
+        Some(Pythons { jazzy: Vendor::Jazzy.python()?, bridge: Vendor::Rosbridge.python()? })
+    }
+}
+
+fn free_port() -> u16 {
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).expect("there is a free port");
+    listener.local_addr().expect("it has an address").port()
+}
+
+/// A space with `/peer` behind a bridge.
+fn bridged(domain: &Domain, port: u16, settings: &str, operations: &str, seconds: u32) -> String {
+    let text = space(domain, JOINTS, "", operations, seconds);
+    let bridge = format!("rosbridge \"ws://127.0.0.1:{port}\" {{ {settings} domain");
+    text.replacen("ros2 { domain", &bridge, 1)
+}
+
+/// Runs until a subscriber has so many messages, of which a publisher sends all: what both say.
+fn through(
+    system: &mut System,
+    pythons: &Pythons,
+    domain: &Domain,
+    count: &str,
+    test: &Test,
+) -> [serde_json::Value; 2] {
+    let of_all = ["--type", JOINTS, "--count", count];
+    let listening = [&of_all[..], &["--topic", "/peer", "--content", "--timeout", "20"]].concat();
+    let mut subscriber = Peer::start(&pythons.jazzy, domain, "subscriber.py", &listening);
+    let speaking = [&of_all[..], &["--topic", "/peer/undisturbed", "--rate", "200", "--short", "--hold"]].concat();
+    let publisher = std::cell::RefCell::new(Peer::start(&pythons.jazzy, domain, "publisher.py", &speaking));
+    let ready = || publisher.borrow_mut().go();
+    system.relay_until(test, ready, || subscriber.has_ended());
+    [publisher.into_inner().expect(), subscriber.end().1]
+}
+
+#[test]
+fn a_thousand_messages_reach_nodes_through_a_bridge_and_the_relay_however_they_are_written() {
+    let Some(pythons) = Pythons::find() else { return };
+    let domain = Domain::free();
+    let port = free_port();
+    let _server = Server::start(&pythons, &domain, port);
+    for settings in ["", "compression cbor"] {
+        let plan = plan(&bridged(&domain, port, settings, "", 60));
+        let mut system = System::new(plan);
+        let [said, heard] = through(&mut system, &pythons, &domain, "1000", &Test::default());
+        assert_eq!(heard["count"], 1000, "{settings}: {:?}", system.all_notes());
+        assert_eq!(said["content"], heard["content"], "{settings}");
+        assert_eq!(system.all_notes(), [""; 0]);
+    }
+}
+
+#[test]
+fn after_a_bridge_restarts_every_topic_is_back() {
+    let Some(pythons) = Pythons::find() else { return };
+    let domain = Domain::free();
+    let port = free_port();
+    let server = std::cell::RefCell::new(Some(Server::start(&pythons, &domain, port)));
+    let mut system = System::new(plan(&bridged(&domain, port, "", "", 60)));
+    let of_all = ["--type", JOINTS, "--topic"];
+    let listening = [&of_all[..], &["/peer", "--count", "400", "--timeout", "30"]].concat();
+    let mut subscriber = Peer::start(&pythons.jazzy, &domain, "subscriber.py", &listening);
+    let speaking = [&of_all[..], &["/peer/undisturbed", "--count", "2000", "--rate", "100", "--short", "--hold"]].concat();
+    let publisher = std::cell::RefCell::new(Peer::start(&pythons.jazzy, &domain, "publisher.py", &speaking));
+    let begun = std::cell::Cell::new(Instant::now());
+    let ready = || {
+        publisher.borrow_mut().go();
+        begun.set(Instant::now());
+    };
+    let mut restarted = false;
+    system.relay_until(&Test::default(), ready, || {
+        if !restarted && begun.get().elapsed() > Duration::from_secs(1) {
+            restarted = true;
+            server.borrow_mut().take();
+            *server.borrow_mut() = Some(Server::start(&pythons, &domain, port));
+        }
+        subscriber.has_ended()
+    });
+    assert!(restarted, "the server was to be restarted before all had come");
+    assert_eq!(subscriber.end().1["count"], 400);
+    let notes = system.all_notes();
+    let lost = format!("the connection to the bridge at `ws://127.0.0.1:{port}` was lost for ");
+    assert!(notes.iter().any(|note| note.starts_with(&lost)), "{notes:?}");
+}
