@@ -121,7 +121,8 @@ fn after_a_bridge_restarts_every_topic_is_back() {
     let of_all = ["--type", JOINTS, "--topic"];
     let listening = [&of_all[..], &["/peer", "--count", "400", "--timeout", "30"]].concat();
     let mut subscriber = Peer::start(&pythons.jazzy, &domain, "subscriber.py", &listening);
-    let speaking = [&of_all[..], &["/peer/undisturbed", "--count", "2000", "--rate", "100", "--short", "--hold"]].concat();
+    let speaking =
+        [&of_all[..], &["/peer/undisturbed", "--count", "2000", "--rate", "100", "--short", "--hold"]].concat();
     let publisher = std::cell::RefCell::new(Peer::start(&pythons.jazzy, &domain, "publisher.py", &speaking));
     let begun = std::cell::Cell::new(Instant::now());
     let ready = || {

@@ -7,14 +7,14 @@ use crate::{Clock, Interface, NodeId, Wiring};
 /// Where a bus is, and what a runner shows to be let in.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Remote {
-    /// Its address, for example `ws://127.0.0.1:9090`. It may contain `{port}`, `{worker}` and `{domain}`, for which each
-    /// worker has its own; without them the bus can serve one worker only.
+    /// Its address, for example `ws://127.0.0.1:9090`. It may contain `{port}`, `{worker}` and `{domain}`, for which
+    /// each worker has its own; without them the bus can serve one worker only.
     pub url: String,
     /// What it wants to be shown; `None` for one that lets everybody in.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub token: Option<Secret>,
-    /// A file with the certificates of authorities that are trusted instead of those that the system trusts, relative to
-    /// the folder of the `.sesame` file.
+    /// A file with the certificates of authorities that are trusted instead of those that the system trusts, relative
+    /// to the folder of the `.sesame` file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub trust: Option<String>,
 }
@@ -104,8 +104,8 @@ impl Compression {
 pub struct Mqtt {
     /// The broker of all nodes that have none of their own.
     pub broker: Broker,
-    /// Brokers of nodes. A message goes from the broker of its publisher to those of its subscribers, under the same name
-    /// where these differ; where they do not, publishers of topics that are cut publish on `TOPIC/undisturbed`.
+    /// Brokers of nodes. A message goes from the broker of its publisher to those of its subscribers, under the same
+    /// name where these differ; where they do not, publishers of topics that are cut publish on `TOPIC/undisturbed`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub brokers: Vec<(NodeId, Broker)>,
     /// How surely messages arrive.

@@ -1,7 +1,7 @@
 //! Messages of topics, between the JSON of a bridge and the values of the relay.
 //!
-//! Bridges write what JSON has no number for as `null`, lists of bytes in base64, and points and times as objects. ROS 1
-//! and ROS 2 differ in the names of the parts of a time: a space uses those of ROS 2.
+//! Bridges write what JSON has no number for as `null`, lists of bytes in base64, and points and times as objects. ROS
+//! 1 and ROS 2 differ in the names of the parts of a time: a space uses those of ROS 2.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

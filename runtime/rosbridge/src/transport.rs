@@ -1,7 +1,7 @@
 //! The transport to nodes of ROS behind a bridge: the runner is one of its clients.
 //!
-//! Publishers of topics that are cut publish on `TOPIC/undisturbed`, and the relay on `TOPIC`. Of a service that is cut,
-//! the server is on `SERVICE/undisturbed`, and the runner offers `SERVICE` in its place.
+//! Publishers of topics that are cut publish on `TOPIC/undisturbed`, and the relay on `TOPIC`. Of a service that is
+//! cut, the server is on `SERVICE/undisturbed`, and the runner offers `SERVICE` in its place.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};

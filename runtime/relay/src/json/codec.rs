@@ -11,8 +11,8 @@ use super::encode;
 use crate::message::Mismatch;
 use crate::value::{Record, Value};
 
-/// Reads and writes messages of a plan's topics as texts in JSON. What nobody has changed is written byte for byte as it
-/// was read; parts that the space does not declare are never changed.
+/// Reads and writes messages of a plan's topics as texts in JSON. What nobody has changed is written byte for byte as
+/// it was read; parts that the space does not declare are never changed.
 pub struct Codec {
     plan: CampaignPlan,
     shapes: Shapes,

@@ -5,7 +5,8 @@
 //! clock on the bus, held messages are released when they are due, and a run breaks off when the system falls silent.
 //!
 //! A service that is cut has two lines. At the source of its requests, the bus offers the service to its clients and
-//! numbers their calls; at the sink of its requests, it calls the server. Replies go the other way, by the same numbers.
+//! numbers their calls; at the sink of its requests, it calls the server. Replies go the other way, by the same
+//! numbers.
 
 #![expect(clippy::disallowed_methods, reason = "an adapter: it waits for other processes")]
 
@@ -28,8 +29,8 @@ use self::system::System;
 /// Errors end the run; what concerns one message only is an [`Event::Note`].
 pub trait Bus {
     /// Connects, listens to each source of the lines, and gets ready to publish on each sink. `address` fills
-    /// placeholders of addresses (`{port}`, `{worker}`, `{domain}`) with what this worker has. If nothing answers yet, this
-    /// returns false after a moment (at most 100 ms), and is called again until `connect` succeeds or time is up.
+    /// placeholders of addresses (`{port}`, `{worker}`, `{domain}`) with what this worker has. If nothing answers yet,
+    /// this returns false after a moment (at most 100 ms), and is called again until `connect` succeeds or time is up.
     fn connect(&mut self, lines: &[Line], address: &dyn Fn(&str) -> String) -> Result<bool, TransportError>;
 
     /// What keeps the system from being complete, in words; empty as soon as all that the bus can know of is there:
@@ -45,7 +46,8 @@ pub trait Bus {
     /// Publishes a message on a sink of a line, by their positions. `call` is that of the message from which it comes.
     fn publish(&mut self, line: usize, sink: usize, value: &Value, call: Option<u64>) -> Result<(), TransportError>;
 
-    /// Whether somebody may listen at the sinks of a line, or to a line that is not cut. A bus that cannot know says yes.
+    /// Whether somebody may listen at the sinks of a line, or to a line that is not cut. A bus that cannot know says
+    /// yes.
     fn is_heard(&self, _line: usize) -> bool {
         true
     }
