@@ -25,11 +25,8 @@ pub(crate) enum LabError {
         /// Their names.
         known: String,
     },
-    /// Runners do not reach it.
-    #[error(
-        "lab `{name}` has no simulator that a runner reaches; `process` and `ros2` are. If people run the tests, \
-         `sesamec lab form` prints a form for the results"
-    )]
+    /// People run its tests.
+    #[error("lab `{name}` has no simulator; if people run its tests, `sesamec lab form` prints a form for the results")]
     Unreachable {
         /// Its name.
         name: String,

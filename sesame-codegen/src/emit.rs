@@ -14,7 +14,7 @@ mod rust;
 mod stub;
 mod text;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use quote::{format_ident, quote};
 use serde::Serialize;
@@ -266,7 +266,10 @@ fn runner(runner: &RunnerPlan, environment: &Environment) -> Result<Tree, Proble
     let header = format!("// {note}\n");
 
     let mut features = FEATURES.to_vec();
-    features.extend(feature(&plan.simulator.transport));
+    let in_labs = plan.labs.iter().filter_map(|lab| lab.simulator.as_ref());
+    let reached = std::iter::once(&plan.simulator).chain(in_labs);
+    let wanted: BTreeSet<&str> = reached.filter_map(|simulator| feature(&simulator.transport)).collect();
+    features.extend(wanted);
     let dependencies = package::with_features(&environment.dependencies, &features);
     tree.add(
         "Cargo.toml",

@@ -6,13 +6,13 @@ use sesame_dsl::Analysis;
 use sesame_dsl::diagnostic::{Diagnostic, MEANINGS, Severity, page, render};
 use sesame_dsl::index::Kind;
 use sesame_dsl::model::eddi::Eddi;
-use sesame_dsl::model::{Declaration, Space, Transport};
+use sesame_dsl::model::{Space, Transport};
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::span::Span;
 
 use crate::input::{self, Unreadable};
 use crate::interfaces::Files;
-use crate::lower::{lab_simulator, lower};
+use crate::lower::lower;
 use crate::plan::RunnerPlan;
 use crate::uses;
 
@@ -147,11 +147,6 @@ fn not_used(space: &Space, sources: &SourceMap) -> Vec<String> {
     notes.extend(space.eddis.values().map(|Eddi { declaration, .. }| {
         format!("monitor `{}` ({}) is checked, but not used by runners yet", declaration.name, at(declaration.span))
     }));
-    notes.extend(space.physicals.values().filter_map(|lab| {
-        let Declaration { name, span, .. } = &lab.declaration;
-        let unused = lab.simulator.is_some() && lab_simulator(space, lab).is_none();
-        unused.then(|| format!("`simulator` of lab `{name}` ({}) is checked, but not used yet", at(*span)))
-    }));
     notes
 }
 
@@ -280,7 +275,6 @@ mod tests {
                  through the relay",
                 "monitor `transport` (blocks.sesame:32) is checked, but not used by runners yet",
                 "monitor `conveyor` (blocks.sesame:41) is checked, but not used by runners yet",
-                "`simulator` of lab `lab` (blocks.sesame:47) is checked, but not used yet",
             ]
         );
     }

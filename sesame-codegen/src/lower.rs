@@ -10,7 +10,6 @@
 //!   and of the conditions and expectations of these tests;
 //! - all labs of the space.
 
-mod bus;
 mod condition;
 mod formula;
 mod id;
@@ -20,17 +19,16 @@ mod robustness;
 mod ros2;
 mod selection;
 mod system;
+mod transport;
 
 use sesame_dsl::model::{self, CampaignId, Space};
 use sesame_plan as plan;
 
-use self::bus::bus;
 use self::id::topic_id;
-pub(crate) use self::lab::lab_simulator;
 use self::operation::custom_operations;
-use self::ros2::ros2;
 use self::selection::{Selection, without_operations};
 use self::system::{lifecycle, message, node, topic, unit};
+use self::transport::transport;
 use crate::plan::{HookPlan, RunnerPlan};
 
 /// The plan of a campaign's runner. `source` is the `.sesame` file's name without its folder, `generator` the name and
@@ -38,16 +36,9 @@ use crate::plan::{HookPlan, RunnerPlan};
 pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str) -> RunnerPlan {
     let declared = &space.campaigns[campaign];
     let selection = Selection::of(space, declared);
-    let (transport, simulator_crate) = match &space.simulator.transport {
-        model::Transport::InProcess { path, crate_folder, step_ns } => {
-            (plan::Transport::InProcess { path: path.clone(), step_ns: *step_ns }, crate_folder.clone())
-        }
-        model::Transport::Process { program, arguments, step_ns } => {
-            let (program, arguments) = (program.clone(), arguments.clone());
-            (plan::Transport::Process { program, arguments, step_ns: *step_ns }, None)
-        }
-        model::Transport::Ros2 { .. } => (plan::Transport::Ros2(ros2(space)), None),
-        _ => (bus(space).expect("all other simulators are on a bus"), None),
+    let simulator_crate = match &space.simulator.transport {
+        model::Transport::InProcess { crate_folder, .. } => crate_folder.clone(),
+        _ => None,
     };
     let system_file = space.file_of(&space.simulator.declaration).to_owned();
     let plan = plan::CampaignPlan {
@@ -58,7 +49,7 @@ pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str)
         doc: space.declaration.doc.clone(),
         simulator: plan::Simulator {
             name: space.simulator.declaration.name.clone(),
-            transport,
+            transport: transport(space, &space.simulator.transport),
             lifecycle: lifecycle(&space.lifecycle),
         },
         messages: space.messages.values().map(message).collect(),

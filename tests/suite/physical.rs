@@ -4,6 +4,7 @@
 use std::fs;
 use std::path::PathBuf;
 
+use sesame_plan::Transport;
 use sesame_results::analysis::gap::lab_runs;
 use sesame_results::record::{Origin, Repository};
 use sesame_tests::{Project, Runner, command, done, kuka_cell_lab, sesamec};
@@ -83,6 +84,23 @@ fn recorded_tests_are_run_in_a_lab_and_a_gap_shows_where_one_was_built_in() {
     assert!(!different.is_empty(), "{compared:?}");
     // The metric of what is disturbed does not depend on where it is disturbed.
     assert!(!different.contains(&"fuzzing_time"), "{different:?}");
+}
+
+#[test]
+fn a_campaign_is_performed_in_a_lab_in_place_of_its_simulator() {
+    let runner = project("elsewhere").build("study");
+    runner.run(&["--results", "results", "--simulator", "twin"]).expect(0);
+    let elsewhere = Repository::open(&runner.folder.join("results/5-with-twin")).unwrap();
+    let plan = elsewhere.campaign().plan.clone();
+    assert!(matches!(plan.simulator.transport, Transport::Process { .. }), "{:?}", plan.simulator);
+    assert_eq!(elsewhere.tests().unwrap().iter().filter(|row| row.origin == Origin::Search).count(), 3);
+    // What was found there is run again there, and the simulator knows nothing of it.
+    let again = ["confirm", "T1", "-n", "1", "--results", "results/5-with-twin"];
+    runner.run(&[&again[..], &["--simulator", "twin"]].concat()).expect(0);
+    let said = runner.run(&again).expect(1).err;
+    assert!(said.contains("simulator"), "{said}");
+    let said = runner.run(&["--simulator", "attic"]).expect(1).err;
+    assert!(said.contains("there is no lab `attic`, there is `twin`, `hall`"), "{said}");
 }
 
 #[test]

@@ -15,7 +15,7 @@ use crate::cli::execution::{ExecutionArgs, claim_files, interruptible, refuse_un
 use crate::cli::failure::{Failure, STOPPED};
 use crate::cli::gate::Gate;
 use crate::cli::results_folder::{open, refuse_changed};
-use crate::cli::session::Session;
+use crate::cli::session::{Session, World};
 use crate::cli::terminal::Format;
 use crate::cli::terminal::{print, print_json, say, text_options};
 
@@ -43,10 +43,13 @@ pub struct Options {
     #[command(flatten)]
     gate: Gate,
     #[command(flatten)]
+    world: World,
+    #[command(flatten)]
     execution: ExecutionArgs,
 }
 
 pub(super) fn confirm(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
+    let session = &*options.world.of(session)?;
     let Session { plan, results, .. } = session;
     let repository = open(results, options.results.as_deref())?;
     let mut tests = match options.tests.as_slice() {

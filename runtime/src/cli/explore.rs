@@ -14,7 +14,7 @@ use sesame_search::vary::{coordinate, reach, vary};
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled};
 use crate::cli::failure::Failure;
 use crate::cli::results_folder::{open, refuse_changed};
-use crate::cli::session::Session;
+use crate::cli::session::{Session, World};
 use crate::cli::terminal::say;
 
 /// How many recorded tests are named that lie nearest.
@@ -44,6 +44,8 @@ pub struct Options {
     #[arg(long, value_name = "DIR")]
     results: Option<PathBuf>,
     #[command(flatten)]
+    world: World,
+    #[command(flatten)]
     execution: ExecutionArgs,
     #[command(flatten)]
     output: OutputArgs,
@@ -56,6 +58,7 @@ fn dimension(text: &str) -> Result<Dimension, String> {
 }
 
 pub(super) fn explore(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
+    let session = &*options.world.of(session)?;
     let repository = open(&session.results, options.results.as_deref())?;
     let number = repository.find(&options.test)?;
     refuse_changed(session, &repository, number)?;

@@ -9,7 +9,7 @@ use sesame_plan::{CampaignPlan, KnownTestId, Task};
 
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled};
 use crate::cli::failure::Failure;
-use crate::cli::session::Session;
+use crate::cli::session::{Session, World};
 use crate::cli::terminal::say;
 
 /// Which regression tests are run, and how.
@@ -26,12 +26,15 @@ pub struct Options {
     #[arg(long, value_name = "DIR")]
     results: Option<PathBuf>,
     #[command(flatten)]
+    world: World,
+    #[command(flatten)]
     execution: ExecutionArgs,
     #[command(flatten)]
     output: OutputArgs,
 }
 
 pub(super) fn known(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
+    let session = &*options.world.of(session)?;
     let Session { plan, results, .. } = session;
     let task = Task::Known { tests: chosen(plan, &options.names).map_err(Failure)? };
     let mut plan = task.plan(plan);

@@ -12,7 +12,7 @@ use sesame_rng::derive_seed;
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled};
 use crate::cli::failure::Failure;
 use crate::cli::results_folder::{open, refuse_changed};
-use crate::cli::session::Session;
+use crate::cli::session::{Session, World};
 
 /// Which test is repeated, and how.
 #[derive(Debug, Args)]
@@ -33,6 +33,8 @@ pub struct Options {
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     #[command(flatten)]
+    world: World,
+    #[command(flatten)]
     execution: ExecutionArgs,
     #[command(flatten)]
     output: OutputArgs,
@@ -50,6 +52,7 @@ struct Repeated {
 }
 
 pub(super) fn repeat(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
+    let session = &*options.world.of(session)?;
     let Session { plan, results, .. } = session;
     let declared = plan.tests.iter().find(|test| test.name == options.test && options.results.is_none());
     let Repeated { name, test, plan, seed, results } = match declared {

@@ -11,7 +11,7 @@ use sesame_results::record::{self, Recorder};
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled, shown};
 use crate::cli::failure::Failure;
 use crate::cli::results_folder::{open, refuse_other_model, run_folder};
-use crate::cli::session::Session;
+use crate::cli::session::{Session, World};
 
 /// How a campaign is run. Nothing here but the seed and the number of evaluations changes results.
 #[derive(Debug, Args)]
@@ -33,6 +33,8 @@ pub(super) struct Options {
     #[arg(long, value_name = "DIR")]
     results: Option<PathBuf>,
     #[command(flatten)]
+    world: World,
+    #[command(flatten)]
     execution: ExecutionArgs,
     #[command(flatten)]
     output: OutputArgs,
@@ -45,19 +47,22 @@ pub struct ResumeOptions {
     #[arg(value_name = "DIR")]
     results: Option<PathBuf>,
     #[command(flatten)]
+    world: World,
+    #[command(flatten)]
     execution: ExecutionArgs,
     #[command(flatten)]
     output: OutputArgs,
 }
 
 pub(super) fn run(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
+    let session = &*options.world.of(session)?;
     let Session { plan, results, .. } = session;
     let mut plan = plan.clone();
     if let Some(wanted) = options.evaluations {
         plan.campaign.search.set_evaluations(wanted);
     }
     let seed = options.seed.unwrap_or(plan.campaign.seed);
-    let mut name = seed.to_string();
+    let mut name = format!("{seed}{}", options.world.suffix());
     if let Some(folder) = &options.compensation {
         let compensated = open(results, Some(folder))?;
         refuse_other_model(session, &compensated)?;
@@ -83,6 +88,7 @@ pub(super) fn compensated_name(seed: &str, lab: &str) -> String {
 }
 
 pub(super) fn resume(session: &Session, options: &ResumeOptions) -> Result<ExitCode, Failure> {
+    let session = &*options.world.of(session)?;
     let results = &session.results;
     let folder = match &options.results {
         Some(folder) => run_folder(results, folder),

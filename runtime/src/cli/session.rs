@@ -1,6 +1,9 @@
 //! What each command of a runner works with.
 
+use std::borrow::Cow;
 use std::path::PathBuf;
+
+use clap::Args;
 
 use sesame_plan::CampaignPlan;
 
@@ -10,7 +13,7 @@ use crate::cli::failure::Failure;
 use crate::runner::Runner;
 
 /// A runner whose command is carried out.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Session {
     pub runner: Runner,
     pub plan: CampaignPlan,
@@ -30,11 +33,38 @@ impl Session {
         Ok(Session { runner, plan, results, program: self.program.clone().in_lab(name), caller })
     }
 
+    /// No lab is reached without programs.
+    #[cfg(not(feature = "process"))]
+    pub(super) fn in_lab(&self, name: &str) -> Result<Self, Failure> {
+        let runner = &self.runner.directory;
+        Err(Failure(format!("cannot reach lab `{name}`: {} was built without `process`", runner.display())))
+    }
+
     pub(super) fn new(runner: Runner, program: WorkerProgram, caller: Caller) -> Result<Self, Failure> {
         let plan = serde_json::from_str(&runner.plan).map_err(|error| {
             Failure(format!("the plan in this runner is damaged ({error}): run `sesamec generate` again"))
         })?;
         let results = runner.directory.join("results");
         Ok(Session { runner, plan, results, program, caller })
+    }
+}
+
+/// Where tests are run.
+#[derive(Debug, Default, Args)]
+pub(super) struct World {
+    /// Run in this lab of the space, in place of its simulator
+    #[arg(long, value_name = "LAB")]
+    simulator: Option<String>,
+}
+
+impl World {
+    /// The session, in the lab that is named.
+    pub(super) fn of<'a>(&self, session: &'a Session) -> Result<Cow<'a, Session>, Failure> {
+        self.simulator.as_deref().map_or(Ok(Cow::Borrowed(session)), |lab| session.in_lab(lab).map(Cow::Owned))
+    }
+
+    /// What the name of a run has behind its seed.
+    pub(super) fn suffix(&self) -> String {
+        self.simulator.as_ref().map_or(String::new(), |lab| format!("-with-{lab}"))
     }
 }

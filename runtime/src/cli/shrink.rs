@@ -14,7 +14,7 @@ use crate::cli::caller::Caller;
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled};
 use crate::cli::failure::Failure;
 use crate::cli::results_folder::{open, refuse_changed};
-use crate::cli::session::Session;
+use crate::cli::session::{Session, World};
 
 /// Which test is shrunk, and how.
 #[derive(Debug, Args)]
@@ -39,12 +39,15 @@ pub struct Options {
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
     evaluations: u32,
     #[command(flatten)]
+    world: World,
+    #[command(flatten)]
     execution: ExecutionArgs,
     #[command(flatten)]
     output: OutputArgs,
 }
 
 pub(super) fn shrink(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
+    let session = &*options.world.of(session)?;
     let Session { results, .. } = session;
     if options.evaluations < options.runs {
         return Err(Failure(format!(

@@ -1,47 +1,18 @@
 //! Labs.
 
-use sesame_dsl::model::physical::{Fit, Form, LabSetting, LabSimulator, Physical, Place, Shape};
+use sesame_dsl::model::physical::{Fit, Form, Physical, Place, Shape};
 use sesame_dsl::model::{self, Space};
 use sesame_plan as plan;
 
 use super::id::topic_id;
-use super::ros2::ros2;
 use super::selection::Selection;
+use super::transport::transport;
 
-/// How a lab is reached; `None` if it has no simulator, or one of a kind that runners cannot reach.
-pub(crate) fn lab_simulator(space: &Space, lab: &Physical) -> Option<plan::Simulator> {
-    let LabSimulator { declaration, transport, arguments, settings } = lab.simulator.as_ref()?;
-    let setting = |wanted: &str| settings.iter().find(|(name, _)| name == wanted).map(|(_, value)| value);
-    let transport = match (transport.as_str(), &arguments[..]) {
-        ("process", [program, arguments @ ..]) => {
-            let step_ns = match setting("step") {
-                Some(LabSetting::Seconds(seconds)) => Some(nanoseconds(*seconds)),
-                _ => None,
-            };
-            plan::Transport::Process { program: program.clone(), arguments: arguments.to_vec(), step_ns }
-        }
-        // The nodes of the lab are those of the system, in a domain of their own.
-        ("ros2", _) if matches!(space.simulator.transport, model::Transport::Ros2 { .. }) => {
-            let system = ros2(space);
-            let domain = match setting("domain") {
-                Some(LabSetting::Count(domain)) => u16::try_from(*domain).ok()?,
-                _ => system.domain,
-            };
-            plan::Transport::Ros2(plan::Ros2 { domain, step: None, reset: None, ..system })
-        }
-        _ => return None,
-    };
+/// How a lab is reached; `None` if people run its tests.
+fn lab_simulator(space: &Space, lab: &Physical) -> Option<plan::Simulator> {
+    let model::Simulator { declaration, transport: way } = lab.simulator.as_ref()?;
     let (name, lifecycle) = (declaration.name.clone(), plan::Lifecycle::default());
-    Some(plan::Simulator { name, transport, lifecycle })
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a step is positive, and no step lasts years"
-)]
-fn nanoseconds(seconds: f64) -> u64 {
-    (seconds * 1e9).round().max(1.0) as u64
+    Some(plan::Simulator { name, transport: transport(space, way), lifecycle })
 }
 
 impl Selection {

@@ -1,4 +1,4 @@
-//! A ROS 2 system, from the model to the plan: its layouts, and how its topics are cut.
+//! Systems of ROS, from the model to the plan: their layouts, and how topics are cut.
 
 use std::collections::BTreeSet;
 
@@ -7,21 +7,6 @@ use sesame_plan as plan;
 use sesame_plan::WireType;
 
 use super::id::node_id;
-
-/// What a plan says of a space whose simulator is one of ROS 2.
-pub(super) fn ros2(space: &Space) -> plan::Ros2 {
-    let model::Transport::Ros2 { domain, clock, step, reset } = &space.simulator.transport else {
-        unreachable!("the simulator is one of ROS 2")
-    };
-    plan::Ros2 {
-        domain: *domain,
-        clock: clock.clone(),
-        step: step.clone(),
-        reset: reset.clone(),
-        interfaces: interfaces(space),
-        wiring: wirings(space, step.is_some()),
-    }
-}
 
 /// How the topics of a space are cut, in their order.
 pub(super) fn wirings(space: &Space, stepped: bool) -> Vec<plan::Wiring> {

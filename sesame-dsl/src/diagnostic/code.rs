@@ -102,7 +102,7 @@ codes! {
     CANNOT_CONTAIN = "E0505": "An operation requires something that the campaign's conditions cannot contain, or lengths that its activations do not have.",
     NOTHING_TO_EXPLORE = "E0506": "A strategy lacks what it needs: cells, time windows, conditions, requirements or NSGA-II.",
     BAD_MONITOR = "E0601": "A monitor's guarantees have no order, or are not made of evidence and demands.",
-    BAD_LAB = "E0602": "An address or setting does not fit the transport of a lab's simulator.",
+    BAD_LAB = "E0602": "The simulator of a lab cannot stand in the place of the system's.",
     OUTLASTS_THE_END = "W0001": "A window extends beyond the campaign's end.",
     UNUSED_OPERATION = "W0002": "No campaign and no test uses the operation.",
     OBJECTIVE_WITHOUT_DEFAULT = "W0003": "An objective has no default value.",

@@ -7,6 +7,7 @@ use super::declaration::Declaration;
 use super::fuzz::Target;
 use super::ids::{MetricId, TopicId};
 use super::metrics::Range;
+use super::system::Simulator;
 
 /// A lab.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,7 +15,7 @@ pub struct Physical {
     /// Its name and doc comment.
     pub declaration: Declaration,
     /// How the lab is reached; `None` for a lab whose results come in by hand.
-    pub simulator: Option<LabSimulator>,
+    pub simulator: Option<Simulator>,
     /// How often each chosen test is run; at least 1. Default 1.
     pub repeats: u32,
     /// What running a test costs.
@@ -43,32 +44,6 @@ impl Physical {
         metrics.extend(self.tolerance.iter().map(|&(metric, _)| metric));
         metrics.extend(self.interlock.iter().copied());
     }
-}
-
-/// How a lab is reached. Its transports are those of a simulator.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LabSimulator {
-    /// Its name and doc comment; the name is the lab's own.
-    pub declaration: Declaration,
-    /// The word of the transport, for example `simlog`.
-    pub transport: String,
-    /// Its address or program, and the program's arguments.
-    pub arguments: Vec<String>,
-    /// Its settings by name, in written order.
-    pub settings: Vec<(String, LabSetting)>,
-}
-
-/// The value of a setting.
-#[derive(Debug, Clone, PartialEq)]
-pub enum LabSetting {
-    /// It is on.
-    Flag,
-    /// A whole number.
-    Count(u32),
-    /// A time in seconds; positive.
-    Seconds(f64),
-    /// A text.
-    Text(String),
 }
 
 /// A body.

@@ -2,48 +2,16 @@
 
 use std::collections::BTreeMap;
 
+use super::ros2::is_of_ros;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::physical::{
-    Fit, Form, LabBudget, LabCost, LabSetting, LabSimulator, Physical, Place, RankOrder, Shape,
-};
-use crate::model::{Dimension, Domain, Id as _, MetricId, Parameter};
+use crate::model::physical::{Fit, Form, LabBudget, LabCost, Physical, Place, RankOrder, Shape};
+use crate::model::{Dimension, Domain, Id as _, MetricId, Parameter, Simulator, Type};
 use crate::similar::most_similar;
 use crate::span::Span;
 use crate::syntax::ast::physical as written;
 use crate::syntax::ast::{self, Name, Quantity};
 use crate::units::Unit;
-
-/// What a setting of a transport takes.
-#[derive(Clone, Copy)]
-enum Takes {
-    Nothing,
-    Count,
-    Time,
-    Text,
-}
-
-/// The highest domain of ROS whose ports exist on every system: domains are the only settings that count.
-const MOST_DOMAIN: f64 = 232.0;
-
-/// What a transport takes.
-struct LabTransport {
-    word: &'static str,
-    /// How many texts it takes: at least, at most.
-    texts: (usize, usize),
-    settings: &'static [(&'static str, Takes)],
-}
-
-const TRANSPORTS: [LabTransport; 8] = [
-    LabTransport { word: "in_process", texts: (1, 1), settings: &[("crate", Takes::Text), ("step", Takes::Time)] },
-    LabTransport { word: "process", texts: (1, usize::MAX), settings: &[("step", Takes::Time)] },
-    LabTransport { word: "ros2", texts: (0, 0), settings: &[("domain", Takes::Count), ("types", Takes::Text)] },
-    LabTransport { word: "ros1", texts: (1, 1), settings: &[] },
-    LabTransport { word: "rosbridge", texts: (1, 1), settings: &[("clock", Takes::Text)] },
-    LabTransport { word: "simlog", texts: (1, 1), settings: &[("step", Takes::Time), ("lockstep", Takes::Nothing)] },
-    LabTransport { word: "zenoh", texts: (0, 1), settings: &[] },
-    LabTransport { word: "grpc", texts: (1, 1), settings: &[] },
-];
 
 impl<'a> Resolver<'a> {
     pub(super) fn physicals(&mut self) -> Vec<Option<Physical>> {
@@ -115,91 +83,34 @@ impl<'a> Resolver<'a> {
         }
     }
 
-    fn lab_simulator(&mut self, simulator: &'a written::LabSimulator) -> Option<LabSimulator> {
-        let transport = &simulator.transport;
-        let LabTransport { word, texts: (least, most), settings: known } = TRANSPORTS
-            .into_iter()
-            .find(|known| known.word == transport.text)
-            .expect("the grammar has these transports");
-        let mut complete = true;
-        let given = simulator.arguments.len();
-        if given < least || given > most {
-            let expected = match (least, most) {
-                (0, 0) => "no text".to_owned(),
-                (0, _) => "at most one text".to_owned(),
-                (1, 1) => "one text, its address".to_owned(),
-                _ => "a program and its arguments".to_owned(),
-            };
-            let title = format!("`{word}` takes {expected}, but got {given}");
-            self.report(Diagnostic::new(Code::BAD_LAB, transport.span, title).label(format!("expected {expected}")));
-            complete = false;
-        }
-        let mut settings: Vec<(String, LabSetting)> = Vec::new();
-        let mut first: BTreeMap<&str, Span> = BTreeMap::new();
-        for (name, value) in &simulator.settings {
-            if let Some(&before) = first.get(name.text.as_str()) {
-                self.at_most_one(&[before, name.span], &name.text);
-                complete = false;
-                continue;
+    /// The simulator in a lab's place: as that of a system, but no part of the runner.
+    fn lab_simulator(&mut self, simulator: &'a ast::Simulator) -> Option<Simulator> {
+        let resolved = self.simulator(simulator);
+        let problem = match simulator.transport.as_ref()? {
+            ast::Transport::InProcess(_) => {
+                let label =
+                    "a Rust type is part of the runner; write a program around it, and reach that with `process`";
+                Some(("a lab is reached from outside", label))
             }
-            first.insert(&name.text, name.span);
-            let Some((_, takes)) = known.iter().find(|(word, _)| *word == name.text) else {
-                let known: Vec<&str> = known.iter().map(|(word, _)| *word).collect();
-                let title = format!("`{word}` has no setting `{}`", name.text);
-                let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title).label("unknown setting");
-                diagnostic = match most_similar(&name.text, known.iter().copied()) {
-                    Some(similar) => diagnostic.did_you_mean(name.span, similar),
-                    None if known.is_empty() => diagnostic.note(format!("`{word}` has no settings")),
-                    None => diagnostic.note(format!("the settings of `{word}` are {}", super::words::list(&known))),
-                };
-                self.report(diagnostic);
-                complete = false;
-                continue;
-            };
-            match self.setting(name, value.as_ref(), *takes) {
-                Some(value) => settings.push((name.text.clone(), value)),
-                None => complete = false,
+            transport if is_of_ros(transport) && !self.has_ros_types() => {
+                let label = "name the ROS type of each topic's message, for example `message Twist = \"geometry_msgs/msg/Twist\"`";
+                Some(("a lab of ROS needs topics of ROS", label))
             }
-        }
-        complete.then(|| LabSimulator {
-            declaration: self.declaration(&simulator.head),
-            transport: word.to_owned(),
-            arguments: simulator.arguments.iter().map(|text| text.text.clone()).collect(),
-            settings,
-        })
+            _ => None,
+        };
+        let Some((title, label)) = problem else { return resolved };
+        self.report(Diagnostic::new(Code::BAD_LAB, simulator.head.name.span, title).label(label));
+        None
     }
 
-    fn setting(&mut self, name: &Name, value: Option<&written::Setting>, takes: Takes) -> Option<LabSetting> {
-        let what = format!("`{}`", name.text);
-        let expected = match (takes, value) {
-            (Takes::Nothing, None) => return Some(LabSetting::Flag),
-            (Takes::Text, Some(written::Setting::Text(text))) => return Some(LabSetting::Text(text.text.clone())),
-            (Takes::Time, Some(written::Setting::Quantity(time))) => {
-                return self.positive(time, &Unit::seconds(), &what).map(LabSetting::Seconds);
+    /// Whether each topic carries a message with a ROS type, as far as that is known.
+    fn has_ros_types(&self) -> bool {
+        self.system.topics.iter().flatten().all(|topic| match topic.ty {
+            Type::Message(id) => {
+                self.system.messages[id.index()].as_ref().is_none_or(|message| message.interface.is_some())
             }
-            (Takes::Count, Some(written::Setting::Quantity(number))) => {
-                let value = self.value(number, None, &what)?;
-                if !self.whole(value, number.span, &what) {
-                    return None;
-                }
-                if (0.0..=MOST_DOMAIN).contains(&value) {
-                    #[expect(
-                        clippy::cast_possible_truncation,
-                        clippy::cast_sign_loss,
-                        reason = "it is whole and in the range of u32"
-                    )]
-                    return Some(LabSetting::Count(value as u32));
-                }
-                "a whole number from 0 to 232"
-            }
-            (Takes::Nothing, Some(_)) => "no value",
-            (Takes::Text, _) => "a text",
-            (Takes::Time, _) => "a time such as `20ms`",
-            (Takes::Count, _) => "a whole number",
-        };
-        let title = format!("the setting {what} takes {expected}");
-        self.report(Diagnostic::new(Code::BAD_LAB, name.span, title).label(format!("expected {expected}")));
-        None
+            _ => false,
+        })
     }
 
     /// A plain number, 0 or more.

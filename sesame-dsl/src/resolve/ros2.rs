@@ -28,7 +28,13 @@ impl<'a> Resolver<'a> {
 
     /// Whether the simulator's messages are those of ROS, whichever way they come.
     pub(super) fn is_of_ros(&self) -> bool {
-        self.ast_ros2().is_some() || self.ast_bus().is_some_and(|bus| bus.kind != BusKind::Mqtt)
+        self.simulators().next().and_then(|simulator| simulator.transport.as_ref()).is_some_and(is_of_ros)
+    }
+
+    /// Whether the messages of some lab are those of ROS.
+    fn has_a_lab_of_ros(&self) -> bool {
+        let simulators = self.file.physicals.iter().flat_map(|lab| &lab.simulators);
+        simulators.filter_map(|(_, simulator)| simulator.transport.as_ref()).any(is_of_ros)
     }
 
     /// The folders with definitions of messages that the simulator names.
@@ -55,9 +61,9 @@ impl<'a> Resolver<'a> {
         self.kind().filter(|(word, _)| *word != "ros2")
     }
 
-    /// The same if its messages are not those of ROS.
+    /// The same if its messages are not those of ROS, and those of no lab are.
     pub(super) fn other_than_ros(&self) -> Option<(&'static str, Span)> {
-        self.kind().filter(|_| !self.is_of_ros())
+        self.kind().filter(|_| !self.is_of_ros() && !self.has_a_lab_of_ros())
     }
 
     /// The same if the simulator itself brings all messages, so that nobody is told apart.
@@ -178,6 +184,15 @@ impl<'a> Resolver<'a> {
                 None
             }
         }
+    }
+}
+
+/// Whether messages that come this way are those of ROS.
+pub(super) fn is_of_ros(transport: &ast::Transport) -> bool {
+    match transport {
+        ast::Transport::InProcess(_) | ast::Transport::Process(_) => false,
+        ast::Transport::Ros2(_) => true,
+        ast::Transport::Bus(bus) => bus.kind != BusKind::Mqtt,
     }
 }
 

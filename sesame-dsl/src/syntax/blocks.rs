@@ -358,7 +358,7 @@ pub(super) const BLOCKS: &[Block] = &[
         error: Rule::error_physical_member,
         one: Rule::one_physical_member,
         members: &[
-            Member::new(Rule::lab_simulator, "simulator"),
+            Member::new(Rule::simulator, "simulator"),
             Member::new(Rule::repeats, "repeats"),
             Member::new(Rule::cost, "cost"),
             Member::new(Rule::exclude, "exclude"),
@@ -369,13 +369,6 @@ pub(super) const BLOCKS: &[Block] = &[
             Member::new(Rule::shape, "shape"),
             Member::new(Rule::fit, "fit"),
         ],
-    },
-    Block {
-        rule: Rule::lab_settings,
-        name: "simulator",
-        error: Rule::error_setting,
-        one: Rule::one_lab_setting,
-        members: &[Member::named(Rule::lab_setting, "a setting such as `step 20ms`")],
     },
 ];
 

@@ -510,8 +510,6 @@ fn phrases_of(rule: Rule) -> Vec<String> {
         Rule::held => &["`held`"],
         Rule::stale => &["`stale after`"],
         Rule::mitigation => &["`mitigate with`"],
-        Rule::lab_transport => &["a simulator kind such as `simlog`"],
-        Rule::lab_setting_name => &["a setting such as `step 20ms`"],
         Rule::rank_key | Rule::tolerated => &["a metric"],
         Rule::per_operation => &["`, plus … per operation`"],
         Rule::sphere => &["`sphere`"],

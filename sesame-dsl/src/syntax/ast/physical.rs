@@ -3,6 +3,7 @@
 use sesame_grammar::Rule;
 
 use super::operation::{Amounts, Target};
+use super::system::Simulator;
 use super::words::{Bound, Count, Head, Name, Point, Quantity, Range, Text};
 use crate::span::Span;
 
@@ -10,7 +11,7 @@ use crate::span::Span;
 #[derive(Debug)]
 pub(crate) struct Physical {
     pub(crate) head: Head,
-    pub(crate) simulators: Vec<(Span, LabSimulator)>,
+    pub(crate) simulators: Vec<(Span, Simulator)>,
     pub(crate) repeats: Vec<(Span, Count)>,
     /// What a test costs, and what each of its operations costs besides.
     pub(crate) costs: Vec<(Span, (Quantity, Option<Quantity>))>,
@@ -23,21 +24,6 @@ pub(crate) struct Physical {
     pub(crate) shapes: Vec<Shape>,
     pub(crate) fits: Vec<(Span, Vec<Fit>)>,
     pub(crate) has_errors: bool,
-}
-
-/// How the lab is reached.
-#[derive(Debug)]
-pub(crate) struct LabSimulator {
-    pub(crate) head: Head,
-    pub(crate) transport: Name,
-    pub(crate) arguments: Vec<Text>,
-    pub(crate) settings: Vec<(Name, Option<Setting>)>,
-}
-
-#[derive(Debug)]
-pub(crate) enum Setting {
-    Quantity(Quantity),
-    Text(Text),
 }
 
 /// Which values come first.

@@ -3,8 +3,8 @@
 use sesame_grammar::Rule;
 
 use super::reader::{Pair, Reader, child, children, expect_child};
-use crate::syntax::ast::physical::{Budget, Fit, Form, LabSimulator, Physical, RankOrder, Setting, Shape, ShapePlace};
-use crate::syntax::ast::{Amounts, Name};
+use crate::syntax::ast::Amounts;
+use crate::syntax::ast::physical::{Budget, Fit, Form, Physical, RankOrder, Shape, ShapePlace};
 
 impl Reader<'_> {
     pub(super) fn physical(&mut self, pair: &Pair<'_>) -> Physical {
@@ -25,7 +25,7 @@ impl Reader<'_> {
         lab.has_errors = self.members(pair, |reader, member| {
             let span = reader.keyword_span(&member);
             match member.as_rule() {
-                Rule::lab_simulator => lab.simulators.push((span, reader.lab_simulator(&member))),
+                Rule::simulator => lab.simulators.push((span, reader.simulator(&member))),
                 Rule::repeats => lab.repeats.push((span, reader.count(&expect_child(&member, Rule::number)))),
                 Rule::cost => {
                     let each = child(&member, Rule::per_operation)
@@ -88,23 +88,6 @@ impl Reader<'_> {
                 Fit::Relay { rule, target: target?, amounts: Amounts::Range(range) }
             }
         })
-    }
-
-    fn lab_simulator(&mut self, pair: &Pair<'_>) -> LabSimulator {
-        let word = expect_child(pair, Rule::lab_transport);
-        let transport = Name { text: word.as_str().to_owned(), span: self.span(&word) };
-        let arguments = children(pair, Rule::text).map(|text| self.text_of(&text)).collect();
-        let mut settings = Vec::new();
-        if let Some(block) = child(pair, Rule::lab_settings) {
-            self.members(&block, |reader, setting| {
-                let name = expect_child(&setting, Rule::lab_setting_name);
-                let name = Name { text: name.as_str().to_owned(), span: reader.span(&name) };
-                let number = child(&setting, Rule::signed).map(|number| Setting::Quantity(reader.signed(&number)));
-                let text = child(&setting, Rule::text).map(|text| Setting::Text(reader.text_of(&text)));
-                settings.push((name, number.or(text)));
-            });
-        }
-        LabSimulator { head: self.head(pair), transport, arguments, settings }
     }
 
     fn shape(&mut self, pair: &Pair<'_>) -> Shape {

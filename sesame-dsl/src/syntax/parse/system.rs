@@ -42,7 +42,7 @@ impl Reader<'_> {
         system
     }
 
-    fn simulator(&mut self, pair: &Pair<'_>) -> Simulator {
+    pub(super) fn simulator(&mut self, pair: &Pair<'_>) -> Simulator {
         let head = self.head(pair);
         if let Some(unsupported) = child(pair, Rule::unsupported_transport) {
             self.unsupported(&unsupported);

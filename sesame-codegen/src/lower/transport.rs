@@ -1,0 +1,47 @@
+//! How a simulator is reached, from the model to the plan.
+
+use sesame_dsl::model::{self, NodeId, Space};
+use sesame_plan as plan;
+
+use super::id::node_id;
+use super::ros2::{interfaces, wirings};
+
+/// The way to a simulator of a space: its own, or that of a lab.
+pub(super) fn transport(space: &Space, transport: &model::Transport) -> plan::Transport {
+    let wiring = || wirings(space, false);
+    match transport.clone() {
+        model::Transport::InProcess { path, crate_folder: _, step_ns } => plan::Transport::InProcess { path, step_ns },
+        model::Transport::Process { program, arguments, step_ns } => {
+            plan::Transport::Process { program, arguments, step_ns }
+        }
+        model::Transport::Ros2 { domain, clock, step, reset } => {
+            let wiring = wirings(space, step.is_some());
+            plan::Transport::Ros2(plan::Ros2 { domain, clock, step, reset, interfaces: interfaces(space), wiring })
+        }
+        model::Transport::Rosbridge { remote, domain, dialect, compression, clock, reset } => {
+            let (interfaces, wiring) = (interfaces(space), wiring());
+            plan::Transport::Rosbridge(plan::Rosbridge {
+                remote,
+                domain,
+                dialect,
+                compression,
+                clock,
+                reset,
+                interfaces,
+                wiring,
+            })
+        }
+        model::Transport::Ros1 { master, clock, reset } => {
+            let (interfaces, wiring) = (interfaces(space), wiring());
+            plan::Transport::Ros1(plan::Ros1 { master, clock, reset, interfaces, wiring })
+        }
+        model::Transport::Mqtt { broker, quality } => {
+            let of_node = |(id, node): (NodeId, &model::Node)| {
+                let remote = plan::Remote { url: node.broker.clone()?, ..broker.remote.clone() };
+                Some((node_id(id), plan::Broker { remote, user: broker.user.clone() }))
+            };
+            let brokers = space.nodes.iter().filter_map(of_node).collect();
+            plan::Transport::Mqtt(plan::Mqtt { broker, brokers, quality, wiring: wiring() })
+        }
+    }
+}
