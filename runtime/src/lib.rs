@@ -52,6 +52,8 @@ pub mod transport {
     pub use sesame_relay::transport::*;
     #[cfg(feature = "ros2")]
     pub use sesame_ros2::ros2;
+    #[cfg(feature = "simlog")]
+    pub use sesame_simlog::simlog;
 }
 
 /// The version of the interface between generated code and this crate.

@@ -102,7 +102,7 @@ pub fn emit(plans: &[RunnerPlan], environment: &Environment) -> Result<Vec<Tree>
 pub fn simulator_path(transport: &Transport) -> Option<Vec<&str>> {
     match transport {
         Transport::InProcess { path, .. } => Some(path.split("::").collect()),
-        Transport::Process { .. } | Transport::Ros2(_) => None,
+        Transport::Process { .. } | Transport::Ros2(_) | Transport::Simlog(_) => None,
     }
 }
 
@@ -257,6 +257,9 @@ fn runner(runner: &RunnerPlan, environment: &Environment) -> Result<Tree, Proble
 
     let mut features = FEATURES.to_vec();
     features.extend(matches!(plan.simulator.transport, Transport::Ros2(_)).then_some("ros2"));
+    if let Transport::Simlog(simlog) = &plan.simulator.transport {
+        features.push(if simlog.url.starts_with("https://") { "simlog-tls" } else { "simlog" });
+    }
     let dependencies = package::with_features(&environment.dependencies, &features);
     tree.add(
         "Cargo.toml",
@@ -283,7 +286,7 @@ fn runner(runner: &RunnerPlan, environment: &Environment) -> Result<Tree, Proble
         seed: plan.campaign.seed,
         wiring: match plan.simulator.transport {
             Transport::Ros2(_) => doc_lines(&crate::wiring::text(plan)),
-            Transport::InProcess { .. } | Transport::Process { .. } => Vec::new(),
+            Transport::InProcess { .. } | Transport::Process { .. } | Transport::Simlog(_) => Vec::new(),
         },
     };
     tree.add("README.md", Owner::Machine, environment.templates.render("runner/runner_readme.md.tera", &readme)?);
@@ -374,6 +377,7 @@ fn campaign(runner: &RunnerPlan, environment: &Environment, header: &str) -> Str
         };
         let transport = match plan.simulator.transport {
             Transport::Ros2(_) => quote! { ros2 },
+            Transport::Simlog(_) => quote! { simlog },
             Transport::InProcess { .. } | Transport::Process { .. } => quote! { process },
         };
         let connect = quote! {

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Launch, Lifecycle, MessageId, Ros2, TopicId};
+use crate::{Launch, Lifecycle, MessageId, Ros2, Simlog, TopicId};
 
 /// The simulator, and how the runner reaches it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -41,6 +41,8 @@ pub enum Transport {
     },
     /// Nodes of ROS 2.
     Ros2(Ros2),
+    /// A simulator that speaks SimlogAPI.
+    Simlog(Simlog),
 }
 
 /// A named message type.
@@ -114,7 +116,7 @@ pub struct Topic {
     #[serde(rename = "type")]
     pub ty: Type,
     /// The layout of its messages on the wire, by the name of an [`Interface`](crate::Interface), where the transport
-    /// needs it.
+    /// needs it. Of SimlogAPI it is the name of the type, which may be left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interface: Option<String>,
     /// Whether it is a topic of the middleware, or one direction of a service.

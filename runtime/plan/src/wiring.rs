@@ -87,7 +87,7 @@ impl CampaignPlan {
     fn cut(&self) -> impl Iterator<Item = (TopicId, &Topic, &Wiring)> {
         let wiring = match &self.simulator.transport {
             Transport::Ros2(ros2) => &ros2.wiring[..],
-            Transport::InProcess { .. } | Transport::Process { .. } => &[],
+            Transport::InProcess { .. } | Transport::Process { .. } | Transport::Simlog(_) => &[],
         };
         let topics = (0..).map(TopicId).zip(&self.topics).zip(wiring);
         topics.filter(|(_, wiring)| wiring.cut).map(|((id, topic), wiring)| (id, topic, wiring))

@@ -245,7 +245,9 @@ fn arm() -> CampaignPlan {
 fn ros(plan: &mut CampaignPlan) -> &mut Ros2 {
     match &mut plan.simulator.transport {
         Transport::Ros2(ros2) => ros2,
-        Transport::InProcess { .. } | Transport::Process { .. } => panic!("it is a system of ROS"),
+        Transport::InProcess { .. } | Transport::Process { .. } | Transport::Simlog(_) => {
+            panic!("it is a system of ROS")
+        }
     }
 }
 
