@@ -16,6 +16,7 @@ pub mod v3 {
 
 /// Version 3: steps.
 #[cfg(feature = "client")]
+#[cfg_attr(feature = "server", expect(non_camel_case_types, reason = "named after a method of the protocol"))]
 #[expect(missing_docs, reason = "generated; the protocol's file describes it")]
 #[expect(clippy::pedantic, reason = "generated")]
 pub mod simulator3 {
