@@ -109,13 +109,16 @@ def main():
     parser.add_argument("--back-at", type=int, help="the step in which the clock goes back")
     simulator, port = Simulator(parser.parse_args()), two_ports()
     steps, topics = sim_services.add_SimServerAPIServicer_to_server, services.add_SimlogAPIServicer_to_server
+    servers = []
     for add, at in ((steps, port), (topics, port + 1)):
         server = grpc.server(futures.ThreadPoolExecutor(16))
         add(simulator, server)
         server.add_insecure_port(f"127.0.0.1:{at}")
         server.start()
+        servers.append(server)
     print(f"port {port}", flush=True)
-    server.wait_for_termination()
+    for server in servers:
+        server.wait_for_termination()
 
 
 if __name__ == "__main__":
