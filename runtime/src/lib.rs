@@ -46,6 +46,8 @@ pub use sesame_rng as rng;
 pub use sesame_search as search;
 #[cfg(feature = "campaign")]
 pub use sesame_search::{coverage, sspr};
+#[cfg(feature = "simlog-server")]
+pub use sesame_simlog::server as simlog_server;
 
 /// How a runner reaches its simulator.
 pub mod transport {

@@ -17,8 +17,8 @@ use sesame_plan::WireNames;
 use sesame_relay::simulator::{Bus, Setup, Simulator, SimulatorError};
 use tokio::net::TcpListener;
 use tokio::runtime::Builder;
-use tokio_stream::wrappers::TcpListenerStream;
 use tonic::transport::Server;
+use tonic::transport::server::TcpIncoming;
 
 use self::bearer::Bearer;
 use self::calls::Calls;
@@ -69,8 +69,9 @@ pub fn serve<S: Simulator>(
     let address = listener.local_addr()?;
     let calls = SimlogApiServer::new(Calls::new(sender)).max_decoding_message_size(MESSAGE_LIMIT);
     let guarded = tonic::service::interceptor::InterceptedService::new(calls, Bearer::new(options.token.clone()));
-    let server = Server::builder().tcp_nodelay(true).add_service(guarded);
-    let incoming = TcpListenerStream::new(listener);
+    let server = Server::builder().add_service(guarded);
+    // Answers are small, and none may wait for the next one.
+    let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
     let serving = std::thread::Builder::new()
         .name("simlog".to_owned())
         .spawn(move || runtime.block_on(server.serve_with_incoming(incoming)))?;

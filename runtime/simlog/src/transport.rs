@@ -36,6 +36,9 @@ const SILENCE: Duration = Duration::from_secs(10);
 /// How long a simulator is waited for to acknowledge what is listened to: some do not until their first message.
 const ACKNOWLEDGED: Duration = Duration::from_millis(300);
 
+/// How long the messages of the last step are waited for: a simulation that has ended need not publish them.
+const LAST_WORDS: Duration = Duration::from_millis(500);
+
 /// How often it is looked whether a launched program has ended.
 const LOOK: Duration = Duration::from_millis(100);
 
@@ -188,8 +191,10 @@ impl System {
                 break;
             }
             let ended = round.stepped.is_some_and(|stepped| stepped.ended);
-            let wait = if complete || ended {
+            let wait = if complete {
                 settle
+            } else if ended {
+                LAST_WORDS
             } else if round.stepped.is_none() {
                 Duration::from_millis(1)
             } else {

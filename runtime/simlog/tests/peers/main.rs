@@ -7,5 +7,6 @@ mod peer;
 mod recorder;
 
 mod client;
+mod served;
 mod version2;
 mod version3;
