@@ -3,6 +3,7 @@
 //! Each stream of messages is opened by a task of its own, since a server may acknowledge it with its first message
 //! only, which no step may wait for.
 
+mod api;
 mod connect;
 mod error;
 mod inbox;
@@ -13,71 +14,20 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use sesame_plan::SimlogVersion;
 use tokio::runtime::{Builder, Handle};
 use tokio::sync::oneshot;
-use tonic::service::interceptor::InterceptedService;
-use tonic::transport::Channel;
 use tonic::{Status, Streaming};
 
-use self::connect::{Bearer, connected, endpoint, next_port};
+use self::api::{Api, uuid};
 use self::inbox::Inbox;
 use crate::message::Message;
-use crate::proto::simulator3::sim_server_api_client::SimServerApiClient;
 use crate::proto::simulator3::{SimStatus, StepRequest as StepRequest3};
-use crate::proto::v2::simlog_api_client::SimlogApiClient as Api2;
 use crate::proto::v2::{InjectRequest, PubRequest, RosMessage, StepRequest, StepSizeRequest, TopicDescriptor};
-use crate::proto::v3::simlog_api_client::SimlogApiClient as Api3;
 use crate::proto::v3::{self, SimlogMessage, Subscriber, SubscriptionRequest, TopicInfoRequest};
 
+pub use self::api::Options;
 pub use self::error::ClientError;
 pub use self::inbox::{Bounds, Heard};
-
-/// The largest message that is taken, in bytes.
-const MESSAGE_LIMIT: usize = 4 << 20;
-
-/// Where a simulator is, and how it is spoken to.
-#[derive(Debug, Clone)]
-pub struct Options {
-    /// Its URL, `http://HOST:PORT` or `https://HOST:PORT`.
-    pub url: String,
-    /// The URL of its topics in version 3; `None` for the port after that of `url`.
-    pub topics_url: Option<String>,
-    /// The version of the protocol.
-    pub version: SimlogVersion,
-    /// The certificates (PEM) of whoever vouches for an `https://` URL.
-    pub ca: Option<Vec<u8>>,
-    /// Sent with each call (`authorization: Bearer …`).
-    pub token: Option<String>,
-    /// How long connecting may take, and an answer.
-    pub patience: Duration,
-    /// How much may wait to be taken.
-    pub bounds: Bounds,
-}
-
-impl Options {
-    /// Those of a URL: without TLS and token, and with a patience of ten seconds.
-    pub fn new(url: &str, version: SimlogVersion) -> Self {
-        Options {
-            url: url.to_owned(),
-            topics_url: None,
-            version,
-            ca: None,
-            token: None,
-            patience: Duration::from_secs(10),
-            bounds: Bounds::default(),
-        }
-    }
-}
-
-type Line = InterceptedService<Channel, Bearer>;
-
-/// The calls of a version.
-#[derive(Debug, Clone)]
-enum Api {
-    V2(Api2<Line>),
-    V3 { topics: Api3<Line>, simulator: SimServerApiClient<Line> },
-}
 
 /// What a step has come to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -143,7 +93,7 @@ impl Client {
         });
         let mut client = Client {
             patience: options.patience,
-            api: api(options, &handle, Endpoints::of(options)?)?,
+            api: api::connect(options, &handle)?,
             uuid: uuid(),
             step: 0,
             inbox: Arc::new(Inbox::new(&url, options.bounds)),
@@ -405,63 +355,10 @@ impl Drop for Client {
     }
 }
 
-struct Endpoints {
-    urls: Vec<String>,
-    bearer: Bearer,
-}
-
-impl Endpoints {
-    fn of(options: &Options) -> Result<Self, ClientError> {
-        let mut urls = vec![options.url.clone()];
-        if options.version == SimlogVersion::V3 {
-            urls.push(match &options.topics_url {
-                Some(url) => url.clone(),
-                None => next_port(&options.url)?,
-            });
-        }
-        Ok(Endpoints { urls, bearer: Bearer::new(&options.url, options.token.as_deref())? })
-    }
-}
-
-/// Connects to all servers of a simulator.
-fn api(options: &Options, handle: &Handle, Endpoints { urls, bearer }: Endpoints) -> Result<Api, ClientError> {
-    let mut lines = Vec::new();
-    for url in urls {
-        let endpoint = endpoint(&url, options.ca.as_deref())?;
-        let (sender, receiver) = sync_channel(1);
-        let within = options.patience;
-        let connecting = connected(url.clone(), endpoint, within);
-        handle.spawn(async move { sender.send(connecting.await).ok() });
-        // It ends by itself a little after its time.
-        let late = |how: RecvTimeoutError| ClientError::Unreachable { url, limit: within, how: how.to_string() };
-        let channel = receiver.recv_timeout(within + Duration::from_secs(1)).map_err(late)??;
-        lines.push(InterceptedService::new(channel, bearer.clone()));
-    }
-    let mut lines = lines.into_iter();
-    let (first, second) = (lines.next(), lines.next());
-    Ok(match (first, second) {
-        (Some(simulator), Some(topics)) => Api::V3 {
-            topics: Api3::new(topics).max_decoding_message_size(MESSAGE_LIMIT),
-            simulator: SimServerApiClient::new(simulator).max_decoding_message_size(MESSAGE_LIMIT),
-        },
-        (Some(simulator), None) => Api::V2(Api2::new(simulator).max_decoding_message_size(MESSAGE_LIMIT)),
-        (None, _) => unreachable!("there is always a URL"),
-    })
-}
-
 fn descriptor(name: &str, kind: &str) -> TopicDescriptor {
     TopicDescriptor { path: name.to_owned(), msg_type: kind.to_owned() }
 }
 
 fn over(url: &str, what: &str) -> ClientError {
     ClientError::Lost { url: url.to_owned(), how: format!("the stream of {what} ended") }
-}
-
-/// A name that no other subscriber has: of this process, and of its count of clients.
-fn uuid() -> String {
-    use std::sync::atomic::{AtomicU64, Ordering};
-    static CLIENTS: AtomicU64 = AtomicU64::new(0);
-    let client = CLIENTS.fetch_add(1, Ordering::Relaxed);
-    let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
-    format!("{:08x}-0000-4000-8000-{:012x}", std::process::id(), since.as_nanos() as u64 % (1 << 40) + client)
 }

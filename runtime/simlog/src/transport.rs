@@ -15,6 +15,7 @@
 
 mod lines;
 mod round;
+mod session;
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -27,8 +28,9 @@ use sesame_relay::simulator::Progress;
 use sesame_relay::transport::{Capabilities, Connect, Incidents, Transport, TransportError};
 
 use self::lines::Lines;
-use self::round::{Round, Start};
-use crate::client::{Client, ClientError, Options};
+use self::round::Round;
+use self::session::{Session, Start, fault};
+use crate::client::{Client, Options};
 
 /// How long nothing may come in while something must.
 const SILENCE: Duration = Duration::from_secs(10);
@@ -38,6 +40,9 @@ const ACKNOWLEDGED: Duration = Duration::from_millis(300);
 
 /// How long the messages of the last step are waited for: a simulation that has ended need not publish them.
 const LAST_WORDS: Duration = Duration::from_millis(500);
+
+/// Within which time it is noticed that a program has ended.
+const NOTICED: Duration = Duration::from_secs(1);
 
 /// How often it is looked whether a launched program has ended.
 const LOOK: Duration = Duration::from_millis(100);
@@ -86,18 +91,6 @@ struct System {
     start: Option<Start>,
     deliveries: Vec<Delivery>,
     incidents: Incidents,
-}
-
-/// The connection of one run.
-struct Session {
-    client: Client,
-    lines: Lines,
-    /// The stream of the marker, if there is one.
-    marker: Option<usize>,
-    /// What the simulator's own time was when this run began.
-    start: Option<Start>,
-    /// What was noted, each once.
-    notes: Vec<String>,
 }
 
 impl System {
@@ -221,10 +214,16 @@ impl System {
     }
 
     fn fail(&mut self, error: TransportError) -> TransportError {
-        // A launched program that has ended comes first: the connection may be lost for want of it.
-        let error = match self.launched.check() {
-            Err(ended) => ended,
-            Ok(()) => error,
+        // A launched program that has ended comes first: the connection may be lost for want of it. A connection is
+        // lost before a process has ended.
+        let lost = matches!(error, TransportError::ConnectionLost { .. }) && self.launched.is_started();
+        let limit = if lost { now() + NOTICED } else { now() };
+        let error = loop {
+            match self.launched.check() {
+                Err(ended) => break ended,
+                Ok(()) if now() >= limit => break error,
+                Ok(()) => std::thread::sleep(Duration::from_millis(5)),
+            }
         };
         if matches!(error, TransportError::Silent { .. }) {
             self.incidents.notes.push(error.to_string());
@@ -281,23 +280,6 @@ impl Transport for System {
     }
 }
 
-/// The error of a run for one of its client.
-fn fault(error: ClientError) -> TransportError {
-    match error {
-        ClientError::Lost { url, how } => TransportError::ConnectionLost { to: url, how },
-        ClientError::Unreachable { url, .. } => {
-            TransportError::ConnectionLost { to: url.clone(), how: "nobody answers there".to_owned() }
-        }
-        ClientError::Silent { url, what, limit } => {
-            TransportError::Silent { awaited: format!("the answer of {url} to {what}"), limit: limit.as_secs_f64() }
-        }
-        ClientError::Refused { .. } => TransportError::Simulator(error.to_string()),
-        ClientError::Url { .. } | ClientError::NoTopic { .. } | ClientError::Overflow { .. } => {
-            TransportError::Wiring(error.to_string())
-        }
-    }
-}
-
 /// Whole milliseconds, as plans have them.
 fn milliseconds(nanoseconds: u64) -> i64 {
     i64::try_from(nanoseconds / 1_000_000).unwrap_or(i64::MAX)
@@ -306,3 +288,6 @@ fn milliseconds(nanoseconds: u64) -> i64 {
 fn now() -> Instant {
     Instant::now()
 }
+
+#[cfg(test)]
+mod tests;

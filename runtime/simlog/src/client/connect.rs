@@ -7,8 +7,7 @@ use tonic::service::Interceptor;
 use tonic::transport::{Channel, Endpoint};
 use tonic::{Request, Status};
 
-use super::ClientError;
-use super::error::root;
+use super::error::{ClientError, root};
 
 /// How long an attempt waits after the one before it.
 const PAUSE: Duration = Duration::from_millis(50);
@@ -68,13 +67,15 @@ fn over_tls(_: Endpoint, _: Option<&[u8]>) -> Result<Endpoint, String> {
 /// Connects, trying again until the time is over: what was just launched may not listen yet.
 pub(super) async fn connected(url: String, endpoint: Endpoint, within: Duration) -> Result<Channel, ClientError> {
     let began = Instant::now();
+    let mut how = "it does not answer".to_owned();
     loop {
         let left = within.saturating_sub(began.elapsed());
-        let how = match tokio::time::timeout(left, endpoint.connect()).await {
+        match tokio::time::timeout(left, endpoint.connect()).await {
             Ok(Ok(channel)) => return Ok(channel),
-            Ok(Err(error)) => root(&error),
-            Err(_) => "it does not answer".to_owned(),
-        };
+            Ok(Err(error)) => how = root(&error),
+            // How an attempt failed before says more.
+            Err(_) => {}
+        }
         if began.elapsed() + PAUSE >= within {
             return Err(ClientError::Unreachable { url, limit: within, how });
         }

@@ -5,7 +5,7 @@ use std::mem;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use super::ClientError;
+use super::error::ClientError;
 use crate::message::Message;
 
 /// A message that came in.

@@ -2,15 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
-use sesame_base::time::SimTime;
 use sesame_plan::{CampaignPlan, Simlog, TopicId, Type};
+use sesame_relay::message::Mismatch;
 use sesame_relay::relay::{Delivery, Exchange};
-use sesame_relay::transport::TransportError;
+use sesame_relay::value::Value;
 use sesame_relay::wire::{Wire, WireTable};
 
-use super::round::Round;
-use super::{Session, fault};
-use crate::client::{Client, ClientError, Heard};
+use crate::client::{Client, ClientError};
 use crate::message::Message;
 use crate::shape::Shape;
 
@@ -79,9 +77,44 @@ impl Lines {
         self.lines.iter()
     }
 
-    /// The wire of a stream of the client; none of the marker's.
+    /// The line of a stream of the client; there is none of the marker's.
     pub(super) fn of_stream(&self, stream: usize) -> Option<&Line> {
         self.lines.get(stream)
+    }
+
+    /// As [`Lines::of_stream`], mutable.
+    pub(super) fn of_stream_mut(&mut self, stream: usize) -> Option<&mut Line> {
+        self.lines.get_mut(stream)
+    }
+
+    /// The line of a wire.
+    pub(super) fn of_wire(&self, wire: Wire) -> Option<&Line> {
+        self.by_wire.get(&wire).map(|&at| &self.lines[at])
+    }
+}
+
+impl Line {
+    /// Takes the next message: gives its value, and remembers it as it came.
+    pub(super) fn take(&mut self, message: Message) -> Result<Value, Mismatch> {
+        let value = message.read(&self.shape)?;
+        if self.injected.is_some() {
+            if self.originals.len() == REMEMBERED {
+                self.originals.pop_front();
+            }
+            self.originals.push_back((self.count, message));
+        }
+        self.count += 1;
+        Ok(value)
+    }
+
+    /// What a delivery is on the wire, and under which name; `None` where messages are only heard, and are where they
+    /// belong already.
+    pub(super) fn written(&self, delivery: &Delivery) -> Result<Option<(String, Message)>, Mismatch> {
+        let Some(name) = &self.injected else { return Ok(None) };
+        let of_index = self.originals.iter().find(|(number, _)| *number == delivery.index);
+        // Nothing is delivered that has not come.
+        let Some((_, original)) = of_index.or(self.originals.back()) else { return Ok(None) };
+        Ok(Some((name.clone(), original.with(&delivery.value)?)))
     }
 }
 
@@ -94,72 +127,6 @@ fn kind(plan: &CampaignPlan, topic: TopicId) -> String {
         (None, Type::Point { .. }) => "Point".to_owned(),
         (None, Type::Bool | Type::Int { .. } | Type::Real { .. } | Type::Text | Type::List { .. }) => {
             "STRING".to_owned()
-        }
-    }
-}
-
-impl Session {
-    /// Takes what was heard through the relay, in the order of wires.
-    pub(super) fn relay(
-        &mut self,
-        plan: &CampaignPlan,
-        now: SimTime,
-        mut heard: Vec<Heard>,
-        relay: &mut dyn Exchange,
-        deliveries: &mut Vec<Delivery>,
-    ) -> Result<(), TransportError> {
-        heard.sort_by_key(|heard| heard.stream);
-        for Heard { stream, message } in heard {
-            let Some(line) = self.lines.lines.get_mut(stream) else { continue };
-            let value = message.read(&line.shape).map_err(|mismatch| TransportError::WrongType {
-                path: relay.wires().path(line.wire).to_owned(),
-                reason: format!("{mismatch}; topic `{}` declares it", plan.topic(line.topic).name),
-            })?;
-            if line.injected.is_some() {
-                if line.originals.len() == REMEMBERED {
-                    line.originals.pop_front();
-                }
-                line.originals.push_back((line.count, message));
-            }
-            line.count += 1;
-            relay.message(now, line.wire, value, deliveries);
-        }
-        Ok(())
-    }
-
-    /// Publishes what is delivered, and notes who will answer it. What was only listened to is where it belongs.
-    pub(super) fn deliver(
-        &mut self,
-        plan: &CampaignPlan,
-        deliveries: &mut Vec<Delivery>,
-        relay: &dyn Exchange,
-        round: &mut Round,
-    ) -> Result<(), TransportError> {
-        let mut published = Vec::new();
-        for Delivery { wire, index, value } in deliveries.drain(..) {
-            let Some(line) = self.lines.by_wire.get(&wire).map(|&at| &self.lines.lines[at]) else { continue };
-            let Some(name) = &line.injected else { continue };
-            let original = line.originals.iter().find(|(number, _)| *number == index).or(line.originals.back());
-            // Nothing is delivered that has not come.
-            let Some((_, original)) = original else { continue };
-            match original.with(&value) {
-                Ok(message) => {
-                    round.owe(plan, relay.wires(), wire);
-                    published.push((name.clone(), message));
-                }
-                Err(mismatch) => {
-                    let path = relay.wires().path(wire);
-                    let note = format!("a message on `{path}` cannot be written and is dropped: {mismatch}");
-                    self.note(note);
-                }
-            }
-        }
-        if published.is_empty() { Ok(()) } else { self.client.publish(published).map_err(fault) }
-    }
-
-    pub(super) fn note(&mut self, note: String) {
-        if !self.notes.contains(&note) {
-            self.notes.push(note);
         }
     }
 }

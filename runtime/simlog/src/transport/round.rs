@@ -1,19 +1,12 @@
-//! The messages of one step: which are expected, which have come, and what time the simulator says it is.
+//! The messages of one step: which are expected, and which have come.
 
 use std::collections::BTreeMap;
 
-use sesame_base::time::SimTime;
 use sesame_plan::CampaignPlan;
-use sesame_relay::transport::TransportError;
 use sesame_relay::wire::{Wire, WireTable};
 
-use super::Session;
 use super::lines::Lines;
 use crate::client::{Heard, Stepped};
-
-/// What the simulator's own time is ahead of the run's, in nanoseconds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Start(i128);
 
 /// One step.
 pub(super) struct Round {
@@ -93,48 +86,5 @@ impl Round {
             Some(format!("{count} on `{}`", plan.topic(line.topic).name))
         });
         format!("a message of the step ({})", owed.collect::<Vec<_>>().join(", "))
-    }
-}
-
-impl Session {
-    /// Compares the simulator's time with that of the run: by its clock, or else by the stamps of messages.
-    pub(super) fn look_at_time(
-        &mut self,
-        now: SimTime,
-        step: SimTime,
-        stepped: Option<Stepped>,
-        heard: &[Heard],
-        first_run: &mut Option<Start>,
-    ) -> Result<(), TransportError> {
-        let (run, step) = (i128::from(now.nanos()), i128::from(step.nanos()));
-        let clock = stepped.and_then(|stepped| stepped.clock_ms).map(|clock| i128::from(clock) * 1_000_000);
-        let stamps = heard.iter().filter_map(|heard| heard.message.stamp()).map(i128::from);
-        let stamps: Vec<i128> = if clock.is_some() { Vec::new() } else { stamps.collect() };
-        let Some(latest) = clock.or_else(|| stamps.iter().copied().max()) else { return Ok(()) };
-        let Some(Start(start)) = self.start else {
-            let start = latest - run;
-            let Start(first) = *first_run.get_or_insert(Start(start));
-            if start > first + step {
-                let seconds = (start as f64) / 1e9;
-                return Err(TransportError::Wiring(format!(
-                    "the simulator did not begin anew: its time goes on from {seconds:.3} s; declare what launches it, so \
-                     that each test starts it"
-                )));
-            }
-            self.start = Some(Start(start));
-            return Ok(());
-        };
-        if clock.is_some() && latest < start + run - step {
-            let time = |time: i128| SimTime::from_nanos(i64::try_from(time - start).unwrap_or(i64::MAX));
-            return Err(TransportError::ClockBack { from: time(start + run - step), to: time(latest) });
-        }
-        if stamps.iter().any(|&stamp| stamp - start <= run - step) {
-            self.note(
-                "messages came after their step was complete, so equal tests may differ: declare the topics that are \
-                 published `every step`, or a longer settling time"
-                    .to_owned(),
-            );
-        }
-        Ok(())
     }
 }

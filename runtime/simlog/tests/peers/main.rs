@@ -3,10 +3,14 @@
 //! `examples/set_up.py` makes the environment of the peers, and `SESAME_SIMLOG` names its Python. A test without it says
 //! that it is skipped, and fails with `CI=true`.
 
+#![cfg(all(feature = "client", feature = "server"))]
+
 mod peer;
 mod recorder;
 
 mod client;
 mod served;
+#[cfg(feature = "tls")]
+mod tls;
 mod version2;
 mod version3;

@@ -1,7 +1,7 @@
 //! A relay that writes down what passes, and changes it.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::Path;
 
 use sesame_base::time::SimTime;
 use sesame_plan::testing::{minimal, node, topic};
@@ -122,8 +122,13 @@ pub(crate) fn plan(url: &str, protocol: SimlogVersion, topics: &[(&str, Type)]) 
 
 /// The transport of a plan.
 pub(crate) fn transport(plan: &CampaignPlan) -> Box<dyn Transport> {
+    transport_in(plan, Path::new(env!("CARGO_MANIFEST_DIR")))
+}
+
+/// The transport of a plan whose files are seen from this folder.
+pub(crate) fn transport_in(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
     plan.validate().expect("the plan is sound");
-    sesame_simlog::simlog(PathBuf::from(env!("CARGO_MANIFEST_DIR"))).transport(plan)
+    sesame_simlog::simlog(folder.to_owned()).transport(plan)
 }
 
 /// Runs until the end, or until this many steps were taken. How many were.

@@ -12,14 +12,14 @@ use sesame_relay::value::Value;
 use sesame_simlog::client::{Client, Options};
 use sesame_simlog::server;
 
-use crate::recorder::{Recorder, plan, run, transport};
+use crate::recorder::{Change, Recorder, plan, run, transport};
 
 const REAL: Type = Type::Real { unit: None };
 
 /// A controller, and a cart that moves by what it hears until it has arrived.
 struct Cart {
-    joint: Port,
-    cart: Port,
+    target: Port,
+    state: Port,
     zone: Port,
     at: f64,
 }
@@ -29,18 +29,18 @@ impl Simulator for Cart {
         if setup.step.nanos() > 1_000_000_000 {
             return Err(SimulatorError("steps are too long".to_owned()));
         }
-        let [joint, cart, zone] = ["joint", "cart", "safetyzones/Z1"].map(|path| bus.open(path));
-        bus.subscribe(joint);
-        bus.publish(cart, [-1.0, 0.0, 0.0]);
-        Ok(Cart { joint, cart, zone, at: 0.0 })
+        let [target, state, zone] = ["joint", "cart", "safetyzones/Z1"].map(|path| bus.open(path));
+        bus.subscribe(target);
+        bus.publish(state, [-1.0, 0.0, 0.0]);
+        Ok(Cart { target, state, zone, at: 0.0 })
     }
 
     fn step(&mut self, bus: &mut Bus<'_>) -> Result<Progress, SimulatorError> {
-        bus.publish(self.joint, 0.5);
-        while let Some(heard) = bus.receive(self.joint) {
+        bus.publish(self.target, 0.5);
+        while let Some(heard) = bus.receive(self.target) {
             self.at += heard.number_at::<&str>(&[]).unwrap_or(f64::NAN);
         }
-        bus.publish(self.cart, [self.at, bus.now().seconds(), 0.0]);
+        bus.publish(self.state, [self.at, bus.now().seconds(), 0.0]);
         let fields =
             [("zone", "Z1".into()), ("level", Value::Real(self.at)), ("object1", "a".into()), ("object2", "b".into())];
         bus.publish(self.zone, record(&fields));
@@ -61,12 +61,10 @@ fn anywhere() -> server::Options {
     server::Options::new(([127, 0, 0, 1], 0).into())
 }
 
-fn doubled(path: &str, value: Value) -> Option<Value> {
-    match value {
-        Value::Real(x) if path == "joint" => Some(Value::Real(2.0 * x)),
-        other => Some(other),
-    }
-}
+const DOUBLED: Change = |path, value| match value {
+    Value::Real(x) if path == "joint" => Some(Value::Real(2.0 * x)),
+    other => Some(other),
+};
 
 #[test]
 fn a_simulator_of_ours_is_disturbed_over_the_protocol() {
@@ -76,7 +74,7 @@ fn a_simulator_of_ours_is_disturbed_over_the_protocol() {
     let mut plan = plan(&url, SimlogVersion::V2, &topics);
     plan.messages = vec![message("SafetyZone", vec![field("zone", Type::Text), field("level", REAL)])];
     let mut transport = transport(&plan);
-    let mut first = Recorder::new(&plan, doubled);
+    let mut first = Recorder::new(&plan, DOUBLED);
     // What is delivered arrives a step later, and twice as large: one more in each step after the first.
     assert_eq!(run(transport.as_mut(), 500, &mut first), Ok(101));
     let positions = first.numbers("cart", &["x"]);
@@ -84,7 +82,7 @@ fn a_simulator_of_ours_is_disturbed_over_the_protocol() {
     assert_eq!(positions, expected, "at the start, and in each step");
     assert_eq!(first.numbers("safetyzones/Z1", &["level"]), expected[1..]);
     assert_eq!(first.of("cart")[0].0.nanos(), 0);
-    let mut second = Recorder::new(&plan, doubled);
+    let mut second = Recorder::new(&plan, DOUBLED);
     assert_eq!(run(transport.as_mut(), 500, &mut second), Ok(101), "each run begins anew");
     assert_eq!(first.published, second.published);
     assert_eq!(transport.incidents().notes, [""; 0]);

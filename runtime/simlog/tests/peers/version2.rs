@@ -7,7 +7,7 @@ use sesame_relay::transport::{Fault, TransportError};
 use sesame_relay::value::Value;
 
 use crate::peer::Peer;
-use crate::recorder::{Recorder, STEP, plan, run, transport};
+use crate::recorder::{Change, Recorder, STEP, plan, run, transport};
 
 const REAL: Type = Type::Real { unit: None };
 const INT: Type = Type::Int { unit: None };
@@ -52,21 +52,18 @@ fn everything(url: &str) -> CampaignPlan {
     plan
 }
 
-fn undisturbed(_: &str, value: Value) -> Option<Value> {
-    Some(value)
-}
+const UNDISTURBED: Change = |_, value| Some(value);
 
 /// Adds a half to the target of the joint.
-fn biased(path: &str, value: Value) -> Option<Value> {
-    match value {
-        Value::Real(x) if path == "joint" => Some(Value::Real(x + 0.5)),
-        other => Some(other),
-    }
-}
+const BIASED: Change = |path, value| match value {
+    Value::Real(x) if path == "joint" => Some(Value::Real(x + 0.5)),
+    other => Some(other),
+};
 
 fn near(found: &[f64], expected: impl Iterator<Item = f64>) {
     for (at, (found, expected)) in found.iter().zip(expected).enumerate() {
-        assert!((found - expected).abs() < 1e-5, "message {at} is {found}, not {expected}");
+        let tolerance = 1e-5 * expected.abs().max(1.0);
+        assert!((found - expected).abs() < tolerance, "message {at} is {found}, not {expected}");
     }
 }
 
@@ -78,7 +75,7 @@ fn times() -> impl Iterator<Item = f64> + Clone {
 fn five_hundred_steps(arguments: &[&str]) {
     let Some(peer) = Peer::start("simulator2.py", arguments) else { return };
     let plan = everything(&peer.url());
-    let (mut transport, mut relay) = (transport(&plan), Recorder::new(&plan, biased));
+    let (mut transport, mut relay) = (transport(&plan), Recorder::new(&plan, BIASED));
     assert_eq!(run(transport.as_mut(), STEPS, &mut relay), Ok(STEPS));
     assert_eq!(relay.subscribed, ["joint"], "nobody hears the relay where nothing is cut");
     for topic in &plan.topics {
@@ -94,7 +91,7 @@ fn five_hundred_steps(arguments: &[&str]) {
     near(&relay.numbers("stamped", &["header", "seq"]), (1..=STEPS).map(f64::from));
     near(&relay.numbers("turn", &["z"]), times().map(f64::sin));
     near(&relay.numbers("clock", &["stamp", "nsec"]), times().map(|t| (t.fract() * 1e9).round() % 1e9));
-    near(&relay.numbers("safetyzones/Z1", &["level"]), times().map(|t| f64::from((300.0 - t) as f32)));
+    near(&relay.numbers("safetyzones/Z1", &["level"]), times().map(|t| 300.0 - t));
     near(&relay.numbers("state", &["t"]), times());
     let (_, last) = relay.of("command").last().expect("there are messages");
     assert_eq!(last.at(&["cmd"]), Some(&Value::from("stop")));
@@ -130,7 +127,7 @@ fn topics_without_a_declared_count_are_given_time() {
     let Some(peer) = Peer::start("simulator2.py", &[]) else { return };
     let mut plan = plan(&peer.url(), SimlogVersion::V2, &[("joint", REAL)]);
     plan.topics.push(topic("seldom", &["seldom"], INT));
-    let (mut transport, mut relay) = (transport(&plan), Recorder::new(&plan, undisturbed));
+    let (mut transport, mut relay) = (transport(&plan), Recorder::new(&plan, UNDISTURBED));
     assert_eq!(run(transport.as_mut(), 100, &mut relay), Ok(100));
     let expected: Vec<(SimTime, Value)> =
         (1..=10).map(|n| (SimTime::from_nanos(STEP.nanos() * 10 * n), Value::Int(10 * n))).collect();
@@ -141,10 +138,10 @@ fn topics_without_a_declared_count_are_given_time() {
 fn the_simulation_may_end() {
     let Some(peer) = Peer::start("simulator2.py", &["--end-at", "7"]) else { return };
     let plan = plan(&peer.url(), SimlogVersion::V2, &[("joint", REAL)]);
-    let (mut transport, mut relay) = (transport(&plan), Recorder::new(&plan, undisturbed));
+    let (mut transport, mut relay) = (transport(&plan), Recorder::new(&plan, UNDISTURBED));
     assert_eq!(run(transport.as_mut(), 100, &mut relay), Ok(7));
     assert_eq!(relay.of("joint").len(), 7, "the last step counts");
-    let mut again = Recorder::new(&plan, undisturbed);
+    let mut again = Recorder::new(&plan, UNDISTURBED);
     assert_eq!(run(transport.as_mut(), 100, &mut again), Ok(7), "a new run begins anew");
     assert_eq!(again.of("joint"), relay.of("joint"), "equal runs are equal");
 }
@@ -154,8 +151,8 @@ fn a_run_that_does_not_begin_anew_is_refused() {
     let Some(peer) = Peer::start("simulator2.py", &["--goes-on"]) else { return };
     let plan = plan(&peer.url(), SimlogVersion::V2, &[("joint", REAL)]);
     let mut transport = transport(&plan);
-    assert_eq!(run(transport.as_mut(), 10, &mut Recorder::new(&plan, undisturbed)), Ok(10));
-    let refused = run(transport.as_mut(), 10, &mut Recorder::new(&plan, undisturbed)).unwrap_err().to_string();
+    assert_eq!(run(transport.as_mut(), 10, &mut Recorder::new(&plan, UNDISTURBED)), Ok(10));
+    let refused = run(transport.as_mut(), 10, &mut Recorder::new(&plan, UNDISTURBED)).unwrap_err().to_string();
     assert!(refused.contains("did not begin anew") && refused.contains("0.200 s"), "{refused}");
 }
 
@@ -163,7 +160,7 @@ fn a_run_that_does_not_begin_anew_is_refused() {
 fn what_is_not_of_its_type_is_an_error() {
     let Some(peer) = Peer::start("simulator2.py", &["--malformed"]) else { return };
     let plan = plan(&peer.url(), SimlogVersion::V2, &[("joint", REAL), ("point", POINT)]);
-    let run = run(transport(&plan).as_mut(), 10, &mut Recorder::new(&plan, undisturbed));
+    let run = run(transport(&plan).as_mut(), 10, &mut Recorder::new(&plan, UNDISTURBED));
     let Err(TransportError::WrongType { path, reason }) = run else { panic!("{run:?}") };
     assert_eq!(path, "point");
     assert!(reason.contains("expected JSON, found text") && reason.contains("topic `point`"), "{reason}");
@@ -173,7 +170,7 @@ fn what_is_not_of_its_type_is_an_error() {
 fn a_lost_simulator_is_named() {
     let Some(peer) = Peer::start("simulator2.py", &["--die-at", "5"]) else { return };
     let plan = plan(&peer.url(), SimlogVersion::V2, &[("joint", REAL)]);
-    let mut relay = Recorder::new(&plan, undisturbed);
+    let mut relay = Recorder::new(&plan, UNDISTURBED);
     let lost = run(transport(&plan).as_mut(), 10, &mut relay).unwrap_err();
     assert_eq!(lost.fault(), Fault::Disconnect, "{lost}");
     assert!(lost.to_string().contains(&peer.url()), "{lost}");

@@ -6,7 +6,7 @@ use sesame_relay::transport::{Fault, TransportError};
 use sesame_relay::value::Value;
 
 use crate::peer::Peer;
-use crate::recorder::{Recorder, plan, run, transport};
+use crate::recorder::{Change, Recorder, plan, run, transport};
 
 const REAL: Type = Type::Real { unit: None };
 const STEPS: u32 = 500;
@@ -19,18 +19,16 @@ fn cell(peer: &Peer) -> CampaignPlan {
     plan
 }
 
-fn doubled(path: &str, value: Value) -> Option<Value> {
-    match value {
-        Value::Real(x) if path == "joint" => Some(Value::Real(2.0 * x)),
-        other => Some(other),
-    }
-}
+const DOUBLED: Change = |path, value| match value {
+    Value::Real(x) if path == "joint" => Some(Value::Real(2.0 * x)),
+    other => Some(other),
+};
 
 #[test]
 fn messages_pass_in_every_step() {
     let Some(peer) = Peer::start("simulator3.py", &[]) else { return };
     let plan = cell(&peer);
-    let (mut transport, mut relay) = (transport(&plan), Recorder::new(&plan, doubled));
+    let (mut transport, mut relay) = (transport(&plan), Recorder::new(&plan, DOUBLED));
     assert_eq!(run(transport.as_mut(), STEPS, &mut relay), Ok(STEPS));
     let times: Vec<f64> = (1..=STEPS).map(|step| f64::from(step) * 0.02).collect();
     let (joint, cart) = (relay.numbers("joint", &[]), relay.numbers("cart", &[]));
@@ -49,7 +47,7 @@ fn messages_pass_in_every_step() {
 fn the_simulation_may_end() {
     let Some(peer) = Peer::start("simulator3.py", &["--end-at", "7"]) else { return };
     let plan = cell(&peer);
-    let mut relay = Recorder::new(&plan, doubled);
+    let mut relay = Recorder::new(&plan, DOUBLED);
     assert_eq!(run(transport(&plan).as_mut(), 100, &mut relay), Ok(7));
     assert_eq!(relay.of("joint").len(), 7);
 }
@@ -58,7 +56,7 @@ fn the_simulation_may_end() {
 fn a_clock_that_goes_back_is_an_error() {
     let Some(peer) = Peer::start("simulator3.py", &["--back-at", "5"]) else { return };
     let plan = cell(&peer);
-    let back = run(transport(&plan).as_mut(), 100, &mut Recorder::new(&plan, doubled)).unwrap_err();
+    let back = run(transport(&plan).as_mut(), 100, &mut Recorder::new(&plan, DOUBLED)).unwrap_err();
     assert_eq!(back.fault(), Fault::WrongClock, "{back}");
 }
 
@@ -66,7 +64,7 @@ fn a_clock_that_goes_back_is_an_error() {
 fn a_topic_that_is_not_there_is_named() {
     let Some(peer) = Peer::start("simulator3.py", &[]) else { return };
     let plan = plan(&peer.url(), SimlogVersion::V3, &[("joint", REAL), ("carts", REAL)]);
-    let refused = run(transport(&plan).as_mut(), 10, &mut Recorder::new(&plan, doubled));
+    let refused = run(transport(&plan).as_mut(), 10, &mut Recorder::new(&plan, DOUBLED));
     let Err(TransportError::Wiring(said)) = refused else { panic!("{refused:?}") };
     assert!(said.contains("no topic `SIM://carts/out`"), "{said}");
 }
