@@ -303,7 +303,8 @@ impl Client {
     fn subscribe(&self, name: &str, stream: usize) -> Result<(), ClientError> {
         let Api::V3 { topics: mut api, .. } = self.api.clone() else { return Ok(()) };
         self.inbox.name(name, stream);
-        // A subscription needs the subscriber, whose task may not have created it yet. Not every server says when it has.
+        // A subscription needs the subscriber, whose task may not have created it yet. Not every server says when it
+        // has.
         if stream == 0 {
             self.inbox.await_open(1, self.patience / 10)?;
         }

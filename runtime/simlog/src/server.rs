@@ -1,8 +1,8 @@
 //! A simulator of ours over SimlogAPI, version 2: what other platforms drive over that protocol can drive it too.
 //!
-//! The simulator stays on the thread that serves it; calls come from the threads of the connections. A run begins when a
-//! client sets the length of a step, and again when it does so again. What the simulator publishes as it starts goes to
-//! the first who subscribes before the first step. Topics that are cut stay cut as long as the stream of the cut is
+//! The simulator stays on the thread that serves it; calls come from the threads of the connections. A run begins when
+//! a client sets the length of a step, and again when it does so again. What the simulator publishes as it starts goes
+//! to the first who subscribes before the first step. Topics that are cut stay cut as long as the stream of the cut is
 //! there. The code of a step is 0, or -1 once the simulation has ended.
 
 mod bearer;

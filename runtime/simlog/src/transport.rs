@@ -1,14 +1,14 @@
 //! The transport to a simulator that speaks SimlogAPI, stepped in lock-step.
 //!
 //! Topics on which operations act are cut: the simulator hands their messages to the runner, and subscribers hear what
-//! the runner publishes instead. Time stands still between steps, so what is published in a step reaches its subscribers
-//! in the next one, disturbed or not. All other topics are only listened to.
+//! the runner publishes instead. Time stands still between steps, so what is published in a step reaches its
+//! subscribers in the next one, disturbed or not. All other topics are only listened to.
 //!
 //! When the messages of a step are complete: in version 3, when the message of the marker has come. Else, when the
 //! simulator has answered the step, each topic that a node publishes `every step` has sent one message on each of its
-//! names, and each message that was delivered has been answered where a node says that it `answers`. If a topic is heard
-//! of which no node says how many messages it has, nothing may have come for a settling time as well; a message that is
-//! later than that counts for the step after, which is noted where its time stamp shows it.
+//! names, and each message that was delivered has been answered where a node says that it `answers`. If a topic is
+//! heard of which no node says how many messages it has, nothing may have come for a settling time as well; a message
+//! that is later than that counts for the step after, which is noted where its time stamp shows it.
 //!
 //! A run begins with a new connection and the length of a step. The plan launches the simulator afresh, or else the
 //! simulator must begin anew then, as ours do; one whose time goes on from the run before is refused.
@@ -50,8 +50,8 @@ const LOOK: Duration = Duration::from_millis(100);
 /// The variable with the token that is sent with each call, if there is one.
 const TOKEN: &str = "SESAME_SIMLOG_TOKEN";
 
-/// Connects to a simulator that speaks SimlogAPI. Launched programs run in this folder, and names of files are seen from
-/// it. If the variable `SESAME_SIMLOG_TOKEN` is set, its token goes with each call.
+/// Connects to a simulator that speaks SimlogAPI. Launched programs run in this folder, and names of files are seen
+/// from it. If the variable `SESAME_SIMLOG_TOKEN` is set, its token goes with each call.
 pub fn simlog(folder: PathBuf) -> Connect {
     Connect::new(connect, folder)
 }

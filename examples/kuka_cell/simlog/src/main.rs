@@ -1,5 +1,5 @@
-//! The gearbox cell over SimlogAPI, version 2: the protocol of the simulator that the paper used, so whatever drives that
-//! simulator can drive this cell.
+//! The gearbox cell over SimlogAPI, version 2: the protocol of the simulator that the paper used, so whatever drives
+//! that simulator can drive this cell.
 
 use std::net::SocketAddr;
 use std::process::ExitCode;

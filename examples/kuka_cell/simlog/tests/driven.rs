@@ -1,7 +1,7 @@
 //! The program driven by grpcio: its runs are those of the cell.
 //!
-//! `SESAME_SIMLOG` names the Python, which `./test` sets up. Without it the tests say that they are skipped, and fail with
-//! `CI=true`.
+//! `SESAME_SIMLOG` names the Python, which `./test` sets up. Without it the tests say that they are skipped, and fail
+//! with `CI=true`.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead as _, BufReader};

@@ -88,3 +88,11 @@ fn a_program_that_ends_is_named() {
     let ended = run(&mut system(&plan), &plan, 50).unwrap_err();
     assert!(matches!(&ended, TransportError::Ended { what, .. } if what.contains("simulator2.py")), "{ended}");
 }
+
+#[test]
+fn settings_that_are_left_out_have_their_defaults() {
+    let json = r#"{"url": "http://localhost:8089", "step_ns": 20000000, "protocol": "v2"}"#;
+    let simlog: Simlog = serde_json::from_str(json).unwrap();
+    assert_eq!(simlog.names, WireNames::default());
+    assert_eq!((simlog.settle_ns, &simlog.cut, &simlog.marker, &simlog.ca), (5_000_000, &Vec::new(), &None, &None));
+}

@@ -1,7 +1,7 @@
 //! SimlogAPI with peers that others wrote: grpcio, with what its tools make of the same files.
 //!
-//! `examples/set_up.py` makes the environment of the peers, and `SESAME_SIMLOG` names its Python. A test without it says
-//! that it is skipped, and fails with `CI=true`.
+//! `examples/set_up.py` makes the environment of the peers, and `SESAME_SIMLOG` names its Python. A test without it
+//! says that it is skipped, and fails with `CI=true`.
 
 #![cfg(all(feature = "client", feature = "server"))]
 
