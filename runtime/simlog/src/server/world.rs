@@ -15,7 +15,7 @@ use crate::ros;
 use crate::shape::Shape;
 
 /// How many subscribers there may be.
-const SUBSCRIBERS: usize = 1000;
+const SUBSCRIBERS: usize = 256;
 
 /// How many messages are kept for the first subscriber of a topic.
 const KEPT: usize = 1000;
@@ -122,7 +122,7 @@ impl<S: Simulator, F: FnMut(&Setup, &mut Bus<'_>) -> Result<S, SimulatorError>> 
         Ok(if self.ended { -1 } else { 0 })
     }
 
-    /// Sends a message to all who hear its topic. Whoever does not keep up is told so, and hears no more.
+    /// Sends a message to all who hear its topic. The stream of whoever does not keep up ends.
     fn send(&mut self, topic: &str, value: &Value, now: SimTime) -> Result<(), Status> {
         if self.subscribers.iter().all(|it| it.topic != topic) {
             return Ok(());

@@ -126,8 +126,8 @@ impl Session {
 pub(super) fn fault(error: ClientError) -> TransportError {
     match error {
         ClientError::Lost { url, how } => TransportError::ConnectionLost { to: url, how },
-        ClientError::Unreachable { url, .. } => {
-            TransportError::ConnectionLost { to: url.clone(), how: "nobody answers there".to_owned() }
+        ClientError::Unreachable { url, how, .. } => {
+            TransportError::ConnectionLost { to: url, how: format!("nobody answers there: {how}") }
         }
         ClientError::Silent { url, what, limit } => {
             TransportError::Silent { awaited: format!("the answer of {url} to {what}"), limit: limit.as_secs_f64() }
