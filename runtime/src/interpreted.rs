@@ -32,6 +32,8 @@ pub(crate) fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> 
         sesame_plan::Transport::Ros2(_) => sesame_ros2::ros2(folder.to_owned()),
         #[cfg(feature = "rosbridge")]
         sesame_plan::Transport::Rosbridge(_) => sesame_rosbridge::rosbridge(folder.to_owned()),
+        #[cfg(feature = "simlog")]
+        sesame_plan::Transport::Simlog(_) => sesame_simlog::simlog(folder.to_owned()),
         sesame_plan::Transport::Process { .. } => transport::process(folder.to_owned()),
         other => return Box::new(Unavailable(other.word())),
     };

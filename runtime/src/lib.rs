@@ -46,6 +46,8 @@ pub use sesame_rng as rng;
 pub use sesame_search as search;
 #[cfg(feature = "campaign")]
 pub use sesame_search::{coverage, sspr};
+#[cfg(feature = "simlog-server")]
+pub use sesame_simlog::server as simlog_server;
 
 /// How a runner reaches its simulator.
 pub mod transport {
@@ -54,6 +56,8 @@ pub mod transport {
     pub use sesame_ros2::ros2;
     #[cfg(feature = "rosbridge")]
     pub use sesame_rosbridge::rosbridge;
+    #[cfg(feature = "simlog")]
+    pub use sesame_simlog::simlog;
 }
 
 /// The version of the interface between generated code and this crate.

@@ -113,6 +113,8 @@ fn feature(transport: &Transport) -> Option<&'static str> {
         Transport::Ros2(_) | Transport::Rosbridge(_) | Transport::Ros1(_) | Transport::Mqtt(_) => {
             Some(transport.word())
         }
+        Transport::Simlog(simlog) if simlog.url.starts_with("https://") => Some("simlog-tls"),
+        Transport::Simlog(_) => Some("simlog"),
     }
 }
 
@@ -295,7 +297,7 @@ fn runner(runner: &RunnerPlan, environment: &Environment) -> Result<Tree, Proble
         evaluations: plan.campaign.search.evaluations(),
         seed: plan.campaign.seed,
         wiring: match plan.simulator.transport {
-            Transport::InProcess { .. } | Transport::Process { .. } => Vec::new(),
+            Transport::InProcess { .. } | Transport::Process { .. } | Transport::Simlog(_) => Vec::new(),
             _ => doc_lines(&crate::wiring::text(plan)),
         },
     };

@@ -135,9 +135,9 @@ fn not_used(space: &Space, sources: &SourceMap) -> Vec<String> {
     let mut notes = Vec::new();
     let unmeasured = match &space.simulator.transport {
         Transport::InProcess { .. } => Some("an in-process simulator is stepped without delay"),
-        Transport::Process { step_ns: Some(_), .. } | Transport::Ros2 { step: Some(_), .. } => {
-            Some("in lock-step time stands still while messages pass through the relay")
-        }
+        Transport::Process { step_ns: Some(_), .. }
+        | Transport::Ros2 { step: Some(_), .. }
+        | Transport::Simlog { .. } => Some("in lock-step time stands still while messages pass through the relay"),
         Transport::Ros2 { step: None, .. } => None,
         _ => Some("it is measured between nodes of ROS 2 only"),
     };

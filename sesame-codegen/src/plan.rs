@@ -95,15 +95,17 @@ impl RunnerPlan {
     }
 
     /// Whether a runner of this campaign contains Rust that this command does not: the user's simulator or hooks, or
-    /// the transport of ROS 2 unless the command was built with it. Without, the plan says everything.
+    /// the transport of ROS 2 or SimlogAPI unless the command was built with it. Without, the plan says everything.
     pub fn needs_rust(&self) -> bool {
-        let transport = match self.plan.simulator.transport {
+        let transport = match &self.plan.simulator.transport {
             Transport::InProcess { .. } => true,
             Transport::Process { .. } => false,
             Transport::Ros2(_) => !cfg!(feature = "ros2"),
             Transport::Rosbridge(_) => !cfg!(feature = "rosbridge"),
             Transport::Ros1(_) => !cfg!(feature = "ros1"),
             Transport::Mqtt(_) => !cfg!(feature = "mqtt"),
+            Transport::Simlog(simlog) if simlog.url.starts_with("https://") => !cfg!(feature = "simlog-tls"),
+            Transport::Simlog(_) => !cfg!(feature = "simlog"),
         };
         transport
             || self.hooks.iter().any(|hook| self.uses(hook))

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Launch, Lifecycle, MessageId, Mqtt, Ros1, Ros2, Rosbridge, TopicId, Wiring};
+use crate::{Launch, Lifecycle, MessageId, Mqtt, Ros1, Ros2, Rosbridge, Simlog, TopicId, Wiring};
 
 /// The simulator, and how the runner reaches it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -47,6 +47,8 @@ pub enum Transport {
     Ros1(Ros1),
     /// A system whose messages go over brokers of MQTT.
     Mqtt(Mqtt),
+    /// A simulator that speaks SimlogAPI.
+    Simlog(Simlog),
 }
 
 impl Transport {
@@ -59,13 +61,14 @@ impl Transport {
             Transport::Rosbridge(_) => "rosbridge",
             Transport::Ros1(_) => "ros1",
             Transport::Mqtt(_) => "mqtt",
+            Transport::Simlog(_) => "simlog",
         }
     }
 
     /// How each topic of the plan is cut, in their order; empty where the simulator itself brings all messages.
     pub fn wiring(&self) -> &[Wiring] {
         match self {
-            Transport::InProcess { .. } | Transport::Process { .. } => &[],
+            Transport::InProcess { .. } | Transport::Process { .. } | Transport::Simlog(_) => &[],
             Transport::Ros2(ros2) => &ros2.wiring,
             Transport::Rosbridge(rosbridge) => &rosbridge.wiring,
             Transport::Ros1(ros1) => &ros1.wiring,
@@ -145,7 +148,7 @@ pub struct Topic {
     #[serde(rename = "type")]
     pub ty: Type,
     /// The layout of its messages on the wire, by the name of an [`Interface`](crate::Interface), where the transport
-    /// needs it.
+    /// needs it. Of SimlogAPI it is the name of the type, which may be left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interface: Option<String>,
     /// Whether it is a topic of the middleware, or one direction of a service.

@@ -33,12 +33,12 @@ impl Mismatch {
     }
 
     /// A missing field.
-    pub(crate) fn missing(name: &str) -> Self {
+    pub fn missing(name: &str) -> Self {
         Mismatch { path: vec![name.to_owned()], expected: "a value", found: "nothing" }
     }
 
     /// The same mismatch, inside of a message or list.
-    pub(crate) fn inside(mut self, name: &str) -> Self {
+    pub fn inside(mut self, name: &str) -> Self {
         self.path.insert(0, name.to_owned());
         self
     }

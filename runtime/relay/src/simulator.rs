@@ -166,7 +166,11 @@ pub(crate) trait Wires {
 
 pub mod bench;
 #[cfg(feature = "serve")]
+mod hosted;
+#[cfg(feature = "serve")]
 mod serve;
 
+#[cfg(feature = "serve")]
+pub use hosted::{Hosted, Message};
 #[cfg(feature = "serve")]
 pub use serve::serve;

@@ -3,10 +3,11 @@
 use sesame_plan::condition::{ConditionEnd, ConditionSpace};
 use sesame_plan::testing::{field, lab, message, minimal, node, topic};
 use sesame_plan::{
-    Activation, ActivationMode, Adjustment, Answer, Bound, CampaignPlan, Clock, Command, Dimension, Domain, Fitted,
-    Interface, InterfaceField, KnownTestId, LabBudget, Launch, Lifecycle, MessageId, MessageType, MetricId,
+    Activation, ActivationMode, Adjustment, Answer, Bound, CampaignPlan, Channel, Clock, Command, Dimension, Domain,
+    Fitted, Interface, InterfaceField, KnownTestId, LabBudget, Launch, Lifecycle, MessageId, MessageType, MetricId,
     MetricSource, Node, NodeId, OperationId, RankOrder, Ready, ReadyWhen, RelayBudget, Ros2, Search, ShapeForm,
-    ShapePlace, Simulator, StepBy, Stepping, Strategy, Topic, TopicId, Transport, Type, WireType, Wiring,
+    ShapePlace, Simlog, SimlogVersion, Simulator, StepBy, Stepping, Strategy, Topic, TopicId, Transport, Type,
+    WireNames, WireType, Wiring,
 };
 use sesame_results::record::sample;
 
@@ -186,8 +187,29 @@ fn each_thing_that_later_code_relies_on_is_asked_for() {
             "simulator.lifecycle.relay_budget.jitter: -1 is not above 0",
         ),
     ];
+    let of_simlog: &[Altered] = &[
+        (|plan| simlog(plan).step_ns = 0, "simulator.transport.step_ns: must be positive"),
+        (|plan| simlog(plan).step_ns = 1_500_000, "step_ns: is 1500000, which is no whole number of milliseconds"),
+        (|plan| simlog(plan).url = "localhost:8089".to_owned(), "simulator.transport.url: is `localhost:8089`, not"),
+        (|plan| simlog(plan).url = "https://".to_owned(), "simulator.transport.url: is `https://`, not"),
+        (|plan| simlog(plan).topics_url = Some("there".to_owned()), "simulator.transport.topics_url: is `there`, not"),
+        (
+            |plan| simlog(plan).protocol = SimlogVersion::V2,
+            "simulator.transport.marker: is there, but version 2 of the protocol has none",
+        ),
+        (
+            |plan| simlog(plan).names.injected = simlog(plan).names.cut.clone(),
+            "simulator.transport.names.injected: names the same topic as what it replaces",
+        ),
+        (|plan| simlog(plan).names.bare.push(String::new()), "simulator.transport.names.bare[0]: is in every name"),
+        (|plan| simlog(plan).cut[0] = TopicId(1), "simulator.transport.cut[0]: there is no topic 1"),
+        (|plan| plan.topics[0].interface = Some(String::new()), "topics[0].interface: is empty"),
+        (|plan| plan.topics[0].channel = Channel::Request, "simulator.transport: has no services, and `joints` is one"),
+    ];
     let conditional = sample::offline_plan(ConditionEnd::Condition);
-    for (whole, altered) in [(rich(), by_time), (conditional, by_condition), (arm(), of_ros)] {
+    for (whole, altered) in
+        [(rich(), by_time), (conditional, by_condition), (arm(), of_ros), (over_simlog(), of_simlog)]
+    {
         whole.validate().unwrap();
         for (alter, words) in altered {
             let mut plan = whole.clone();
@@ -239,6 +261,33 @@ fn arm() -> CampaignPlan {
         topics: vec![topic],
         nodes: vec![Node { launch: Some(launch(ready_at)), answers, ..node("arm") }],
         ..minimal()
+    }
+}
+
+/// A plan of a simulator that speaks SimlogAPI.
+fn over_simlog() -> CampaignPlan {
+    let transport = Transport::Simlog(Simlog {
+        url: "http://localhost:8089".to_owned(),
+        topics_url: None,
+        step_ns: 20_000_000,
+        protocol: SimlogVersion::V3,
+        names: WireNames::of_version_3(),
+        marker: Some("SIMLOG://step".to_owned()),
+        cut: vec![TopicId(0)],
+        settle_ns: 0,
+        ca: None,
+    });
+    CampaignPlan {
+        simulator: Simulator { name: "cell".to_owned(), transport, lifecycle: Lifecycle::default() },
+        topics: vec![Topic { interface: Some("STRING".to_owned()), ..topic("joints", &["joints"], Type::Bool) }],
+        ..minimal()
+    }
+}
+
+fn simlog(plan: &mut CampaignPlan) -> &mut Simlog {
+    match &mut plan.simulator.transport {
+        Transport::Simlog(simlog) => simlog,
+        other => panic!("it speaks SimlogAPI, and not {}", other.word()),
     }
 }
 

@@ -1,9 +1,11 @@
 //! How a simulator is reached, from the model to the plan.
 
-use sesame_dsl::model::{self, NodeId, Space};
+use std::collections::BTreeSet;
+
+use sesame_dsl::model::{self, NodeId, Space, TopicId};
 use sesame_plan as plan;
 
-use super::id::node_id;
+use super::id::{node_id, topic_id};
 use super::ros2::{interfaces, wirings};
 
 /// The way to a simulator of a space: its own, or that of a lab.
@@ -42,6 +44,21 @@ pub(super) fn transport(space: &Space, transport: &model::Transport) -> plan::Tr
             };
             let brokers = space.nodes.iter().filter_map(of_node).collect();
             plan::Transport::Mqtt(plan::Mqtt { broker, brokers, quality, wiring: wiring() })
+        }
+        model::Transport::Simlog { url, topics_url, step_ns, protocol, names, marker, settle_ns, trust: ca } => {
+            let acted_on: BTreeSet<TopicId> = space.operations.values().filter_map(model::Operation::topic).collect();
+            let cut = acted_on.into_iter().map(topic_id).collect();
+            plan::Transport::Simlog(plan::Simlog {
+                url,
+                topics_url,
+                step_ns,
+                protocol,
+                names,
+                marker,
+                cut,
+                settle_ns,
+                ca,
+            })
         }
     }
 }

@@ -4,7 +4,7 @@ use super::declaration::Declaration;
 use super::ids::{MessageId, TopicId};
 use crate::span::Span;
 use crate::units::Unit;
-use sesame_plan::{Broker, Channel, Clock, Compression, Dialect, Quality, Remote, Stepping};
+use sesame_plan::{Broker, Channel, Clock, Compression, Dialect, Quality, Remote, SimlogVersion, Stepping, WireNames};
 
 /// The simulator under test.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,6 +78,25 @@ pub enum Transport {
         broker: Broker,
         /// How surely messages arrive. Default at least once.
         quality: Quality,
+    },
+    /// A simulator that speaks `SimlogAPI`, stepped in lock-step.
+    Simlog {
+        /// Where it is.
+        url: String,
+        /// Where its topics are, in version 3; `None` for the port after that of `url`.
+        topics_url: Option<String>,
+        /// Simulation time of one step, in nanoseconds; whole milliseconds.
+        step_ns: u64,
+        /// The version of the protocol. Default 2.
+        protocol: SimlogVersion,
+        /// How names on the wire follow from those of topics. Default as the original platform.
+        names: WireNames,
+        /// The topic that marks the end of a step, in version 3.
+        marker: Option<String>,
+        /// For how long nothing may come in until a step is complete that nobody declares, in nanoseconds. Default 5 ms.
+        settle_ns: u64,
+        /// A file with the certificates of authorities that are trusted.
+        trust: Option<String>,
     },
 }
 

@@ -1,11 +1,12 @@
 //! Systems whose messages go over a bus: addresses, and what is shown to whoever is there.
 
-use sesame_plan::{Broker, Dialect, Remote};
+use sesame_plan::{Broker, Dialect, Remote, SimlogVersion, WireNames};
 
 use super::Resolver;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::Transport;
-use crate::syntax::ast::{self, BusKind, Text};
+use crate::span::Span;
+use crate::syntax::ast::{self, BusKind, Name, Text};
 
 /// How addresses of a kind begin.
 struct Schemes {
@@ -20,6 +21,9 @@ impl Schemes {
         match kind {
             BusKind::Rosbridge => Schemes { plain: "ws://", encrypted: Some("wss://"), example: "ws://127.0.0.1:9090" },
             BusKind::Ros1 => Schemes { plain: "http://", encrypted: None, example: "http://127.0.0.1:11311" },
+            BusKind::Simlog => {
+                Schemes { plain: "http://", encrypted: Some("https://"), example: "http://127.0.0.1:8089" }
+            }
             BusKind::Mqtt => {
                 Schemes { plain: "mqtt://", encrypted: Some("mqtts://"), example: "mqtt://127.0.0.1:1883" }
             }
@@ -28,7 +32,10 @@ impl Schemes {
 }
 
 impl<'a> Resolver<'a> {
-    pub(super) fn bus(&mut self, bus: &'a ast::Bus) -> Option<Transport> {
+    pub(super) fn bus(&mut self, name: &Name, bus: &'a ast::Bus) -> Option<Transport> {
+        if bus.kind == BusKind::Simlog {
+            return self.simlog(name, bus);
+        }
         let address = self.address(&bus.address, bus);
         let clock = self.simulator_clock(&bus.clocks);
         let reset = self.reset_service(&bus.resets);
@@ -65,7 +72,64 @@ impl<'a> Resolver<'a> {
             },
             BusKind::Ros1 => Transport::Ros1 { master: remote.url, clock: clock?, reset: reset.ok()? },
             BusKind::Mqtt => Transport::Mqtt { broker: Broker { remote, user }, quality },
+            BusKind::Simlog => unreachable!("it has a way of its own"),
         })
+    }
+
+    /// A simulator that speaks `SimlogAPI`.
+    fn simlog(&mut self, name: &Name, bus: &'a ast::Bus) -> Option<Transport> {
+        const MILLISECOND: u64 = 1_000_000;
+        let url = self.address(&bus.address, bus);
+        let topics_url = match self.single(&bus.topics, "topics at") {
+            Some(written) => self.address(written, bus).map(Some).ok_or(()),
+            None => Ok(None),
+        };
+        let step_ns = self.step_of(name, &bus.steps, bus.has_errors);
+        let whole = step_ns.is_none_or(|step| step % MILLISECOND == 0);
+        if let (false, Some((_, step))) = (whole, bus.steps.first()) {
+            let title = format!("`{}` is not a step of SimlogAPI", self.text(step.span));
+            let label = "expected whole milliseconds, which the protocol counts in";
+            self.report(Diagnostic::new(Code::OUT_OF_RANGE, step.span, title).label(label));
+        }
+        let protocol = match self.single(&bus.protocols, "protocol").map(|protocol| (protocol.value, protocol.span)) {
+            None | Some((Some(2), _)) => Some(SimlogVersion::V2),
+            Some((Some(3), _)) => Some(SimlogVersion::V3),
+            Some((_, span)) => {
+                let title = format!("SimlogAPI has no version `{}`", self.text(span));
+                self.report(Diagnostic::new(Code::OUT_OF_RANGE, span, title).label("expected 2 or 3"));
+                None
+            }
+        };
+        let settle_ns = match self.single(&bus.settles, "settle") {
+            Some(settle) => self.step(settle),
+            None => Some(5 * MILLISECOND),
+        };
+        let marker = self.single(&bus.markers, "marker").map(|marker| marker.text.clone());
+        let mut names = match protocol? {
+            SimlogVersion::V2 => WireNames::default(),
+            SimlogVersion::V3 => WireNames::of_version_3(),
+        };
+        let mut replace = |written: &'a [(Span, Text)], word: &str, name: &mut String| {
+            if let Some(text) = self.single(written, word) {
+                name.clone_from(&text.text);
+            }
+        };
+        replace(&bus.prefixes, "prefix", &mut names.prefix);
+        replace(&bus.cuts, "cut", &mut names.cut);
+        replace(&bus.heards, "heard", &mut names.heard);
+        replace(&bus.injecteds, "injected", &mut names.injected);
+        if let Some(bare) = self.single(&bus.bares, "bare") {
+            names.bare = bare.iter().map(|text| text.text.clone()).collect();
+        }
+        if let (SimlogVersion::V2, Some((span, _))) = (protocol?, bus.topics.first().or(bus.markers.first())) {
+            let title = "version 2 of SimlogAPI has one server, and no marker".to_owned();
+            self.report(Diagnostic::new(Code::BAD_ADDRESS, *span, title).label("remove it, or add `protocol 3`"));
+            return None;
+        }
+        let trust = self.single(&bus.trusts, "trust").map(|file| file.text.clone());
+        let (protocol, settle_ns, step_ns) = (protocol?, settle_ns?, step_ns.filter(|_| whole)?);
+        let (url, topics_url) = (url?, topics_url.ok()?);
+        Some(Transport::Simlog { url, topics_url, step_ns, protocol, names, marker, settle_ns, trust })
     }
 
     /// The address of a node's own broker, if it has one. An error was reported.

@@ -68,7 +68,7 @@ impl<'a> Resolver<'a> {
 
     /// The same if the simulator itself brings all messages, so that nobody is told apart.
     pub(super) fn one_for_all(&self) -> Option<(&'static str, Span)> {
-        self.kind().filter(|(word, _)| matches!(*word, "in_process" | "process"))
+        self.kind().filter(|(word, _)| matches!(*word, "in_process" | "process" | "simlog"))
     }
 
     /// The word of the simulator's kind, if that is known, and where it is declared.
@@ -82,6 +82,7 @@ impl<'a> Resolver<'a> {
                 BusKind::Rosbridge => "rosbridge",
                 BusKind::Ros1 => "ros1",
                 BusKind::Mqtt => "mqtt",
+                BusKind::Simlog => "simlog",
             },
         };
         Some((word, simulator.head.name.span))
@@ -192,7 +193,7 @@ pub(super) fn is_of_ros(transport: &ast::Transport) -> bool {
     match transport {
         ast::Transport::InProcess(_) | ast::Transport::Process(_) => false,
         ast::Transport::Ros2(_) => true,
-        ast::Transport::Bus(bus) => bus.kind != BusKind::Mqtt,
+        ast::Transport::Bus(bus) => matches!(bus.kind, BusKind::Rosbridge | BusKind::Ros1),
     }
 }
 

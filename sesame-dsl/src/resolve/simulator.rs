@@ -38,7 +38,7 @@ impl<'a> Resolver<'a> {
                 Transport::Process { program: program?, arguments, step_ns }
             }
             ast::Transport::Ros2(ros2) => self.ros2(name, ros2)?,
-            ast::Transport::Bus(bus) => self.bus(bus)?,
+            ast::Transport::Bus(bus) => self.bus(name, bus)?,
         };
         Some(Simulator { declaration: self.declaration(&simulator.head), transport })
     }
@@ -61,7 +61,7 @@ impl<'a> Resolver<'a> {
         Some(Pace::FreeRunning)
     }
 
-    fn step_of(&mut self, name: &Name, steps: &'a [(Span, ast::Quantity)], has_errors: bool) -> Option<u64> {
+    pub(super) fn step_of(&mut self, name: &Name, steps: &'a [(Span, ast::Quantity)], has_errors: bool) -> Option<u64> {
         let step = self.single(steps, "step");
         if step.is_none() && !has_errors {
             self.missing(name, "its step size", "step 20ms");

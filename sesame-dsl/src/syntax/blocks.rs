@@ -203,6 +203,23 @@ pub(super) const BLOCKS: &[Block] = &[
             Member::new(Rule::setting_trust, "trust"),
         ],
     ),
+    Block::settings(
+        Rule::simlog_settings,
+        "simlog",
+        &[
+            Member::new(Rule::setting_step, "step"),
+            Member::new(Rule::setting_protocol, "protocol"),
+            Member::like(Rule::setting_topics, "topics", "topics at"),
+            Member::new(Rule::setting_marker, "marker"),
+            Member::new(Rule::setting_settle, "settle"),
+            Member::new(Rule::setting_trust, "trust"),
+            Member::new(Rule::setting_prefix, "prefix"),
+            Member::new(Rule::setting_cut, "cut"),
+            Member::new(Rule::setting_heard, "heard"),
+            Member::new(Rule::setting_injected, "injected"),
+            Member::new(Rule::setting_bare, "bare"),
+        ],
+    ),
     Block::settings(Rule::launch_settings, "launch", &[Member::like(Rule::ready, "ready", "ready when")]),
     Block::settings(
         Rule::budget_settings,

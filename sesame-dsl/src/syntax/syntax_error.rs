@@ -529,6 +529,7 @@ fn phrases_of(rule: Rule) -> Vec<String> {
         Rule::rosbridge => &["`rosbridge`"],
         Rule::ros1 => &["`ros1`"],
         Rule::mqtt => &["`mqtt`"],
+        Rule::simlog => &["`simlog`"],
         Rule::secret => &["`from env` or `from file`"],
         Rule::k_at_most_once => &["`at_most_once`"],
         Rule::k_at_least_once => &["`at_least_once`"],

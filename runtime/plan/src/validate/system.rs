@@ -4,12 +4,15 @@ use std::collections::BTreeSet;
 
 use super::check::{Checked, at, each, id, name, positive, require};
 use crate::{
-    CampaignPlan, Clock, Interface, Launch, Lifecycle, Node, NodeId, ReadyWhen, Ros2, Simulator, Transport, WireType,
-    Wiring,
+    CampaignPlan, Channel, Clock, Interface, Launch, Lifecycle, Node, NodeId, ReadyWhen, Ros2, Simlog, SimlogVersion,
+    Simulator, Transport, WireType, Wiring,
 };
 
 /// The highest domain of ROS whose ports exist on every system.
 const MOST_DOMAIN: u16 = 232;
+
+/// In nanoseconds.
+const MILLISECOND: u64 = 1_000_000;
 
 impl CampaignPlan {
     pub(super) fn sound_simulator(&self, simulator: &Simulator) -> Checked {
@@ -19,6 +22,7 @@ impl CampaignPlan {
             Transport::Process { step_ns, .. } => *step_ns,
             Transport::Ros2(ros2) => ros2.step.as_ref().map(|step| step.step_ns),
             Transport::Rosbridge(_) | Transport::Ros1(_) | Transport::Mqtt(_) => None,
+            Transport::Simlog(simlog) => Some(simlog.step_ns),
         };
         at("transport.step_ns", require(step_ns != Some(0), || "must be positive".to_owned()))?;
         match &simulator.transport {
@@ -47,6 +51,7 @@ impl CampaignPlan {
                 })?;
                 at("transport", self.sound_wiring(&simulator.transport))?;
             }
+            Transport::Simlog(simlog) => at("transport", self.sound_simlog(simlog))?,
         }
         let Lifecycle { launch, terminate: _, relay_budget } = &simulator.lifecycle;
         at("lifecycle.launch", launch.as_ref().map_or(Ok(()), |launch| self.sound_launch(launch)))?;
@@ -63,6 +68,35 @@ impl CampaignPlan {
             each("subscribers", subscribers, |&id| self.has_node(id))?;
             let distinguishes = !publishers.is_empty() || !subscribers.is_empty();
             require(*cut || !distinguishes, || "distinguishes nodes of a topic that is not cut".to_owned())
+        })
+    }
+
+    fn sound_simlog(&self, simlog: &Simlog) -> Checked {
+        let Simlog { url, topics_url, step_ns, protocol, names, marker, cut, settle_ns: _, ca: _ } = simlog;
+        let is_url = |url: &str| {
+            let host = url.strip_prefix("http://").or_else(|| url.strip_prefix("https://"));
+            let named = host.is_some_and(|host| !host.is_empty());
+            require(named, || format!("is `{url}`, not `http://HOST:PORT` or `https://HOST:PORT`"))
+        };
+        at("url", is_url(url))?;
+        at("topics_url", topics_url.as_deref().map_or(Ok(()), is_url))?;
+        let whole = step_ns.is_multiple_of(MILLISECOND);
+        at("step_ns", require(whole, || format!("is {step_ns}, which is no whole number of milliseconds")))?;
+        // Else whoever publishes what is injected would hear it again.
+        let apart = names.cut != names.injected && !names.injected.is_empty();
+        at("names.injected", require(apart, || "names the same topic as what it replaces".to_owned()))?;
+        each("names.bare", &names.bare, |part| require(!part.is_empty(), || "is in every name".to_owned()))?;
+        let of_3 = |it: &Option<String>| {
+            let known = *protocol == SimlogVersion::V3 || it.is_none();
+            require(known, || "is there, but version 2 of the protocol has none".to_owned())
+        };
+        at("topics_url", of_3(topics_url))?;
+        at("marker", of_3(marker))?;
+        each("cut", cut, |&id| self.has_topic(id))?;
+        let service = self.topics.iter().find(|topic| topic.channel != Channel::Topic);
+        require(service.is_none(), || {
+            let name = service.map_or("", |topic| topic.name.as_str());
+            format!("has no services, and `{name}` is one")
         })
     }
 
@@ -92,7 +126,9 @@ impl CampaignPlan {
 
     fn has_a_clock(&self) -> bool {
         let clock = match &self.simulator.transport {
-            Transport::InProcess { .. } | Transport::Process { .. } | Transport::Mqtt(_) => return false,
+            Transport::InProcess { .. } | Transport::Process { .. } | Transport::Mqtt(_) | Transport::Simlog(_) => {
+                return false;
+            }
             Transport::Ros2(ros2) => &ros2.clock,
             Transport::Rosbridge(rosbridge) => &rosbridge.clock,
             Transport::Ros1(ros1) => &ros1.clock,
@@ -111,7 +147,9 @@ impl CampaignPlan {
             Transport::Rosbridge(rosbridge) => &rosbridge.interfaces,
             Transport::Ros1(ros1) => &ros1.interfaces,
             // It may be for a lab.
-            Transport::InProcess { .. } | Transport::Process { .. } | Transport::Mqtt(_) => return Ok(()),
+            Transport::InProcess { .. } | Transport::Process { .. } | Transport::Mqtt(_) | Transport::Simlog(_) => {
+                return interface.map_or(Ok(()), name);
+            }
         };
         let Some(wanted) = interface else { return require(false, || "there is none".to_owned()) };
         let known = interfaces.iter().any(|Interface { name, .. }| name == wanted);

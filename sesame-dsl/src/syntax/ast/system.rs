@@ -32,7 +32,7 @@ pub(crate) enum Transport {
     InProcess(InProcess),
     Process(Process),
     Ros2(Ros2),
-    Bus(Bus),
+    Bus(Box<Bus>),
 }
 
 #[derive(Debug)]
@@ -82,6 +82,19 @@ pub(crate) struct Bus {
     /// A token or a password.
     pub(crate) secrets: Vec<(Span, Secret)>,
     pub(crate) trusts: Vec<(Span, Text)>,
+    pub(crate) steps: Vec<(Span, Quantity)>,
+    pub(crate) protocols: Vec<(Span, Count)>,
+    /// The address of a server of topics.
+    pub(crate) topics: Vec<(Span, Text)>,
+    pub(crate) markers: Vec<(Span, Text)>,
+    pub(crate) settles: Vec<(Span, Quantity)>,
+    /// What is written around names: before them, and behind them where they are cut, heard and injected.
+    pub(crate) prefixes: Vec<(Span, Text)>,
+    pub(crate) cuts: Vec<(Span, Text)>,
+    pub(crate) heards: Vec<(Span, Text)>,
+    pub(crate) injecteds: Vec<(Span, Text)>,
+    pub(crate) bares: Vec<(Span, Vec<Text>)>,
+    pub(crate) has_errors: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -89,6 +102,7 @@ pub(crate) enum BusKind {
     Rosbridge,
     Ros1,
     Mqtt,
+    Simlog,
 }
 
 /// Where a secret is kept.

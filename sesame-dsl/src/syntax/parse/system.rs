@@ -48,14 +48,16 @@ impl Reader<'_> {
             self.unsupported(&unsupported);
             return Simulator { head, transport: None };
         }
-        let kinds = [Rule::in_process, Rule::process, Rule::ros2, Rule::rosbridge, Rule::ros1, Rule::mqtt];
+        let kinds =
+            [Rule::in_process, Rule::process, Rule::ros2, Rule::rosbridge, Rule::ros1, Rule::mqtt, Rule::simlog];
         let kind = first_of(pair, &kinds).expect("a simulator has a kind");
         let transport = match kind.as_rule() {
             Rule::process => Transport::Process(self.process(&kind)),
             Rule::ros2 => Transport::Ros2(self.ros2(&kind)),
-            Rule::rosbridge => Transport::Bus(self.bus(&kind, BusKind::Rosbridge, Rule::rosbridge_settings)),
-            Rule::ros1 => Transport::Bus(self.bus(&kind, BusKind::Ros1, Rule::ros1_settings)),
-            Rule::mqtt => Transport::Bus(self.bus(&kind, BusKind::Mqtt, Rule::mqtt_settings)),
+            Rule::rosbridge => Transport::Bus(Box::new(self.bus(&kind, BusKind::Rosbridge, Rule::rosbridge_settings))),
+            Rule::ros1 => Transport::Bus(Box::new(self.bus(&kind, BusKind::Ros1, Rule::ros1_settings))),
+            Rule::simlog => Transport::Bus(Box::new(self.bus(&kind, BusKind::Simlog, Rule::simlog_settings))),
+            Rule::mqtt => Transport::Bus(Box::new(self.bus(&kind, BusKind::Mqtt, Rule::mqtt_settings))),
             _ => Transport::InProcess(self.in_process(&kind)),
         };
         Simulator { head, transport: Some(transport) }
@@ -136,11 +138,23 @@ impl Reader<'_> {
             users: vec![],
             secrets: vec![],
             trusts: vec![],
+            steps: vec![],
+            protocols: vec![],
+            topics: vec![],
+            markers: vec![],
+            settles: vec![],
+            prefixes: vec![],
+            cuts: vec![],
+            heards: vec![],
+            injecteds: vec![],
+            bares: vec![],
+            has_errors: false,
         };
         let Some(settings) = child(pair, settings) else { return bus };
-        self.members(&settings, |reader, setting| {
+        bus.has_errors = self.members(&settings, |reader, setting| {
             let span = reader.keyword_span(&setting);
             let text = |reader: &mut Self| reader.text_of(&expect_child(&setting, Rule::text));
+            let quantity = |reader: &mut Self| reader.signed(&expect_child(&setting, Rule::signed));
             let has = |rule| child(&setting, rule).is_some();
             match setting.as_rule() {
                 Rule::setting_domain => bus.domains.push((span, reader.count(&expect_child(&setting, Rule::number)))),
@@ -165,6 +179,18 @@ impl Reader<'_> {
                 }
                 Rule::setting_user => bus.users.push((span, text(reader))),
                 Rule::setting_trust => bus.trusts.push((span, text(reader))),
+                Rule::setting_step => bus.steps.push((span, quantity(reader))),
+                Rule::setting_protocol => {
+                    bus.protocols.push((span, reader.count(&expect_child(&setting, Rule::number))));
+                }
+                Rule::setting_topics => bus.topics.push((span, text(reader))),
+                Rule::setting_marker => bus.markers.push((span, text(reader))),
+                Rule::setting_settle => bus.settles.push((span, quantity(reader))),
+                Rule::setting_prefix => bus.prefixes.push((span, text(reader))),
+                Rule::setting_cut => bus.cuts.push((span, text(reader))),
+                Rule::setting_heard => bus.heards.push((span, text(reader))),
+                Rule::setting_injected => bus.injecteds.push((span, text(reader))),
+                Rule::setting_bare => bus.bares.push((span, reader.folders(&setting))),
                 _ => bus.secrets.push((span, reader.secret(&expect_child(&setting, Rule::secret)))),
             }
         });

@@ -1,0 +1,54 @@
+//! A message of either version.
+
+use prost::Message as _;
+use sesame_relay::message::Mismatch;
+use sesame_relay::value::Value;
+
+use crate::proto::v2::RosMessage;
+use crate::proto::v3::SimlogMessage;
+use crate::shape::Shape;
+use crate::{dynamic, ros};
+
+/// A message as it is on the wire.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Message {
+    /// Of version 2.
+    V2(Box<RosMessage>),
+    /// Of version 3.
+    V3(Box<SimlogMessage>),
+}
+
+impl Message {
+    /// Its value, read as this. The mismatch says which field is of another type.
+    pub fn read(&self, shape: &Shape) -> Result<Value, Mismatch> {
+        match self {
+            Message::V2(message) => ros::read(shape, message),
+            Message::V3(message) => dynamic::read(shape, message),
+        }
+    }
+
+    /// The same message with another value; what the value does not have stays, such as a time stamp. The mismatch says
+    /// which field the wire cannot hold. Reals that have 32 bits on the wire are rounded to the nearest.
+    pub fn with(&self, value: &Value) -> Result<Message, Mismatch> {
+        match self {
+            Message::V2(message) => ros::write(value, message).map(|it| Message::V2(Box::new(it))),
+            Message::V3(message) => dynamic::write(value, message).map(|it| Message::V3(Box::new(it))),
+        }
+    }
+
+    /// When it was published, by its own stamp, in nanoseconds; `None` if it has none.
+    pub fn stamp(&self) -> Option<u64> {
+        match self {
+            Message::V2(message) => ros::stamp(message),
+            Message::V3(message) => dynamic::stamp(message),
+        }
+    }
+
+    /// How many bytes it has on the wire.
+    pub fn size(&self) -> usize {
+        match self {
+            Message::V2(message) => message.encoded_len(),
+            Message::V3(message) => message.encoded_len(),
+        }
+    }
+}

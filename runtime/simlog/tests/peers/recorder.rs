@@ -1,0 +1,148 @@
+//! A relay that writes down what passes, and changes it.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use sesame_base::time::SimTime;
+use sesame_plan::testing::{minimal, node, topic};
+use sesame_plan::{CampaignPlan, Lifecycle, NodeId, Simlog, SimlogVersion, TopicId, Type, WireNames};
+use sesame_relay::fuzz::Order;
+use sesame_relay::relay::{Delivery, Exchange};
+use sesame_relay::simulator::Progress;
+use sesame_relay::transport::{Transport, TransportError};
+use sesame_relay::value::Value;
+use sesame_relay::wire::{Wire, WireTable};
+
+pub(crate) const STEP: SimTime = SimTime::from_nanos(20_000_000);
+
+/// What becomes of a message on a wire; `None` drops it.
+pub(crate) type Change = fn(&str, Value) -> Option<Value>;
+
+pub(crate) struct Recorder {
+    wires: WireTable,
+    change: Change,
+    counts: BTreeMap<Wire, u64>,
+    pub(crate) published: BTreeMap<String, Vec<(SimTime, Value)>>,
+    pub(crate) subscribed: Vec<String>,
+}
+
+impl Recorder {
+    pub(crate) fn new(plan: &CampaignPlan, change: Change) -> Self {
+        let (counts, published) = (BTreeMap::new(), BTreeMap::new());
+        Recorder { wires: WireTable::new(plan), change, counts, published, subscribed: Vec::new() }
+    }
+
+    /// All that was published on a topic.
+    pub(crate) fn of(&self, path: &str) -> &[(SimTime, Value)] {
+        self.published.get(path).map_or(&[], Vec::as_slice)
+    }
+
+    /// As numbers.
+    pub(crate) fn numbers(&self, path: &str, field: &[&str]) -> Vec<f64> {
+        self.of(path).iter().map(|(_, value)| value.number_at(field).expect("it is a number")).collect()
+    }
+}
+
+impl Exchange for Recorder {
+    fn wires(&self) -> &WireTable {
+        &self.wires
+    }
+
+    fn intercepts(&self, _: Wire) -> bool {
+        true
+    }
+
+    fn subscribed(&mut self, wire: Wire) {
+        self.subscribed.push(self.wires.path(wire).to_owned());
+    }
+
+    fn advance(&mut self, _: SimTime, _: &mut Vec<Delivery>) {}
+
+    fn message_from(
+        &mut self,
+        now: SimTime,
+        wire: Wire,
+        _: Option<NodeId>,
+        value: Value,
+        deliveries: &mut Vec<Delivery>,
+    ) {
+        let path = self.wires.path(wire).to_owned();
+        let count = self.counts.entry(wire).or_default();
+        if let Some(value) = (self.change)(&path, value.clone()) {
+            deliveries.push(Delivery { wire, index: *count, value });
+        }
+        *count += 1;
+        self.published.entry(path).or_default().push((now, value));
+    }
+
+    fn parameters(&self) -> &[(String, f64)] {
+        &[]
+    }
+
+    fn take_orders(&mut self) -> Vec<Order> {
+        Vec::new()
+    }
+
+    fn carried_out(&mut self, _: SimTime, _: usize) {}
+
+    fn next_due(&self) -> Option<SimTime> {
+        None
+    }
+}
+
+/// A plan of topics, of which `joint` is cut and all are published every step.
+pub(crate) fn plan(url: &str, protocol: SimlogVersion, topics: &[(&str, Type)]) -> CampaignPlan {
+    let mut plan = minimal();
+    plan.topics = topics.iter().map(|(path, ty)| topic(path, &[path], ty.clone())).collect();
+    let mut all = node("simulator");
+    all.every_step = (0..).take(topics.len()).map(TopicId).collect();
+    plan.nodes = vec![all];
+    let cut = (0..).map(TopicId).zip(topics).filter(|(_, (path, _))| *path == "joint").map(|(id, _)| id).collect();
+    let (names, marker) = match protocol {
+        SimlogVersion::V2 => (WireNames::default(), None),
+        SimlogVersion::V3 => (WireNames::of_version_3(), Some("SIMLOG://step".to_owned())),
+    };
+    plan.simulator = sesame_plan::Simulator {
+        name: "there".to_owned(),
+        transport: sesame_plan::Transport::Simlog(Simlog {
+            url: url.to_owned(),
+            topics_url: None,
+            step_ns: 20_000_000,
+            protocol,
+            names,
+            marker,
+            cut,
+            settle_ns: 20_000_000,
+            ca: None,
+        }),
+        lifecycle: Lifecycle::default(),
+    };
+    plan
+}
+
+/// The transport of a plan.
+pub(crate) fn transport(plan: &CampaignPlan) -> Box<dyn Transport> {
+    transport_in(plan, Path::new(env!("CARGO_MANIFEST_DIR")))
+}
+
+/// The transport of a plan whose files are seen from this folder.
+pub(crate) fn transport_in(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
+    plan.validate().expect("the plan is sound");
+    sesame_simlog::simlog(folder.to_owned()).transport(plan)
+}
+
+/// Runs until the end, or until this many steps were taken. How many were.
+pub(crate) fn run(transport: &mut dyn Transport, steps: u32, relay: &mut Recorder) -> Result<u32, TransportError> {
+    transport.reset(1, relay)?;
+    let until = SimTime::from_nanos(STEP.nanos() * i64::from(steps));
+    let mut taken = 0;
+    while transport.now() < until {
+        let progress = transport.advance(until, relay)?;
+        taken += 1;
+        if progress == Progress::Ended {
+            return Ok(taken);
+        }
+    }
+    assert_eq!(transport.advance(until, relay)?, Progress::Ended, "the run is over");
+    Ok(taken)
+}

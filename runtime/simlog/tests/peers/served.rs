@@ -1,0 +1,130 @@
+//! A simulator of ours, served and driven over version 2.
+
+use std::net::SocketAddr;
+use std::sync::mpsc;
+use std::time::Duration;
+
+use sesame_plan::testing::{field, message};
+use sesame_plan::{MessageId, SimlogVersion, Type};
+use sesame_relay::message::record;
+use sesame_relay::simulator::{Bus, Port, Progress, Setup, Simulator, SimulatorError};
+use sesame_relay::value::Value;
+use sesame_simlog::client::{Client, Options};
+use sesame_simlog::server;
+
+use crate::recorder::{Change, Recorder, plan, run, transport};
+
+const REAL: Type = Type::Real { unit: None };
+
+/// A controller, and a cart that moves by what it hears until it has arrived.
+struct Cart {
+    target: Port,
+    state: Port,
+    zone: Port,
+    at: f64,
+}
+
+impl Simulator for Cart {
+    fn start(setup: &Setup, bus: &mut Bus<'_>) -> Result<Self, SimulatorError> {
+        if setup.step.nanos() > 1_000_000_000 {
+            return Err(SimulatorError("steps are too long".to_owned()));
+        }
+        let [target, state, zone] = ["joint", "cart", "safetyzones/Z1"].map(|path| bus.open(path));
+        bus.subscribe(target);
+        bus.publish(state, [-1.0, 0.0, 0.0]);
+        Ok(Cart { target, state, zone, at: 0.0 })
+    }
+
+    fn step(&mut self, bus: &mut Bus<'_>) -> Result<Progress, SimulatorError> {
+        bus.publish(self.target, 0.5);
+        while let Some(heard) = bus.receive(self.target) {
+            self.at += heard.number_at::<&str>(&[]).unwrap_or(f64::NAN);
+        }
+        bus.publish(self.state, [self.at, bus.now().seconds(), 0.0]);
+        let fields =
+            [("zone", "Z1".into()), ("level", Value::Real(self.at)), ("object1", "a".into()), ("object2", "b".into())];
+        bus.publish(self.zone, record(&fields));
+        Ok(if self.at >= 100.0 { Progress::Ended } else { Progress::Running })
+    }
+}
+
+fn served(options: server::Options) -> SocketAddr {
+    let (sender, receiver) = mpsc::channel();
+    // It serves until the test's process ends.
+    std::thread::spawn(move || {
+        server::serve(&options, |address| sender.send(address).expect("it is awaited"), Cart::start)
+    });
+    receiver.recv_timeout(Duration::from_secs(10)).expect("it listens")
+}
+
+fn anywhere() -> server::Options {
+    server::Options::new(([127, 0, 0, 1], 0).into())
+}
+
+const DOUBLED: Change = |path, value| match value {
+    Value::Real(x) if path == "joint" => Some(Value::Real(2.0 * x)),
+    other => Some(other),
+};
+
+#[test]
+fn a_simulator_of_ours_is_disturbed_over_the_protocol() {
+    let url = format!("http://{}", served(anywhere()));
+    let zone = Type::Message { id: MessageId(0) };
+    let topics = [("joint", REAL), ("cart", Type::Point { unit: None }), ("safetyzones/Z1", zone)];
+    let mut plan = plan(&url, SimlogVersion::V2, &topics);
+    plan.messages = vec![message("SafetyZone", vec![field("zone", Type::Text), field("level", REAL)])];
+    let mut transport = transport(&plan);
+    let mut first = Recorder::new(&plan, DOUBLED);
+    // What is delivered arrives a step later, and twice as large: one more in each step after the first.
+    assert_eq!(run(transport.as_mut(), 500, &mut first), Ok(101));
+    let positions = first.numbers("cart", &["x"]);
+    let expected: Vec<f64> = std::iter::once(-1.0).chain((0..=100).map(f64::from)).collect();
+    assert_eq!(positions, expected, "at the start, and in each step");
+    assert_eq!(first.numbers("safetyzones/Z1", &["level"]), expected[1..]);
+    assert_eq!(first.of("cart")[0].0.nanos(), 0);
+    let mut second = Recorder::new(&plan, DOUBLED);
+    assert_eq!(run(transport.as_mut(), 500, &mut second), Ok(101), "each run begins anew");
+    assert_eq!(first.published, second.published);
+    assert_eq!(transport.incidents().notes, [""; 0]);
+}
+
+#[test]
+fn whoever_has_no_token_is_refused() {
+    let address = served(server::Options { token: Some("secret".to_owned()), ..anywhere() });
+    let asked = |token: Option<&str>| {
+        let url = format!("http://{address}");
+        let token = token.map(str::to_owned);
+        let mut client = Client::connect(&Options { token, ..Options::new(&url, SimlogVersion::V2) })?;
+        client.set_step(20)
+    };
+    assert_eq!(asked(Some("secret")), Ok(()));
+    for wrong in [None, Some("Secret")] {
+        let refused = asked(wrong).unwrap_err().to_string();
+        assert!(refused.contains("does not carry the token"), "{refused}");
+    }
+}
+
+#[test]
+fn other_machines_need_a_token() {
+    for token in [None, Some(String::new())] {
+        let options = server::Options { token, ..server::Options::new(([0, 0, 0, 0], 0).into()) };
+        let refused = server::serve(&options, |_| panic!("nobody may listen"), Cart::start).unwrap_err();
+        assert!(refused.to_string().contains("needs a token"), "{refused}");
+    }
+}
+
+#[test]
+fn what_cannot_be_done_is_said() {
+    let url = format!("http://{}", served(anywhere()));
+    let mut client = Client::connect(&Options::new(&url, SimlogVersion::V2)).expect("it listens");
+    let said = client.step().unwrap_err().to_string();
+    assert!(said.contains("no run has begun"), "{said}");
+    for (milliseconds, why) in [(0, "no length of a step"), (-5, "no length of a step"), (5000, "steps are too long")] {
+        let said = client.set_step(milliseconds).unwrap_err().to_string();
+        assert!(said.contains(why), "{said}");
+    }
+    client.set_step(20).expect("that is a length");
+    client.listen("carts/in", "").expect("it is asked for only");
+    let said = client.await_streams(Duration::from_secs(5)).unwrap_err().to_string();
+    assert!(said.contains("no topic `carts/in`"), "{said}");
+}
