@@ -8,7 +8,7 @@
 //! simulator has answered the step, each topic that a node publishes `every step` has sent one message on each of its
 //! names, and each message that was delivered has been answered where a node says that it `answers`. If a topic is
 //! heard of which no node says how many messages it has, nothing may have come for a settling time as well; a message
-//! that is later than that counts for the step after, which is noted where its time stamp shows it.
+//! that is later than that goes through the relay in the step after, which is noted where its time stamp shows it.
 //!
 //! A run begins with a new connection and the length of a step. The plan launches the simulator afresh, or else the
 //! simulator must begin anew then, as ours do; one whose time goes on from the run before is refused.
