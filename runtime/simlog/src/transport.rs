@@ -8,7 +8,7 @@
 //! simulator has answered the step, each topic that a node publishes `every step` has sent one message on each of its
 //! names, and each message that was delivered has been answered where a node says that it `answers`. If a topic is
 //! heard of which no node says how many messages it has, nothing may have come for a settling time as well; a message
-//! that is later than that counts for the step after, which is noted where its time stamp shows it.
+//! that is later than that goes through the relay in the step after, which is noted where its time stamp shows it.
 //!
 //! A run begins with a new connection and the length of a step. The plan launches the simulator afresh, or else the
 //! simulator must begin anew then, as ours do; one whose time goes on from the run before is refused.
@@ -37,6 +37,12 @@ const SILENCE: Duration = Duration::from_secs(10);
 
 /// How long a simulator is waited for to acknowledge what is listened to: some do not until their first message.
 const ACKNOWLEDGED: Duration = Duration::from_millis(300);
+
+/// For how long nothing may come in before the first step is taken, if nothing longer is declared.
+const QUIET: Duration = Duration::from_millis(50);
+
+/// How long messages may come in before the first step: a simulator that publishes by itself never stops.
+const LONGEST_START: Duration = Duration::from_secs(1);
 
 /// How long the messages of the last step are waited for: a simulation that has ended need not publish them.
 const LAST_WORDS: Duration = Duration::from_millis(500);
@@ -132,8 +138,17 @@ impl System {
         lines.tell_subscribers(relay);
         let session = Session { client, lines, marker, start: None, notes: Vec::new() };
         let session = self.session.insert(session);
-        // What was published before the first step.
-        let heard = session.client.take(Duration::ZERO).map_err(fault)?;
+        // What was published before the first step, which must not be taken for messages of that step.
+        let (mut heard, limit) = (Vec::new(), now() + LONGEST_START);
+        let quiet = QUIET.max(Duration::from_nanos(self.settings.settle_ns));
+        loop {
+            let mut more = session.client.take(quiet).map_err(fault)?;
+            let over = more.is_empty() || now() >= limit;
+            heard.append(&mut more);
+            if over {
+                break;
+            }
+        }
         session.relay(&self.plan, SimTime::ZERO, heard, relay, &mut self.deliveries)
     }
 
@@ -169,7 +184,8 @@ impl System {
         self.now = self.now + step;
         // What was held back reaches its subscribers before the step begins.
         relay.advance(self.now, &mut self.deliveries);
-        let mut round = Round::new(&self.plan, relay.wires(), session.marker);
+        let before = session.start.or(self.start).map(|start| start.middle_of(self.now, step));
+        let mut round = Round::new(&self.plan, relay.wires(), session.marker, before);
         session.deliver(&self.plan, &mut self.deliveries, relay, &mut round)?;
         let answer = session.client.begin_step();
         let settle = Duration::from_nanos(self.settings.settle_ns);

@@ -17,10 +17,12 @@ pub(super) struct Round {
     /// The stream of the marker.
     marker: Option<usize>,
     marked: bool,
+    /// What is stamped before this is of a step before, and owed no longer.
+    before: Option<i128>,
 }
 
 impl Round {
-    pub(super) fn new(plan: &CampaignPlan, wires: &WireTable, marker: Option<usize>) -> Self {
+    pub(super) fn new(plan: &CampaignPlan, wires: &WireTable, marker: Option<usize>, before: Option<i128>) -> Self {
         let mut owed = BTreeMap::new();
         let answers = |topic| plan.nodes.iter().flat_map(|node| &node.answers).any(|answer| answer.with == topic);
         let every = |topic| plan.nodes.iter().flat_map(|node| &node.every_step).filter(|&&it| it == topic).count();
@@ -31,7 +33,7 @@ impl Round {
                 owed.insert(wire, i64::try_from(count).unwrap_or(i64::MAX));
             }
         }
-        Round { heard: Vec::new(), stepped: None, owed, marker, marked: false }
+        Round { heard: Vec::new(), stepped: None, owed, marker, marked: false, before }
     }
 
     /// Counts the answers to a message that is delivered on this wire. Of groups of one size, one member answers
@@ -54,6 +56,11 @@ impl Round {
         for heard in heard.drain(..) {
             if Some(heard.stream) == self.marker {
                 self.marked = true;
+                continue;
+            }
+            let late = self.before.zip(heard.message.stamp()).is_some_and(|(before, at)| i128::from(at) < before);
+            if late {
+                self.heard.push(heard);
                 continue;
             }
             if let Some(owed) = lines.of_stream(heard.stream).and_then(|line| self.owed.get_mut(&line.wire)) {

@@ -13,6 +13,13 @@ use crate::client::{Client, ClientError, Heard, Stepped};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Start(i128);
 
+impl Start {
+    /// The simulator's own time in the middle of the step that ends at this time of the run.
+    pub(super) fn middle_of(self, end: SimTime, step: SimTime) -> i128 {
+        self.0 + i128::from(end.nanos()) - i128::from(step.nanos()) / 2
+    }
+}
+
 /// The connection of one run.
 pub(super) struct Session {
     pub(super) client: Client,

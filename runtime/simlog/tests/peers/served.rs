@@ -4,11 +4,17 @@ use std::net::SocketAddr;
 use std::sync::mpsc;
 use std::time::Duration;
 
-use sesame_plan::testing::{field, message};
-use sesame_plan::{MessageId, SimlogVersion, Type};
+use sesame_base::observation::Outcome;
+use sesame_plan::testing::{field, latency, message, metric, operation, test_of, use_of};
+use sesame_plan::{
+    Choice, Distribution, Drain, FieldRef, MessageId, MetricSource, OperationKind, SimlogVersion, TopicId, Type,
+};
+use sesame_relay::evaluate::{Custom, evaluate};
 use sesame_relay::message::record;
+use sesame_relay::metric::MetricTable;
 use sesame_relay::simulator::{Bus, Port, Progress, Setup, Simulator, SimulatorError};
 use sesame_relay::value::Value;
+use sesame_relay::wire::WireTable;
 use sesame_simlog::client::{Client, Options};
 use sesame_simlog::server;
 
@@ -86,6 +92,37 @@ fn a_simulator_of_ours_is_disturbed_over_the_protocol() {
     assert_eq!(run(transport.as_mut(), 500, &mut second), Ok(101), "each run begins anew");
     assert_eq!(first.published, second.published);
     assert_eq!(transport.incidents().notes, [""; 0]);
+}
+
+/// Whole runs with operations: the relay is the real one.
+#[test]
+fn operations_act_on_messages_of_the_protocol() {
+    let url = format!("http://{}", served(anywhere()));
+    let mut plan = plan(&url, SimlogVersion::V2, &[("joint", REAL), ("cart", Type::Point { unit: None })]);
+    let latency = latency(Distribution::Fixed, Drain::Finish);
+    plan.operations = vec![operation(0, OperationKind::Bias), operation(0, latency)];
+    plan.campaign.end_after = 1.0;
+    let state = FieldRef { topic: TopicId(1), path: vec!["x".to_owned()] };
+    plan.metrics = vec![metric("position", MetricSource::Last { input: state })];
+    let wires = WireTable::new(&plan);
+    let metrics = MetricTable::new(&plan, &wires, &[]).expect("they are sound");
+    let mut transport = transport(&plan);
+    let mut evaluated = |operations| {
+        let test = test_of(operations);
+        evaluate(&plan, &wires, &metrics, transport.as_mut(), &test, 1, &mut Custom::none()).expect("it fits the plan")
+    };
+    let value = |value| vec![Choice::Value { value }];
+    // Fifty steps; the first message arrives in the second one, and each moves the cart by a half.
+    let reference = evaluated(Vec::new());
+    assert_eq!(reference.outcome, Outcome::Completed, "{reference:?}");
+    assert_eq!(reference.metrics[0].value, Some(24.5));
+    // Those of 0.2 s to 0.4 s are larger by a quarter: of ten steps.
+    let biased = evaluated(vec![use_of(0, 0.2, 0.4, value(0.25), 1)]);
+    assert_eq!((biased.metrics[0].value, biased.operations[0].counters.changed), (Some(27.0), 10));
+    // All before the last one are later by 0.1 s: that of 0.9 s is due at the end of the last step, and arrives in it.
+    let late = evaluated(vec![use_of(1, 0.0, 1.0, value(0.1), 1)]);
+    assert_eq!((late.metrics[0].value, late.operations[0].counters.delayed), (Some(22.5), 49));
+    assert_eq!(evaluated(vec![use_of(1, 0.0, 1.0, value(0.1), 1)]).metrics, late.metrics, "equal tests are equal");
 }
 
 #[test]
