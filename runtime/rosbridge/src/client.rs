@@ -286,9 +286,11 @@ async fn open(address: &Address) -> Result<Socket, ConnectError> {
 fn failed(address: &Address, error: &SocketError) -> ConnectError {
     let url = address.url.clone();
     match error {
-        SocketError::Io(error) if error.kind() != io::ErrorKind::InvalidData => {
-            ConnectError::NoAnswer { url, reason: error.to_string() }
+        // Somebody is there, and it is no TLS that it speaks, or not with us.
+        SocketError::Io(error) if matches!(error.kind(), io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof) => {
+            ConnectError::Refused { url, reason: format!("{error}; does it speak TLS?") }
         }
+        SocketError::Io(error) => ConnectError::NoAnswer { url, reason: error.to_string() },
         SocketError::Http(response) if response.status() == StatusCode::UNAUTHORIZED => {
             let reason = if address.token.is_some() {
                 "it does not accept the token (401)".to_owned()
@@ -321,4 +323,118 @@ fn trusting(pem: &[u8]) -> Result<Arc<rustls::ClientConfig>, String> {
         .with_safe_default_protocol_versions()
         .map_err(|error| error.to_string())?;
     Ok(Arc::new(config.with_root_certificates(authorities).with_no_client_auth()))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::SocketAddr;
+
+    use serde_json::json;
+    use tokio::net::TcpListener;
+    use tokio_tungstenite::accept_hdr_async;
+    use tokio_tungstenite::tungstenite::handshake::server::{ErrorResponse, Request, Response};
+
+    use super::*;
+
+    const SECRET: &str = "s3cret-of-the-hall";
+
+    /// A server that wants the secret, sends these frames to each client, and tells what it is told.
+    fn server(frames: Vec<Frame>) -> (SocketAddr, Receiver<String>) {
+        let (told, tells) = sync_channel(100);
+        let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap();
+        listener.set_nonblocking(true).unwrap();
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+        let serve = async move {
+            let listener = TcpListener::from_std(listener).unwrap();
+            while let Ok((stream, _)) = listener.accept().await {
+                #[expect(clippy::result_large_err, reason = "the signature is the library's")]
+                let check = |request: &Request, response: Response| -> Result<Response, ErrorResponse> {
+                    let shown = request.headers().get(AUTHORIZATION).and_then(|it| it.to_str().ok());
+                    if shown == Some(&format!("Bearer {SECRET}")) {
+                        return Ok(response);
+                    }
+                    let mut refused = ErrorResponse::new(None);
+                    *refused.status_mut() = StatusCode::UNAUTHORIZED;
+                    Err(refused)
+                };
+                let Ok(mut socket) = accept_hdr_async(stream, check).await else { continue };
+                for frame in &frames {
+                    socket.send(frame.clone()).await.unwrap();
+                }
+                // Each client is gone after its second frame.
+                for _ in 0..2 {
+                    if let Some(Ok(Frame::Text(text))) = socket.next().await {
+                        told.try_send(text.to_string()).unwrap();
+                    }
+                }
+            }
+        };
+        thread::spawn(move || runtime.block_on(serve));
+        (address, tells)
+    }
+
+    fn at(scheme: &str, address: SocketAddr, token: Option<&str>) -> Address {
+        Address {
+            url: format!("{scheme}://{address}"),
+            token: token.map(str::to_owned),
+            trusted: None,
+            found_again_within: Duration::from_secs(5),
+        }
+    }
+
+    fn refused(address: &Address) -> String {
+        let said = match Client::connect(address) {
+            Ok(_) => panic!("it was let in"),
+            Err(error @ ConnectError::Refused { .. }) => error.to_string(),
+            Err(error) => panic!("not refused: {error}"),
+        };
+        assert!(!said.contains(SECRET) && !said.contains("wrong-secret"), "{said}");
+        said
+    }
+
+    #[test]
+    fn a_wrong_token_none_and_tls_to_a_plain_port_are_refused_without_a_secret_in_the_words() {
+        let (address, _told) = server(Vec::new());
+        let said = refused(&at("ws", address, Some("wrong-secret")));
+        assert_eq!(said, format!("`ws://{address}` refused the connection: it does not accept the token (401)"));
+        let said = refused(&at("ws", address, None));
+        assert!(said.ends_with("it wants a token (401); add `token from env \"NAME\"` to the simulator"), "{said}");
+        refused(&at("wss", address, Some(SECRET)));
+    }
+
+    #[test]
+    fn where_nobody_listens_is_no_answer() {
+        let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+        assert!(matches!(Client::connect(&at("ws", free, None)), Err(ConnectError::NoAnswer { .. })));
+    }
+
+    #[test]
+    fn what_stands_is_said_again_after_a_loss_and_malformed_frames_change_nothing() {
+        let good = r#"{"op":"publish","topic":"/a","msg":{"data":1}}"#;
+        let mut frames: Vec<Frame> = (0u32..10_000).map(|at| Frame::text(format!("{{\"op\":\"{at}"))).collect();
+        frames.push(Frame::binary(vec![0xff; 64]));
+        frames.push(Frame::text(good));
+        let (address, told) = server(frames);
+        let client = Client::connect(&at("ws", address, Some(SECRET))).unwrap();
+        let subscribe = Operation::Unsubscribe { id: None, topic: "/a".to_owned() };
+        assert!(client.stand(&subscribe));
+        assert!(client.say("\"once\"".to_owned()));
+        let (mut malformed, mut operations, mut found_again) = (0, 0, 0);
+        while operations < 2 {
+            match client.receive(Duration::from_secs(10)).expect("the server sends something") {
+                Incoming::Operation(operation, _) => {
+                    let Operation::Publish { msg, .. } = *operation else { panic!("{operation:?}") };
+                    assert_eq!(msg, json!({ "data": 1 }));
+                    operations += 1;
+                }
+                Incoming::Malformed(_) => malformed += 1,
+                Incoming::FoundAgain(_) => found_again += 1,
+                Incoming::Lost(how) => panic!("{how}"),
+            }
+        }
+        assert_eq!((malformed, found_again), (2 * 10_001, 1));
+        let told: Vec<String> = (0..3).map(|_| told.recv_timeout(Duration::from_secs(5)).unwrap()).collect();
+        assert_eq!(told, [subscribe.text(), "\"once\"".to_owned(), subscribe.text()]);
+    }
 }
