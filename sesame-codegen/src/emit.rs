@@ -110,9 +110,7 @@ pub fn simulator_path(transport: &Transport) -> Option<Vec<&str>> {
 fn feature(transport: &Transport) -> Option<&'static str> {
     match transport {
         Transport::InProcess { .. } | Transport::Process { .. } => None,
-        Transport::Ros2(_) | Transport::Rosbridge(_) | Transport::Ros1(_) | Transport::Mqtt(_) => {
-            Some(transport.word())
-        }
+        Transport::Ros2(_) | Transport::Rosbridge(_) | Transport::Ros1(_) => Some(transport.word()),
         Transport::Simlog(simlog) if simlog.url.starts_with("https://") => Some("simlog-tls"),
         Transport::Simlog(_) => Some("simlog"),
     }

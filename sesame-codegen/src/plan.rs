@@ -103,7 +103,6 @@ impl RunnerPlan {
             Transport::Ros2(_) => !cfg!(feature = "ros2"),
             Transport::Rosbridge(_) => !cfg!(feature = "rosbridge"),
             Transport::Ros1(_) => !cfg!(feature = "ros1"),
-            Transport::Mqtt(_) => !cfg!(feature = "mqtt"),
             Transport::Simlog(simlog) if simlog.url.starts_with("https://") => !cfg!(feature = "simlog-tls"),
             Transport::Simlog(_) => !cfg!(feature = "simlog"),
         };

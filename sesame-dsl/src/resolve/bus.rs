@@ -1,6 +1,6 @@
 //! Systems whose messages go over a bus: addresses, and what is shown to whoever is there.
 
-use sesame_plan::{Broker, Dialect, Remote, SimlogVersion, WireNames};
+use sesame_plan::{Dialect, Remote, SimlogVersion, WireNames};
 
 use super::Resolver;
 use crate::diagnostic::{Code, Diagnostic};
@@ -24,9 +24,6 @@ impl Schemes {
             BusKind::Simlog => {
                 Schemes { plain: "http://", encrypted: Some("https://"), example: "http://127.0.0.1:8089" }
             }
-            BusKind::Mqtt => {
-                Schemes { plain: "mqtt://", encrypted: Some("mqtts://"), example: "mqtt://127.0.0.1:1883" }
-            }
         }
     }
 }
@@ -46,11 +43,8 @@ impl<'a> Resolver<'a> {
         self.single(&bus.types, "types");
         let dialect = self.single(&bus.dialects, "dialect").copied().unwrap_or_default();
         let compression = self.single(&bus.compressions, "compression").copied().unwrap_or_default();
-        let quality = self.single(&bus.qualities, "quality").copied().unwrap_or_default();
-        let user = self.single(&bus.users, "user").map(|user| user.text.clone());
         let trust = self.single(&bus.trusts, "trust").map(|file| file.text.clone());
-        let word = if bus.kind == BusKind::Mqtt { "password" } else { "token" };
-        let token = self.single(&bus.secrets, word).map(|secret| match secret {
+        let token = self.single(&bus.secrets, "token").map(|secret| match secret {
             ast::Secret::Environment(name) => sesame_plan::Secret::Environment { name: name.text.clone() },
             ast::Secret::File(path) => sesame_plan::Secret::File { path: path.text.clone() },
         });
@@ -71,7 +65,6 @@ impl<'a> Resolver<'a> {
                 reset: reset.ok()?,
             },
             BusKind::Ros1 => Transport::Ros1 { master: remote.url, clock: clock?, reset: reset.ok()? },
-            BusKind::Mqtt => Transport::Mqtt { broker: Broker { remote, user }, quality },
             BusKind::Simlog => unreachable!("it has a way of its own"),
         })
     }
@@ -132,23 +125,6 @@ impl<'a> Resolver<'a> {
         Some(Transport::Simlog { url, topics_url, step_ns, protocol, names, marker, settle_ns, trust })
     }
 
-    /// The address of a node's own broker, if it has one. An error was reported.
-    pub(super) fn broker_of(&mut self, node: &'a ast::Node) -> Result<Option<String>, ()> {
-        let Some(written) = self.single(&node.brokers, "broker") else { return Ok(None) };
-        match (self.kind(), self.ast_bus()) {
-            (_, Some(bus)) if bus.kind == BusKind::Mqtt => self.address(written, bus).map(Some).ok_or(()),
-            (Some((kind, simulator)), _) => {
-                let title = format!("simulator kind `{kind}` has no brokers");
-                let diagnostic = Diagnostic::new(Code::BAD_ADDRESS, written.span, title)
-                    .label("only nodes of an `mqtt` simulator have a broker; remove it")
-                    .secondary(simulator, "the simulator is declared here");
-                self.report(diagnostic);
-                Err(())
-            }
-            (None, _) => Err(()),
-        }
-    }
-
     /// An address: its scheme, a host, and a port. A secret goes over plain text on this machine only.
     fn address(&mut self, written: &Text, bus: &ast::Bus) -> Option<String> {
         // An empty text was reported where it was read.
@@ -195,9 +171,7 @@ fn malformed(rest: &str) -> Option<String> {
         return Some(format!("expected a host and a port without `{}`", c.escape_default()));
     }
     if rest.contains('@') {
-        return Some(
-            "a name or password in an address would be in every log; write `user`, `token` or `password`".into(),
-        );
+        return Some("a name or password in an address would be in every log; write `token`".into());
     }
     if host(rest).is_empty() {
         return Some("expected a host after the scheme".to_owned());

@@ -15,7 +15,6 @@ pub(super) struct RestOfNode {
     pub(super) launch: Option<model::Launch>,
     pub(super) answers: Vec<(TopicId, TopicId)>,
     pub(super) every_step: Vec<TopicId>,
-    pub(super) broker: Option<String>,
 }
 
 impl<'a> Resolver<'a> {
@@ -115,14 +114,7 @@ impl<'a> Resolver<'a> {
                 _ => every_step = None,
             }
         }
-        let broker = self.broker_of(node);
-        Some(RestOfNode {
-            named: named?,
-            launch: launch?,
-            answers: answers?,
-            every_step: every_step?,
-            broker: broker.ok()?,
-        })
+        Some(RestOfNode { named: named?, launch: launch?, answers: answers?, every_step: every_step? })
     }
 
     /// A topic of an answer, which is among those that the node says it publishes or subscribes to.
