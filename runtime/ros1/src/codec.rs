@@ -29,6 +29,7 @@ use sesame_plan::Interface;
 use sesame_relay::value::Value;
 use sesame_relay::wire::Wanted;
 
+pub(crate) use self::error::LARGEST;
 pub use self::error::{CodecError, LayoutError};
 use self::layout::{Layout, Selection};
 use self::read::Input;
@@ -64,6 +65,14 @@ impl Codec {
     /// that their field holds, and a list ends where its type does.
     pub fn write(&self, message: &Value) -> Result<Arc<[u8]>, CodecError> {
         write::write(&self.layout, &self.selection, message)
+    }
+
+    /// Where a layout that others have differs from this one, in a phrase. The number in headers is no difference.
+    pub(crate) fn difference(&self, interfaces: &[Interface], name: &str) -> Option<String> {
+        match Layout::new(interfaces, name) {
+            Ok(other) => self.layout.difference(&other),
+            Err(error) => Some(error.to_string()),
+        }
     }
 
     /// Whether these bytes are a message of this layout.

@@ -123,6 +123,33 @@ impl Layout {
         Selection::Fields(fields, selections.collect())
     }
 
+    /// Where another layout differs from this one, in a phrase.
+    pub(super) fn difference(&self, other: &Layout) -> Option<String> {
+        self.shape_difference(self.message(), other, other.message())
+    }
+
+    fn shape_difference(&self, ours: &Shape, other: &Layout, theirs: &Shape) -> Option<String> {
+        if ours.meaning == theirs.meaning && matches!(ours.meaning, Meaning::Time(_)) {
+            return None;
+        }
+        let ([our_names, our_types], [their_names, their_types]) = (ours.shown(), theirs.shown());
+        if our_names != their_names {
+            return Some(format!("fields `{our_names}`, not `{their_names}`"));
+        }
+        if our_types != their_types {
+            return Some(format!("types `{our_types}` of `{our_names}`, not `{their_types}`"));
+        }
+        // Of headers, the number may be in one layout only.
+        let skip = |shape: &Shape, other: &Shape| usize::from(shape.before == 0 && other.before > 0);
+        let ours_then = ours.types.iter().zip(ours.fields.names()).skip(skip(ours, theirs));
+        let theirs_then = theirs.types.iter().skip(skip(theirs, ours));
+        ours_then.zip(theirs_then).find_map(|((our, name), their)| {
+            let (our, their) = (innermost(our)?, innermost(their)?);
+            let inside = self.shape_difference(&self.shapes[our], other, &other.shapes[their])?;
+            Some(format!("in `{name}`: {inside}"))
+        })
+    }
+
     /// How many bytes a value of a type has.
     pub(super) fn size(&self, ty: &Ty) -> Size {
         size(ty, &self.shapes)
@@ -131,6 +158,41 @@ impl Layout {
     /// How many bytes a message has.
     pub(super) fn size_of(shape: &Shape) -> Size {
         shape.size
+    }
+}
+
+impl Shape {
+    /// The names of its fields, and their types without those of messages, as they are on the wire.
+    fn shown(&self) -> [String; 2] {
+        let number = (self.before > 0).then_some("seq");
+        let names: Vec<&str> =
+            number.into_iter().chain(self.fields.names().iter().map(sesame_relay::value::Text::as_str)).collect();
+        let number = (self.before > 0).then(|| written(&Ty::Primitive(SEQ)));
+        let types: Vec<String> = number.into_iter().chain(self.types.iter().map(written)).collect();
+        [names.join(", "), types.join(", ")]
+    }
+}
+
+/// A type as `.msg` files write it.
+fn written(ty: &Ty) -> String {
+    match ty {
+        // A `byte` has a sign in ROS 1, and none in ROS 2.
+        Ty::Primitive(Primitive::Int8 | Primitive::Uint8) => "int8".to_owned(),
+        Ty::Primitive(primitive) => format!("{primitive:?}").to_lowercase(),
+        Ty::String => "string".to_owned(),
+        Ty::Shape(_) => "message".to_owned(),
+        Ty::Array(of, length) => format!("{}[{length}]", written(of)),
+        // At most how many elements there are makes no difference on the wire.
+        Ty::Sequence(of, _) => format!("{}[]", written(of)),
+    }
+}
+
+/// The message in a type.
+fn innermost(ty: &Ty) -> Option<usize> {
+    match ty {
+        Ty::Shape(at) => Some(*at),
+        Ty::Array(of, _) | Ty::Sequence(of, _) => innermost(of),
+        Ty::Primitive(_) | Ty::String => None,
     }
 }
 

@@ -1,0 +1,258 @@
+//! Topics to which the node subscribes.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use super::send::Offer;
+use super::{Incoming, Shared, lock};
+use crate::codec::Codec;
+use crate::connection::Connection;
+use crate::definition::Texts;
+use crate::master::{self, Address, AskError};
+use crate::protocol::header::{self, ANY, Header};
+use crate::protocol::xmlrpc::Value;
+
+/// How long a publisher may take to say who it is.
+const HANDSHAKE: Duration = Duration::from_secs(5);
+
+/// How long a connection may take.
+const CONNECT: Duration = Duration::from_secs(2);
+
+/// How long it is waited until a publisher that cannot be reached is tried again: at first, and at most.
+const PAUSES: [Duration; 2] = [Duration::from_millis(50), Duration::from_secs(1)];
+
+/// The most publishers of a topic.
+const MOST_PUBLISHERS: usize = 200;
+
+/// The most bytes of a message.
+const MOST_BYTES: usize = crate::codec::LARGEST;
+
+/// A topic to which the node subscribes.
+#[derive(Debug)]
+pub(crate) struct Subscription {
+    pub(crate) topic: String,
+    /// Its declared type as ROS 1 names it.
+    pub(crate) ty: String,
+    /// Its declared layout, with which that of its publishers is compared.
+    pub(crate) codec: Option<Arc<Codec>>,
+    /// The publications that get their type from its publishers, by position.
+    pub(crate) feeds: Vec<usize>,
+    /// Its publishers by their addresses.
+    publishers: BTreeMap<String, Publisher>,
+    /// Whether a connection of it was lost.
+    lost: bool,
+}
+
+#[derive(Debug, Default)]
+struct Publisher {
+    /// Whether the master names it. One that it no longer names is listened to until it closes the connection.
+    listed: bool,
+    /// Its node, while it is connected.
+    node: Option<String>,
+}
+
+impl Subscription {
+    pub(crate) fn new(topic: &str, ty: &str, codec: Option<Arc<Codec>>, feeds: Vec<usize>) -> Self {
+        let (topic, ty) = (topic.to_owned(), ty.to_owned());
+        Subscription { topic, ty, codec, feeds, publishers: BTreeMap::new(), lost: false }
+    }
+
+    /// The nodes to whose messages it listens.
+    pub(crate) fn connected(&self) -> impl Iterator<Item = &str> {
+        self.publishers.values().filter_map(|publisher| publisher.node.as_deref())
+    }
+}
+
+impl Shared {
+    /// Subscribes. What arrives comes with the position that is returned.
+    pub(crate) fn subscribe(self: &Arc<Self>, subscription: Subscription) -> Result<usize, AskError> {
+        let (topic, ty) = (subscription.topic.clone(), subscription.ty.clone());
+        let at = {
+            let mut subscriptions = lock(&self.subscriptions);
+            subscriptions.push(subscription);
+            subscriptions.len() - 1
+        };
+        let publishers = self.master.subscribe(&topic, &ty)?;
+        self.add_publishers(at, &publishers);
+        Ok(at)
+    }
+
+    /// Registers all subscriptions again, at a master that has forgotten them. Connections stay.
+    pub(super) fn subscribe_again(self: &Arc<Self>) -> Result<(), AskError> {
+        let all: Vec<(String, String)> =
+            lock(&self.subscriptions).iter().map(|it| (it.topic.clone(), it.ty.clone())).collect();
+        for (at, (topic, ty)) in all.into_iter().enumerate() {
+            let publishers = self.master.subscribe(&topic, &ty)?;
+            self.add_publishers(at, &publishers);
+        }
+        Ok(())
+    }
+
+    /// What the master says of the publishers of a topic.
+    pub(super) fn update_publishers(self: &Arc<Self>, topic: &str, uris: &[String]) {
+        let all: Vec<usize> = {
+            let mut subscriptions = lock(&self.subscriptions);
+            let of_topic = subscriptions.iter_mut().enumerate().filter(|(_, it)| it.topic == topic);
+            of_topic
+                .map(|(at, subscription)| {
+                    for (uri, publisher) in &mut subscription.publishers {
+                        publisher.listed = uris.contains(uri);
+                    }
+                    at
+                })
+                .collect()
+        };
+        all.into_iter().for_each(|at| self.add_publishers(at, uris));
+    }
+
+    fn add_publishers(self: &Arc<Self>, subscription: usize, uris: &[String]) {
+        for uri in uris {
+            {
+                let mut subscriptions = lock(&self.subscriptions);
+                let publishers = &mut subscriptions[subscription].publishers;
+                if let Some(known) = publishers.get_mut(uri) {
+                    known.listed = true;
+                    continue;
+                }
+                if publishers.len() >= MOST_PUBLISHERS || *uri == self.master.uri {
+                    continue;
+                }
+                publishers.insert(uri.clone(), Publisher { listed: true, node: None });
+            }
+            let uri = uri.clone();
+            self.spawn_connection(move |shared| shared.listen_to(subscription, &uri));
+        }
+    }
+
+    /// Listens to a publisher, again and again for as long as the master names it.
+    fn listen_to(self: &Arc<Self>, at: usize, uri: &str) {
+        let mut pause = PAUSES[0];
+        while !self.stop.is_set() {
+            match self.meet_publisher(at, uri) {
+                Ok(connection) => {
+                    self.take_messages(at, uri, connection);
+                    pause = PAUSES[0];
+                }
+                Err(Problem::Told(problem)) => self.note(problem),
+                // It has gone, or is not yet ready: it is tried again.
+                Err(Problem::Unreachable) => {}
+            }
+            let mut subscriptions = lock(&self.subscriptions);
+            let publishers = &mut subscriptions[at].publishers;
+            if publishers.get(uri).is_none_or(|publisher| !publisher.listed) {
+                publishers.remove(uri);
+                return;
+            }
+            drop(subscriptions);
+            self.pause(pause);
+            pause = (pause * 2).min(PAUSES[1]);
+        }
+    }
+
+    /// Connects to a publisher, and takes over its type.
+    fn meet_publisher(self: &Arc<Self>, at: usize, uri: &str) -> Result<Connection, Problem> {
+        let (topic, ty, codec, feeds) = {
+            let subscriptions = lock(&self.subscriptions);
+            let it = &subscriptions[at];
+            (it.topic.clone(), it.ty.clone(), it.codec.clone(), it.feeds.clone())
+        };
+        let asked = Address::read(uri).ok_or(Problem::Unreachable)?;
+        let protocols = Value::List(vec![Value::List(vec!["TCPROS".into()])]);
+        let request = [self.name.as_str().into(), topic.as_str().into(), protocols];
+        let place = master::ask(&asked, "requestTopic", &request, &self.stop).map_err(|_| Problem::Unreachable)?;
+        let [Value::Text(_), Value::Text(host), Value::Int(port)] = place.items() else {
+            return Err(Problem::Unreachable);
+        };
+        let port = u16::try_from(*port).map_err(|_| Problem::Unreachable)?;
+        let mut connection = Connection::to(host, port, CONNECT, &self.stop).map_err(|_| Problem::Unreachable)?;
+        let ours = Header::new(&[
+            ("callerid", self.name.as_str()),
+            ("md5sum", ANY),
+            ("message_definition", ""),
+            ("tcp_nodelay", "1"),
+            ("topic", &topic),
+            ("type", &ty),
+        ]);
+        let deadline = Some(Instant::now() + HANDSHAKE);
+        connection.write_all(&ours.write(), deadline).map_err(|_| Problem::Unreachable)?;
+        let theirs = connection.read_frame(header::MOST, deadline).map_err(|_| Problem::Unreachable)?;
+        let theirs = Header::read(&theirs)
+            .map_err(|problem| Problem::Told(format!("the header of a publisher of `{topic}` is broken: {problem}")))?;
+        let node = node_of(&theirs);
+        if let Some(problem) = wrong(&theirs, &topic, &ty, codec.as_deref()) {
+            return Err(Problem::Told(format!("`{node}` is not listened to: {problem}")));
+        }
+        let offer = Offer::of(&theirs);
+        for feed in feeds {
+            self.offer(feed, &node, &offer)
+                .map_err(|problem| Problem::Told(format!("`{node}` is not listened to: {problem}")))?;
+        }
+        let mut subscriptions = lock(&self.subscriptions);
+        let subscription = &mut subscriptions[at];
+        if subscription.lost {
+            self.note(format!("`{node}` publishes on `{topic}` again"));
+        }
+        if let Some(publisher) = subscription.publishers.get_mut(uri) {
+            publisher.node = Some(node);
+        }
+        Ok(connection)
+    }
+
+    /// Takes the messages of a publisher until its connection ends.
+    fn take_messages(&self, at: usize, uri: &str, mut connection: Connection) {
+        let problem = loop {
+            match connection.read_frame(MOST_BYTES, None) {
+                Ok(bytes) => {
+                    let (bytes, arrived) = (bytes.into(), Instant::now());
+                    if !self.inbox.push(Incoming::Message { subscription: at, bytes, arrived }) {
+                        return;
+                    }
+                }
+                Err(error) => break error,
+            }
+        };
+        if self.stop.is_set() {
+            return;
+        }
+        let mut subscriptions = lock(&self.subscriptions);
+        let subscription = &mut subscriptions[at];
+        subscription.lost = true;
+        let node = subscription.publishers.get_mut(uri).and_then(|publisher| publisher.node.take()).unwrap_or_default();
+        self.note(format!("`{node}` no longer publishes on `{}`: {problem}", subscription.topic));
+    }
+}
+
+/// Why a publisher is not listened to.
+enum Problem {
+    /// It does not answer.
+    Unreachable,
+    /// It is not what was declared, in a sentence.
+    Told(String),
+}
+
+fn node_of(header: &Header) -> String {
+    let node = header.get("callerid");
+    if node.is_empty() { "a publisher without a name".to_owned() } else { node.to_owned() }
+}
+
+/// What is wrong with a publisher.
+fn wrong(header: &Header, topic: &str, ty: &str, codec: Option<&Codec>) -> Option<String> {
+    let (error, found) = (header.get("error"), header.get("type"));
+    if !error.is_empty() {
+        return Some(format!("it refuses: {error}"));
+    }
+    if found.is_empty() || header.get("md5sum").is_empty() {
+        return Some(format!("it does not say what it publishes on `{topic}`"));
+    }
+    if found != ty && found != ANY && ty != ANY {
+        return Some(format!("it publishes `{found}` on `{topic}`; expected `{ty}`"));
+    }
+    // A definition that does not have the MD5 that goes with it says nothing.
+    let texts = Texts::of_definition(found, header.get("message_definition")).ok()?;
+    if texts.md5(found).ok()? != header.get("md5sum") {
+        return None;
+    }
+    let difference = codec?.difference(&texts.layout(found).ok()?, found)?;
+    Some(format!("`{found}` has another layout than the space says: {difference}"))
+}
