@@ -1,0 +1,192 @@
+//! Messages through the runner: nothing is lost, and nothing is changed that nobody changes.
+
+use std::time::{Duration, Instant};
+
+use nix::sys::signal::Signal;
+use sesame_plan::testing::{at, operation, test_of, use_of};
+use sesame_plan::{Choice, Clock, OperationKind, Test};
+
+use crate::core::Core;
+use crate::system::{System, peers, remapped, ros1};
+
+const STRING: &str = "std_msgs/msg/String";
+const JOINTS: &str = "sensor_msgs/msg/JointState";
+
+fn nothing() -> Test {
+    test_of(Vec::new())
+}
+
+/// Messages from a publisher to a subscriber through the runner, with nothing lost and nothing changed.
+fn relay(interface: &str, ty: &str, count: u64, rate: u32) -> Option<(Core, System)> {
+    let core = Core::start()?;
+    let plan = peers(&core.uri(), interface);
+    let (count_text, rate) = (count.to_string(), rate.to_string());
+    let remapped = remapped(&plan, 0);
+    let mut publisher = core.ready_peer("publisher.py", &["/peer", ty, &count_text, &rate, &remapped[0]]);
+    let mut subscriber = core.ready_peer("subscriber.py", &["/peer", ty, &count_text, "20"]);
+    let mut system = System::new(plan);
+    let mut said = None;
+    let finished = system.run(&nothing(), || publisher.go(), || {
+        said = said.take().or_else(|| subscriber.said_already());
+        said.is_some()
+    });
+    let (said, sent) = (said.unwrap(), publisher.said());
+    assert_eq!(said["received"], count, "{said}");
+    assert_eq!(said["digest"], sent["digest"], "byte for byte");
+    assert_eq!(said["callerid"], "/sesame_relay_1");
+    assert_eq!(said["type"], ty);
+    assert_eq!(finished.unwrap().messages, count);
+    assert_eq!(system.incidents().notes, [""; 0]);
+    Some((core, system))
+}
+
+#[test]
+fn thirty_seconds_of_joint_states_at_200_hz_arrive_byte_for_byte() {
+    relay(JOINTS, "sensor_msgs/JointState", 6_000, 200);
+}
+
+#[test]
+fn many_messages_at_once_arrive_byte_for_byte() {
+    relay(STRING, "std_msgs/String", 5_000, 2_000);
+}
+
+#[test]
+fn tools_of_ros_count_what_passes_as_the_runner_does() {
+    let Some(core) = Core::start() else { return };
+    let plan = peers(&core.uri(), JOINTS);
+    let remapped = remapped(&plan, 0);
+    let ty = "sensor_msgs/JointState";
+    let mut publisher = core.ready_peer("publisher.py", &["/peer", ty, "1000", "200", &remapped[0]]);
+    let bag = core.home.path().join("peer.bag");
+    let record = core.tool("rosbag", &["record", "-O", &bag.display().to_string(), "/peer", "/peer/undisturbed"]);
+    let mut hz = core.tool("rostopic", &["hz", "/peer"]);
+    // The recorder and the tool are subscribers that the plan does not know.
+    let mut subscriber = core.ready_peer("subscriber.py", &["/peer", ty, "1000", "20"]);
+    let mut system = System::new(plan);
+    let mut said = None;
+    let begun = Instant::now();
+    let mut gone = false;
+    let finished = system.run(&nothing(), || {}, || {
+        // They come a while after the others.
+        if !gone && begun.elapsed() > Duration::from_secs(5) {
+            publisher.go();
+            gone = true;
+        }
+        said = said.take().or_else(|| subscriber.said_already());
+        said.is_some()
+    });
+    assert_eq!(finished.unwrap().messages, 1000);
+    assert_eq!(said.unwrap()["received"], 1000);
+    let rates: Vec<String> = (0..8).map(|_| hz.line()).filter(|line| line.starts_with("average rate")).collect();
+    let rate = |line: &String| line.rsplit(' ').next().unwrap().parse::<f64>().unwrap();
+    assert!(rates.iter().map(rate).all(|rate| (190.0..210.0).contains(&rate)), "{rates:?}");
+    assert!(!rates.is_empty());
+    record.end(Signal::SIGINT);
+    let mut info = core.tool("rosbag", &["info", "-y", "-k", "topics", &bag.display().to_string()]);
+    let lines: Vec<String> = (0..10).map(|_| info.line()).take_while(|line| !line.is_empty()).take(8).collect();
+    let counted: Vec<&str> = lines.iter().filter_map(|line| line.trim().strip_prefix("messages: ")).collect();
+    assert_eq!(counted, ["1000", "1000"], "{lines:?}");
+}
+
+#[test]
+fn what_an_operation_changes_is_all_that_changes() {
+    let Some(core) = Core::start() else { return };
+    let mut plan = peers(&core.uri(), STRING);
+    plan.operations = vec![operation(0, OperationKind::Blackhole)];
+    let remapped = remapped(&plan, 0);
+    let mut publisher = core.ready_peer("publisher.py", &["/peer", "std_msgs/String", "400", "200", &remapped[0]]);
+    let mut subscriber = core.ready_peer("subscriber.py", &["/peer", "std_msgs/String", "400", "3"]);
+    let mut system = System::new(plan);
+    let test = test_of(vec![use_of(0, 0.5, 1.0, Vec::new(), 1)]);
+    let mut said = None;
+    let finished = system.run(&test, || publisher.go(), || {
+        said = said.take().or_else(|| subscriber.said_already());
+        said.is_some()
+    });
+    let received = said.unwrap()["received"].as_u64().unwrap();
+    assert!((290..=310).contains(&received), "half a second of 200 Hz is missing: {received}");
+    assert_eq!(finished.unwrap().messages, 400);
+}
+
+#[test]
+fn a_header_is_changed_in_its_place() {
+    let Some(core) = Core::start() else { return };
+    let mut plan = peers(&core.uri(), JOINTS);
+    plan.operations = vec![at(&["header", "stamp"], operation(0, OperationKind::ClockSkew))];
+    let remapped = remapped(&plan, 0);
+    let ty = "sensor_msgs/JointState";
+    let mut publisher = core.ready_peer("publisher.py", &["/peer", ty, "1", "10", &remapped[0]]);
+    let mut echo = core.tool("rostopic", &["echo", "-p", "-n", "1", "/peer"]);
+    let mut subscriber = core.ready_peer("subscriber.py", &["/peer", ty, "1", "20"]);
+    let mut system = System::new(plan);
+    let test = test_of(vec![use_of(0, 0.0, 1_000.0, vec![Choice::Value { value: 5.0 }], 1)]);
+    let (mut said, begun, mut gone) = (None, Instant::now(), false);
+    let finished = system.run(&test, || {}, || {
+        if !gone && begun.elapsed() > Duration::from_secs(4) {
+            publisher.go();
+            gone = true;
+        }
+        said = said.take().or_else(|| subscriber.said_already());
+        said.is_some()
+    });
+    finished.unwrap();
+    let (names, values) = (echo.line(), echo.line());
+    let value = |name: &str| {
+        let at = names.split(',').position(|it| it == name).unwrap();
+        values.split(',').nth(at).unwrap().to_owned()
+    };
+    let (received, stamp) = (value("%time"), value("field.header.stamp"));
+    let [received, stamp] = [received, stamp].map(|nanos| nanos.parse::<i64>().unwrap());
+    assert_eq!(value("field.header.seq"), "1", "rospy counts from one");
+    assert_eq!(value("field.header.frame_id"), "base");
+    assert_eq!(value("field.name6"), "joint_6");
+    // It is the time of the stamp that `rostopic` shows.
+    assert_eq!(received, stamp);
+    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap().as_nanos();
+    let ahead = stamp - i64::try_from(now).unwrap();
+    assert!((0..5_000_000_000).contains(&ahead), "five seconds ahead of when it was sent: {ahead}");
+}
+
+#[test]
+fn latched_messages_are_there_for_those_who_come_later() {
+    let Some(core) = Core::start() else { return };
+    let mut plan = peers(&core.uri(), STRING);
+    plan.nodes.truncate(1);
+    let remapped = remapped(&plan, 0);
+    let latched = ["/peer", "std_msgs/String", "3", "100", "latch", "at-once", &remapped[0]];
+    let mut publisher = core.ready_peer("publisher.py", &latched);
+    assert_eq!(publisher.said()["sent"], 3);
+    let mut system = System::new(plan);
+    let (mut subscriber, mut said, begun) = (None, None, Instant::now());
+    let finished = system.run(&nothing(), || {}, || {
+        if begun.elapsed() > Duration::from_secs(1) {
+            let late = subscriber.get_or_insert_with(|| core.peer("subscriber.py", &["/peer", "std_msgs/String", "1", "20"]));
+            said = late.said_already().filter(|it| it["received"].is_u64()).or(said.take());
+        }
+        said.is_some()
+    });
+    finished.unwrap();
+    let said = said.unwrap();
+    assert_eq!((&said["received"], &said["latching"]), (&1.into(), &"1".into()), "{said}");
+}
+
+#[test]
+fn time_is_that_of_the_clock() {
+    let Some(core) = Core::start() else { return };
+    let mut plan = peers(&core.uri(), STRING);
+    ros1(&mut plan).clock = Clock::Topic { path: "/clock".to_owned() };
+    let remapped = remapped(&plan, 0);
+    let _clock = core.ready_peer("clock.py", &["/peer", &remapped[0]]);
+    let mut subscriber = core.ready_peer("subscriber.py", &["/peer", "std_msgs/String", "20", "20"]);
+    let mut system = System::new(plan);
+    let (mut said, mut begun) = (None, None);
+    let finished = system.run(&nothing(), || begun = Some(Instant::now()), || {
+        said = said.take().or_else(|| subscriber.said_already());
+        said.is_some()
+    });
+    let (messages, wall) = (finished.unwrap().messages, begun.unwrap().elapsed().as_secs_f64());
+    let sim = system.now().nanos() as f64 / 1e9;
+    assert!(messages as f64 >= sim - 2.0 && messages as f64 <= sim + 2.0, "one in each second: {messages} in {sim} s");
+    // A busy machine may hold the clock back, but never makes it faster.
+    assert!((3.0 * wall..=10.5 * wall).contains(&sim), "{sim} s in {wall} s");
+}
