@@ -9,12 +9,16 @@
 pub mod codec;
 #[expect(clippy::disallowed_methods, clippy::disallowed_types, reason = "an adapter: it has connections")]
 mod connection;
+#[expect(clippy::disallowed_methods, reason = "an adapter: it waits for others")]
+mod contact;
 pub mod definition;
 #[expect(clippy::disallowed_methods, reason = "an adapter: it waits for others")]
 mod master;
 #[expect(clippy::disallowed_methods, clippy::disallowed_types, reason = "an adapter: it waits for others on threads")]
 mod node;
 mod protocol;
+#[expect(clippy::disallowed_methods, reason = "an adapter: it asks others")]
+pub mod scan;
 #[expect(clippy::disallowed_methods, reason = "an adapter: it waits for other processes")]
 mod transport;
 

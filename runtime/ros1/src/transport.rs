@@ -5,6 +5,8 @@
 //! original publishers. A service that is cut is served under the name that clients know, in the same way.
 
 mod presence;
+#[cfg(test)]
+mod tests;
 mod wired;
 
 use std::path::{Path, PathBuf};
@@ -41,7 +43,12 @@ fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
     let sesame_plan::Transport::Ros1(ros1) = &plan.simulator.transport else {
         unreachable!("the generator connects each kind of simulator by its own transport")
     };
-    let place = place(plan, ros1, Place::of_worker(folder.to_owned()));
+    at_place(plan, ros1, Place::of_worker(folder.to_owned()))
+}
+
+/// The transport of a worker whose programs run at this place.
+fn at_place(plan: &CampaignPlan, ros1: &Ros1, place: Place) -> Box<dyn Transport> {
+    let place = in_ros(plan, ros1, place);
     let settings = Settings {
         has_clock: matches!(ros1.clock, Clock::Topic { .. }),
         resets: ros1.reset.is_some(),
@@ -61,7 +68,7 @@ fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
 }
 
 /// What launched programs are given.
-fn place(plan: &CampaignPlan, ros1: &Ros1, place: Place) -> Place {
+fn in_ros(plan: &CampaignPlan, ros1: &Ros1, place: Place) -> Place {
     let own = |name: &str| place.folder.join(name).display().to_string();
     let mut environment = vec![
         ("ROS_MASTER_URI".to_owned(), ros1.master.clone()),

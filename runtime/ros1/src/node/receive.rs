@@ -8,16 +8,10 @@ use super::send::Offer;
 use super::{Incoming, Shared, lock};
 use crate::codec::Codec;
 use crate::connection::Connection;
+use crate::contact::{self, ContactError};
 use crate::definition::Texts;
-use crate::master::{self, Address, AskError};
-use crate::protocol::header::{self, ANY, Header};
-use crate::protocol::xmlrpc::Value;
-
-/// How long a publisher may take to say who it is.
-const HANDSHAKE: Duration = Duration::from_secs(5);
-
-/// How long a connection may take.
-const CONNECT: Duration = Duration::from_secs(2);
+use crate::master::{Address, AskError};
+use crate::protocol::header::{ANY, Header};
 
 /// How long it is waited until a publisher that cannot be reached is tried again: at first, and at most.
 const PAUSES: [Duration; 2] = [Duration::from_millis(50), Duration::from_secs(1)];
@@ -158,27 +152,13 @@ impl Shared {
             (it.topic.clone(), it.ty.clone(), it.codec.clone(), it.feeds.clone())
         };
         let asked = Address::read(uri).ok_or(Problem::Unreachable)?;
-        let protocols = Value::List(vec![Value::List(vec!["TCPROS".into()])]);
-        let request = [self.name.as_str().into(), topic.as_str().into(), protocols];
-        let place = master::ask(&asked, "requestTopic", &request, &self.stop).map_err(|_| Problem::Unreachable)?;
-        let [Value::Text(_), Value::Text(host), Value::Int(port)] = place.items() else {
-            return Err(Problem::Unreachable);
-        };
-        let port = u16::try_from(*port).map_err(|_| Problem::Unreachable)?;
-        let mut connection = Connection::to(host, port, CONNECT, &self.stop).map_err(|_| Problem::Unreachable)?;
-        let ours = Header::new(&[
-            ("callerid", self.name.as_str()),
-            ("md5sum", ANY),
-            ("message_definition", ""),
-            ("tcp_nodelay", "1"),
-            ("topic", &topic),
-            ("type", &ty),
-        ]);
-        let deadline = Some(Instant::now() + HANDSHAKE);
-        connection.write_all(&ours.write(), deadline).map_err(|_| Problem::Unreachable)?;
-        let theirs = connection.read_frame(header::MOST, deadline).map_err(|_| Problem::Unreachable)?;
-        let theirs = Header::read(&theirs)
-            .map_err(|problem| Problem::Told(format!("the header of a publisher of `{topic}` is broken: {problem}")))?;
+        let met = contact::subscribe(&asked, [&self.name, &topic, &ty], &self.stop);
+        let (connection, theirs) = met.map_err(|error| match error {
+            ContactError::Unreachable(_) => Problem::Unreachable,
+            ContactError::Broken(problem) => {
+                Problem::Told(format!("the header of a publisher of `{topic}` is broken: {problem}"))
+            }
+        })?;
         let node = node_of(&theirs);
         if let Some(problem) = wrong(&theirs, &topic, &ty, codec.as_deref()) {
             return Err(Problem::Told(format!("`{node}` is not listened to: {problem}")));

@@ -8,17 +8,15 @@ use std::time::{Duration, Instant};
 
 use super::{Incoming, Shared, lock};
 use crate::connection::{Connection, LOOK};
+use crate::contact::{self, ContactError};
 use crate::master::AskError;
 use crate::protocol::header::{self, ANY, Header};
 
 /// The most bytes of a request or reply.
 const MOST_BYTES: usize = 64 << 20;
 
-/// How long a server may take to say who it is.
+/// How long a client may take to hear what it calls.
 const HANDSHAKE: Duration = Duration::from_secs(5);
-
-/// How long a connection may take.
-const CONNECT: Duration = Duration::from_secs(2);
 
 /// A service that the node offers.
 #[derive(Debug)]
@@ -143,16 +141,12 @@ impl Shared {
     ) -> Result<(Header, Arc<[u8]>), CallError> {
         let lost = |error: io::Error| CallError::Lost { service: service.to_owned(), error };
         let at = self.master.server(service)?.ok_or_else(|| CallError::Nobody(service.to_owned()))?;
-        let mut connection = Connection::to(&at.host, at.port, CONNECT, &self.stop).map_err(lost)?;
-        let mut ours = vec![("callerid", self.name.as_str()), ("md5sum", ANY), ("service", service)];
-        if request.is_none() {
-            ours.push(("probe", "1"));
-        }
-        let deadline = Some(Instant::now() + HANDSHAKE);
-        connection.write_all(&Header::new(&ours).write(), deadline).map_err(lost)?;
-        let theirs = connection.read_frame(header::MOST, deadline).map_err(lost)?;
         let failed = |why: String| CallError::Failed { service: service.to_owned(), why };
-        let theirs = Header::read(&theirs).map_err(failed)?;
+        let met = contact::serve(&at, [&self.name, service], request.is_none(), &self.stop);
+        let (mut connection, theirs) = met.map_err(|error| match error {
+            ContactError::Unreachable(error) => lost(error),
+            ContactError::Broken(problem) => failed(format!("its header is broken: {problem}")),
+        })?;
         if !theirs.get("error").is_empty() {
             return Err(failed(theirs.get("error").to_owned()));
         }

@@ -30,10 +30,6 @@ impl Value {
         if let Value::Text(text) = self { Some(text) } else { None }
     }
 
-    pub(crate) fn int(&self) -> Option<i32> {
-        if let Value::Int(number) = self { Some(*number) } else { None }
-    }
-
     /// The elements of a list; none of what is no list.
     pub(crate) fn items(&self) -> &[Value] {
         if let Value::List(items) = self { items } else { &[] }

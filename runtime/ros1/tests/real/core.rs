@@ -162,6 +162,10 @@ impl Program {
 impl Drop for Program {
     fn drop(&mut self) {
         // Tools of ROS end their own children when they are asked to end.
-        self.stop(if self.name == "roscore" || self.name.starts_with("ros") { Signal::SIGINT } else { Signal::SIGKILL });
+        self.stop(if self.name == "roscore" || self.name.starts_with("ros") {
+            Signal::SIGINT
+        } else {
+            Signal::SIGKILL
+        });
     }
 }

@@ -10,6 +10,6 @@ mod core;
 mod system;
 
 mod faults;
-mod launched;
 mod relaying;
+mod scanning;
 mod services;

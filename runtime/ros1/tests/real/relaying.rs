@@ -26,10 +26,14 @@ fn relay(interface: &str, ty: &str, count: u64, rate: u32) -> Option<(Core, Syst
     let mut subscriber = core.ready_peer("subscriber.py", &["/peer", ty, &count_text, "20"]);
     let mut system = System::new(plan);
     let mut said = None;
-    let finished = system.run(&nothing(), || publisher.go(), || {
-        said = said.take().or_else(|| subscriber.said_already());
-        said.is_some()
-    });
+    let finished = system.run(
+        &nothing(),
+        || publisher.go(),
+        || {
+            said = said.take().or_else(|| subscriber.said_already());
+            said.is_some()
+        },
+    );
     let (said, sent) = (said.unwrap(), publisher.said());
     assert_eq!(said["received"], count, "{said}");
     assert_eq!(said["digest"], sent["digest"], "byte for byte");
@@ -66,15 +70,19 @@ fn tools_of_ros_count_what_passes_as_the_runner_does() {
     let mut said = None;
     let begun = Instant::now();
     let mut gone = false;
-    let finished = system.run(&nothing(), || {}, || {
-        // They come a while after the others.
-        if !gone && begun.elapsed() > Duration::from_secs(5) {
-            publisher.go();
-            gone = true;
-        }
-        said = said.take().or_else(|| subscriber.said_already());
-        said.is_some()
-    });
+    let finished = system.run(
+        &nothing(),
+        || {},
+        || {
+            // They come a while after the others.
+            if !gone && begun.elapsed() > Duration::from_secs(5) {
+                publisher.go();
+                gone = true;
+            }
+            said = said.take().or_else(|| subscriber.said_already());
+            said.is_some()
+        },
+    );
     assert_eq!(finished.unwrap().messages, 1000);
     assert_eq!(said.unwrap()["received"], 1000);
     let rates: Vec<String> = (0..8).map(|_| hz.line()).filter(|line| line.starts_with("average rate")).collect();
@@ -99,10 +107,14 @@ fn what_an_operation_changes_is_all_that_changes() {
     let mut system = System::new(plan);
     let test = test_of(vec![use_of(0, 0.5, 1.0, Vec::new(), 1)]);
     let mut said = None;
-    let finished = system.run(&test, || publisher.go(), || {
-        said = said.take().or_else(|| subscriber.said_already());
-        said.is_some()
-    });
+    let finished = system.run(
+        &test,
+        || publisher.go(),
+        || {
+            said = said.take().or_else(|| subscriber.said_already());
+            said.is_some()
+        },
+    );
     let received = said.unwrap()["received"].as_u64().unwrap();
     assert!((290..=310).contains(&received), "half a second of 200 Hz is missing: {received}");
     assert_eq!(finished.unwrap().messages, 400);
@@ -121,14 +133,18 @@ fn a_header_is_changed_in_its_place() {
     let mut system = System::new(plan);
     let test = test_of(vec![use_of(0, 0.0, 1_000.0, vec![Choice::Value { value: 5.0 }], 1)]);
     let (mut said, begun, mut gone) = (None, Instant::now(), false);
-    let finished = system.run(&test, || {}, || {
-        if !gone && begun.elapsed() > Duration::from_secs(4) {
-            publisher.go();
-            gone = true;
-        }
-        said = said.take().or_else(|| subscriber.said_already());
-        said.is_some()
-    });
+    let finished = system.run(
+        &test,
+        || {},
+        || {
+            if !gone && begun.elapsed() > Duration::from_secs(4) {
+                publisher.go();
+                gone = true;
+            }
+            said = said.take().or_else(|| subscriber.said_already());
+            said.is_some()
+        },
+    );
     finished.unwrap();
     let (names, values) = (echo.line(), echo.line());
     let value = |name: &str| {
@@ -158,13 +174,18 @@ fn latched_messages_are_there_for_those_who_come_later() {
     assert_eq!(publisher.said()["sent"], 3);
     let mut system = System::new(plan);
     let (mut subscriber, mut said, begun) = (None, None, Instant::now());
-    let finished = system.run(&nothing(), || {}, || {
-        if begun.elapsed() > Duration::from_secs(1) {
-            let late = subscriber.get_or_insert_with(|| core.peer("subscriber.py", &["/peer", "std_msgs/String", "1", "20"]));
-            said = late.said_already().filter(|it| it["received"].is_u64()).or(said.take());
-        }
-        said.is_some()
-    });
+    let finished = system.run(
+        &nothing(),
+        || {},
+        || {
+            if begun.elapsed() > Duration::from_secs(1) {
+                let late = subscriber
+                    .get_or_insert_with(|| core.peer("subscriber.py", &["/peer", "std_msgs/String", "1", "20"]));
+                said = late.said_already().filter(|it| it["received"].is_u64()).or(said.take());
+            }
+            said.is_some()
+        },
+    );
     finished.unwrap();
     let said = said.unwrap();
     assert_eq!((&said["received"], &said["latching"]), (&1.into(), &"1".into()), "{said}");
@@ -180,10 +201,14 @@ fn time_is_that_of_the_clock() {
     let mut subscriber = core.ready_peer("subscriber.py", &["/peer", "std_msgs/String", "20", "20"]);
     let mut system = System::new(plan);
     let (mut said, mut begun) = (None, None);
-    let finished = system.run(&nothing(), || begun = Some(Instant::now()), || {
-        said = said.take().or_else(|| subscriber.said_already());
-        said.is_some()
-    });
+    let finished = system.run(
+        &nothing(),
+        || begun = Some(Instant::now()),
+        || {
+            said = said.take().or_else(|| subscriber.said_already());
+            said.is_some()
+        },
+    );
     let (messages, wall) = (finished.unwrap().messages, begun.unwrap().elapsed().as_secs_f64());
     let sim = system.now().nanos() as f64 / 1e9;
     assert!(messages as f64 >= sim - 2.0 && messages as f64 <= sim + 2.0, "one in each second: {messages} in {sim} s");

@@ -1,7 +1,7 @@
 //! Calls of services through the runner.
 
-use sesame_plan::testing::test_of;
 use sesame_plan::Channel::{Reply, Request};
+use sesame_plan::testing::test_of;
 use sesame_plan::{Node, TopicId, testing};
 
 use crate::core::Core;
@@ -19,11 +19,8 @@ fn clients_call_servers_through_the_runner() {
             ("question", "/ask", "std_srvs/srv/Trigger_Request", Request),
         ],
     );
-    plan.nodes = vec![Node {
-        publishes: vec![TopicId(1)],
-        subscribes: vec![TopicId(0), TopicId(2)],
-        ..testing::node("server")
-    }];
+    plan.nodes =
+        vec![Node { publishes: vec![TopicId(1)], subscribes: vec![TopicId(0), TopicId(2)], ..testing::node("server") }];
     ros1(&mut plan).reset = Some("/reset".to_owned());
     let remapped = remapped(&plan, 0);
     assert_eq!(remapped, ["/switch:=/switch/undisturbed", "/ask:=/ask/undisturbed"]);
@@ -31,13 +28,17 @@ fn clients_call_servers_through_the_runner() {
     let mut client = core.ready_peer("client.py", &[]);
     let mut system = System::new(plan);
     let (mut said, mut begun) = (None, false);
-    let finished = system.run(&test_of(Vec::new()), || {}, || {
-        if !std::mem::replace(&mut begun, true) {
-            client.go();
-        }
-        said = said.take().or_else(|| client.said_already());
-        said.is_some()
-    });
+    let finished = system.run(
+        &test_of(Vec::new()),
+        || {},
+        || {
+            if !std::mem::replace(&mut begun, true) {
+                client.go();
+            }
+            said = said.take().or_else(|| client.said_already());
+            said.is_some()
+        },
+    );
     let (said, finished) = (said.unwrap(), finished.unwrap());
     assert_eq!(said["answers"], serde_json::json!([[true, "on"], [false, "off"], [true, "on"]]));
     assert!(said["failed"].as_str().unwrap().contains("not today"), "{said}");
