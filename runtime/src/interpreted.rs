@@ -22,9 +22,11 @@ pub struct Interpreted {
     pub simulator: PathBuf,
 }
 
-/// The transport to the simulator of a plan, which is a program or a system of ROS 2 nodes.
+/// The transport to the simulator of a plan, which is a program or a system of ROS nodes.
 pub(crate) fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
     let connect = match &plan.simulator.transport {
+        #[cfg(feature = "ros1")]
+        sesame_plan::Transport::Ros1(_) => sesame_ros1::ros1(folder.to_owned()),
         #[cfg(feature = "ros2")]
         sesame_plan::Transport::Ros2(_) => sesame_ros2::ros2(folder.to_owned()),
         _ => transport::process(folder.to_owned()),

@@ -26,9 +26,10 @@ pub fn msg(package: &str, name: &str, text: &str) -> Result<Definition, Definiti
 /// The interfaces of requests and replies that a `.srv` file declares: `NAME_Request` and `NAME_Response`.
 pub fn srv(package: &str, name: &str, text: &str) -> Result<[Definition; 2], DefinitionError> {
     let [request, reply] = parts(text)?;
+    let before = text.split('\n').count() - reply.split('\n').count();
     Ok([
         definition(package, format!("{package}/srv/{name}_Request"), &request, 1)?,
-        definition(package, format!("{package}/srv/{name}_Response"), &reply, request.split('\n').count() + 1)?,
+        definition(package, format!("{package}/srv/{name}_Response"), &reply, before + 1)?,
     ])
 }
 
@@ -169,8 +170,11 @@ fn wire_type(package: &str, written: &str) -> Result<WireType, String> {
         if let Some((_, name)) = TIMES.iter().find(|(time, _)| *time == element) {
             return Ok(WireType::Interface { name: (*name).to_owned() });
         }
-        let name = message(package, written).map(|name| interface(&name)).filter(|name| name.split('/').all(is_name));
-        name.map(|name| WireType::Interface { name }).ok_or_else(|| format!("`{written}` is no type of ROS 1"))
+        // Names in small letters exist (`tf/tfMessage`), but without a package they are mistakes.
+        let is_type = element.contains('/') || element.starts_with(|first: char| first.is_ascii_uppercase());
+        let name = message(package, written).map(|name| interface(&name));
+        let name = name.filter(|name| is_type && element.split('/').count() <= 2 && name.split('/').all(is_name));
+        name.map(|name| WireType::Interface { name }).ok_or_else(|| format!("`{element}` is no type of ROS 1"))
     })
 }
 

@@ -7,7 +7,6 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use md5::{Digest as _, Md5};
 use sesame_interfaces::{Catalogue, DefinitionError, ResolveError, ros1};
 use sesame_plan::Interface;
 
@@ -153,7 +152,9 @@ impl Texts {
         let mut all = vec![name.to_owned()];
         self.collect(name, 0, &mut all)?;
         let mut catalogue = Catalogue::default();
-        ros1::builtin().into_iter().for_each(|definition| catalogue.add(definition));
+        for definition in ros1::builtin() {
+            catalogue.add(definition);
+        }
         for name in all {
             let last = name.rsplit('/').next().unwrap_or_default();
             let definition = ros1::msg(package(&name), last, self.text(&name)?);
@@ -175,5 +176,5 @@ fn package(name: &str) -> &str {
 }
 
 fn hex(text: &str) -> String {
-    Md5::digest(text.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect()
+    format!("{:x}", md5::compute(text))
 }

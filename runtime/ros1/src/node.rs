@@ -33,6 +33,9 @@ use self::watch::Seen;
 /// The most connections at a time, in each direction.
 const MOST_CONNECTIONS: usize = 500;
 
+/// The most characters of a note, in which may be what others sent.
+const LONGEST_NOTE: usize = 600;
+
 /// How long it takes at most to find out that nobody listens at an address.
 const LOOK: Duration = Duration::from_millis(100);
 
@@ -112,7 +115,7 @@ impl Node {
 
     /// Begins to look who is there, once everything is declared.
     pub(crate) fn watch(&self) {
-        self.shared.spawn(|shared| watch::watch(shared));
+        self.shared.spawn(watch::watch);
     }
 }
 
@@ -128,9 +131,10 @@ impl Drop for Node {
         self.shared.unregister();
         self.shared.stop.set();
         self.shared.inbox.close();
-        for at in self.listens {
-            // Wakes the thread that listens there.
-            let _ = std::net::TcpStream::connect_timeout(&at, LOOK);
+        let wake = |at| std::net::TcpStream::connect_timeout(at, LOOK).is_ok();
+        if !self.listens.iter().all(wake) {
+            // A thread that listens ends when the next one comes; nobody waits for that.
+            return;
         }
         let threads = std::mem::take(&mut *lock(&self.shared.threads));
         for thread in threads {
@@ -144,9 +148,13 @@ impl Shared {
     /// Starts a thread that ends when the node does.
     fn spawn(self: &Arc<Self>, work: impl FnOnce(&Arc<Shared>) + Send + 'static) {
         let shared = Arc::clone(self);
+        let started = thread::Builder::new().name("ros1".to_owned()).spawn(move || work(&shared));
         let mut threads = lock(&self.threads);
         threads.retain(|thread| !thread.is_finished());
-        threads.push(thread::spawn(move || work(&shared)));
+        match started {
+            Ok(thread) => threads.push(thread),
+            Err(error) => self.note(format!("a thread for a connection of ROS 1 cannot be started: {error}")),
+        }
     }
 
     /// Starts a thread for a connection, if there are not too many.
@@ -165,7 +173,11 @@ impl Shared {
     }
 
     /// Something for the user to know.
-    fn note(&self, note: String) {
+    fn note(&self, mut note: String) {
+        if let Some((end, _)) = note.char_indices().nth(LONGEST_NOTE) {
+            note.truncate(end);
+            note.push('…');
+        }
         self.inbox.note(note);
     }
 

@@ -131,13 +131,15 @@ pub fn scan(master: &str, within: Duration) -> Result<Facts, ScanError> {
     let declared: BTreeMap<String, String> = asked.types()?.into_iter().collect();
     let scan = Scan { master: asked, until: Instant::now() + within };
     let mut nodes = nodes(&state);
-    nodes.iter_mut().for_each(|node| node.answers = scan.has_time() && scan.master.is_alive(&node.name));
+    for node in &mut nodes {
+        node.answers = scan.has_time() && scan.master.is_alive(&node.name);
+    }
     let answering: BTreeSet<&str> = nodes.iter().filter(|node| node.answers).map(|node| node.name.as_str()).collect();
     let mut topics = topics(&state, &declared);
     let mut types = BTreeMap::new();
     for topic in &mut topics {
-        let publishers = topic.publishers.iter().filter(|node| answering.contains(node.as_str()));
-        if let Some(header) = publishers.filter_map(|node| scan.publisher(node, topic)).next() {
+        let mut publishers = topic.publishers.iter().filter(|node| answering.contains(node.as_str()));
+        if let Some(header) = publishers.find_map(|node| scan.publisher(node, topic)) {
             topic.latching = Some(header.is("latching"));
             header.get("type").clone_into(&mut topic.ty);
             describe(&header, &mut types);
@@ -203,9 +205,9 @@ fn nodes(state: &State) -> Vec<FoundNode> {
     add(&state.servers, |node| &mut node.serves);
     let mut nodes: Vec<FoundNode> = nodes.into_values().collect();
     for node in &mut nodes {
-        [&mut node.publishes, &mut node.subscribes, &mut node.serves]
-            .into_iter()
-            .for_each(|paths| paths.sort_unstable());
+        for paths in [&mut node.publishes, &mut node.subscribes, &mut node.serves] {
+            paths.sort_unstable();
+        }
     }
     nodes
 }

@@ -102,13 +102,13 @@ impl Ros1Bus {
     }
 
     /// A message that came in, as an event; one that cannot be read goes on as it is.
-    fn event(&self, line: usize, source: usize, call: Option<u64>, bytes: Arc<[u8]>, arrived: Instant) -> Event {
+    fn event(&self, line: usize, source: usize, call: Option<u64>, bytes: &Arc<[u8]>, arrived: Instant) -> Event {
         let wired = &self.lines[line];
-        match wired.codec.read(Arc::clone(&bytes)) {
+        match wired.codec.read(Arc::clone(bytes)) {
             Ok(value) => Event::Message { line, source, value, call, arrived },
             Err(error) => {
                 for sink in 0..wired.line.sinks.len() {
-                    self.send(line, sink, &bytes, call);
+                    self.send(line, sink, bytes, call);
                 }
                 let (path, interface) = (&wired.line.path, &wired.interface);
                 Event::Note(format!("a message on `{path}` is no `{interface}`, and goes on unchanged: {error}"))
@@ -138,7 +138,7 @@ impl Ros1Bus {
                     || Event::Note(format!("a message of the clock is no `{CLOCK}`, and is left out")),
                     Event::Clock,
                 )),
-                Role::Source { line, source } => Some(self.event(*line, *source, None, bytes, arrived)),
+                Role::Source { line, source } => Some(self.event(*line, *source, None, &bytes, arrived)),
             },
             Incoming::Call { service, call, bytes, arrived } => {
                 let [request, _] = self.services.get(service)?;
@@ -146,7 +146,7 @@ impl Ros1Bus {
                     self.node.as_ref()?.pass_call(service, Some(call), bytes);
                     return None;
                 };
-                Some(self.event(line, 0, Some(call), bytes, arrived))
+                Some(self.event(line, 0, Some(call), &bytes, arrived))
             }
             Incoming::Reply { service, call, bytes, arrived } => {
                 let [_, reply] = self.services.get(service)?;
@@ -154,7 +154,7 @@ impl Ros1Bus {
                     self.node.as_ref()?.reply(call, Ok(bytes));
                     return None;
                 };
-                Some(self.event(line, 0, Some(call), bytes, arrived))
+                Some(self.event(line, 0, Some(call), &bytes, arrived))
             }
         }
     }

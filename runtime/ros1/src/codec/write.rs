@@ -103,7 +103,9 @@ impl Output<'_> {
                         input.skip(layout, of).map_err(|error| error.element(at))?;
                     }
                 }
-                now.iter().take(is).skip(was).for_each(|item| self.value(of, Some(item)));
+                for item in now.iter().take(is).skip(was) {
+                    self.value(of, Some(item));
+                }
                 Ok(())
             }
         }
@@ -143,7 +145,9 @@ impl Output<'_> {
                 let items = value.map_or(&[][..], items);
                 let items = &items[..items.len().min(bound.map_or(usize::MAX, |bound| bound as usize))];
                 self.length(items.len());
-                items.iter().for_each(|item| self.value(of, Some(item)));
+                for item in items {
+                    self.value(of, Some(item));
+                }
             }
             Ty::Shape(at) => {
                 let shape = &self.layout.shapes[*at];

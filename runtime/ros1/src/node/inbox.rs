@@ -12,7 +12,7 @@ const MOST: usize = 10_000;
 /// The most bytes of messages that wait, beside the last message.
 const MOST_BYTES: usize = 256 << 20;
 
-/// The most notes that wait.
+/// The most notes; others could cause any number of them.
 const MOST_NOTES: usize = 1_000;
 
 /// Something that came in.
@@ -72,11 +72,13 @@ impl Inbox {
         true
     }
 
-    /// Puts a note in, unless there are too many.
+    /// Puts a note in, unless there were too many; the last one says so.
     pub(super) fn note(&self, note: String) {
         let mut state = lock(&self.state);
         if state.notes < MOST_NOTES {
             state.notes += 1;
+            let last = state.notes == MOST_NOTES;
+            let note = if last { format!("after {MOST_NOTES} notes on ROS 1, no more are kept") } else { note };
             state.queue.push_back(Incoming::Note(note));
             self.filled.notify_one();
         }
@@ -89,9 +91,6 @@ impl Inbox {
         let (mut state, _) = waited.unwrap_or_else(std::sync::PoisonError::into_inner);
         let incoming = state.queue.pop_front()?;
         state.bytes -= incoming.size();
-        if matches!(incoming, Incoming::Note(_)) {
-            state.notes -= 1;
-        }
         self.emptied.notify_all();
         Some(incoming)
     }
@@ -144,8 +143,10 @@ mod tests {
         let inbox = Inbox::default();
         (0..2 * MOST_NOTES).for_each(|at| inbox.note(at.to_string()));
         assert_eq!(lock(&inbox.state).queue.len(), MOST_NOTES);
-        while inbox.pop(Duration::ZERO).is_some() {}
-        inbox.note("again".to_owned());
-        assert!(inbox.pop(Duration::ZERO).is_some());
+        let mut last = None;
+        while let Some(Incoming::Note(note)) = inbox.pop(Duration::ZERO) {
+            last = Some(note);
+        }
+        assert_eq!(last.as_deref(), Some("after 1000 notes on ROS 1, no more are kept"));
     }
 }

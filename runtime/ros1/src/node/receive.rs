@@ -97,7 +97,9 @@ impl Shared {
                 })
                 .collect()
         };
-        all.into_iter().for_each(|at| self.add_publishers(at, uris));
+        for at in all {
+            self.add_publishers(at, uris);
+        }
     }
 
     fn add_publishers(self: &Arc<Self>, subscription: usize, uris: &[String]) {
@@ -235,4 +237,70 @@ fn wrong(header: &Header, topic: &str, ty: &str, codec: Option<&Codec>) -> Optio
     }
     let difference = codec?.difference(&texts.layout(found).ok()?, found)?;
     Some(format!("`{found}` has another layout than the space says: {difference}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use sesame_plan::{Interface, InterfaceField, Primitive, WireType};
+    use sesame_relay::wire::Wanted;
+
+    use super::*;
+
+    const DEFINITION: &str = "Header header\nfloat64[] values\n================================================================================\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n";
+
+    /// What a publisher says, with the MD5 of this definition.
+    fn header(definition: &str) -> Header {
+        let md5 = Texts::of_definition("p/M", DEFINITION).unwrap().md5("p/M").unwrap();
+        Header::new(&[("type", "p/M"), ("md5sum", &md5), ("message_definition", definition)])
+    }
+
+    /// The layout of a space, as ROS 2 has it, with a field of this name and primitive.
+    fn codec(values: &str, primitive: Primitive) -> Codec {
+        let number = |primitive| WireType::Primitive { primitive };
+        let field = |name: &str, ty| InterfaceField { name: name.to_owned(), ty };
+        let nested = |name: &str| WireType::Interface { name: name.to_owned() };
+        let interface = |name: &str, fields| Interface { name: name.to_owned(), fields };
+        let time = vec![field("sec", number(Primitive::Int32)), field("nanosec", number(Primitive::Uint32))];
+        let stamped = vec![field("stamp", nested("builtin_interfaces/msg/Time")), field("frame_id", WireType::String)];
+        let many = WireType::Sequence { of: Box::new(number(primitive)), bound: None };
+        let all = [
+            interface("builtin_interfaces/msg/Time", time),
+            interface("std_msgs/msg/Header", stamped),
+            interface("p/msg/M", vec![field("header", nested("std_msgs/msg/Header")), field(values, many)]),
+        ];
+        Codec::new(&all, "p/msg/M", &Wanted::All).unwrap()
+    }
+
+    #[test]
+    fn a_publisher_with_another_layout_is_not_listened_to() {
+        let wrong = |header: &Header, codec: &Codec| super::wrong(header, "/m", "p/M", Some(codec));
+        let header = header(DEFINITION);
+        assert_eq!(wrong(&header, &codec("values", Primitive::Float64)), None, "the number of the header aside");
+        assert_eq!(
+            wrong(&header, &codec("values", Primitive::Float32)).unwrap(),
+            "`p/M` has another layout than the space says: types `message, float32[]` of `header, values`, not `message, \
+             float64[]`"
+        );
+        assert_eq!(
+            wrong(&header, &codec("value", Primitive::Float64)).unwrap(),
+            "`p/M` has another layout than the space says: fields `header, value`, not `header, values`"
+        );
+    }
+
+    #[test]
+    fn a_definition_that_is_not_that_of_its_md5_says_nothing() {
+        let codec = codec("value", Primitive::Float32);
+        for definition in ["", "int8 other", "no definition"] {
+            assert_eq!(wrong(&header(definition), "/m", "p/M", Some(&codec)), None, "{definition}");
+        }
+    }
+
+    #[test]
+    fn who_does_not_say_what_it_publishes_is_not_listened_to() {
+        let wrong = |header: &Header| super::wrong(header, "/m", "p/M", None);
+        assert_eq!(wrong(&Header::refusal("no")).unwrap(), "it refuses: no");
+        assert_eq!(wrong(&Header::new(&[])).unwrap(), "it does not say what it publishes on `/m`");
+        let other = Header::new(&[("type", "p/N"), ("md5sum", "1")]);
+        assert_eq!(wrong(&other).unwrap(), "it publishes `p/N` on `/m`; expected `p/M`");
+    }
 }

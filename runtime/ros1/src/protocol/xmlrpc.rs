@@ -54,7 +54,9 @@ impl Value {
             }
             Value::List(items) => {
                 out.push_str("<array><data>");
-                items.iter().for_each(|item| item.write(out));
+                for item in items {
+                    item.write(out);
+                }
                 out.push_str("</data></array>");
             }
         }

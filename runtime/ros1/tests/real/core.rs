@@ -4,7 +4,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use nix::sys::signal::{Signal, kill};
@@ -119,11 +119,12 @@ impl Program {
 
     /// The next line.
     pub(crate) fn line(&mut self) -> String {
-        match self.lines.recv_timeout(LIMIT) {
-            Ok(line) => line,
-            Err(RecvTimeoutError::Timeout) => panic!("{} says nothing", self.name),
-            Err(RecvTimeoutError::Disconnected) => panic!("{} has ended: {:?}", self.name, self.child.wait()),
-        }
+        self.line_if_any().unwrap_or_else(|| panic!("{} says no more", self.name))
+    }
+
+    /// The next line; `None` at its end.
+    pub(crate) fn line_if_any(&mut self) -> Option<String> {
+        self.lines.recv_timeout(LIMIT).ok()
     }
 
     /// A line that is there already.

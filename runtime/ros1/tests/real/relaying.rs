@@ -90,10 +90,58 @@ fn tools_of_ros_count_what_passes_as_the_runner_does() {
     assert!(rates.iter().map(rate).all(|rate| (190.0..210.0).contains(&rate)), "{rates:?}");
     assert!(!rates.is_empty());
     record.end(Signal::SIGINT);
-    let mut info = core.tool("rosbag", &["info", "-y", "-k", "topics", &bag.display().to_string()]);
-    let lines: Vec<String> = (0..10).map(|_| info.line()).take_while(|line| !line.is_empty()).take(8).collect();
-    let counted: Vec<&str> = lines.iter().filter_map(|line| line.trim().strip_prefix("messages: ")).collect();
-    assert_eq!(counted, ["1000", "1000"], "{lines:?}");
+    assert_eq!(counted(&core, &bag.display().to_string()), ["1000", "1000"]);
+}
+
+#[test]
+fn nodes_of_roscpp_are_relayed_too() {
+    let Some(core) = Core::start() else { return };
+    let ty = "sensor_msgs/JointState";
+    let [bag, copy] = ["peer.bag", "copy.bag"].map(|name| core.home.path().join(name).display().to_string());
+    // `rosbag record` and `rosbag play` are written with roscpp.
+    let mut publisher = core.ready_peer("publisher.py", &["/peer", ty, "500", "200"]);
+    let record = core.tool("rosbag", &["record", "-O", &bag, "/peer"]);
+    await_subscriber(&core);
+    publisher.go();
+    publisher.said();
+    std::thread::sleep(Duration::from_millis(500));
+    record.end(Signal::SIGINT);
+    drop(publisher);
+    let mut plan = peers(&core.uri(), JOINTS);
+    let remapped = remapped(&plan, 0);
+    // It publishes as soon as somebody listens; the recorder comes after it is offered.
+    plan.nodes.clear();
+    let record = core.tool("rosbag", &["record", "-O", &copy, "/peer"]);
+    let play = ["play", "-q", "--wait-for-subscribers", "-d", "6", &bag, &remapped[0]];
+    let _play = core.tool("rosbag", &play);
+    let mut system = System::new(plan);
+    let begun = Instant::now();
+    let finished = system.run(&nothing(), || {}, || begun.elapsed() > Duration::from_secs(12)).unwrap();
+    assert_eq!(finished.messages, 500);
+    record.end(Signal::SIGINT);
+    assert_eq!(counted(&core, &copy), ["500"]);
+}
+
+/// Waits until a program listens to `/peer`.
+fn await_subscriber(core: &Core) {
+    let limit = Instant::now() + Duration::from_secs(20);
+    loop {
+        let facts = sesame_ros1::scan::scan(&core.uri(), Duration::ZERO).unwrap();
+        if facts.topics.iter().any(|topic| topic.path == "/peer" && !topic.subscribers.is_empty()) {
+            // It is registered, and connects next.
+            std::thread::sleep(Duration::from_secs(1));
+            return;
+        }
+        assert!(Instant::now() < limit, "nobody listens");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+/// How many messages of each topic a bag has.
+fn counted(core: &Core, bag: &str) -> Vec<String> {
+    let mut info = core.tool("rosbag", &["info", "-y", "-k", "topics", bag]);
+    let lines = std::iter::from_fn(|| info.line_if_any()).take(20);
+    lines.filter_map(|line| Some(line.trim().strip_prefix("messages: ")?.to_owned())).collect()
 }
 
 #[test]
