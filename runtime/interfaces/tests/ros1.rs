@@ -1,7 +1,5 @@
 //! Files of ROS 1: what they mean, and what is wrong with them.
 
-#![expect(clippy::unwrap_used, reason = "a test ends where something is missing")]
-
 use proptest::prelude::*;
 use sesame_interfaces::{Catalogue, ros1};
 use sesame_plan::{Primitive, WireType};
