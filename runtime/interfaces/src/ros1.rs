@@ -17,8 +17,8 @@ const TIMES: [(&str, &str); 2] =
 /// The most characters of a file.
 const LONGEST: usize = 1 << 20;
 
-/// The interface that a `.msg` file declares: package and name are those of its folder and of the file. An empty file is
-/// an interface without fields.
+/// The interface that a `.msg` file declares: package and name are those of its folder and of the file. An empty file
+/// is an interface without fields.
 pub fn msg(package: &str, name: &str, text: &str) -> Result<Definition, DefinitionError> {
     definition(package, format!("{package}/msg/{name}"), text, 1)
 }
@@ -67,8 +67,8 @@ pub fn interface(type_name: &str) -> String {
     }
 }
 
-/// The types of other messages that a `.msg` file contains, as ROS 1 names them, in the order of its fields; a type that
-/// is there twice is named twice.
+/// The types of other messages that a `.msg` file contains, as ROS 1 names them, in the order of its fields; a type
+/// that is there twice is named twice.
 pub fn contained(package: &str, text: &str) -> Result<Vec<String>, DefinitionError> {
     let lines = lines(text, 1)?;
     Ok(lines.iter().filter(|line| line.value.is_none()).filter_map(|line| message(package, line.ty)).collect())

@@ -1,8 +1,8 @@
 //! Messages as ROS 1 serialises them: little-endian, without alignment, each behind the other.
 //!
-//! What is not read is skipped, and what is not changed is copied byte for byte. Layouts may be those of ROS 1 or those of
-//! ROS 2: a `std_msgs/Header` without the field `seq`, which ROS 2 does not have, gets it on the wire, and a message that
-//! in ROS 2 has the one field `structure_needs_at_least_one_member` is empty.
+//! What is not read is skipped, and what is not changed is copied byte for byte. Layouts may be those of ROS 1 or those
+//! of ROS 2: a `std_msgs/Header` without the field `seq`, which ROS 2 does not have, gets it on the wire, and a message
+//! that in ROS 2 has the one field `structure_needs_at_least_one_member` is empty.
 //!
 //! | on the wire | in the language |
 //! |---|---|
@@ -42,15 +42,16 @@ pub struct Codec {
 }
 
 impl Codec {
-    /// A codec for the interface of this name, with or without `/msg/` in it, which reads what is wanted. Each interface
-    /// comes after those that it contains.
+    /// A codec for the interface of this name, with or without `/msg/` in it, which reads what is wanted. Each
+    /// interface comes after those that it contains.
     pub fn new(interfaces: &[Interface], name: &str, wanted: &Wanted) -> Result<Self, LayoutError> {
         let layout = Layout::new(interfaces, name)?;
         let selection = layout.select(wanted);
         Ok(Codec { layout, selection })
     }
 
-    /// Reads a message, without the length before it: a record with the fields that are wanted, which remembers the bytes.
+    /// Reads a message, without the length before it: a record with the fields that are wanted, which remembers the
+    /// bytes.
     ///
     /// The whole message is checked: one that is too short or too long is an error, wherever that is.
     pub fn read(&self, message: Arc<[u8]>) -> Result<Value, CodecError> {

@@ -1,8 +1,8 @@
-//! Definitions of types, as ROS 1 hands them out: the text of a `.msg` file with those that it contains, and the MD5 that
-//! identifies the type.
+//! Definitions of types, as ROS 1 hands them out: the text of a `.msg` file with those that it contains, and the MD5
+//! that identifies the type.
 //!
-//! A subscriber and a publisher connect only if they have the same MD5. It depends on constants too, so it cannot be had
-//! from a layout.
+//! A subscriber and a publisher connect only if they have the same MD5. It depends on constants too, so it cannot be
+//! had from a layout.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

@@ -1,8 +1,8 @@
-//! ROS 1: its messages ([`codec`]), the definitions of its types ([`definition`]), and the runner as a node between real
-//! nodes.
+//! ROS 1: its messages ([`codec`]), the definitions of its types ([`definition`]), and the runner as a node between
+//! real nodes.
 //!
-//! The codec and the definitions are pure. The node is an adapter around them, in Rust alone: nothing of ROS is needed to
-//! build or run it. It speaks XML-RPC and TCPROS itself, because it needs what no crate has: connection headers of
+//! The codec and the definitions are pure. The node is an adapter around them, in Rust alone: nothing of ROS is needed
+//! to build or run it. It speaks XML-RPC and TCPROS itself, because it needs what no crate has: connection headers of
 //! others, under which it publishes and serves; services whose types are known only when it runs; bounds for everything
 //! that others send; and no interface but the loopback one.
 

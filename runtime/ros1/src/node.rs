@@ -1,7 +1,7 @@
 //! A node of ROS 1 that takes messages without knowing their types, and publishes and serves under the types of others.
 //!
-//! Written on threads that block, without a runtime: one for each connection, and three that listen and watch. Everything
-//! is bounded: messages that wait in either direction, connections, and what each of them may send.
+//! Written on threads that block, without a runtime: one for each connection, and three that listen and watch.
+//! Everything is bounded: messages that wait in either direction, connections, and what each of them may send.
 //!
 //! It binds one address only. That is the loopback interface, unless `ROS_HOSTNAME` or `ROS_IP` names another one.
 

@@ -32,9 +32,9 @@ const CLOCK: &str = "rosgraph_msgs/Clock";
 
 /// Connects to a system of ROS 1 nodes; launched programs run in this folder.
 ///
-/// The runner listens on the loopback interface, unless `ROS_HOSTNAME` or `ROS_IP` names another address of this machine,
-/// as nodes of ROS have it; then it binds this address, and no other. Launched programs get `ROS_MASTER_URI`, folders of
-/// their own in `ROS_HOME` and `ROS_LOG_DIR`, and `ROS_IP=127.0.0.1`, unless one of these variables is set.
+/// The runner listens on the loopback interface, unless `ROS_HOSTNAME` or `ROS_IP` names another address of this
+/// machine, as nodes of ROS have it; then it binds this address, and no other. Launched programs get `ROS_MASTER_URI`,
+/// folders of their own in `ROS_HOME` and `ROS_LOG_DIR`, and `ROS_IP=127.0.0.1`, unless one of these variables is set.
 pub fn ros1(folder: PathBuf) -> Connect {
     Connect::new(connect, folder)
 }

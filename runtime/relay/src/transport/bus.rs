@@ -10,6 +10,8 @@
 #![expect(clippy::disallowed_methods, reason = "an adapter: it waits for other processes")]
 
 mod system;
+#[cfg(test)]
+mod tests;
 
 use std::time::{Duration, Instant};
 

@@ -26,8 +26,8 @@ pub fn value_of(primitive: Primitive, bits: u64) -> Option<Value> {
     })
 }
 
-/// The bits of a number, held inside the range of its primitive: whole numbers beyond it become its nearest number, reals
-/// are rounded to the nearest one that it has. Without a number they are zero.
+/// The bits of a number, held inside the range of its primitive: whole numbers beyond it become its nearest number,
+/// reals are rounded to the nearest one that it has. Without a number they are zero.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

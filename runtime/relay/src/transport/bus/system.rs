@@ -213,20 +213,25 @@ impl System {
         Ok(())
     }
 
-    /// What the clock shows when it ticks next; messages that come before are passed on. After a reset, ticks from before
-    /// it may still come: it is waited a moment for one that goes back, which those of some simulators never do.
+    /// What the clock shows when it ticks next; messages that come before are passed on. After a reset, ticks from
+    /// before it may still come: it is waited a moment for one that goes back, which those of some simulators never do.
     fn first_tick(&mut self) -> Result<i64, TransportError> {
         let limit = Instant::now() + SILENCE;
-        let mut settled = None;
         let mut heard = Heard::default();
+        // What the clock shows, and until when it may go back.
+        let mut latest: Option<(i64, Instant)> = None;
         while Instant::now() < limit {
-            match self.bus.receive(WATCH)? {
+            let left = latest.map_or(WATCH, |(_, settled)| settled.saturating_duration_since(Instant::now()));
+            if let Some((nanos, _)) = latest.filter(|_| left.is_zero()) {
+                return Ok(nanos);
+            }
+            match self.bus.receive(left)? {
                 Some(Event::Clock(nanos)) => {
-                    let goes_on = self.shown.replace(nanos).is_some_and(|shown| nanos >= shown);
-                    let settled = *settled.get_or_insert_with(|| Instant::now() + WATCH);
-                    if !goes_on || !self.settings.resets || Instant::now() >= settled {
+                    let went_back = self.shown.replace(nanos).is_some_and(|shown| nanos < shown);
+                    if went_back || !self.settings.resets {
                         return Ok(nanos);
                     }
+                    latest = Some((nanos, latest.map_or_else(|| Instant::now() + WATCH, |(_, settled)| settled)));
                 }
                 Some(event) => self.pass_on(event, &mut heard)?,
                 None => self.launched.check()?,
