@@ -52,6 +52,8 @@ pub use sesame_simlog::server as simlog_server;
 /// How a runner reaches its simulator.
 pub mod transport {
     pub use sesame_relay::transport::*;
+    #[cfg(feature = "ros1")]
+    pub use sesame_ros1::ros1;
     #[cfg(feature = "ros2")]
     pub use sesame_ros2::ros2;
     #[cfg(feature = "rosbridge")]

@@ -1,11 +1,13 @@
 //! Interfaces of ROS: the text of `.msg`, `.srv` and `.idl` files as layouts of messages.
 //!
 //! Pure: it reads no files. A caller gives the text of each file to [`msg`], [`srv`] or [`idl`], collects what comes
-//! out in a [`Catalogue`], and asks it for the layout of an interface with everything that it contains.
+//! out in a [`Catalogue`], and asks it for the layout of an interface with everything that it contains. Files of ROS 1
+//! are read by [`ros1`].
 
 mod catalogue;
 mod idl;
 mod msg;
+pub mod ros1;
 
 pub use catalogue::{Catalogue, ResolveError};
 pub use idl::idl;
@@ -18,7 +20,7 @@ use sesame_plan::WireType;
 pub struct Definition {
     /// Its name with package and kind, for example `sensor_msgs/msg/JointState` or `std_srvs/srv/SetBool_Request`.
     pub name: String,
-    /// Its fields, in order. An interface without fields has the one that is on the wire in their place:
+    /// Its fields, in order. In ROS 2, an interface without fields has the one that is on the wire in their place:
     /// `structure_needs_at_least_one_member`.
     pub fields: Vec<Field>,
     /// Its constants, in order; they are not on the wire.

@@ -81,8 +81,13 @@ fn constant(ty: &WireType, value: &str) -> String {
 
 /// A type as `.msg` files write it, for example `float64[9]` or `geometry_msgs/Point[]`.
 fn wire_type(package: &str, written: &str) -> Result<WireType, String> {
-    let Some((of, length)) = written.split_once('[') else { return element(package, written) };
-    let of = Box::new(element(package, of)?);
+    array(written, &|written| element(package, written))
+}
+
+/// A type that may be an array, as it is written.
+pub(crate) fn array(written: &str, element: &dyn Fn(&str) -> Result<WireType, String>) -> Result<WireType, String> {
+    let Some((of, length)) = written.split_once('[') else { return element(written) };
+    let of = Box::new(element(of)?);
     let length = length.strip_suffix(']').ok_or_else(|| format!("type `{written}` has no `]` at its end"))?;
     let number = |length: &str| {
         let number = length.parse().ok().filter(|&number: &u32| (1..=LONGEST_ARRAY).contains(&number));
@@ -130,7 +135,8 @@ fn capital(name: &str) -> &'static str {
     if name == "time" { "Time" } else { "Duration" }
 }
 
-fn primitive(name: &str) -> Option<Primitive> {
+/// A number or truth value of `.msg` files.
+pub(crate) fn primitive(name: &str) -> Option<Primitive> {
     Some(match name {
         "bool" => Primitive::Bool,
         "byte" | "char" | "uint8" => Primitive::Uint8,

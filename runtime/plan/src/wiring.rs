@@ -1,6 +1,6 @@
 //! Who is remapped, so that the messages of topics that are cut pass through the relay.
 
-use crate::{CampaignPlan, Channel, Node, NodeId, Topic, TopicId, Wiring};
+use crate::{CampaignPlan, Channel, Node, NodeId, Topic, TopicId, Transport, Wiring};
 
 /// A name of a topic or service that a node knows under another name.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -12,7 +12,7 @@ pub struct Remapping {
 }
 
 impl Remapping {
-    /// As a rule for `-r`: `/joints:=/joints/undisturbed`.
+    /// As a rule of ROS: `/joints:=/joints/undisturbed`.
     pub fn rule(&self) -> String {
         format!("{}:={}", self.from, self.to)
     }
@@ -37,7 +37,14 @@ impl CampaignPlan {
 
     /// The arguments that remap a node, or for `None` all nodes of a program that starts several: none if nothing is
     /// cut.
+    ///
+    /// In ROS 2 they are rules behind `--ros-args -r`, in ROS 1 they are the rules alone. There, no rule is of one node
+    /// of a program only, so that a program that starts several gets none: its nodes are remapped where it starts them.
     pub fn ros_args(&self, node: Option<NodeId>) -> Vec<String> {
+        if matches!(self.simulator.transport, Transport::Ros1(_)) {
+            let rules = node.map(|node| self.remappings(node)).unwrap_or_default();
+            return rules.iter().map(Remapping::rule).collect();
+        }
         let rules: Vec<String> = match node {
             Some(node) => self.remappings(node).iter().map(Remapping::rule).collect(),
             None => (0..)
@@ -120,7 +127,7 @@ fn is_source(node: &Node, topic: TopicId, channel: Channel) -> bool {
 mod tests {
     use super::*;
     use crate::testing::{self, minimal, topic};
-    use crate::{Clock, Ros2, Transport, Type};
+    use crate::{Clock, Ros1, Ros2, Transport, Type};
 
     fn plan() -> CampaignPlan {
         let mut plan = minimal();
@@ -181,6 +188,22 @@ mod tests {
         assert_eq!(all.len(), 1 + 2 * 6);
         assert_eq!(plan.ros_args(Some(NodeId(2))), ["--ros-args", "-r", "/grip:=/grip/undisturbed"]);
         assert!(minimal().ros_args(None).is_empty());
+    }
+
+    #[test]
+    fn in_ros_1_the_rules_alone_are_the_arguments_of_a_node() {
+        let mut plan = plan();
+        let Transport::Ros2(ros2) = plan.simulator.transport else { panic!("it is a system of ROS 2") };
+        plan.simulator.transport = Transport::Ros1(Ros1 {
+            master: "http://127.0.0.1:{port}".to_owned(),
+            clock: ros2.clock,
+            reset: None,
+            interfaces: Vec::new(),
+            wiring: ros2.wiring,
+        });
+        assert_eq!(plan.ros_args(Some(NodeId(2))), ["/grip:=/grip/undisturbed"]);
+        assert_eq!(plan.ros_args(Some(NodeId(0))).len(), 3);
+        assert!(plan.ros_args(None).is_empty(), "a rule would be of all nodes of the program");
     }
 
     #[test]

@@ -2,12 +2,16 @@
 //! messages to a subscriber that operations distinguish.
 
 mod line;
+mod primitive;
+mod wanted;
 
 use std::collections::BTreeMap;
 
 use sesame_plan::{CampaignPlan, NodeId, Operation, TopicId};
 
 pub use self::line::{Line, Sink, Source, lines, service_lines};
+pub use self::primitive::{bits_of, seconds_and_nanos, value_of};
+pub use self::wanted::{Wanted, wanted};
 
 /// A single topic on the wire: position in [`WireTable`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

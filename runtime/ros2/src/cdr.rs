@@ -17,7 +17,6 @@
 mod error;
 mod layout;
 mod read;
-mod wanted;
 mod write;
 
 #[cfg(test)]
@@ -27,10 +26,10 @@ use std::sync::Arc;
 
 use sesame_plan::Interface;
 use sesame_relay::value::Value;
+pub use sesame_relay::wire::Wanted;
 
 pub use self::error::{CodecError, LayoutError};
 use self::layout::{Layout, Selection};
-pub use self::wanted::Wanted;
 
 /// The bytes that say how a sample is encoded.
 const HEADER: usize = 4;

@@ -14,7 +14,6 @@ mod served;
 mod service;
 mod session;
 mod traffic;
-mod wanted;
 mod watch;
 mod wires;
 

@@ -62,6 +62,7 @@ pub struct Place {
     /// What `{domain}` stands for.
     pub domain: u32,
     /// What is in the environment of all programs beside `SESAME_WORKER`, `SESAME_WORKER_FOLDER` and `SESAME_SEED`.
+    /// Placeholders in its values are replaced as in arguments.
     pub environment: Vec<(String, String)>,
     /// What an argument `{ros-args}` stands for; nothing for what is not in it.
     pub ros_args: BTreeMap<Part, Vec<String>>,
@@ -327,6 +328,7 @@ impl Launched {
         let Place { worker, folder, space, environment, ros_args, in_runner, .. } = &self.place;
         let own = self.own();
         let list = ros_args.get(&part).map_or(&[][..], Vec::as_slice);
+        let filled = environment.iter().map(|(name, value)| (name.clone(), own.fill(value)));
         let of_worker = [
             ("SESAME_WORKER".to_owned(), worker.to_string()),
             ("SESAME_WORKER_FOLDER".to_owned(), folder.display().to_string()),
@@ -336,7 +338,7 @@ impl Launched {
             name: command.program.clone(),
             arguments: own.arguments(&command.arguments, list),
             folder: space.clone(),
-            environment: of_worker.into_iter().chain(environment.iter().cloned()).collect(),
+            environment: of_worker.into_iter().chain(filled).collect(),
             in_runner: *in_runner,
         }
     }
@@ -359,6 +361,7 @@ impl Launched {
         let asks = |command: &Command| command.arguments.iter().any(|argument| asks_for_port(argument));
         self.parts.iter().any(|(_, started)| asks(&started.launch.command) || ready(&started.launch))
             || self.terminate.as_ref().is_some_and(asks)
+            || self.place.environment.iter().any(|(_, value)| asks_for_port(value))
     }
 
     /// The port on which a program is awaited, if one is.

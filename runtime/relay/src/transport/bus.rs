@@ -12,6 +12,8 @@
 
 pub mod secret;
 mod system;
+#[cfg(test)]
+mod tests;
 
 use std::time::{Duration, Instant};
 

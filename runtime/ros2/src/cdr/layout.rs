@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use sesame_plan::{Interface, Primitive, WireType};
 use sesame_relay::value::Fields;
+use sesame_relay::wire::Wanted;
 
 use super::error::{LARGEST, LayoutError};
-use super::wanted::Wanted;
 
 /// The shapes of a message and of all that it contains. The last one is the message.
 #[derive(Debug)]

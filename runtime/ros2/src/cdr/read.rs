@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use sesame_plan::Primitive;
 use sesame_relay::value::{Record, Text, Value};
+use sesame_relay::wire::value_of;
 
 use super::error::CodecError;
 use super::layout::{Layout, Meaning, Selection, Shape, Ty};
@@ -191,7 +192,10 @@ fn value(layout: &Layout, ty: &Ty, selection: &Selection, input: &mut Input<'_>)
         items.collect::<Result<Vec<Value>, _>>().map(Value::List)
     };
     match ty {
-        Ty::Primitive(primitive) => primitive_value(*primitive, input.bits(primitive.size())?),
+        Ty::Primitive(primitive) => {
+            let bits = input.bits(primitive.size())?;
+            value_of(*primitive, bits).ok_or(CodecError::TooLarge { path: String::new(), number: bits })
+        }
         Ty::String => input.text().map(Value::Text),
         Ty::WString => input.wide_text().map(Value::Text),
         Ty::Array(of, length) => list(*length, of, input),
@@ -226,25 +230,4 @@ fn value(layout: &Layout, ty: &Ty, selection: &Selection, input: &mut Input<'_>)
             }
         }
     }
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    reason = "each has the size of its primitive, whose bits it holds"
-)]
-fn primitive_value(primitive: Primitive, bits: u64) -> Result<Value, CodecError> {
-    Ok(match primitive {
-        Primitive::Bool => Value::Bool(bits != 0),
-        Primitive::Int8 => Value::Int(i64::from(bits as i8)),
-        Primitive::Int16 => Value::Int(i64::from(bits as i16)),
-        Primitive::Int32 => Value::Int(i64::from(bits as i32)),
-        Primitive::Int64 => Value::Int(bits as i64),
-        Primitive::Uint8 | Primitive::Uint16 | Primitive::Uint32 | Primitive::Uint64 => {
-            let number = i64::try_from(bits);
-            Value::Int(number.map_err(|_| CodecError::TooLarge { path: String::new(), number: bits })?)
-        }
-        Primitive::Float32 => Value::Real(f64::from(f32::from_bits(bits as u32))),
-        Primitive::Float64 => Value::Real(f64::from_bits(bits)),
-    })
 }

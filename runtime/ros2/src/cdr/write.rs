@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use sesame_plan::Primitive;
 use sesame_relay::value::Value;
+use sesame_relay::wire::{bits_of, seconds_and_nanos};
 
 use super::error::CodecError;
 use super::layout::{Layout, Meaning, Selection, Shape, Ty};
@@ -193,7 +194,7 @@ impl Output {
     /// Writes a value anew; without one, zero or nothing.
     fn value(&mut self, layout: &Layout, ty: &Ty, value: Option<&Value>) {
         match ty {
-            Ty::Primitive(primitive) => self.bits(bits(*primitive, value), primitive.size()),
+            Ty::Primitive(primitive) => self.bits(bits_of(*primitive, value), primitive.size()),
             Ty::String => {
                 let text = if let Some(Value::Text(text)) = value { text.as_str() } else { "" };
                 self.length(text.len() + 1);
@@ -222,8 +223,8 @@ impl Output {
                 match (shape.meaning, value) {
                     (Meaning::Time, Some(Value::Real(time))) => {
                         let (seconds, nanos) = seconds_and_nanos(*time);
-                        self.bits(seconds, 4);
-                        self.bits(nanos, 4);
+                        self.bits(bits_of(Primitive::Int32, Some(&Value::Int(seconds))), 4);
+                        self.bits(nanos.into(), 4);
                     }
                     (Meaning::Point, Some(Value::Point(point))) => {
                         for (ty, coordinate) in shape.types.iter().zip(point) {
@@ -235,52 +236,6 @@ impl Output {
             }
         }
     }
-}
-
-/// The bits of a number, held inside the range of its primitive.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "whole numbers are clamped before; a real that is written as a single is rounded to the nearest one"
-)]
-fn bits(primitive: Primitive, value: Option<&Value>) -> u64 {
-    let real = match value {
-        Some(Value::Real(real)) => *real,
-        Some(Value::Int(number)) => *number as f64,
-        Some(Value::Bool(truth)) => f64::from(u8::from(*truth)),
-        _ => 0.0,
-    };
-    let whole = match value {
-        Some(Value::Int(number)) => *number,
-        _ => real.round() as i64,
-    };
-    let clamped = |low: i64, high: i64| whole.clamp(low, high) as u64;
-    match primitive {
-        Primitive::Bool => u64::from(whole != 0),
-        Primitive::Int8 => clamped(i8::MIN.into(), i8::MAX.into()),
-        Primitive::Uint8 => clamped(0, u8::MAX.into()),
-        Primitive::Int16 => clamped(i16::MIN.into(), i16::MAX.into()),
-        Primitive::Uint16 => clamped(0, u16::MAX.into()),
-        Primitive::Int32 => clamped(i32::MIN.into(), i32::MAX.into()),
-        Primitive::Uint32 => clamped(0, u32::MAX.into()),
-        Primitive::Int64 => whole as u64,
-        Primitive::Uint64 => clamped(0, i64::MAX),
-        Primitive::Float32 => u64::from((real as f32).to_bits()),
-        Primitive::Float64 => real.to_bits(),
-    }
-}
-
-/// A time as its two fields: whole seconds, rounded down, and the nanoseconds after them.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "casts of reals saturate; its bits are written"
-)]
-fn seconds_and_nanos(time: f64) -> (u64, u64) {
-    let whole = time.floor();
-    let nanos = ((time - whole) * 1e9).round();
-    let (whole, nanos) = if nanos >= 1e9 { (whole + 1.0, 0.0) } else { (whole, nanos) };
-    (i64::from(whole as i32) as u64, nanos as u64)
 }
 
 fn items(value: &Value) -> &[Value] {

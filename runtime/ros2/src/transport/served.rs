@@ -9,12 +9,11 @@ use std::collections::BTreeMap;
 use rustdds::rpc::SampleIdentity;
 use rustdds::{GUID, SequenceNumber};
 use sesame_plan::{CampaignPlan, Channel, Ros2, TopicId};
-use sesame_relay::wire::{Wire, WireTable};
+use sesame_relay::wire::{Wire, WireTable, wanted};
 
 use crate::cdr::Codec;
 use crate::dds::{DdsError, Endpoint, Participant, ReaderId, Received, Sample, WriterId, mirrored};
 use crate::names;
-use crate::transport::wanted::wanted;
 use crate::transport::wires::absolute;
 
 /// How many calls are remembered; the oldest are forgotten.

@@ -8,7 +8,7 @@ use rustdds::QosPolicies;
 use rustdds::policy::{Durability, History, Reliability};
 use rustdds::rpc::SampleIdentity;
 use sesame_plan::{CampaignPlan, Clock, Fitted, NodeId, OperationKind, Ros2, StepBy, TopicId};
-use sesame_relay::wire::{Line, Wire, WireTable};
+use sesame_relay::wire::{Line, Wire, WireTable, wanted};
 
 use crate::cdr::Codec;
 use crate::dds::{DdsError, Endpoint, Participant, ReaderId, Received, Sample, WriterId, mirrored};
@@ -18,7 +18,6 @@ use crate::parameters::Parameters;
 use crate::transport::added::Added;
 use crate::transport::served::{Direction, Served, services};
 use crate::transport::service::{self, Client};
-use crate::transport::wanted::wanted;
 use crate::transport::watch::Watch;
 use crate::transport::wires::{absolute, lines_in_ros};
 

@@ -38,6 +38,8 @@ pub(super) struct System {
     zero: Zero,
     /// When the clock went on last.
     ticked: Instant,
+    /// What the clock showed last, in this run or before it.
+    shown: Option<i64>,
     deliveries: Vec<Delivery>,
     /// How many messages each wire was given in this run, and to which calls some of them belong.
     counts: BTreeMap<Wire, u64>,
@@ -85,6 +87,7 @@ impl System {
             now: SimTime::ZERO,
             zero: Zero::Wall(Instant::now()),
             ticked: Instant::now(),
+            shown: None,
             deliveries: Vec::new(),
             counts: BTreeMap::new(),
             calls: BTreeMap::new(),
@@ -113,7 +116,12 @@ impl System {
                 line.sinks.iter().for_each(|sink| relay.subscribed(sink.wire));
             }
         }
-        self.zero = if self.settings.has_clock { Zero::Clock(self.first_tick()?) } else { Zero::Wall(Instant::now()) };
+        self.zero = if self.settings.has_clock {
+            Zero::Clock(self.first_tick()?)
+        } else {
+            self.pass_on_all()?;
+            Zero::Wall(Instant::now())
+        };
         self.ticked = Instant::now();
         match relay.parameters() {
             [] => Ok(()),
@@ -185,6 +193,7 @@ impl System {
                 }
             }
             Event::Clock(nanos) => {
+                self.shown = Some(nanos);
                 let (first, latest) = heard.ticks.get_or_insert((nanos, nanos));
                 (*first, *latest) = ((*first).min(nanos), (*latest).max(nanos));
             }
@@ -193,13 +202,37 @@ impl System {
         Ok(())
     }
 
-    /// What the clock shows when it ticks next; messages that come before are passed on.
+    /// Passes on what has come until now. More than comes in a moment is of the next run.
+    fn pass_on_all(&mut self) -> Result<(), TransportError> {
+        let limit = Instant::now() + WATCH;
+        while Instant::now() < limit
+            && let Some(event) = self.bus.receive(Duration::ZERO)?
+        {
+            self.pass_on(event, &mut Heard::default())?;
+        }
+        Ok(())
+    }
+
+    /// What the clock shows when it ticks next; messages that come before are passed on. After a reset, ticks from
+    /// before it may still come: it is waited a moment for one that goes back, which those of some simulators never do.
     fn first_tick(&mut self) -> Result<i64, TransportError> {
         let limit = Instant::now() + SILENCE;
         let mut heard = Heard::default();
+        // What the clock shows, and until when it may go back.
+        let mut latest: Option<(i64, Instant)> = None;
         while Instant::now() < limit {
-            match self.bus.receive(WATCH)? {
-                Some(Event::Clock(nanos)) => return Ok(nanos),
+            let left = latest.map_or(WATCH, |(_, settled)| settled.saturating_duration_since(Instant::now()));
+            if let Some((nanos, _)) = latest.filter(|_| left.is_zero()) {
+                return Ok(nanos);
+            }
+            match self.bus.receive(left)? {
+                Some(Event::Clock(nanos)) => {
+                    let went_back = self.shown.replace(nanos).is_some_and(|shown| nanos < shown);
+                    if went_back || !self.settings.resets {
+                        return Ok(nanos);
+                    }
+                    latest = Some((nanos, latest.map_or_else(|| Instant::now() + WATCH, |(_, settled)| settled)));
+                }
                 Some(event) => self.pass_on(event, &mut heard)?,
                 None => self.launched.check()?,
             }
@@ -237,6 +270,7 @@ impl System {
     }
 
     fn tick(&mut self, nanos: i64, until: SimTime, relay: &mut dyn Exchange) -> Result<(), TransportError> {
+        self.shown = Some(nanos);
         let Zero::Clock(zero) = self.zero else { return Ok(()) };
         let time = SimTime::from_nanos(nanos.saturating_sub(zero));
         if time < self.now {

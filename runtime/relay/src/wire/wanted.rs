@@ -1,12 +1,37 @@
-//! What of each message somebody reads: only that is decoded.
+//! What of each message somebody reads: a codec decodes only that.
+
+use std::collections::BTreeMap;
 
 use sesame_plan::{CampaignPlan, FieldRef, Input, MetricSource, OperationKind, Place, Step, TopicId};
 
-use crate::cdr::Wanted;
+/// Which fields of a message are read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Wanted {
+    /// All of them.
+    All,
+    /// These, each with what of it is read.
+    Fields(BTreeMap<String, Wanted>),
+}
+
+impl Wanted {
+    /// No field at all.
+    pub fn nothing() -> Self {
+        Wanted::Fields(BTreeMap::new())
+    }
+
+    /// Adds the field at the end of a path, with everything in it.
+    pub fn add<'a>(&mut self, mut path: impl Iterator<Item = &'a str>) {
+        let Wanted::Fields(fields) = self else { return };
+        match path.next() {
+            None => *self = Wanted::All,
+            Some(field) => fields.entry(field.to_owned()).or_insert_with(Wanted::nothing).add(path),
+        }
+    }
+}
 
 /// The fields of a topic's messages that metrics of the plan read and that its operations change. All of them where the
 /// user's code sees the message, or where traces are recorded.
-pub(super) fn wanted(plan: &CampaignPlan, topic: TopicId) -> Wanted {
+pub fn wanted(plan: &CampaignPlan, topic: TopicId) -> Wanted {
     let seen_whole = plan.campaign.record.is_some()
         || plan
             .metrics

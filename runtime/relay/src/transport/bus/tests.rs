@@ -1,0 +1,81 @@
+//! Runs over a bus whose events are written down.
+
+use std::collections::VecDeque;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use sesame_base::time::SimTime;
+use sesame_plan::testing::{minimal, test_of};
+
+use super::*;
+use crate::metric::MetricTable;
+use crate::relay::Relay;
+use crate::wire::WireTable;
+
+/// A bus with a clock. Each reset is followed by ticks.
+struct Written {
+    events: VecDeque<Event>,
+    after_reset: Vec<i64>,
+}
+
+impl Bus for Written {
+    fn connect(&mut self, _: &[Line], _: &dyn Fn(&str) -> String) -> Result<bool, TransportError> {
+        Ok(true)
+    }
+
+    fn receive(&mut self, _: Duration) -> Result<Option<Event>, TransportError> {
+        Ok(self.events.pop_front())
+    }
+
+    fn publish(&mut self, _: usize, _: usize, _: &Value, _: Option<u64>) -> Result<(), TransportError> {
+        Ok(())
+    }
+
+    fn reset(&mut self, _: Duration) -> Result<(), TransportError> {
+        self.events.extend(self.after_reset.iter().copied().map(Event::Clock));
+        Ok(())
+    }
+
+    fn disconnect(&mut self) {}
+}
+
+/// The time after some events, of two runs in which the same ticks follow each reset.
+fn times(resets: bool, before: &[i64], after_reset: &[i64], events: usize) -> Vec<Result<i64, TransportError>> {
+    let plan = minimal();
+    let events_before = before.iter().copied().map(Event::Clock).collect();
+    let bus = Written { events: events_before, after_reset: after_reset.to_vec() };
+    let settings = Settings { has_clock: true, resets, addresses: Vec::new() };
+    let place = Place { in_runner: false, ..Place::of_worker(PathBuf::from(".")) };
+    let mut transport = on_bus(&plan, Box::new(bus), settings, place);
+    let mut run = || {
+        let wires = WireTable::new(&plan);
+        let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
+        let mut relay = Relay::new(&plan, &wires, &test_of(Vec::new()), metrics.start(), &[]).unwrap();
+        relay.begin();
+        transport.reset(1, &mut relay)?;
+        for _ in 0..events {
+            transport.advance(SimTime::from_seconds(1_000.0), &mut relay)?;
+        }
+        Ok(transport.now().nanos())
+    };
+    (0..2).map(|_| run()).collect()
+}
+
+#[test]
+fn ticks_from_before_a_reset_are_not_time_zero() {
+    // At the second reset, two ticks of the first run are still on their way.
+    let times = times(true, &[70], &[80, 90, 5, 6, 8, 10], 2);
+    assert_eq!(times, [Ok(3), Ok(3)], "from 5 to 8");
+}
+
+#[test]
+fn a_clock_that_goes_on_after_a_reset_counts_from_what_it_shows_then() {
+    // At the first reset it is waited in vain for a tick that goes back; at the second one, it does.
+    assert_eq!(times(true, &[], &[5, 6, 7], 1), [Ok(0), Ok(1)], "from 7, and from 5 to 6");
+}
+
+#[test]
+fn without_a_reset_the_first_tick_is_time_zero() {
+    let times = times(false, &[70, 75], &[80, 90], 1);
+    assert_eq!(times[0], Ok(5), "from 70 to 75");
+}

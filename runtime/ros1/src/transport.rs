@@ -1,0 +1,256 @@
+//! The transport to a system of ROS 1 nodes.
+//!
+//! For each run the runner is a node between the others. A topic that is cut has its publishers on names of their own,
+//! and the relay publishes on the name that subscribers know, with the type, the definition and the latching of the
+//! original publishers. A service that is cut is served under the name that clients know, in the same way.
+
+mod presence;
+#[cfg(test)]
+mod tests;
+mod wired;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use sesame_plan::{CampaignPlan, Channel, Clock, NodeId, Ros1};
+use sesame_relay::lifecycle::launch::{Part, Place};
+use sesame_relay::transport::bus::{Bus, Event, FOUND_AGAIN_WITHIN, Settings, on_bus};
+use sesame_relay::transport::{Connect, Transport, TransportError};
+use sesame_relay::value::Value;
+use sesame_relay::wire::Line;
+
+use self::wired::{Clocked, Role, Wired, wire};
+use crate::master::Address;
+use crate::node::{Incoming, Node, Subscription};
+
+/// The name of the runner's node, before the number of its worker.
+const NODE: &str = "/sesame_relay_";
+
+/// The type of a clock.
+const CLOCK: &str = "rosgraph_msgs/Clock";
+
+/// Connects to a system of ROS 1 nodes; launched programs run in this folder.
+///
+/// The runner listens on the loopback interface, unless `ROS_HOSTNAME` or `ROS_IP` names another address of this
+/// machine, as nodes of ROS have it; then it binds this address, and no other. Launched programs get `ROS_MASTER_URI`,
+/// folders of their own in `ROS_HOME` and `ROS_LOG_DIR`, and `ROS_IP=127.0.0.1`, unless one of these variables is set.
+pub fn ros1(folder: PathBuf) -> Connect {
+    Connect::new(connect, folder)
+}
+
+fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
+    let sesame_plan::Transport::Ros1(ros1) = &plan.simulator.transport else {
+        unreachable!("the generator connects each kind of simulator by its own transport")
+    };
+    at_place(plan, ros1, Place::of_worker(folder.to_owned()))
+}
+
+/// The transport of a worker whose programs run at this place.
+fn at_place(plan: &CampaignPlan, ros1: &Ros1, place: Place) -> Box<dyn Transport> {
+    let place = in_ros(plan, ros1, place);
+    let settings = Settings {
+        has_clock: matches!(ros1.clock, Clock::Topic { .. }),
+        resets: ros1.reset.is_some(),
+        addresses: vec![ros1.master.clone()],
+    };
+    let bus = Ros1Bus {
+        plan: plan.clone(),
+        ros1: ros1.clone(),
+        name: format!("{NODE}{}", place.worker),
+        node: None,
+        lines: Vec::new(),
+        roles: Vec::new(),
+        services: Vec::new(),
+        clock: None,
+    };
+    on_bus(plan, Box::new(bus), settings, place)
+}
+
+/// What launched programs are given.
+fn in_ros(plan: &CampaignPlan, ros1: &Ros1, place: Place) -> Place {
+    let own = |name: &str| place.folder.join(name).display().to_string();
+    let mut environment = vec![
+        ("ROS_MASTER_URI".to_owned(), ros1.master.clone()),
+        ("ROS_HOME".to_owned(), own("ros")),
+        ("ROS_LOG_DIR".to_owned(), own("ros/log")),
+    ];
+    if ["ROS_IP", "ROS_HOSTNAME"].iter().all(|name| std::env::var_os(name).is_none()) {
+        environment.push(("ROS_IP".to_owned(), "127.0.0.1".to_owned()));
+    }
+    let parts = (0u32..).map(NodeId).take(plan.nodes.len());
+    let ros_args = parts.map(|node| (Part::Node(node), plan.ros_args(Some(node)))).collect();
+    Place { environment, ros_args, ..place }
+}
+
+struct Ros1Bus {
+    plan: CampaignPlan,
+    ros1: Ros1,
+    name: String,
+    node: Option<Node>,
+    lines: Vec<Wired>,
+    /// What each subscription of the node is for, by its position.
+    roles: Vec<Role>,
+    /// The lines of each service of the node: that of requests and that of replies, where it has one.
+    services: Vec<[Option<usize>; 2]>,
+    clock: Option<Clocked>,
+}
+
+impl Ros1Bus {
+    fn node(&self) -> Result<&Node, TransportError> {
+        self.node.as_ref().ok_or_else(|| TransportError::Simulator("ROS 1 was used before it was connected".to_owned()))
+    }
+
+    /// A message that came in, as an event; one that cannot be read goes on as it is.
+    fn event(&self, line: usize, source: usize, call: Option<u64>, bytes: &Arc<[u8]>, arrived: Instant) -> Event {
+        let wired = &self.lines[line];
+        match wired.codec.read(Arc::clone(bytes)) {
+            Ok(value) => Event::Message { line, source, value, call, arrived },
+            Err(error) => {
+                for sink in 0..wired.line.sinks.len() {
+                    self.send(line, sink, bytes, call);
+                }
+                let (path, interface) = (&wired.line.path, &wired.interface);
+                Event::Note(format!("a message on `{path}` is no `{interface}`, and goes on unchanged: {error}"))
+            }
+        }
+    }
+
+    fn send(&self, line: usize, sink: usize, bytes: &Arc<[u8]>, call: Option<u64>) {
+        let (Some(node), wired) = (&self.node, &self.lines[line]) else { return };
+        match wired.line.channel {
+            Channel::Topic => node.publish(wired.sinks[sink], bytes),
+            Channel::Request => node.pass_call(wired.service, call, Arc::clone(bytes)),
+            Channel::Reply => {
+                if let Some(call) = call {
+                    node.reply(call, Ok(Arc::clone(bytes)));
+                }
+            }
+        }
+    }
+
+    /// Something that came in, as an event.
+    fn incoming(&self, incoming: Incoming) -> Option<Event> {
+        match incoming {
+            Incoming::Note(note) => Some(Event::Note(note)),
+            Incoming::Message { subscription, bytes, arrived } => match self.roles.get(subscription)? {
+                Role::Clock => Some(wired::clock(&bytes).map_or_else(
+                    || Event::Note(format!("a message of the clock is no `{CLOCK}`, and is left out")),
+                    Event::Clock,
+                )),
+                Role::Source { line, source } => Some(self.event(*line, *source, None, &bytes, arrived)),
+            },
+            Incoming::Call { service, call, bytes, arrived } => {
+                let [request, _] = self.services.get(service)?;
+                let Some(line) = *request else {
+                    self.node.as_ref()?.pass_call(service, Some(call), bytes);
+                    return None;
+                };
+                Some(self.event(line, 0, Some(call), &bytes, arrived))
+            }
+            Incoming::Reply { service, call, bytes, arrived } => {
+                let [_, reply] = self.services.get(service)?;
+                let Some(line) = *reply else {
+                    self.node.as_ref()?.reply(call, Ok(bytes));
+                    return None;
+                };
+                Some(self.event(line, 0, Some(call), &bytes, arrived))
+            }
+        }
+    }
+}
+
+impl Bus for Ros1Bus {
+    fn connect(&mut self, lines: &[Line], address: &dyn Fn(&str) -> String) -> Result<bool, TransportError> {
+        let master = address(&self.ros1.master);
+        let at = Address::read(&master).ok_or_else(|| {
+            TransportError::Wiring(format!("`{master}` is no address of a master, such as `http://127.0.0.1:11311`"))
+        })?;
+        let started = Node::start(&at, &self.name).map_err(|error| TransportError::Wiring(error.to_string()))?;
+        let Some(node) = started else { return Ok(false) };
+        let lost = |error: crate::master::AskError| lost(&at, &error.to_string());
+        (self.lines, self.roles, self.services) = (Vec::new(), Vec::new(), Vec::new());
+        for line in lines {
+            let mut wired = wire(&self.plan, &self.ros1, line)?;
+            if line.channel == Channel::Topic {
+                let (roles, position) = (&mut self.roles, self.lines.len());
+                wired.subscribe(&node, |source| roles.push(Role::Source { line: position, source })).map_err(lost)?;
+            } else {
+                wired.serve(&node, &self.lines, &mut self.services, self.lines.len());
+            }
+            self.lines.push(wired);
+        }
+        if let Clock::Topic { path } = &self.ros1.clock {
+            let path = wired::absolute(path);
+            self.roles.push(Role::Clock);
+            let subscription = node.subscribe(Subscription::new(&path, CLOCK, None, Vec::new())).map_err(lost)?;
+            self.clock = Some(Clocked { path, subscription });
+        }
+        node.watch();
+        self.node = Some(node);
+        Ok(true)
+    }
+
+    fn missing(&mut self) -> Vec<String> {
+        presence::missing(self)
+    }
+
+    fn receive(&mut self, timeout: Duration) -> Result<Option<Event>, TransportError> {
+        let until = Instant::now() + timeout;
+        loop {
+            let node = self.node()?;
+            let silent = node.silent_for();
+            if silent > FOUND_AGAIN_WITHIN {
+                return Err(lost(&node.master.at, &format!("it has not answered for {} s", silent.as_secs())));
+            }
+            let Some(incoming) = node.inbox.pop(until.saturating_duration_since(Instant::now())) else {
+                return Ok(None);
+            };
+            if let Some(event) = self.incoming(incoming) {
+                return Ok(Some(event));
+            }
+        }
+    }
+
+    fn publish(&mut self, line: usize, sink: usize, value: &Value, call: Option<u64>) -> Result<(), TransportError> {
+        let wired = &self.lines[line];
+        let bytes = wired
+            .codec
+            .write(value)
+            .map_err(|error| TransportError::WrongType { path: wired.line.path.clone(), reason: error.to_string() })?;
+        self.send(line, sink, &bytes, call);
+        Ok(())
+    }
+
+    fn is_heard(&self, line: usize) -> bool {
+        presence::is_heard(self, line)
+    }
+
+    fn reset(&mut self, within: Duration) -> Result<(), TransportError> {
+        let (Some(service), Some(node)) = (&self.ros1.reset, &self.node) else { return Ok(()) };
+        let service = wired::absolute(service);
+        let failed = |problem: String| TransportError::Simulator(format!("the reset by `{service}` failed: {problem}"));
+        let (header, reply) =
+            node.call(&service, Some(&[]), Some(within)).map_err(|error| failed(error.to_string()))?;
+        match header.get("type") {
+            "std_srvs/Empty" => Ok(()),
+            "std_srvs/Trigger" => match wired::trigger(&reply) {
+                Some(Ok(())) => Ok(()),
+                Some(Err(message)) => Err(failed(message)),
+                None => Err(failed("its reply is none of `std_srvs/Trigger`".to_owned())),
+            },
+            other => Err(TransportError::Wiring(format!(
+                "service `{service}` is of type `{other}`; expected `std_srvs/Trigger` or `std_srvs/Empty`"
+            ))),
+        }
+    }
+
+    fn disconnect(&mut self) {
+        self.node = None;
+        self.clock = None;
+    }
+}
+
+fn lost(at: &Address, how: &str) -> TransportError {
+    TransportError::ConnectionLost { to: format!("the master at `{at}`"), how: how.to_owned() }
+}

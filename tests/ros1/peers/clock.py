@@ -1,0 +1,38 @@
+"""Publishes a clock that goes ten times as fast as the wall, and a message at each second of it. `/reset` sets it back.
+
+    clock.py TOPIC
+"""
+
+import time
+
+import rospy
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import String
+from std_srvs.srv import Empty, EmptyResponse
+
+from common import say, start
+
+
+def main():
+    (topic,) = start("clock")
+    clock = rospy.Publisher("/clock", Clock, queue_size=100)
+    publisher = rospy.Publisher(topic, String, queue_size=100)
+    begun, at, steps = time.monotonic(), 0, 0
+
+    def reset(_):
+        nonlocal at
+        at = 0
+        return EmptyResponse()
+
+    rospy.Service("/reset", Empty, reset)
+    say({"ready": True})
+    while True:
+        at, steps = at + 1, steps + 1
+        clock.publish(Clock(rospy.Time(1000 + at // 100, at % 100 * 10_000_000)))
+        if at % 100 == 0:
+            publisher.publish(String(str(at // 100)))
+        time.sleep(max(0.0, begun + steps / 1000 - time.monotonic()))
+
+
+if __name__ == "__main__":
+    main()
