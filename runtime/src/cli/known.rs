@@ -107,9 +107,9 @@ mod tests {
         assert!(chosen(&["third"]).unwrap_err().ends_with("it can run known_jitter, second"));
         plan.tests[1].simulator_seed = Some(7);
         let mut seeded = plan.clone();
-        assert_eq!(forget_seeds(&mut seeded, &Task::Known { tests: vec![KnownTestId(0)] }), [""; 0]);
+        assert_eq!(forget_seeds(&mut seeded, &Task::Known { tests: vec![KnownTestId(0)], lab: None }), [""; 0]);
         assert_eq!(seeded, plan);
-        assert_eq!(forget_seeds(&mut seeded, &Task::Known { tests: vec![KnownTestId(1)] }), ["second"]);
+        assert_eq!(forget_seeds(&mut seeded, &Task::Known { tests: vec![KnownTestId(1)], lab: None }), ["second"]);
         assert_eq!(seeded.tests[1].simulator_seed, None);
         plan.tests.clear();
         assert!(super::chosen(&plan, &[]).unwrap_err().contains("none of the space's regression tests"));
