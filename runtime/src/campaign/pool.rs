@@ -220,8 +220,8 @@ impl WorkerSlot {
                 (observation, words.into_iter().collect(), lost)
             }
         };
-        let (number, twice) = (job.number, false);
-        Ok((JobResult { number, observation, notes, added, trace_failure, killed: twice, lock_stepped }, killed))
+        let number = job.number;
+        Ok((JobResult { number, observation, notes, added, trace_failure, killed: false, lock_stepped }, killed))
     }
 
     /// Saves what a dead worker wrote of a trace that was asked for; why not, otherwise.

@@ -38,13 +38,18 @@ impl Added {
         self.by_wire.entry(wire).or_default().record(added);
     }
 
-    /// What was measured on each wire that had messages, in the order of the wires; then everything begins anew.
+    /// What was measured on each wire that had messages, in the order of the wires, each name once: the two directions
+    /// of a service have one. Then everything begins anew.
     pub fn take(&mut self, wires: &WireTable) -> Vec<AddedOnWire> {
-        let taken = std::mem::take(&mut self.by_wire);
+        let mut taken: Vec<AddedOnWire> = Vec::new();
+        for (wire, latencies) in std::mem::take(&mut self.by_wire) {
+            let path = wires.path(wire);
+            match taken.iter_mut().find(|known| known.path == path) {
+                Some(known) => known.latencies.add(&latencies),
+                None => taken.push(AddedOnWire { path: path.to_owned(), latencies }),
+            }
+        }
         taken
-            .into_iter()
-            .map(|(wire, latencies)| AddedOnWire { path: wires.path(wire).to_owned(), latencies })
-            .collect()
     }
 }
 

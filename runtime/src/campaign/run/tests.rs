@@ -45,6 +45,7 @@ impl Executor for InThread<'_> {
             number,
             observation,
             notes: Vec::new(),
+            added: Vec::new(),
             trace_failure: None,
             killed: false,
             lock_stepped: true,
