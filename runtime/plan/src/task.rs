@@ -219,11 +219,7 @@ impl Task {
         match self {
             Task::Known { lab, .. } | Task::Undisturbed(Undisturbed { lab, .. }) => lab.as_deref(),
             Task::Lab(task) => Some(&task.lab),
-            Task::Campaign
-            | Task::Repeat { .. }
-            | Task::Shrink(_)
-            | Task::Compensated(_)
-            | Task::Variations(_) => None,
+            Task::Campaign | Task::Repeat { .. } | Task::Shrink(_) | Task::Compensated(_) | Task::Variations(_) => None,
         }
     }
 

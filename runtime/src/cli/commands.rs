@@ -10,10 +10,10 @@ use crate::campaign;
 #[cfg(all(feature = "process", feature = "mcap"))]
 use crate::cli::compensate;
 use crate::cli::failure::Failure;
-#[cfg(feature = "process")]
-use crate::cli::{mitm, null, physical, prepare};
 use crate::cli::session::Session;
 use crate::cli::{confirm, explore, export, known, repeat, replay, replay_recording, report, run, shrink, view};
+#[cfg(feature = "process")]
+use crate::cli::{mitm, null, physical, prepare};
 #[cfg(feature = "process")]
 use crate::runner::Runner;
 

@@ -76,8 +76,7 @@ fn in_lab(session: &Session, lab: &str, options: &Options) -> Result<ExitCode, F
     command.extend(["--lab".to_owned(), lab.name.clone()]);
     command.extend(options.seed.iter().flat_map(|seed| ["--seed".to_owned(), seed.to_string()]));
     let name = format!("known-{}", lab.name);
-    let preparation =
-        PreparationArgs::of(options.resume.clone(), options.results.clone(), options.output.format());
+    let preparation = PreparationArgs::of(options.resume.clone(), options.results.clone(), options.output.format());
     let call = Call { name: &name, command, options: &preparation, execution: &options.execution };
     carry_out(session, call, |work| {
         let mut found = Found::default();

@@ -51,10 +51,7 @@ pub(super) fn mitm(session: &Session, options: &Options) -> Result<ExitCode, Fai
         None => session,
     };
     if session.plan.relayable().is_empty() {
-        return Err(Failure(format!(
-            "{}; `null` runs the scenario without a relay",
-            nothing_to_relay(session)
-        )));
+        return Err(Failure(format!("{}; `null` runs the scenario without a relay", nothing_to_relay(session))));
     }
     carry_out(session, call, |work| {
         let mut found = Found::default();

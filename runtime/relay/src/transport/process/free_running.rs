@@ -22,11 +22,11 @@ use crate::lifecycle::launch::Launched;
 use crate::lifecycle::{Alarm, Input, Program, Running};
 use crate::relay::Exchange;
 use crate::simulator::Progress;
+use crate::transport::added::{Added, AddedOnWire};
 use crate::transport::process::fault::{explain, note_restart};
 use crate::transport::process::launched::{health, launch};
 use crate::transport::process::protocol::{LINE_LIMIT, Line, Read, SimulatorMessage, read_line, request};
 use crate::transport::process::session::{Fault, Topics};
-use crate::transport::added::{Added, AddedOnWire};
 use crate::transport::{Capabilities, Incidents, Transport, TransportError};
 use crate::wire::WireTable;
 

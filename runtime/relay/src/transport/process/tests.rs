@@ -606,15 +606,7 @@ fn what_a_slow_listener_adds_is_measured_on_the_wire_of_each_message_and_handed_
     let run = Run { test: &test, simulator_seed: 1 };
     for _ in 0..2 {
         let mut custom = Custom::none();
-        let observed = evaluate_tapped(
-            &plan,
-            &wires,
-            &metrics,
-            transport.as_mut(),
-            &run,
-            &mut custom,
-            Some(&mut Slow),
-        );
+        let observed = evaluate_tapped(&plan, &wires, &metrics, transport.as_mut(), &run, &mut custom, Some(&mut Slow));
         assert_eq!(observed.unwrap().outcome, Outcome::Completed);
         let added = transport.added();
         let [on_wire] = &added[..] else { panic!("one wire has subscribers: {added:?}") };

@@ -6,9 +6,7 @@ use sesame_plan::{CampaignPlan, KnownTestId, Lab};
 
 use crate::present::number::exact_bound;
 use crate::record::{Origin, RecordError, Repository, TestRecord, Verdict, verdict};
-use crate::report::preparation::sides::{
-    MetricSides, RequirementSides, metrics, place, requirements, runs,
-};
+use crate::report::preparation::sides::{MetricSides, RequirementSides, metrics, place, requirements, runs};
 
 /// Regression tests on both sides.
 #[derive(Debug, Clone, PartialEq, Serialize)]

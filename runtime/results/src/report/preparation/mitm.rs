@@ -105,8 +105,7 @@ pub struct Drift {
 /// one.
 pub fn mitm(stages: &[Repository]) -> Result<MitmTesting, RecordError> {
     let plan = stages[0].plan();
-    let budget =
-        plan.simulator.lifecycle.relay_budget.map(|it| Budget { latency: it.latency, jitter: it.jitter });
+    let budget = plan.simulator.lifecycle.relay_budget.map(|it| Budget { latency: it.latency, jitter: it.jitter });
     let lock_stepped = is_stepped(plan);
     let lab = stages[0].task().lab().map(str::to_owned);
     // Of the last stage: with fewer topics relayed, fewer are cut.

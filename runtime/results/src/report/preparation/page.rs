@@ -107,7 +107,10 @@ fn mitm(body: &mut Markup, it: &MitmTesting) {
     }
     part(body, "Added by the relay", &tables::added(it));
     part(body, "Drift of metrics", &tables::drifts(it));
-    said(body, "Drift is the mean minus that of the runs in which nothing was relayed; beside it is how far these are apart.");
+    said(
+        body,
+        "Drift is the mean minus that of the runs in which nothing was relayed; beside it is how far these are apart.",
+    );
     body.close();
 }
 

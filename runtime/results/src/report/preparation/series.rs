@@ -22,12 +22,7 @@ const RUNS: usize = 5;
 const POINTS: usize = 400;
 
 /// A figure for each metric that changes in the course of a run.
-pub(super) fn figures(
-    plan: &CampaignPlan,
-    name: &str,
-    simulation: &[&TestRecord],
-    lab: &[&TestRecord],
-) -> Vec<Figure> {
+pub(super) fn figures(plan: &CampaignPlan, name: &str, simulation: &[&TestRecord], lab: &[&TestRecord]) -> Vec<Figure> {
     let changing = (0u32..).map(MetricId).take(plan.metrics.len());
     changing.filter_map(|id| figure(plan, name, id, simulation, lab)).take(METRICS).collect()
 }

@@ -111,7 +111,9 @@ impl MetricSides {
                 quantity(difference.abs(), unit),
                 quantity(tolerance, unit)
             ),
-            None if self.simulation.is_some() => format!("`{name}`{of} has a value in simulation and none in lab `{lab}`"),
+            None if self.simulation.is_some() => {
+                format!("`{name}`{of} has a value in simulation and none in lab `{lab}`")
+            }
             None => format!("`{name}`{of} has a value in lab `{lab}` and none in simulation"),
         })
     }

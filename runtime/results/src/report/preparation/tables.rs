@@ -59,7 +59,8 @@ pub(super) fn metrics(lab: Option<&str>, metrics: &[MetricSides]) -> Table {
 /// The range of each metric: the least and the greatest value of each side.
 pub(super) fn ranges(lab: Option<&str>, metrics: &[MetricSides]) -> Table {
     let sides = ["simulation"].into_iter().chain(lab);
-    let columns = sides.flat_map(|side| ["runs", "least", "greatest"].map(|what| Column::number(&format!("{what}, {side}"))));
+    let columns =
+        sides.flat_map(|side| ["runs", "least", "greatest"].map(|what| Column::number(&format!("{what}, {side}"))));
     let mut table = Table::with(std::iter::once(Column::heading("metric")).chain(columns));
     for it in metrics {
         let unit = it.unit.as_deref();
@@ -171,7 +172,8 @@ pub(super) fn drifts(mitm: &MitmTesting) -> Table {
 pub(super) fn expectations(known: &KnownTesting) -> Table {
     let lab = known.lab.as_deref();
     let columns = [Column::heading("test"), Column::words("metric"), Column::line("expected")];
-    let sides = std::iter::once("simulation").chain(lab).flat_map(|side| [Column::number(side), Column::line("verdict")]);
+    let sides =
+        std::iter::once("simulation").chain(lab).flat_map(|side| [Column::number(side), Column::line("verdict")]);
     let mut table = Table::with(columns.into_iter().chain(sides));
     for test in &known.tests {
         for it in &test.expectations {

@@ -12,7 +12,8 @@ pub fn text(preparation: &Preparation, options: TextOptions) -> String {
     if let Some(null) = null {
         heading(&mut text, "Without disturbance", options);
         let lab = null.lab.as_deref();
-        let on_sides = lab.map_or_else(String::new, |lab| format!(" in simulation, and as many in lab {}", visible(lab)));
+        let on_sides =
+            lab.map_or_else(String::new, |lab| format!(" in simulation, and as many in lab {}", visible(lab)));
         sentence(&mut text, &format!("{}{on_sides}", plural(null.runs, "run", "runs")), options);
         section(&mut text, "Requirements", &tables::requirements(lab, &null.requirements), options);
         section(&mut text, "Metrics", &tables::metrics(lab, &null.metrics), options);

@@ -168,7 +168,12 @@ pub(in crate::report) fn dot(drawn: &mut Markup, class: &str, place: [f64; 2], r
 
 /// Writes names beside their dots, within these edges, where they cover neither each other nor a dot. `apart` is how
 /// many times further from the middle of a dot they stand than usual.
-pub(in crate::report) fn names(drawn: &mut Markup, [left, top, right, bottom]: [f64; 4], dots: &[([f64; 2], String)], apart: f64) {
+pub(in crate::report) fn names(
+    drawn: &mut Markup,
+    [left, top, right, bottom]: [f64; 4],
+    dots: &[([f64; 2], String)],
+    apart: f64,
+) {
     let screen = Screen { width: right - left, height: bottom - top };
     let shares = dots.iter().map(|([x, y], _)| ((x - left) / screen.width, (y - top) / screen.height));
     let lengths: Vec<f64> = dots.iter().map(|(_, name)| name.len() as f64 * LETTER).collect();
