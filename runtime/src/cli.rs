@@ -15,7 +15,16 @@ mod failure;
 mod gate;
 mod known;
 #[cfg(feature = "process")]
+mod mitm;
+#[cfg(feature = "process")]
+mod null;
+mod over_budget;
+#[cfg(feature = "process")]
 mod physical;
+#[cfg(feature = "process")]
+mod preparation;
+#[cfg(feature = "process")]
+mod prepare;
 mod progress;
 mod progress_line;
 mod repeat;
@@ -53,7 +62,7 @@ pub use self::commands::{Internal, Running, Showing};
 
 /// What the exit codes of a runner mean.
 pub const EXIT_CODES: &str = "Exit codes: 0 done; 1 failed; 2 wrong usage; 3 done, but not as required (`known`: an \
-                          expectation is not kept; `replay`: the test came out different; `replay-recording`: a metric \
+                          expectation is not kept; `null`, `mitm`, `prepare`: what they say; `replay`: the test came out different; `replay-recording`: a metric \
                           did; `--fail-on`: what it names was found; a campaign says too little: most of its tests broke \
                           off, none was disturbed, or no requirement was judged); 130 stopped by the user.";
 

@@ -32,6 +32,7 @@ mod large_results;
 mod latest;
 mod optimisers;
 mod physical;
+mod preparation;
 mod random_models;
 mod regeneration;
 mod search;

@@ -14,13 +14,14 @@ const PAGE: &str = "docs/json.md";
 const MARK: &str = "<!-- From here on a test writes this page; CONTRIBUTING.md says how. -->\n";
 
 /// What is printed: the heading, how the values come, and the type with its file.
-const PRINTED: [(&str, &str, &str, &str); 11] = [
+const PRINTED: [(&str, &str, &str, &str); 12] = [
     (
         "`run`, `resume`, `known`, `repeat`, `shrink`, `report`",
         "One object.",
         "Concluded",
         "runtime/src/cli/execution.rs",
     ),
+    ("`null`, `mitm`, `known --lab`, `prepare`", "One object.", "Concluded", "runtime/src/cli/preparation.rs"),
     ("`list`", "One object.", "TestList", "runtime/results/src/report/facts/show.rs"),
     ("`show`", "One object.", "TestReport", "runtime/results/src/report/facts/show.rs"),
     (

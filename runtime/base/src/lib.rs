@@ -6,6 +6,7 @@
 
 pub mod activation;
 pub mod condition;
+pub mod latency;
 pub mod observation;
 pub mod robustness;
 pub mod shell;

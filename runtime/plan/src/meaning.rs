@@ -266,7 +266,7 @@ mod tests {
             plan.campaign.coverage = Some(CoverageGoal { axes, hits: 1, stop_at: None });
         }));
         // What a command does instead of the campaign changes nothing of the model, so that `resume` goes on with it.
-        assert!(Task::Known { tests: Vec::new() }.plan(&plan).same_model(&plan));
+        assert!(Task::Known { tests: Vec::new(), lab: None }.plan(&plan).same_model(&plan));
     }
 
     #[test]

@@ -62,6 +62,16 @@ impl Transport {
         }
     }
 
+    /// The same, to be changed.
+    pub fn wiring_mut(&mut self) -> &mut [Wiring] {
+        match self {
+            Transport::InProcess { .. } | Transport::Process { .. } | Transport::Simlog(_) => &mut [],
+            Transport::Ros2(ros2) => &mut ros2.wiring,
+            Transport::Rosbridge(rosbridge) => &mut rosbridge.wiring,
+            Transport::Ros1(ros1) => &mut ros1.wiring,
+        }
+    }
+
     /// How each topic of the plan is cut, in their order; empty where the simulator itself brings all messages.
     pub fn wiring(&self) -> &[Wiring] {
         match self {

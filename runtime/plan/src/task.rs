@@ -15,6 +15,9 @@ pub enum Task {
     Known {
         /// Which.
         tests: Vec<KnownTestId>,
+        /// The lab in which they are run; `None` for the simulation.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        lab: Option<String>,
     },
     /// It repeats one test: `repeat`.
     Repeat {
@@ -34,6 +37,23 @@ pub enum Task {
     Compensated(LabTask),
     /// It runs variations of a test along one dimension, each once: `explore`.
     Variations(Variations),
+    /// It runs the scenario without disturbance, as preparatory testing does: `null` and `mitm`.
+    Undisturbed(Undisturbed),
+}
+
+/// Runs of the scenario without disturbance. The reference run is the first of them.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Undisturbed {
+    /// How many; at least one.
+    pub runs: u32,
+    /// How many of the topics that [operations can act on](CampaignPlan::relayable) pass through the relay, the first
+    /// ones; the others are only observed.
+    pub relayed: u32,
+    /// Whether the simulator has one seed in all runs, so that equal runs show that it is deterministic.
+    pub equal_seeds: bool,
+    /// The lab in which they are made; `None` for the simulation.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lab: Option<String>,
 }
 
 /// Variations of a test of a campaign.
@@ -126,13 +146,14 @@ impl Task {
     pub fn evaluations(&self, plan: &CampaignPlan) -> u32 {
         match self {
             Task::Campaign => plan.campaign.search.evaluations(),
-            Task::Known { tests } => u32::try_from(tests.len()).unwrap_or(u32::MAX),
+            Task::Known { tests, .. } => u32::try_from(tests.len()).unwrap_or(u32::MAX),
             Task::Repeat { times, .. } => *times,
             Task::Shrink(shrinking) => shrinking.evaluations,
             Task::Lab(LabTask { tests, repeats, .. }) | Task::Compensated(LabTask { tests, repeats, .. }) => {
                 u32::try_from(tests.len()).unwrap_or(u32::MAX).saturating_mul(*repeats)
             }
             Task::Variations(variations) => u32::try_from(variations.tests.len()).unwrap_or(u32::MAX),
+            Task::Undisturbed(Undisturbed { runs, .. }) => runs.saturating_sub(1),
         }
     }
 
@@ -188,6 +209,20 @@ impl Task {
         self.in_lab().or(self.compensated())
     }
 
+    /// Runs without disturbance; `None` if it is about disturbances.
+    pub fn undisturbed(&self) -> Option<&Undisturbed> {
+        if let Task::Undisturbed(undisturbed) = self { Some(undisturbed) } else { None }
+    }
+
+    /// The lab that it runs in; `None` for the simulation.
+    pub fn lab(&self) -> Option<&str> {
+        match self {
+            Task::Known { lab, .. } | Task::Undisturbed(Undisturbed { lab, .. }) => lab.as_deref(),
+            Task::Lab(task) => Some(&task.lab),
+            Task::Campaign | Task::Repeat { .. } | Task::Shrink(_) | Task::Compensated(_) | Task::Variations(_) => None,
+        }
+    }
+
     /// Whether it searches for tests: only a campaign does, unless it repeats a test.
     pub fn searches(&self, plan: &CampaignPlan) -> bool {
         *self == Task::Campaign && plan.campaign.search.strategy().is_some()
@@ -203,6 +238,7 @@ impl Task {
             Task::Lab(_) => "lab",
             Task::Compensated(_) => "compensated",
             Task::Variations(_) => "variations",
+            Task::Undisturbed(_) => "undisturbed",
         }
     }
 }

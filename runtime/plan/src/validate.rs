@@ -20,7 +20,7 @@ use crate::condition::{Condition, Constraint, Operand};
 use crate::{
     Activation, Bound, CampaignPlan, Choice, Domain, Failing, FieldRef, KnownTest, KnownTestId, LabTask, MessageId,
     Metric, MetricId, MetricSource, Operation, OperationId, OperationKind, RequirementId, SCHEMA, Shrinking, Span,
-    Task, Test, TopicId, Type, Variations,
+    Task, Test, TopicId, Type, Undisturbed, Variations,
 };
 
 use check::{
@@ -242,7 +242,14 @@ impl CampaignPlan {
     pub fn validate_task(&self, task: &Task) -> Result<(), PlanError> {
         match task {
             Task::Campaign => Ok(()),
-            Task::Known { tests } => each("tests", tests, |&id| self.has_test(id)),
+            Task::Known { tests, lab } => {
+                at("lab", lab.as_deref().map_or(Ok(()), name))?;
+                each("tests", tests, |&id| self.has_test(id))
+            }
+            Task::Undisturbed(Undisturbed { runs, relayed: _, equal_seeds: _, lab }) => {
+                at("lab", lab.as_deref().map_or(Ok(()), name))?;
+                at("runs", at_least_one(*runs))
+            }
             Task::Repeat { test, .. } => at("test", self.validate_test(test)),
             Task::Shrink(Shrinking { test, failing, runs, .. }) => {
                 at("test", self.validate_test(test))?;

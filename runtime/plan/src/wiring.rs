@@ -90,6 +90,43 @@ impl CampaignPlan {
         unclaimed
     }
 
+    /// The topics that operations can act on, in declaration order; the two directions of a service are one. Of a
+    /// system of ROS 2 nodes they are the topics that are cut, for all operations of the space.
+    pub fn relayable(&self) -> Vec<Vec<TopicId>> {
+        let acted_on = |id: TopicId| match self.simulator.transport.wiring() {
+            [] => self.operations.iter().any(|operation| operation.topic == Some(id)),
+            wiring => wiring.get(id.index()).is_some_and(|wiring| wiring.cut),
+        };
+        let mut found: Vec<Vec<TopicId>> = Vec::new();
+        for (id, topic) in (0..).map(TopicId).zip(&self.topics).filter(|(id, _)| acted_on(*id)) {
+            let other_direction = |of: &&mut Vec<TopicId>| {
+                let first = self.topic(of[0]);
+                topic.channel != Channel::Topic && first.channel != Channel::Topic && first.paths == topic.paths
+            };
+            match found.iter_mut().find(other_direction) {
+                Some(service) => service.push(id),
+                None => found.push(vec![id]),
+            }
+        }
+        found
+    }
+
+    /// The same plan with only the first so many of the [topics that operations can act on](CampaignPlan::relayable)
+    /// passing through the relay. Of nodes in a middleware the others are not cut, so nothing is remapped for them;
+    /// a simulator of another kind has no way for its messages but the runner.
+    #[must_use]
+    pub fn relaying(&self, first: u32) -> CampaignPlan {
+        let relayed: Vec<TopicId> =
+            self.relayable().into_iter().take(usize::try_from(first).unwrap_or(usize::MAX)).flatten().collect();
+        let mut plan = self.clone();
+        for (id, wiring) in (0..).map(TopicId).zip(plan.simulator.transport.wiring_mut()) {
+            if !relayed.contains(&id) {
+                *wiring = Wiring::default();
+            }
+        }
+        plan
+    }
+
     /// The topics that are cut.
     fn cut(&self) -> impl Iterator<Item = (TopicId, &Topic, &Wiring)> {
         let topics = (0..).map(TopicId).zip(&self.topics).zip(self.simulator.transport.wiring());
@@ -204,6 +241,21 @@ mod tests {
         assert_eq!(plan.ros_args(Some(NodeId(2))), ["/grip:=/grip/undisturbed"]);
         assert_eq!(plan.ros_args(Some(NodeId(0))).len(), 3);
         assert!(plan.ros_args(None).is_empty(), "a rule would be of all nodes of the program");
+    }
+
+    #[test]
+    fn topics_are_relayed_one_after_another_and_both_directions_of_a_service_at_once() {
+        let plan = plan();
+        let ids = |ids: &[u32]| ids.iter().copied().map(TopicId).collect::<Vec<_>>();
+        assert_eq!(plan.relayable(), [ids(&[0]), ids(&[1]), ids(&[3, 4])]);
+        let cut = |first: u32| -> Vec<TopicId> { plan.relaying(first).cut().map(|(id, ..)| id).collect() };
+        assert_eq!([cut(0), cut(1), cut(2), cut(3)], [ids(&[]), ids(&[0]), ids(&[0, 1]), ids(&[0, 1, 3, 4])]);
+        assert!(plan.relaying(0).ros_args(None).is_empty(), "no remapping is asked for");
+        assert_eq!(plan.relaying(9), plan);
+        // Of another simulator, those of operations.
+        let plan = testing::plan(vec![testing::operation(1, crate::OperationKind::Blackhole)]);
+        assert_eq!(plan.relayable(), [ids(&[1])]);
+        assert_eq!(plan.relaying(0), plan);
     }
 
     #[test]

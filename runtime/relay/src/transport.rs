@@ -3,6 +3,7 @@
 //! A transport is a thin adapter: it advances the simulation, passes every message and every moment of time to the
 //! relay, and carries out the relay's deliveries. It decides nothing.
 
+pub mod added;
 #[cfg(feature = "process")]
 pub mod bus;
 #[cfg(feature = "in-process")]
@@ -19,6 +20,7 @@ use sesame_plan::CampaignPlan;
 
 use crate::relay::Exchange;
 use crate::simulator::Progress;
+use crate::transport::added::AddedOnWire;
 
 #[cfg(feature = "in-process")]
 pub use in_process::in_process;
@@ -51,6 +53,13 @@ pub trait Transport {
     /// What happened to the simulator's process since the last call.
     fn incidents(&mut self) -> Incidents {
         Incidents::default()
+    }
+
+    /// How long messages were kept since the last call, wire by wire: from the arrival of a message until it was passed
+    /// on, of those that no operation held back. Nothing where the simulator is stepped, since time stands still
+    /// meanwhile, and nothing of transports that do not measure it.
+    fn added(&mut self) -> Vec<AddedOnWire> {
+        Vec::new()
     }
 }
 

@@ -22,6 +22,7 @@ mod quarantine;
 mod read_tests;
 mod recognise;
 mod recorder;
+mod relay_latencies;
 mod repetitions;
 mod repository;
 #[cfg(any(test, feature = "testing"))]

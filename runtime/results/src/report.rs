@@ -9,6 +9,7 @@ mod facts;
 mod file;
 mod html;
 mod junit;
+pub mod preparation;
 mod sentences;
 pub mod study;
 mod tables;

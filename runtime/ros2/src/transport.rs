@@ -3,7 +3,6 @@
 //! For each run the runner is a node between the others. A topic that is cut has its publishers on names of their own,
 //! and the relay publishes on the name that subscribers know. A run begins when every wire has somebody at both ends.
 
-mod added;
 mod assembly;
 mod domain;
 mod free_running;
@@ -26,7 +25,9 @@ use sesame_plan::{CampaignPlan, NodeId, Ros2, TopicId};
 use sesame_relay::lifecycle::launch::{Launched, Part, Place};
 use sesame_relay::relay::{Delivery, Exchange};
 use sesame_relay::simulator::Progress;
+use sesame_relay::transport::added::{AddedOnWire, objections};
 use sesame_relay::transport::{Capabilities, Connect, Incidents, Transport, TransportError};
+use sesame_relay::wire::WireTable;
 
 use self::domain::Domain;
 use self::orders::Change;
@@ -69,6 +70,9 @@ struct System {
     ticked: Instant,
     deliveries: Vec<Delivery>,
     incidents: Incidents,
+    /// How long messages were kept, of sessions that have ended since it was asked for.
+    added: Vec<AddedOnWire>,
+    wires: WireTable,
     /// What operations have changed and not yet restored.
     changes: Vec<Change>,
     /// Answers that nodes owe which are stopped: they come when the nodes go on.
@@ -111,6 +115,8 @@ impl System {
             ..place
         };
         System {
+            added: Vec::new(),
+            wires: WireTable::new(&plan),
             changes: Vec::new(),
             postponed: BTreeMap::new(),
             spoilt: false,
@@ -217,6 +223,11 @@ impl Transport for System {
         self.judge_budget();
         std::mem::take(&mut self.incidents)
     }
+
+    fn added(&mut self) -> Vec<AddedOnWire> {
+        self.judge_budget();
+        std::mem::take(&mut self.added)
+    }
 }
 
 impl System {
@@ -233,10 +244,18 @@ impl System {
         }
     }
 
-    /// Notes what the relay has added, if that is more than its budget.
+    /// Takes what the relay has added, and notes if that is more than its budget.
     fn judge_budget(&mut self) {
-        if let Some(added) = self.session.as_mut().and_then(|session| session.added.as_mut()) {
-            self.incidents.notes.append(&mut added.judge());
+        let Some(added) = self.session.as_mut().and_then(|session| session.added.as_mut()) else { return };
+        let new = added.take(&self.wires);
+        if let Some(budget) = self.plan.simulator.lifecycle.relay_budget {
+            self.incidents.notes.append(&mut objections(budget, &new));
+        }
+        for it in new {
+            match self.added.iter_mut().find(|known| known.path == it.path) {
+                Some(known) => known.latencies.add(&it.latencies),
+                None => self.added.push(it),
+            }
         }
     }
 

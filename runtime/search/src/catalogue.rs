@@ -29,10 +29,11 @@ use crate::{SearchError, Strategy};
 pub fn strategy_of_task(plan: &CampaignPlan, task: &Task, seed: u64) -> Result<Box<dyn Strategy>, SearchError> {
     match task {
         Task::Campaign => strategy(plan, seed),
-        Task::Known { tests } => Ok(Box::new(FixedTests::known(plan, tests))),
+        Task::Known { tests, .. } => Ok(Box::new(FixedTests::known(plan, tests))),
         Task::Repeat { test, times, .. } => Ok(Box::new(FixedTests::repeated(test, *times, seed))),
         Task::Shrink(shrinking) => Ok(Box::new(Shrink::new(plan, shrinking.clone()))),
         Task::Variations(variations) => Ok(Box::new(FixedTests::each_once(&variations.tests))),
+        Task::Undisturbed(undisturbed) => Ok(Box::new(FixedTests::undisturbed(undisturbed, seed))),
         Task::Lab(lab) | Task::Compensated(lab) => Ok(Box::new(FixedTests::in_lab(lab, seed))),
     }
 }

@@ -1,6 +1,6 @@
 //! Tests that are known before anything is run: known tests, and one test that is repeated.
 
-use sesame_plan::{CampaignPlan, KnownTest, KnownTestId, LabTask, Test};
+use sesame_plan::{CampaignPlan, KnownTest, KnownTestId, LabTask, Test, Undisturbed};
 use sesame_rng::derive_seed;
 
 use crate::{Candidate, Evaluated, Strategy};
@@ -46,6 +46,20 @@ impl FixedTests {
             simulator_seed: None,
         };
         FixedTests { candidates: tests.iter().map(candidate).collect(), awaited: 0 }
+    }
+
+    /// The scenario without disturbance, as often as the task says, but for the first time: that is the reference run.
+    /// `seed` is that of the run.
+    pub(crate) fn undisturbed(task: &Undisturbed, seed: u64) -> Self {
+        let run = |run: u32| Candidate {
+            test: Test::default(),
+            parents: Vec::new(),
+            generation: 0,
+            known: None,
+            // That of the reference run is number 0.
+            simulator_seed: Some(derive_seed(seed, "simulator", &[if task.equal_seeds { 0 } else { u64::from(run) }])),
+        };
+        FixedTests { candidates: (1..task.runs).map(run).collect(), awaited: 0 }
     }
 
     /// Tests in a lab, each as often as the task says, round by round. A stand-in for the lab has another seed in each

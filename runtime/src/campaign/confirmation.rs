@@ -244,7 +244,7 @@ impl Evaluator<'_> {
         }
         each(repeated.runs);
         while !waiting.is_empty() {
-            let JobResult { number: job, observation, notes, trace_failure: _, killed: _, lock_stepped: _ } =
+            let JobResult { number: job, observation, notes, added: _, trace_failure: _, killed: _, lock_stepped: _ } =
                 self.next(&mut || {})?;
             let Some((test, position, simulator_seed)) = waiting.remove(&job) else { continue };
             let repetition = Repetition::of(test, position, simulator_seed, &observation);

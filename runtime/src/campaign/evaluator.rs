@@ -123,7 +123,7 @@ impl<'a> Evaluator<'a> {
             }
         }
         while !waiting.is_empty() {
-            let JobResult { number, observation, notes, trace_failure, killed, lock_stepped: _ } =
+            let JobResult { number, observation, notes, added, trace_failure, killed, lock_stepped: _ } =
                 self.next(awaited)?;
             let Some(test) = waiting.remove(&number) else { continue };
             if let Some(reason) = trace_failure {
@@ -135,6 +135,11 @@ impl<'a> Evaluator<'a> {
                 return Err(CampaignError::Killed { test: number, reason }.into());
             }
             self.record(&test.observed(observation), each)?;
+            // Only there it is asked for: a campaign has too many tests.
+            if self.recorder.repository().task().undisturbed().is_some() {
+                let wires = added.iter().map(|it| (it.path.as_str(), &it.latencies));
+                self.recorder.put_relay_latencies(number, wires)?;
+            }
             for text in notes {
                 self.recorder.put_event(&Event { kind: EventKind::Session, test: Some(number), text })?;
             }

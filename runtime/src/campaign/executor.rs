@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use sesame_base::observation::Observation;
 use sesame_plan::{Compensation, Recorded, Test};
+use sesame_relay::transport::added::AddedOnWire;
 
 /// Carries out tests, in any order.
 pub trait Executor {
@@ -60,6 +61,8 @@ pub struct JobResult {
     /// What happened to its worker: that it was killed and the test run again, what it printed last before it died. Of
     /// this one session: it may hold process numbers.
     pub notes: Vec<String>,
+    /// How long the relay kept messages, wire by wire; wall time of this one session.
+    pub added: Vec<AddedOnWire>,
     /// Why the trace that was asked for could not be written: the result must not be recorded without it.
     pub trace_failure: Option<String>,
     /// Whether its worker or its simulator was killed, and killed again when the test was repeated. The observation

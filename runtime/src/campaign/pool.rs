@@ -192,9 +192,11 @@ impl WorkerSlot {
         let printed = fs::metadata(output_file(&self.directory())).map_or(0, |file| file.len());
         let timeout = Duration::from_millis(self.timeout.load(Ordering::Relaxed));
         let mut killed = None;
+        let mut added = Vec::new();
         let (observation, notes, trace_failure) = match worker.ask(job, timeout, &self.stop) {
             Ok(reply) => {
                 self.worker = Some(worker);
+                added = reply.added;
                 killed = reply.incidents.killed.then_some("simulator");
                 (reply.observation, reply.incidents.notes, reply.trace_failure)
             }
@@ -218,7 +220,8 @@ impl WorkerSlot {
                 (observation, words.into_iter().collect(), lost)
             }
         };
-        Ok((JobResult { number: job.number, observation, notes, trace_failure, killed: false, lock_stepped }, killed))
+        let number = job.number;
+        Ok((JobResult { number, observation, notes, added, trace_failure, killed: false, lock_stepped }, killed))
     }
 
     /// Saves what a dead worker wrote of a trace that was asked for; why not, otherwise.

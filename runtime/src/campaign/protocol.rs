@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use sesame_base::observation::Observation;
 use sesame_relay::transport::Incidents;
+use sesame_relay::transport::added::AddedOnWire;
 
 /// The largest frame either side accepts; time series of a long test are the largest thing sent.
 const FRAME_LIMIT: u32 = 1 << 30;
@@ -37,6 +38,8 @@ pub(super) struct Reply {
     pub(super) trace_failure: Option<String>,
     /// What happened to the simulator's process meanwhile.
     pub(super) incidents: Incidents,
+    /// How long the relay kept messages, wire by wire.
+    pub(super) added: Vec<AddedOnWire>,
 }
 
 pub(super) fn send(stream: &mut impl Write, message: &impl Serialize) -> io::Result<()> {

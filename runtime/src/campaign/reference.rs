@@ -52,9 +52,10 @@ pub(super) fn unheard(plan: &CampaignPlan, task: &Task, reference: &Observation)
     let of_test = |test: &Test| -> Vec<OperationId> { test.operations.iter().map(|used| used.operation).collect() };
     let operations: BTreeSet<OperationId> = match (task, task.repeated(plan)) {
         (_, Some(repeated)) => of_test(repeated.test).into_iter().collect(),
-        (Task::Known { tests }, _) => tests.iter().flat_map(|&id| of_test(&plan.test(id).test)).collect(),
+        (Task::Known { tests, .. }, _) => tests.iter().flat_map(|&id| of_test(&plan.test(id).test)).collect(),
         (Task::Shrink(shrinking), _) => of_test(&shrinking.test).into_iter().collect(),
         (Task::Variations(variations), _) => variations.tests.iter().flat_map(of_test).collect(),
+        (Task::Undisturbed(_), _) => BTreeSet::new(),
         (Task::Lab(lab) | Task::Compensated(lab), _) => lab.tests.iter().flat_map(|it| of_test(&it.test)).collect(),
         (Task::Campaign | Task::Repeat { .. }, _) => plan.campaign.operations.iter().copied().collect(),
     };
@@ -131,7 +132,7 @@ mod tests {
         }
         let partly = Unheard { of: paths.len() + 1, ..found[0].clone() };
         assert!(!partly.wholly() && partly.to_string().contains("other members only"));
-        let known = Task::Known { tests: Vec::new() };
+        let known = Task::Known { tests: Vec::new(), lab: None };
         let mut reference = sample::observe(&plan, &Test::default(), 1);
         reference.unheard = topic.paths.clone();
         assert_eq!(super::unheard(&plan, &known, &reference), [], "only what is to be run counts");

@@ -202,6 +202,10 @@ impl<'a, 'l> Campaign<'a, 'l> {
             reason = why;
         }
         self.tell(CampaignEvent::SearchEnded { reason: &reason });
+        // All of its runs are such runs.
+        if self.evaluator.recorder.repository().task().undisturbed().is_some() {
+            return Ok(reason);
+        }
         let last = reference_run(&mut self.evaluator, &mut self.numbering, &mut || {})?;
         // A simulator that runs freely differs in any case, and the campaign has said so.
         let lock_stepped = self.evaluator.executor.lock_stepped();

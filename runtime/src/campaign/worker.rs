@@ -47,11 +47,12 @@ pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: &Address) -> io::
         compensated.compensation.clone_from(&job.compensation);
         let (observation, trace_failure) =
             traces::run(&compensated, &wires, &metrics, simulator.as_mut(), &job, &directory, &mut custom);
-        let incidents = simulator.incidents();
+        let (incidents, added) = (simulator.incidents(), simulator.added());
         if !observation.outcome.is_whole() {
             transport = None;
         }
-        let sent = protocol::send(&mut stream, &Reply { number: job.number, observation, trace_failure, incidents });
+        let reply = Reply { number: job.number, observation, trace_failure, incidents, added };
+        let sent = protocol::send(&mut stream, &reply);
         if sent.is_err() {
             end_what_was_started();
             return sent;

@@ -16,19 +16,27 @@ pub struct WorkerProgram {
     lab: Option<String>,
     /// Whether it may be asked for traces, also if the campaign records none.
     records: bool,
+    /// How many of the topics that operations can act on pass through the relay; `None` for all.
+    relayed: Option<u32>,
 }
 
 impl WorkerProgram {
     /// A compiled runner contains all that its workers have to know.
     pub fn compiled() -> io::Result<Self> {
-        Ok(WorkerProgram { executable: std::env::current_exe()?, interpreted: None, lab: None, records: false })
+        Ok(WorkerProgram {
+            executable: std::env::current_exe()?,
+            interpreted: None,
+            lab: None,
+            records: false,
+            relayed: None,
+        })
     }
 
     /// A program that interprets a runner reads it from a file.
     #[cfg(feature = "process")]
     pub fn interpreted(runner: &crate::interpreted::Interpreted) -> io::Result<Self> {
         let text = serde_json::to_string(runner)?;
-        Ok(WorkerProgram { executable: std::env::current_exe()?, interpreted: Some(text), lab: None, records: false })
+        Ok(WorkerProgram { interpreted: Some(text), ..WorkerProgram::compiled()? })
     }
 
     /// The same program as a worker that runs tests in this lab.
@@ -41,6 +49,12 @@ impl WorkerProgram {
     /// operations need.
     pub(crate) fn recording(self, records: bool) -> Self {
         WorkerProgram { records, ..self }
+    }
+
+    /// The same program as a worker in which only the first so many of the topics that operations can act on pass
+    /// through the relay.
+    pub(crate) fn relaying(self, first: u32) -> Self {
+        WorkerProgram { relayed: Some(first), ..self }
     }
 
     /// The command that starts a worker with this folder of its own.
@@ -61,6 +75,9 @@ impl WorkerProgram {
         }
         if self.records {
             command.arg("--record");
+        }
+        if let Some(relayed) = self.relayed {
+            command.arg("--relay").arg(relayed.to_string());
         }
         Ok(command)
     }

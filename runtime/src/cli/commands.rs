@@ -10,10 +10,10 @@ use crate::campaign;
 #[cfg(all(feature = "process", feature = "mcap"))]
 use crate::cli::compensate;
 use crate::cli::failure::Failure;
-#[cfg(feature = "process")]
-use crate::cli::physical;
 use crate::cli::session::Session;
 use crate::cli::{confirm, explore, export, known, repeat, replay, replay_recording, report, run, shrink, view};
+#[cfg(feature = "process")]
+use crate::cli::{mitm, null, physical, prepare};
 #[cfg(feature = "process")]
 use crate::runner::Runner;
 
@@ -33,6 +33,15 @@ pub enum Running {
     /// Run recorded tests in a lab, and record what they show there as results of their own
     #[cfg(feature = "process")]
     Physical(physical::Options),
+    /// Run the scenario without disturbance, in simulation and in a lab, and compare
+    #[cfg(feature = "process")]
+    Null(null::Options),
+    /// Let topics pass through the relay, one more in each stage, and measure what that adds and changes
+    #[cfg(feature = "process")]
+    Mitm(mitm::Options),
+    /// Prepare a campaign: `null`, `mitm` and `known` in this order, up to the first that fails
+    #[cfg(feature = "process")]
+    Prepare(prepare::Options),
     /// Fit the simulation to what a lab recorded, and say how much smaller the reality gap is then
     #[cfg(all(feature = "process", feature = "mcap"))]
     Compensate(compensate::Options),
@@ -82,6 +91,9 @@ pub enum Internal {
         /// It may be asked for traces, also if the campaign records none
         #[arg(long)]
         record: bool,
+        /// How many of the topics that operations can act on pass through the relay; by default all
+        #[arg(long, value_name = "N")]
+        relay: Option<u32>,
         /// Where the supervisor is
         #[command(flatten)]
         supervisor: campaign::Address,
@@ -126,6 +138,12 @@ impl Running {
             Running::Explore(options) => explore::explore(session, options),
             #[cfg(feature = "process")]
             Running::Physical(options) => physical::physical(session, options),
+            #[cfg(feature = "process")]
+            Running::Null(options) => null::null(session, options),
+            #[cfg(feature = "process")]
+            Running::Mitm(options) => mitm::mitm(session, options),
+            #[cfg(feature = "process")]
+            Running::Prepare(options) => prepare::prepare(session, options),
             #[cfg(all(feature = "process", feature = "mcap"))]
             Running::Compensate(options) => compensate::compensate(session, options),
             Running::Replay(options) => replay::replay(session, options),
@@ -153,21 +171,22 @@ impl Internal {
     pub(super) fn carry_out(&self, compiled: Option<&Session>) -> Result<ExitCode, Failure> {
         match self {
             #[cfg(feature = "process")]
-            Internal::Worker { runner: Some(file), lab, record, supervisor } => {
+            Internal::Worker { runner: Some(file), lab, record, relay, supervisor } => {
                 let runner = crate::interpreted::Interpreted::read(file)
                     .map_err(|error| Failure(format!("cannot read {}: {error}", file.display())))?
                     .runner();
                 let plan = serde_json::from_str(&runner.plan)?;
-                serve(runner, recorded(plan, *record), lab.as_deref(), supervisor)
+                serve(runner, recorded(plan, *record), lab.as_deref(), *relay, supervisor)
             }
             #[cfg(feature = "process")]
-            Internal::Worker { lab: Some(lab), record, supervisor, .. } => {
+            Internal::Worker { lab: Some(lab), record, relay, supervisor, .. } => {
                 let session = of_its_own(compiled)?;
-                serve(session.runner.clone(), recorded(session.plan.clone(), *record), Some(lab), supervisor)
+                serve(session.runner.clone(), recorded(session.plan.clone(), *record), Some(lab), *relay, supervisor)
             }
-            Internal::Worker { record, supervisor, .. } => {
+            Internal::Worker { record, relay, supervisor, .. } => {
                 let session = of_its_own(compiled)?;
-                campaign::serve(&session.runner, &recorded(session.plan.clone(), *record), supervisor)?;
+                let plan = relaying(recorded(session.plan.clone(), *record), *relay);
+                campaign::serve(&session.runner, &plan, supervisor)?;
                 Ok(ExitCode::SUCCESS)
             }
             #[cfg(all(feature = "process", target_os = "linux"))]
@@ -198,18 +217,24 @@ fn recorded(plan: CampaignPlan, record: bool) -> CampaignPlan {
     plan
 }
 
+/// A plan in which so many topics pass through the relay.
+fn relaying(plan: CampaignPlan, relay: Option<u32>) -> CampaignPlan {
+    relay.map_or_else(|| plan.clone(), |first| plan.relaying(first))
+}
+
 /// Serves a supervisor, in a lab if one is named.
 #[cfg(feature = "process")]
 fn serve(
     runner: Runner,
     plan: CampaignPlan,
     lab: Option<&str>,
+    relay: Option<u32>,
     supervisor: &campaign::Address,
 ) -> Result<ExitCode, Failure> {
     let (runner, plan) = match lab {
         Some(lab) => crate::lab::in_lab(runner, plan, lab)?,
         None => (runner, plan),
     };
-    campaign::serve(&runner, &plan, supervisor)?;
+    campaign::serve(&runner, &relaying(plan, relay), supervisor)?;
     Ok(ExitCode::SUCCESS)
 }

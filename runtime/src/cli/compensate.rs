@@ -313,7 +313,8 @@ impl Again<'_> {
         let files = claim_files(&session.runner, &plan)?;
         let (recorder, folder) = begin(session, results, name, &plan, task, seed, &options.execution)?;
         say(format_args!("   Running {} in {}", task.keyword(&plan), shown(&folder)));
-        let done = perform(session, recorder, &folder, &options.execution, files, interrupted)?;
+        let again = |more: &[&str]| session.caller.command("resume", &[more, &[&shown(&folder)]].concat());
+        let done = perform(session, recorder, &folder, &options.execution, files, interrupted, &again)?;
         Ok(done.map(|repository| (repository, folder)))
     }
 }

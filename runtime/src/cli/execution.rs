@@ -66,7 +66,7 @@ pub(super) struct OutputArgs {
 
 impl OutputArgs {
     /// How it is shown.
-    #[cfg(all(feature = "process", feature = "mcap"))]
+    #[cfg(feature = "process")]
     pub(super) fn format(&self) -> Format {
         self.format
     }
@@ -121,7 +121,6 @@ impl ExecutionArgs {
     }
 
     /// The same with one worker.
-    #[cfg(feature = "process")]
     pub(super) fn one_at_a_time(&self) -> ExecutionArgs {
         let ExecutionArgs { workers: _, timeout, reference_timeout, allow_unheard } = *self;
         ExecutionArgs { workers: Some(NonZeroUsize::MIN), timeout, reference_timeout, allow_unheard }
@@ -244,7 +243,8 @@ pub(super) fn execute(
     let interrupted = interruptible()?;
     let started = Instant::now();
     let before = runs(recorder.repository())?;
-    let Some(repository) = perform(session, recorder, folder, execution, files, &interrupted)? else {
+    let again = |more: &[&str]| session.caller.command("resume", &[more, &[&shown(folder)]].concat());
+    let Some(repository) = perform(session, recorder, folder, execution, files, &interrupted, &again)? else {
         return Ok(ExitCode::from(STOPPED));
     };
     let code = report_outcome(&repository, folder, &folder.join("report.html"), output)?;
@@ -255,7 +255,8 @@ pub(super) fn execute(
     Ok(code)
 }
 
-/// Runs a campaign to its end; `None` if the user stopped it, which is said.
+/// Runs a campaign to its end; `None` if the user stopped it, which is said. `again` gives the command that goes on with
+/// it, with these options more.
 pub(super) fn perform(
     session: &Session,
     recorder: Recorder,
@@ -263,6 +264,7 @@ pub(super) fn perform(
     execution: &ExecutionArgs,
     files: Files,
     interrupted: &AtomicBool,
+    again: &dyn Fn(&[&str]) -> String,
 ) -> Result<Option<Repository>, Failure> {
     let campaign = recorder.repository().campaign();
     let (plan, seed) = (campaign.plan.clone(), campaign.seed);
@@ -274,13 +276,11 @@ pub(super) fn perform(
     });
     display.finish();
     files.finish()?;
-    let resume = || session.caller.command("resume", &[&shown(folder)]);
     let end = end.map_err(|error| {
         let continued = match &error {
-            error if error.leaves_the_run_resumable() => format!("\nThis continues the run:\n    {}", resume()),
+            error if error.leaves_the_run_resumable() => format!("\nThis continues the run:\n    {}", again(&[])),
             CampaignError::Unheard(_) => {
-                let anyway = session.caller.command("resume", &["--allow-unheard", &shown(folder)]);
-                format!("\nThis runs the campaign as it is:\n    {anyway}")
+                format!("\nThis runs the campaign as it is:\n    {}", again(&["--allow-unheard"]))
             }
             _ => String::new(),
         };
@@ -291,7 +291,7 @@ pub(super) fn perform(
         CampaignEnd::Interrupted => {
             say(format_args!(
                 "stopped; everything measured so far is kept. This continues to the same results:\n    {}",
-                resume()
+                again(&[])
             ));
             Ok(None)
         }

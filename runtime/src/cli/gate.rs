@@ -155,8 +155,9 @@ fn seed_note(summary: &Summary, plan: &CampaignPlan, task: &Task, seed: u64) -> 
 fn insufficient(summary: &Summary, plan: &CampaignPlan, task: &Task) -> Vec<String> {
     let counts = summary.counts;
     let is_about_one_test = task.shrinking().is_some() || task.repeated(plan).is_some() || task.of_lab().is_some();
+    let disturbs_nothing = task.undisturbed().is_some();
     let ran = counts.evaluations - counts.duplicates;
-    if ran == 0 || is_about_one_test {
+    if ran == 0 || is_about_one_test || disturbs_nothing {
         return Vec::new();
     }
     let mut objections = Vec::new();
@@ -263,7 +264,7 @@ mod tests {
     #[test]
     fn tests_that_name_no_seed_and_are_not_as_expected_are_told_the_seed_of_the_run() {
         let (mut summary, mut plan) = found();
-        let known = Task::Known { tests: vec![KnownTestId(0)] };
+        let known = Task::Known { tests: vec![KnownTestId(0)], lab: None };
         let expected = |verdict| ExpectationSummary {
             test: TestNumber(1),
             known_test: plan.tests[0].name.clone(),

@@ -5,10 +5,20 @@ use std::process::ExitCode;
 
 use clap::Args;
 
+#[cfg(feature = "process")]
+use sesame_plan::Lab;
 use sesame_plan::{CampaignPlan, KnownTestId, Task};
+#[cfg(feature = "process")]
+use sesame_results::record::Repository;
+#[cfg(feature = "process")]
+use sesame_results::report::preparation;
+#[cfg(feature = "process")]
+use sesame_rng::derive_seed;
 
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled};
 use crate::cli::failure::Failure;
+#[cfg(feature = "process")]
+use crate::cli::preparation::{Call, Found, PreparationArgs, Work, carry_out};
 use crate::cli::session::{Session, World};
 use crate::cli::terminal::say;
 
@@ -22,6 +32,14 @@ pub struct Options {
     /// and that of the campaign's seed if it names none
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+    /// Run them in simulation and in this lab, and compare
+    #[cfg(feature = "process")]
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["junit", "fail_on"])]
+    lab: Option<String>,
+    /// With `--lab`, go on in this folder, for example `results/known-hall`: what is complete is not run again
+    #[cfg(feature = "process")]
+    #[arg(long, value_name = "DIR", requires = "lab", conflicts_with = "results")]
+    resume: Option<PathBuf>,
     /// Folder in which the results get a folder `known`; by default `results` in the runner's folder
     #[arg(long, value_name = "DIR")]
     results: Option<PathBuf>,
@@ -35,16 +53,13 @@ pub struct Options {
 
 pub(super) fn known(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
     let session = &*options.world.of(session)?;
-    let Session { plan, results, .. } = session;
-    let task = Task::Known { tests: chosen(plan, &options.names).map_err(Failure)? };
-    let mut plan = task.plan(plan);
-    if options.seed.is_some() {
-        let replaced = forget_seeds(&mut plan, &task);
-        if !replaced.is_empty() {
-            let names = replaced.join(", ");
-            say(format_args!("note: with --seed, tests do not run with the `simulator seed` that they name: {names}"));
-        }
+    #[cfg(feature = "process")]
+    if let Some(lab) = &options.lab {
+        return in_lab(session, lab, options);
     }
+    let Session { plan, results, .. } = session;
+    let task = Task::Known { tests: chosen(plan, &options.names).map_err(Failure)?, lab: None };
+    let plan = plan_of(plan, &task, options.seed);
     let files = claim_files(&session.runner, &plan)?;
     refuse_unfilled(&session.runner, &plan, true)?;
     let seed = options.seed.unwrap_or(plan.campaign.seed);
@@ -53,9 +68,75 @@ pub(super) fn known(session: &Session, options: &Options) -> Result<ExitCode, Fa
     execute(session, recorder, &folder, &options.execution, &options.output, files)
 }
 
+/// Runs them in simulation and in a lab.
+#[cfg(feature = "process")]
+fn in_lab(session: &Session, lab: &str, options: &Options) -> Result<ExitCode, Failure> {
+    let lab = crate::lab::find(&session.plan, Some(lab))?;
+    refuse_unfilled(&session.runner, &session.plan, true)?;
+    chosen(&session.plan, &options.names).map_err(Failure)?;
+    let mut command = vec!["known".to_owned()];
+    command.extend(options.names.iter().cloned());
+    command.extend(["--lab".to_owned(), lab.name.clone()]);
+    command.extend(options.seed.iter().flat_map(|seed| ["--seed".to_owned(), seed.to_string()]));
+    let name = format!("known-{}", lab.name);
+    let preparation = PreparationArgs::of(options.resume.clone(), options.results.clone(), options.output.format());
+    let call = Call { name: &name, command, options: &preparation, execution: &options.execution };
+    carry_out(session, call, |work| {
+        let mut found = Found::default();
+        let ended = sides(session, work, Some(lab), &options.names, options.seed, &mut found)?;
+        Ok(ended.then_some(found))
+    })
+}
+
+/// Runs tests of these names in simulation, and in the lab if there is one, and compares; false if the user stopped it.
+#[cfg(feature = "process")]
+pub(super) fn sides(
+    session: &Session,
+    work: &Work<'_>,
+    lab: Option<&Lab>,
+    names: &[String],
+    seed: Option<u64>,
+    found: &mut Found,
+) -> Result<bool, Failure> {
+    let tests = chosen(&session.plan, names).map_err(Failure)?;
+    let side = |session: &Session, lab: Option<&Lab>| -> Result<Option<Repository>, Failure> {
+        let task = Task::Known { tests: tests.clone(), lab: lab.map(|lab| lab.name.clone()) };
+        let plan = plan_of(&session.plan, &task, seed);
+        // Of its own: equal seeds would make a stand-in for the lab repeat the runs of the simulation.
+        let run = seed.unwrap_or(plan.campaign.seed);
+        let run = lab.map_or(run, |lab| derive_seed(run, &format!("lab {}", lab.name), &[]));
+        work.runs(session, lab.map_or("simulation", |_| "lab"), &task, &plan, run, lab.is_some())
+    };
+    let Some(simulation) = side(session, None)? else { return Ok(false) };
+    let mut in_lab = None;
+    if let Some(lab) = lab {
+        let Some(repository) = side(&session.in_lab(&lab.name)?, Some(lab))? else { return Ok(false) };
+        in_lab = Some((lab, repository));
+    }
+    let compared = in_lab.as_ref().map(|(lab, repository)| (*lab, repository));
+    found.preparation.known = Some(preparation::known(&simulation, compared)?);
+    found.files.push(("Regression tests, simulation".to_owned(), simulation));
+    let named = |(lab, repository): (&Lab, Repository)| (format!("Regression tests, lab {}", lab.name), repository);
+    found.files.extend(in_lab.map(named));
+    Ok(true)
+}
+
+/// The plan of a task; with a seed for all tests, none of them has one of its own, which is said.
+fn plan_of(plan: &CampaignPlan, task: &Task, seed: Option<u64>) -> CampaignPlan {
+    let mut plan = task.plan(plan);
+    if seed.is_some() {
+        let replaced = forget_seeds(&mut plan, task);
+        if !replaced.is_empty() {
+            let names = replaced.join(", ");
+            say(format_args!("note: with --seed, tests do not run with the `simulator seed` that they name: {names}"));
+        }
+    }
+    plan
+}
+
 /// Takes from the tests of a task the simulator's seeds that they name; returns the names of those that had one.
 fn forget_seeds(plan: &mut CampaignPlan, task: &Task) -> Vec<String> {
-    let Task::Known { tests } = task else { return Vec::new() };
+    let Task::Known { tests, .. } = task else { return Vec::new() };
     let mut replaced = Vec::new();
     for id in tests {
         let test = &mut plan.tests[id.index()];
@@ -110,9 +191,9 @@ mod tests {
         assert!(chosen(&["third"]).unwrap_err().ends_with("it can run known_jitter, second"));
         plan.tests[1].simulator_seed = Some(7);
         let mut seeded = plan.clone();
-        assert_eq!(forget_seeds(&mut seeded, &Task::Known { tests: vec![KnownTestId(0)] }), [""; 0]);
+        assert_eq!(forget_seeds(&mut seeded, &Task::Known { tests: vec![KnownTestId(0)], lab: None }), [""; 0]);
         assert_eq!(seeded, plan);
-        assert_eq!(forget_seeds(&mut seeded, &Task::Known { tests: vec![KnownTestId(1)] }), ["second"]);
+        assert_eq!(forget_seeds(&mut seeded, &Task::Known { tests: vec![KnownTestId(1)], lab: None }), ["second"]);
         assert_eq!(seeded.tests[1].simulator_seed, None);
         plan.tests.clear();
         assert!(super::chosen(&plan, &[]).unwrap_err().contains("none of the space's regression tests"));

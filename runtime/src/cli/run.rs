@@ -10,6 +10,7 @@ use sesame_results::record::{self, Recorder};
 
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled, shown};
 use crate::cli::failure::Failure;
+use crate::cli::over_budget::refuse_over_budget;
 use crate::cli::results_folder::{open, refuse_other_model, run_folder};
 use crate::cli::session::{Session, World};
 
@@ -29,6 +30,9 @@ pub(super) struct Options {
     /// Run although a hook of an objective is not filled in: tests then count as unmeasured
     #[arg(long)]
     allow_unimplemented: bool,
+    /// Run although the latest `mitm` of the same plan exceeded the relay budget
+    #[arg(long)]
+    over_budget: bool,
     /// Folder for results; by default `results` in the runner's folder
     #[arg(long, value_name = "DIR")]
     results: Option<PathBuf>,
@@ -75,9 +79,12 @@ pub(super) fn run(session: &Session, options: &Options) -> Result<ExitCode, Fail
         name = compensated_name(&name, &compensation.lab);
         plan.compensation = Some(compensation);
     }
+    let results = options.results.as_deref().unwrap_or(results);
+    if !options.over_budget {
+        refuse_over_budget(session, results)?;
+    }
     let files = claim_files(&session.runner, &plan)?;
     refuse_unfilled(&session.runner, &plan, options.allow_unimplemented)?;
-    let results = options.results.as_deref().unwrap_or(results);
     let (recorder, folder) = begin(session, results, &name, &plan, &Task::Campaign, seed, &options.execution)?;
     execute(session, recorder, &folder, &options.execution, &options.output, files)
 }
@@ -97,9 +104,17 @@ pub(super) fn resume(session: &Session, options: &ResumeOptions) -> Result<ExitC
         })?,
     };
     let recorder = Recorder::resume(&folder, options.execution.workers())?;
+    let task = recorder.repository().task().clone();
     #[cfg(feature = "process")]
-    if let Some(task) = recorder.repository().task().in_lab() {
-        let (session, execution) = (session.in_lab(&task.lab.clone())?, options.execution.one_at_a_time());
+    if let Some(lab) = task.lab() {
+        let (mut session, execution) = (session.in_lab(lab)?, options.execution.one_at_a_time());
+        if let Some(undisturbed) = task.undisturbed() {
+            session = session.relaying(undisturbed.relayed);
+        }
+        return go_on(&session, recorder, &folder, &execution, &options.output);
+    }
+    if let Some(undisturbed) = task.undisturbed() {
+        let (session, execution) = (session.relaying(undisturbed.relayed), options.execution.one_at_a_time());
         return go_on(&session, recorder, &folder, &execution, &options.output);
     }
     go_on(session, recorder, &folder, &options.execution, &options.output)

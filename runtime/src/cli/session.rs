@@ -40,6 +40,17 @@ impl Session {
         Err(Failure(format!("cannot reach lab `{name}`: {} was built without `process`", runner.display())))
     }
 
+    /// The same with only the first so many of the topics that operations can act on passing through the relay.
+    pub(super) fn relaying(&self, first: u32) -> Self {
+        Session {
+            runner: self.runner.clone(),
+            plan: self.plan.relaying(first),
+            results: self.results.clone(),
+            program: self.program.clone().relaying(first),
+            caller: self.caller.clone(),
+        }
+    }
+
     pub(super) fn new(runner: Runner, program: WorkerProgram, caller: Caller) -> Result<Self, Failure> {
         let plan = serde_json::from_str(&runner.plan).map_err(|error| {
             Failure(format!("the plan in this runner is damaged ({error}): run `sesamec generate` again"))

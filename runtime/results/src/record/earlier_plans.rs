@@ -118,7 +118,7 @@ mod tests {
     #[test]
     fn what_commands_put_in_the_place_of_a_search_is_a_task() {
         let (_, task) = converted(&json!({ "kind": "known", "tests": [0] }));
-        assert_eq!(task, Task::Known { tests: vec![KnownTestId(0)] });
+        assert_eq!(task, Task::Known { tests: vec![KnownTestId(0)], lab: None });
         let shrink = json!({
             "kind": "shrink", "test": 0, "failing": { "kind": "violation", "requirements": [1] },
             "simulator_seed": u64::MAX, "runs": 2, "evaluations": 90,

@@ -3,9 +3,9 @@
 
 mod before_after;
 mod differences;
-mod figure;
+pub(super) mod figure;
 mod page;
-mod provenance;
+pub(super) mod provenance;
 mod signals;
 mod space;
 #[cfg(test)]

@@ -290,7 +290,7 @@ fn only_a_violated_requirement_says_when_its_metric_was_beyond_the_bound() {
 
 #[test]
 fn known_tests_are_compared_with_what_they_expect() {
-    let (_folder, repository) = instead(&Task::Known { tests: vec![sesame_plan::KnownTestId(0)] });
+    let (_folder, repository) = instead(&Task::Known { tests: vec![sesame_plan::KnownTestId(0)], lab: None });
     insta::assert_snapshot!("known", summary_text(&summary(&repository).unwrap(), WIDE));
     let html = page(&repository).unwrap();
     assert!(parsed(&html).descendants().any(|node| node.text() == Some("= 49.00000000000001 s")));

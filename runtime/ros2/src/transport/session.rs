@@ -8,6 +8,7 @@ use rustdds::QosPolicies;
 use rustdds::policy::{Durability, History, Reliability};
 use rustdds::rpc::SampleIdentity;
 use sesame_plan::{CampaignPlan, Clock, Fitted, NodeId, OperationKind, Ros2, StepBy, TopicId};
+use sesame_relay::transport::added::Added;
 use sesame_relay::wire::{Line, Wire, WireTable, wanted};
 
 use crate::cdr::Codec;
@@ -15,7 +16,6 @@ use crate::dds::{DdsError, Endpoint, Participant, ReaderId, Received, Sample, Wr
 use crate::graph::{DISCOVERY_TOPIC, DISCOVERY_TYPE, Gid, NodeInfo, Nodes};
 use crate::names;
 use crate::parameters::Parameters;
-use crate::transport::added::Added;
 use crate::transport::served::{Direction, Served, services};
 use crate::transport::service::{self, Client};
 use crate::transport::watch::Watch;
@@ -50,8 +50,7 @@ pub(super) struct Session {
     said: BTreeSet<String>,
     /// The wires on which a message could not be decoded.
     pub(super) undecodable: BTreeSet<Wire>,
-    /// What the relay adds to the way of messages; `None` where nobody asks, and in lock-step, where time stands still
-    /// meanwhile.
+    /// What the relay adds to the way of messages; `None` in lock-step, where time stands still meanwhile.
     pub(super) added: Option<Added>,
     /// Who comes and goes while a run goes on.
     pub(super) watch: Watch,
@@ -181,7 +180,7 @@ impl Session {
             notes: Vec::new(),
             said: BTreeSet::new(),
             undecodable: BTreeSet::new(),
-            added: plan.simulator.lifecycle.relay_budget.filter(|_| ros2.step.is_none()).map(Added::new),
+            added: ros2.step.is_none().then(Added::default),
             watch: Watch::default(),
         })
     }

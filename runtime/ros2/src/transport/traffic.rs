@@ -212,7 +212,7 @@ impl Session {
         let passes = cut && deliveries.iter().any(|delivery| of(delivery) == wire);
         self.deliver(deliveries, &mut |_| {})?;
         if let (true, Some(added), Some(arrived)) = (passes, &mut self.added, arrived) {
-            added.record(arrived.elapsed());
+            added.record(wire, arrived.elapsed());
         }
         Ok(())
     }

@@ -45,6 +45,7 @@ impl Executor for InThread<'_> {
             number,
             observation,
             notes: Vec::new(),
+            added: Vec::new(),
             trace_failure: None,
             killed: false,
             lock_stepped: true,
@@ -244,7 +245,7 @@ fn a_regression_test_runs_with_the_seed_that_it_names_whatever_the_seed_of_the_c
     let mut plan = sample::plan();
     let seeded = KnownTest { name: "seeded".to_owned(), simulator_seed: Some(11), ..plan.tests[0].clone() };
     plan.tests.push(seeded);
-    let task = Task::Known { tests: vec![KnownTestId(0), KnownTestId(1)] };
+    let task = Task::Known { tests: vec![KnownTestId(0), KnownTestId(1)], lab: None };
     let values = |seed: u64| {
         let folder = tempfile::tempdir().unwrap();
         let claim = record::claim_folder(folder.path(), "known").unwrap();

@@ -10,9 +10,10 @@ use sesame_plan::{CampaignPlan, TopicId};
 use crate::lifecycle::launch::{Launched, Place, Probe};
 use crate::relay::{Delivery, Exchange};
 use crate::simulator::Progress;
+use crate::transport::added::{Added, AddedOnWire, objections};
 use crate::transport::bus::{Bus, Event, Settings};
 use crate::transport::{Capabilities, Incidents, Transport, TransportError};
-use crate::wire::{Line, Wire, lines, service_lines};
+use crate::wire::{Line, Wire, WireTable, lines, service_lines};
 
 /// How long a system may take until it is complete, where nothing else is declared.
 const COMPLETE_WITHIN: Duration = Duration::from_secs(30);
@@ -45,6 +46,10 @@ pub(super) struct System {
     counts: BTreeMap<Wire, u64>,
     calls: BTreeMap<(Wire, u64), u64>,
     incidents: Incidents,
+    added: Added,
+    /// What was taken of that, and nobody has asked for.
+    judged: Vec<AddedOnWire>,
+    wires: WireTable,
     /// What was noted in this run: each note is said once.
     said: BTreeSet<String>,
 }
@@ -92,6 +97,9 @@ impl System {
             counts: BTreeMap::new(),
             calls: BTreeMap::new(),
             incidents: Incidents::default(),
+            added: Added::default(),
+            judged: Vec::new(),
+            wires: WireTable::new(plan),
             said: BTreeSet::new(),
         }
     }
@@ -261,7 +269,16 @@ impl System {
             None => self.launched.check()?,
             Some(Event::Note(note)) => self.note(note),
             Some(Event::Clock(nanos)) => self.tick(nanos, until, relay)?,
-            Some(Event::Message { line, source, value, call, .. }) => self.message(line, source, value, call, relay)?,
+            Some(Event::Message { line, source, value, call, arrived }) => {
+                self.message(line, source, value, call, relay);
+                let of = &self.lines[line];
+                let passes = |delivery: &Delivery| of.sinks.iter().any(|sink| sink.wire == delivery.wire);
+                let measured = self.deliveries.iter().any(passes).then_some(of.wire);
+                self.deliver()?;
+                if let Some(wire) = measured {
+                    self.added.record(wire, arrived.elapsed());
+                }
+            }
         }
         if matches!(self.zero, Zero::Clock(_)) && self.ticked.elapsed() >= SILENCE {
             return Err(no_tick());
@@ -292,7 +309,7 @@ impl System {
         value: crate::value::Value,
         call: Option<u64>,
         relay: &mut dyn Exchange,
-    ) -> Result<(), TransportError> {
+    ) {
         let (wire, publisher) = (self.lines[line].wire, self.lines[line].sources[source].publisher);
         let index = self.counts.entry(wire).or_insert(0);
         if let Some(call) = call {
@@ -303,7 +320,6 @@ impl System {
         }
         *index += 1;
         relay.message_from(self.now, wire, publisher, value, &mut self.deliveries);
-        self.deliver()
     }
 
     /// Publishes what is delivered; what was only listened to stays where it is.
@@ -324,6 +340,15 @@ impl System {
         if self.said.insert(note.clone()) {
             self.incidents.notes.push(note);
         }
+    }
+
+    /// Takes what the relay has added, and notes if that is more than its budget.
+    fn judge_budget(&mut self) {
+        let added = self.added.take(&self.wires);
+        if let Some(budget) = self.plan.simulator.lifecycle.relay_budget {
+            self.incidents.notes.append(&mut objections(budget, &added));
+        }
+        self.judged.extend(added);
     }
 
     /// Ends the connection, and all that was started.
@@ -377,7 +402,13 @@ impl Transport for System {
         self.end();
     }
 
+    fn added(&mut self) -> Vec<AddedOnWire> {
+        self.judge_budget();
+        mem::take(&mut self.judged)
+    }
+
     fn incidents(&mut self) -> Incidents {
+        self.judge_budget();
         mem::take(&mut self.incidents)
     }
 }

@@ -22,11 +22,13 @@ use crate::lifecycle::launch::Launched;
 use crate::lifecycle::{Alarm, Input, Program, Running};
 use crate::relay::Exchange;
 use crate::simulator::Progress;
+use crate::transport::added::{Added, AddedOnWire};
 use crate::transport::process::fault::{explain, note_restart};
 use crate::transport::process::launched::{health, launch};
 use crate::transport::process::protocol::{LINE_LIMIT, Line, Read, SimulatorMessage, read_line, request};
 use crate::transport::process::session::{Fault, Topics};
 use crate::transport::{Capabilities, Incidents, Transport, TransportError};
+use crate::wire::WireTable;
 
 /// How many lines are read ahead. The simulator's output is read while a line to it is written, so a simulator that
 /// writes before it reads does not block the runner.
@@ -52,7 +54,11 @@ struct Connection {
     /// Set when a launched program has ended.
     alarm: Option<Alarm>,
     line: Line,
+    /// When the line came.
+    arrived: Instant,
     topics: Topics,
+    /// How long messages were kept.
+    added: Added,
     clock: Clock,
     resets: bool,
     running: Running,
@@ -60,7 +66,8 @@ struct Connection {
 
 /// What was read of the simulator's output.
 enum Received {
-    Line(Vec<u8>),
+    /// A line, and when its end came.
+    Line(Vec<u8>, Instant),
     TooLong,
 }
 
@@ -124,13 +131,16 @@ impl FreeRunning {
 impl Connection {
     fn start(program: &Program, alarm: Option<Alarm>) -> Result<Self, TransportError> {
         let (running, input, output) = program.start()?;
-        let (lines, topics) = (read_lines(output), Topics::default());
+        let (lines, mut topics) = (read_lines(output), Topics::default());
+        topics.passed = Some(Vec::new());
         Ok(Connection {
             input,
             lines,
             alarm,
             line: Line::default(),
+            arrived: Instant::now(),
             topics,
+            added: Added::default(),
             clock: Clock::Simulator,
             resets: false,
             running,
@@ -142,8 +152,9 @@ impl Connection {
         let received = self.next_line(wait);
         self.line.number += u64::from(received.is_ok());
         match received {
-            Ok(Received::Line(bytes)) => {
+            Ok(Received::Line(bytes, arrived)) => {
                 self.line.bytes = bytes;
+                self.arrived = arrived;
                 Ok(true)
             }
             Ok(Received::TooLong) => Err(self.line.too_long(LINE_LIMIT).into()),
@@ -198,6 +209,8 @@ impl Connection {
             break;
         }
         self.deliver();
+        // They came with the answer, before the run began.
+        self.topics.passed.iter_mut().for_each(Vec::clear);
         Ok(())
     }
 
@@ -277,6 +290,9 @@ impl Connection {
         };
         self.topics.published = 0;
         self.deliver();
+        for wire in self.topics.passed.iter_mut().flat_map(|passed| passed.drain(..)) {
+            self.added.record(wire, self.arrived.elapsed());
+        }
         Ok((time, progress))
     }
 }
@@ -345,6 +361,11 @@ impl Transport for FreeRunning {
         self.incidents.notes.append(&mut self.launched.take_notes());
         mem::take(&mut self.incidents)
     }
+
+    fn added(&mut self) -> Vec<AddedOnWire> {
+        let wires = WireTable::new(&self.plan);
+        self.connection.as_mut().map_or_else(Vec::new, |connection| connection.added.take(&wires))
+    }
 }
 
 /// Sends a line. An error is ignored: a simulator that has closed its input may still have sent the reason.
@@ -360,7 +381,7 @@ fn read_lines(output: ChildStdout) -> Receiver<Received> {
         loop {
             let mut line = Vec::new();
             let received = match read_line(&mut output, LINE_LIMIT, &mut line) {
-                Read::Line => Received::Line(line),
+                Read::Line => Received::Line(line, Instant::now()),
                 Read::TooLong => Received::TooLong,
                 Read::End => return,
             };

@@ -61,6 +61,9 @@ pub(super) struct Topics {
     pub(super) outbox: Vec<u8>,
     /// Messages since the last step began.
     pub(super) published: u64,
+    /// The wires of messages that went to the outbox as soon as they came, each as often; `None` where that is not
+    /// measured.
+    pub(super) passed: Option<Vec<Wire>>,
 }
 
 /// One topic of the simulator.
@@ -196,7 +199,8 @@ impl<R: BufRead, W: Write> Session<R, W> {
 impl Topics {
     /// Forgets the topics of the last run.
     pub(super) fn clear(&mut self) {
-        *self = Topics { shapes: mem::take(&mut self.shapes), ..Topics::default() };
+        let passed = self.passed.as_ref().map(|_| Vec::new());
+        *self = Topics { shapes: mem::take(&mut self.shapes), passed, ..Topics::default() };
     }
 
     /// Takes the simulator's topics; all topics of the space must be among them. Tells the relay which have
@@ -267,6 +271,11 @@ impl Topics {
         for Delivery { wire, value, .. } in self.deliveries.drain(..) {
             if !self.subscribed.get(wire.index()).copied().unwrap_or(false) {
                 continue;
+            }
+            if let (Some(passed), Some((from, _))) = (&mut self.passed, published)
+                && from == wire
+            {
+                passed.push(wire);
             }
             let untouched = published.filter(|&(from, _)| from == wire && !relay.intercepts(wire));
             request::message(&mut self.outbox, relay.wires().path(wire), |out| match untouched {

@@ -12,10 +12,12 @@ use sesame_plan::testing::{latency, operation, plan, test_of, use_of};
 use sesame_plan::{CampaignPlan, Choice, Distribution, Drain, Span, Transport as Declared};
 
 use super::*;
-use crate::evaluate::{Custom, evaluate};
+use crate::evaluate::{Custom, Run, evaluate, evaluate_tapped};
 use crate::metric::MetricTable;
+use crate::relay::Listener;
 use crate::transport::Incidents;
-use crate::wire::WireTable;
+use crate::value::Value;
+use crate::wire::{Wire, WireTable};
 
 /// Says what a simulator of the fixture's plan says first, and then does something else with each order.
 const FRAME: &str = r#"
@@ -562,4 +564,55 @@ fn what_is_launched_ends_a_free_running_simulator_too() {
     let observed = evaluate(&plan, &wires, &metrics, transport.as_mut(), &test, 1, &mut Custom::none()).unwrap();
     let Outcome::Crash { message } = observed.outcome else { panic!("{:?} is no crash", observed.outcome) };
     assert!(message.contains("the bridge broke"), "{message}");
+}
+
+/// A free-running simulator that publishes four messages on a topic that it subscribes to, and ends when it has heard
+/// them.
+const ECHO: &str = r#"
+import json, sys
+def say(what): print(json.dumps(what), flush=True)
+TOPICS = ["arm/command", "zones/Z1", "zones/Z2"]
+for line in sys.stdin:
+    if "reset" in json.loads(line):
+        say({"ready": {"publishes": TOPICS, "subscribes": ["arm/command"], "clock": True, "resets": True}})
+        for at in range(4):
+            say({"publish": [{"topic": "arm/command", "value": at}]})
+            sys.stdin.readline()
+        say({"done": {"ended": True}})
+"#;
+
+#[test]
+fn what_a_slow_listener_adds_is_measured_on_the_wire_of_each_message_and_handed_out_once() {
+    struct Slow;
+    impl Listener for Slow {
+        #[expect(clippy::disallowed_methods, reason = "it is slow on purpose")]
+        fn published(&mut self, _: SimTime, _: Wire, _: u64, _: &Value) {
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        fn delivered(&mut self, _: SimTime, _: Wire, _: u64, _: &Value) {}
+    }
+    if !python() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("sim.py"), ECHO).unwrap();
+    let mut plan = plan_of("python3", &["sim.py"]);
+    let Declared::Process { step_ns, .. } = &mut plan.simulator.transport else { unreachable!() };
+    *step_ns = None;
+    let mut transport = transport(&plan, folder.path().to_owned(), false);
+    let wires = WireTable::new(&plan);
+    let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
+    let test = test_of(Vec::new());
+    let run = Run { test: &test, simulator_seed: 1 };
+    for _ in 0..2 {
+        let mut custom = Custom::none();
+        let observed = evaluate_tapped(&plan, &wires, &metrics, transport.as_mut(), &run, &mut custom, Some(&mut Slow));
+        assert_eq!(observed.unwrap().outcome, Outcome::Completed);
+        let added = transport.added();
+        let [on_wire] = &added[..] else { panic!("one wire has subscribers: {added:?}") };
+        assert_eq!((on_wire.path.as_str(), on_wire.latencies.messages()), ("arm/command", 4));
+        let half = on_wire.latencies.percentile(50).unwrap();
+        assert!(half > 0.019, "{half}");
+        assert!(transport.added().is_empty());
+    }
 }

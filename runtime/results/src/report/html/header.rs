@@ -31,7 +31,16 @@ pub(super) fn header(
     let budget = |what: &str| format!("{what}, {} evaluations", facts.task.evaluations(plan));
     let search = match (&facts.task, &plan.campaign.search) {
         (Task::Campaign, Search::Strategy { strategy, .. }) => budget(&strategy.title()),
-        (Task::Known { tests }, _) => plural(tests.len(), "regression test", "regression tests"),
+        (Task::Known { tests, lab }, _) => {
+            let place = lab.as_ref().map_or_else(String::new, |lab| format!(" in lab {lab}"));
+            format!("{}{place}", plural(tests.len(), "regression test", "regression tests"))
+        }
+        (Task::Undisturbed(task), _) => {
+            let place = task.lab.as_ref().map_or_else(String::new, |lab| format!(" in lab {lab}"));
+            let runs = plural(usize::try_from(task.runs).unwrap_or(usize::MAX), "run", "runs");
+            let topics = plural(usize::try_from(task.relayed).unwrap_or(usize::MAX), "topic", "topics");
+            format!("{runs} without disturbance{place}, {topics} relayed")
+        }
         (Task::Shrink(shrinking), _) => format!("{} at most", budget(&format!("{} shrunk", shrinking.name))),
         (Task::Variations(variations), _) => {
             let count = plural(variations.tests.len(), "variation", "variations");

@@ -27,7 +27,7 @@ const COLOURS: [(&str, &str); 9] = [
 const LETTER: f64 = 7.0;
 
 /// The style of figures on the page.
-pub(super) fn style() -> &'static str {
+pub(in crate::report) fn style() -> &'static str {
     STYLE
 }
 
@@ -37,23 +37,23 @@ pub struct Figure {
     /// What it is called as a file, without `.svg`: letters, digits, `-`, `_` and `.`.
     pub name: String,
     /// What it shows.
-    pub(super) title: String,
+    pub(in crate::report) title: String,
     /// Its size in pixels.
-    pub(super) size: [f64; 2],
+    pub(in crate::report) size: [f64; 2],
     /// What is drawn.
-    pub(super) drawn: Markup,
+    pub(in crate::report) drawn: Markup,
 }
 
 impl Figure {
     /// A name is made a file name: other characters become `_`.
-    pub(super) fn new(name: &str, title: String, size: [f64; 2], drawn: Markup) -> Figure {
+    pub(in crate::report) fn new(name: &str, title: String, size: [f64; 2], drawn: Markup) -> Figure {
         let plain = |c: char| if c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.') { c } else { '_' };
         let name: String = name.chars().take(80).map(plain).collect();
         Figure { name, title, size, drawn }
     }
 
     /// Puts it on the page, with its title below.
-    pub(super) fn show(&self, body: &mut Markup) {
+    pub(in crate::report) fn show(&self, body: &mut Markup) {
         body.open("figure", &[("class", "drawn")]);
         self.picture(body, &[]);
         body.element("figcaption", &[("class", "quiet")], &self.title);
@@ -61,7 +61,7 @@ impl Figure {
     }
 
     /// Only the picture, with these attributes besides.
-    pub(super) fn picture(&self, body: &mut Markup, attributes: &[(&'static str, &str)]) {
+    pub(in crate::report) fn picture(&self, body: &mut Markup, attributes: &[(&'static str, &str)]) {
         let [width, height] = self.size.map(coordinate);
         let frame = format!("0 0 {width} {height}");
         let own = [("class", "figure"), ("viewBox", frame.as_str()), ("role", "img"), ("aria-label", &self.title)];
@@ -90,30 +90,30 @@ impl Figure {
 
 /// An area with two axes.
 #[derive(Debug, Clone)]
-pub(super) struct Plot {
+pub(in crate::report) struct Plot {
     /// The axis from left to right.
-    pub(super) across: Axis,
+    pub(in crate::report) across: Axis,
     /// The axis from bottom to top.
-    pub(super) up: Axis,
+    pub(in crate::report) up: Axis,
     /// Left, top, right and bottom edges, in pixels of the figure.
-    pub(super) edges: [f64; 4],
+    pub(in crate::report) edges: [f64; 4],
 }
 
 impl Plot {
     /// Where a value on the horizontal axis is.
-    pub(super) fn x(&self, value: f64) -> f64 {
+    pub(in crate::report) fn x(&self, value: f64) -> f64 {
         let [left, _, right, _] = self.edges;
         left + self.across.share(value) * (right - left)
     }
 
     /// Where a value on the vertical axis is.
-    pub(super) fn y(&self, value: f64) -> f64 {
+    pub(in crate::report) fn y(&self, value: f64) -> f64 {
         let [_, top, _, bottom] = self.edges;
         bottom - self.up.share(value) * (bottom - top)
     }
 
     /// Draws the grid with its numbers, the title of the vertical axis above it and that of the horizontal one below.
-    pub(super) fn frame(&self, drawn: &mut Markup, across: &str, up: &str) {
+    pub(in crate::report) fn frame(&self, drawn: &mut Markup, across: &str, up: &str) {
         let [left, top, right, bottom] = self.edges;
         for (tick, text) in self.up.ticks.iter().zip(self.up.labels()) {
             let y = self.y(*tick);
@@ -130,7 +130,7 @@ impl Plot {
     }
 
     /// Draws a band between two values of the vertical axis, as far as it is in the plot.
-    pub(super) fn band(&self, drawn: &mut Markup, class: &str, [low, high]: [f64; 2]) {
+    pub(in crate::report) fn band(&self, drawn: &mut Markup, class: &str, [low, high]: [f64; 2]) {
         let [left, _, right, _] = self.edges;
         let (top, bottom) = (self.y(high.min(self.up.high)), self.y(low.max(self.up.low)));
         rectangle(drawn, class, [left, top], [right, bottom]);
@@ -138,13 +138,13 @@ impl Plot {
 }
 
 /// Draws a straight line.
-pub(super) fn line(drawn: &mut Markup, class: &str, from: [f64; 2], to: [f64; 2]) {
+pub(in crate::report) fn line(drawn: &mut Markup, class: &str, from: [f64; 2], to: [f64; 2]) {
     let ([x1, y1], [x2, y2]) = (from.map(coordinate), to.map(coordinate));
     drawn.leaf("line", &[("class", class), ("x1", &x1), ("y1", &y1), ("x2", &x2), ("y2", &y2)]);
 }
 
 /// Draws a filled rectangle; nothing if its corners are the wrong way round.
-pub(super) fn rectangle(drawn: &mut Markup, class: &str, [left, top]: [f64; 2], [right, bottom]: [f64; 2]) {
+pub(in crate::report) fn rectangle(drawn: &mut Markup, class: &str, [left, top]: [f64; 2], [right, bottom]: [f64; 2]) {
     if right <= left || bottom <= top {
         return;
     }
@@ -153,13 +153,13 @@ pub(super) fn rectangle(drawn: &mut Markup, class: &str, [left, top]: [f64; 2], 
 }
 
 /// Writes words.
-pub(super) fn text(drawn: &mut Markup, class: &str, place: [f64; 2], words: &str) {
+pub(in crate::report) fn text(drawn: &mut Markup, class: &str, place: [f64; 2], words: &str) {
     let [x, y] = place.map(coordinate);
     drawn.element("text", &[("class", class), ("x", &x), ("y", &y)], words);
 }
 
 /// Draws a dot with a tooltip.
-pub(super) fn dot(drawn: &mut Markup, class: &str, place: [f64; 2], radius: f64, tip: &str) {
+pub(in crate::report) fn dot(drawn: &mut Markup, class: &str, place: [f64; 2], radius: f64, tip: &str) {
     let ([x, y], r) = (place.map(coordinate), coordinate(radius));
     drawn.open("circle", &[("class", class), ("cx", &x), ("cy", &y), ("r", &r)]);
     drawn.element("title", &[], tip);
@@ -168,7 +168,12 @@ pub(super) fn dot(drawn: &mut Markup, class: &str, place: [f64; 2], radius: f64,
 
 /// Writes names beside their dots, within these edges, where they cover neither each other nor a dot. `apart` is how
 /// many times further from the middle of a dot they stand than usual.
-pub(super) fn names(drawn: &mut Markup, [left, top, right, bottom]: [f64; 4], dots: &[([f64; 2], String)], apart: f64) {
+pub(in crate::report) fn names(
+    drawn: &mut Markup,
+    [left, top, right, bottom]: [f64; 4],
+    dots: &[([f64; 2], String)],
+    apart: f64,
+) {
     let screen = Screen { width: right - left, height: bottom - top };
     let shares = dots.iter().map(|([x, y], _)| ((x - left) / screen.width, (y - top) / screen.height));
     let lengths: Vec<f64> = dots.iter().map(|(_, name)| name.len() as f64 * LETTER).collect();
@@ -180,7 +185,7 @@ pub(super) fn names(drawn: &mut Markup, [left, top, right, bottom]: [f64; 4], do
 }
 
 /// Draws a line through points.
-pub(super) fn path(drawn: &mut Markup, class: &str, points: impl IntoIterator<Item = [f64; 2]>) {
+pub(in crate::report) fn path(drawn: &mut Markup, class: &str, points: impl IntoIterator<Item = [f64; 2]>) {
     let places = points.into_iter().map(|place| place.map(coordinate).join(" "));
     let places: Vec<String> = places.collect();
     if places.len() > 1 {

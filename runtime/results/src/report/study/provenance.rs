@@ -4,7 +4,7 @@ use crate::present::markup::Markup;
 use crate::record::{RecordError, Repository};
 
 /// A table with a row per results file.
-pub(super) fn provenance(body: &mut Markup, files: &[(&str, &Repository)]) -> Result<(), RecordError> {
+pub(in crate::report) fn provenance(body: &mut Markup, files: &[(&str, &Repository)]) -> Result<(), RecordError> {
     body.open("div", &[("class", "scroll")]);
     body.open("table", &[]);
     body.open("thead", &[]);

@@ -1,0 +1,58 @@
+//! What preparatory testing found [SESAME 2023, §3.3]: whether the scenario holds without disturbance, in simulation
+//! and in a lab; what the relay adds; and whether regression tests show the same on both sides.
+//!
+//! Each step has its facts, which serialise to JSON as they are. Tables, sentences, text and page are made of them.
+
+mod known;
+mod mitm;
+mod null;
+mod page;
+mod series;
+mod sides;
+mod tables;
+#[cfg(test)]
+mod tests;
+mod text;
+
+use serde::Serialize;
+
+pub use known::{ExpectationSides, KnownSides, KnownTesting, known};
+pub use mitm::{AddedToTopic, Budget, Drift, MitmTesting, Stage, mitm};
+pub use null::{NullTesting, null};
+pub use page::{Files, page};
+pub use sides::{MetricSides, RequirementSides, Values, VerdictCounts};
+pub use text::text;
+
+/// The steps of preparatory testing that were carried out.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Preparation {
+    /// The scenario without disturbance (2A).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub null: Option<NullTesting>,
+    /// What the relay adds (2B).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mitm: Option<MitmTesting>,
+    /// Regression tests on both sides (2C).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub known: Option<KnownTesting>,
+    /// Steps that were left out, each in a sentence that says why.
+    pub left_out: Vec<String>,
+}
+
+impl Preparation {
+    /// All that is not as required, a sentence each.
+    pub fn objections(&self) -> Vec<&str> {
+        let null = self.null.iter().flat_map(|it| &it.objections);
+        let mitm = self.mitm.iter().flat_map(|it| &it.objections);
+        let known = self.known.iter().flat_map(|it| &it.objections);
+        null.chain(mitm).chain(known).map(String::as_str).collect()
+    }
+
+    /// The steps that were carried out, and whether each passed.
+    pub fn steps(&self) -> Vec<(&'static str, bool)> {
+        let null = self.null.as_ref().map(|it| ("null", it.objections.is_empty()));
+        let mitm = self.mitm.as_ref().map(|it| ("mitm", it.objections.is_empty()));
+        let known = self.known.as_ref().map(|it| ("known", it.objections.is_empty()));
+        [null, mitm, known].into_iter().flatten().collect()
+    }
+}

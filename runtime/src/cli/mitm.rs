@@ -1,0 +1,94 @@
+//! `mitm`: topics pass through the relay, one more in each stage, and no operation acts on them.
+
+use std::process::ExitCode;
+
+use clap::Args;
+
+use sesame_plan::{Task, Undisturbed};
+use sesame_results::report::preparation;
+
+use crate::cli::execution::{ExecutionArgs, refuse_unfilled};
+use crate::cli::failure::Failure;
+use crate::cli::preparation::{Call, Found, PreparationArgs, Work, carry_out};
+use crate::cli::session::Session;
+use crate::lab::find;
+
+/// How often each stage is run, and where.
+#[derive(Debug, Args)]
+pub struct Options {
+    /// How often each stage is run
+    #[arg(long, default_value_t = 3, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    runs: u32,
+    /// The lab in which the stages are run; by default in simulation
+    #[arg(long, value_name = "NAME")]
+    lab: Option<String>,
+    /// The seed of the simulator's seed, which is one for all runs; by default the campaign's
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    #[command(flatten)]
+    preparation: PreparationArgs,
+    #[command(flatten)]
+    execution: ExecutionArgs,
+}
+
+pub(super) fn mitm(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
+    let lab = match &options.lab {
+        Some(name) => Some(find(&session.plan, Some(name))?.name.as_str()),
+        None => None,
+    };
+    refuse_unfilled(&session.runner, &session.plan, true)?;
+    let seed = options.seed.unwrap_or(session.plan.campaign.seed);
+    let mut command = vec!["mitm".to_owned(), "--runs".to_owned(), options.runs.to_string()];
+    command.extend(lab.iter().flat_map(|&lab| ["--lab".to_owned(), lab.to_owned()]));
+    command.extend(options.seed.iter().flat_map(|seed| ["--seed".to_owned(), seed.to_string()]));
+    let call = Call { name: "mitm", command, options: &options.preparation, execution: &options.execution };
+    let here;
+    let session = match lab {
+        Some(name) => {
+            here = session.in_lab(name)?;
+            &here
+        }
+        None => session,
+    };
+    if session.plan.relayable().is_empty() {
+        return Err(Failure(format!("{}; `null` runs the scenario without a relay", nothing_to_relay(session))));
+    }
+    carry_out(session, call, |work| {
+        let mut found = Found::default();
+        let ended = stages(session, work, lab, options.runs, seed, &mut found)?;
+        Ok(ended.then_some(found))
+    })
+}
+
+/// Why there is nothing to relay.
+pub(super) fn nothing_to_relay(session: &Session) -> String {
+    format!("no operation of campaign `{}` acts on a topic, so nothing is relayed", session.plan.campaign.name)
+}
+
+/// Runs all stages and compares them; false if the user stopped it.
+pub(super) fn stages(
+    session: &Session,
+    work: &Work<'_>,
+    lab: Option<&str>,
+    runs: u32,
+    seed: u64,
+    found: &mut Found,
+) -> Result<bool, Failure> {
+    let topics = u32::try_from(session.plan.relayable().len()).unwrap_or(u32::MAX);
+    let mut stages = Vec::new();
+    for relayed in 0..=topics {
+        let lab = lab.map(str::to_owned);
+        let task = Task::Undisturbed(Undisturbed { runs, relayed, equal_seeds: true, lab });
+        let session = session.relaying(relayed);
+        let plan = task.plan(&session.plan);
+        // One at a time: runs beside each other would take the time that is measured from each other.
+        let Some(stage) = work.runs(&session, &relayed.to_string(), &task, &plan, seed, true)? else {
+            return Ok(false);
+        };
+        stages.push(stage);
+    }
+    found.preparation.mitm = Some(preparation::mitm(&stages)?);
+    let named = (0..).zip(stages).map(|(relayed, stage): (u32, _)| (format!("{relayed} relayed"), stage));
+    found.files.extend(named);
+    Ok(true)
+}
