@@ -5,8 +5,8 @@
 //! ([`fragment`]), and what is to be small as a picture ([`png`]). [`Reader`] makes operations of frames, whatever way
 //! they come. No input makes it panic or keep more than [`Limits`] says.
 //!
-//! With the feature `client`, [`client`] is a connection to a bridge, [`payload`] turns messages into values, and
-//! [`rosbridge`] is the transport to the nodes behind it.
+//! With the feature `client`, `client` is a connection to a bridge, `payload` turns messages into values, and
+//! `rosbridge` is the transport to the nodes behind it.
 
 pub mod cbor;
 #[cfg(feature = "client")]

@@ -1,8 +1,8 @@
 //! SimlogAPI over gRPC: the protocol of the simulator that the original platform used, in both its versions.
 //!
 //! A payload of the wire is a [`Message`]; the declared types of a plan say as what it is read ([`Shape`]). The
-//! runner's side is a [`client::Client`] that blocks, with [`simlog`] around it, the transport. The simulator's side
-//! serves any [`Simulator`](sesame_relay::simulator::Simulator) of ours ([`server`]).
+//! runner's side is a `client::Client` that blocks, with `simlog` around it, the transport. The simulator's side
+//! serves any [`Simulator`](sesame_relay::simulator::Simulator) of ours (`server`).
 
 // These macros panic where nothing can be written: on a full disk, or after the reader has gone.
 #![warn(clippy::print_stdout, clippy::print_stderr)]

@@ -86,7 +86,8 @@ pub enum Transport {
         names: WireNames,
         /// The topic that marks the end of a step, in version 3.
         marker: Option<String>,
-        /// For how long nothing may come in until a step is complete that nobody declares, in nanoseconds. Default 5 ms.
+        /// For how long nothing may come in until a step is complete that nobody declares, in nanoseconds. Default 5
+        /// ms.
         settle_ns: u64,
         /// A file with the certificates of authorities that are trusted.
         trust: Option<String>,
