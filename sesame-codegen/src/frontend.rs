@@ -138,8 +138,7 @@ fn not_used(space: &Space, sources: &SourceMap) -> Vec<String> {
         Transport::Process { step_ns: Some(_), .. } | Transport::Ros2 { step: Some(_), .. } => {
             Some("in lock-step time stands still while messages pass through the relay")
         }
-        Transport::Process { step_ns: None, .. } => Some("it is measured between nodes of ROS 2 only"),
-        Transport::Ros2 { step: None, .. } => None,
+        Transport::Process { step_ns: None, .. } | Transport::Ros2 { step: None, .. } => None,
     };
     if let (Some(budget), Some(why)) = (&space.lifecycle.relay_budget, unmeasured) {
         notes.push(format!("`relay budget` ({}) has no effect: {why}", at(budget.span)));

@@ -20,7 +20,8 @@ impl Study {
             .replace("process \"kuka_cell_lab\" {", &format!("process \"kuka_cell_lab\" {lab} {{"))
             .replace("\"kuka_cell_lab\"", &format!("\"{program}\""));
         let test = "test leaning { shift_link1 bias 0.2rad from 8s to 14s  expect top_speed <= 9m/s }\n";
-        let text = text.replacen("/// Offsets on", &format!("{test}\n/// Offsets on"), 1).replace("after 70s", "after 15s");
+        let text =
+            text.replacen("/// Offsets on", &format!("{test}\n/// Offsets on"), 1).replace("after 70s", "after 15s");
         fs::write(folder.join("study.sesame"), text).unwrap();
         Study { folder }
     }
