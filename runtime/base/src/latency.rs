@@ -8,10 +8,10 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 /// Each power of two is divided into so many buckets, as a power of two: what is read is at most 3 % too small.
-const FINE: u32 = 5;
+const FINE: u16 = 5;
 
 /// As many as there are nanoseconds in 64 bits, in buckets.
-const BUCKETS: u16 = (64 - FINE as u16 + 1) << FINE;
+const BUCKETS: u16 = (64 - FINE + 1) << FINE;
 
 /// How long each of many messages took, to within 3 %. Those of several runs can be taken together.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -92,7 +92,7 @@ impl TryFrom<Stored> for Latencies {
 
 /// The bucket of so many nanoseconds.
 fn bucket(nanos: u64) -> u16 {
-    let octave = (u64::BITS - nanos.leading_zeros()).saturating_sub(FINE + 1);
+    let octave = (u64::BITS - nanos.leading_zeros()).saturating_sub(u32::from(FINE) + 1);
     // Of `nanos >> octave` the highest bit is set, unless the octave is the first.
     u16::try_from((u64::from(octave) << FINE) + (nanos >> octave)).unwrap_or(BUCKETS - 1)
 }
