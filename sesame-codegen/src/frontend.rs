@@ -138,8 +138,10 @@ fn not_used(space: &Space, sources: &SourceMap) -> Vec<String> {
         Transport::Process { step_ns: Some(_), .. }
         | Transport::Ros2 { step: Some(_), .. }
         | Transport::Simlog { .. } => Some("in lock-step time stands still while messages pass through the relay"),
-        Transport::Ros2 { step: None, .. } => None,
-        _ => Some("it is measured between nodes of ROS 2 only"),
+        Transport::Process { step_ns: None, .. }
+        | Transport::Ros2 { step: None, .. }
+        | Transport::Rosbridge { .. }
+        | Transport::Ros1 { .. } => None,
     };
     if let (Some(budget), Some(why)) = (&space.lifecycle.relay_budget, unmeasured) {
         notes.push(format!("`relay budget` ({}) has no effect: {why}", at(budget.span)));

@@ -8,6 +8,7 @@ use sesame_relay::evaluate::{Custom, Run, evaluate_tapped};
 use sesame_relay::metric::MetricTable;
 use sesame_relay::relay::{Finished, Listener, Relay};
 use sesame_relay::transport::Transport;
+use sesame_relay::transport::added::AddedOnWire;
 use sesame_relay::wire::WireTable;
 use sesame_tests::workspace;
 
@@ -90,6 +91,11 @@ impl System {
     /// A whole run of a test, as campaigns make them, and what the transport noted.
     pub(crate) fn run(&mut self, test: &Test) -> (Observation, Vec<String>) {
         self.run_tapped(test, None)
+    }
+
+    /// How long messages were kept since it was asked last.
+    pub(crate) fn added(&mut self) -> Vec<AddedOnWire> {
+        self.transport.added()
     }
 
     /// The same, with somebody who listens.

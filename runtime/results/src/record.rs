@@ -7,6 +7,7 @@
 //!
 //! A [`Recorder`] writes while a campaign runs; a [`Repository`] reads, during a run or after it.
 
+mod added;
 mod columns;
 mod cursor;
 mod difference;

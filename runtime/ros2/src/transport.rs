@@ -25,7 +25,7 @@ use sesame_plan::{CampaignPlan, NodeId, Ros2, TopicId};
 use sesame_relay::lifecycle::launch::{Launched, Part, Place};
 use sesame_relay::relay::{Delivery, Exchange};
 use sesame_relay::simulator::Progress;
-use sesame_relay::transport::added::{AddedOnWire, objections};
+use sesame_relay::transport::added::{AddedOnWire, join, objections};
 use sesame_relay::transport::{Capabilities, Connect, Incidents, Transport, TransportError};
 use sesame_relay::wire::WireTable;
 
@@ -251,12 +251,7 @@ impl System {
         if let Some(budget) = self.plan.simulator.lifecycle.relay_budget {
             self.incidents.notes.append(&mut objections(budget, &new));
         }
-        for it in new {
-            match self.added.iter_mut().find(|known| known.path == it.path) {
-                Some(known) => known.latencies.add(&it.latencies),
-                None => self.added.push(it),
-            }
-        }
+        join(&mut self.added, new);
     }
 
     fn collect_notes(&mut self) {

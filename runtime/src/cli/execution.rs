@@ -255,8 +255,8 @@ pub(super) fn execute(
     Ok(code)
 }
 
-/// Runs a campaign to its end; `None` if the user stopped it, which is said. `again` gives the command that goes on with
-/// it, with these options more.
+/// Runs a campaign to its end; `None` if the user stopped it, which is said. `again` gives the command that goes on
+/// with it, with these options more.
 pub(super) fn perform(
     session: &Session,
     recorder: Recorder,

@@ -41,15 +41,20 @@ impl Added {
     /// What was measured on each wire that had messages, in the order of the wires, each name once: the two directions
     /// of a service have one. Then everything begins anew.
     pub fn take(&mut self, wires: &WireTable) -> Vec<AddedOnWire> {
-        let mut taken: Vec<AddedOnWire> = Vec::new();
-        for (wire, latencies) in std::mem::take(&mut self.by_wire) {
-            let path = wires.path(wire);
-            match taken.iter_mut().find(|known| known.path == path) {
-                Some(known) => known.latencies.add(&latencies),
-                None => taken.push(AddedOnWire { path: path.to_owned(), latencies }),
-            }
-        }
+        let mut taken = Vec::new();
+        let named = |(wire, latencies)| AddedOnWire { path: wires.path(wire).to_owned(), latencies };
+        join(&mut taken, std::mem::take(&mut self.by_wire).into_iter().map(named).collect());
         taken
+    }
+}
+
+/// Takes what was measured together with what was measured before, each wire once.
+pub fn join(all: &mut Vec<AddedOnWire>, new: Vec<AddedOnWire>) {
+    for it in new {
+        match all.iter_mut().find(|known| known.path == it.path) {
+            Some(known) => known.latencies.add(&it.latencies),
+            None => all.push(it),
+        }
     }
 }
 

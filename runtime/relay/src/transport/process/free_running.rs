@@ -22,7 +22,7 @@ use crate::lifecycle::launch::Launched;
 use crate::lifecycle::{Alarm, Input, Program, Running};
 use crate::relay::Exchange;
 use crate::simulator::Progress;
-use crate::transport::added::{Added, AddedOnWire};
+use crate::transport::added::{Added, AddedOnWire, join, objections};
 use crate::transport::process::fault::{explain, note_restart};
 use crate::transport::process::launched::{health, launch};
 use crate::transport::process::protocol::{LINE_LIMIT, Line, Read, SimulatorMessage, read_line, request};
@@ -45,6 +45,8 @@ pub(super) struct FreeRunning {
     plan: CampaignPlan,
     now: SimTime,
     incidents: Incidents,
+    /// How long messages were kept, of connections that have ended since it was asked for.
+    added: Vec<AddedOnWire>,
 }
 
 struct Connection {
@@ -89,11 +91,23 @@ impl FreeRunning {
             plan: plan.clone(),
             now: SimTime::ZERO,
             incidents: Incidents::default(),
+            added: Vec::new(),
         }
+    }
+
+    /// Takes what the relay has added, and notes if that is more than its budget.
+    fn judge_budget(&mut self) {
+        let Some(connection) = &mut self.connection else { return };
+        let new = connection.added.take(&WireTable::new(&self.plan));
+        if let Some(budget) = self.plan.simulator.lifecycle.relay_budget {
+            self.incidents.notes.append(&mut objections(budget, &new));
+        }
+        join(&mut self.added, new);
     }
 
     /// Closes the connection, and returns the process.
     fn disconnect(&mut self) -> Option<Running> {
+        self.judge_budget();
         self.connection.take().map(|connection| {
             // The simulator may be waiting for the end of its input.
             drop(connection.input);
@@ -353,18 +367,20 @@ impl Transport for FreeRunning {
     }
 
     fn close(&mut self) {
+        self.judge_budget();
         self.connection = None;
         self.launched.end();
     }
 
     fn incidents(&mut self) -> Incidents {
+        self.judge_budget();
         self.incidents.notes.append(&mut self.launched.take_notes());
         mem::take(&mut self.incidents)
     }
 
     fn added(&mut self) -> Vec<AddedOnWire> {
-        let wires = WireTable::new(&self.plan);
-        self.connection.as_mut().map_or_else(Vec::new, |connection| connection.added.take(&wires))
+        self.judge_budget();
+        mem::take(&mut self.added)
     }
 }
 

@@ -614,5 +614,6 @@ fn what_a_slow_listener_adds_is_measured_on_the_wire_of_each_message_and_handed_
         let half = on_wire.latencies.percentile(50).unwrap();
         assert!(half > 0.019, "{half}");
         assert!(transport.added().is_empty());
+        assert_eq!(transport.incidents().notes, [""; 0], "there is no budget");
     }
 }

@@ -22,6 +22,9 @@ pub struct MitmTesting {
     pub lab: Option<String>,
     /// Whether the simulator is stepped: time stands still while the relay works, so that nothing it adds is measured.
     pub lock_stepped: bool,
+    /// Whether topics that are not relayed go past the relay, as those of ROS 2 nodes do. Other simulators have no way
+    /// for their messages but the runner.
+    pub bypass: bool,
     /// The declared `relay budget`, if there is one.
     pub budget: Option<Budget>,
     /// The stages, in which one topic more each is relayed; the first relays none.
@@ -128,6 +131,7 @@ pub fn mitm(stages: &[Repository]) -> Result<MitmTesting, RecordError> {
         stages: found,
         lab,
         lock_stepped,
+        bypass: !plan.simulator.transport.wiring().is_empty(),
         budget,
     })
 }

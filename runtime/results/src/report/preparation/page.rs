@@ -10,7 +10,7 @@ use crate::report::html::policy;
 use crate::report::preparation::known::KnownTesting;
 use crate::report::preparation::mitm::MitmTesting;
 use crate::report::preparation::null::NullTesting;
-use crate::report::preparation::text::about_latency;
+use crate::report::preparation::text::{about_latency, about_stages};
 use crate::report::preparation::{Preparation, tables};
 use crate::report::study::figure;
 use crate::report::study::provenance::provenance;
@@ -76,7 +76,7 @@ fn null(body: &mut Markup, it: &NullTesting) {
         Some(lab) => format!("{} in simulation and as many in lab {lab}", plural(it.runs, "run", "runs")),
         None => format!("{} in simulation; no lab", plural(it.runs, "run", "runs")),
     };
-    said(body, &format!("{sides}. Nothing is disturbed, and nothing passes through the relay."));
+    said(body, &format!("{sides}. Nothing is disturbed, and no topic is relayed."));
     part(body, "Requirements", &tables::requirements(lab, &it.requirements));
     part(body, "Metrics", &tables::metrics(lab, &it.metrics));
     if lab.is_some() {
@@ -98,6 +98,9 @@ fn null(body: &mut Markup, it: &NullTesting) {
 fn mitm(body: &mut Markup, it: &MitmTesting) {
     section(body, "mitm", "Topics through the relay", &it.objections);
     said(body, &about_latency(it));
+    if let Some(sentence) = about_stages(it) {
+        said(body, sentence);
+    }
     part(body, "Stages", &tables::stages(it));
     for stage in &it.stages {
         if let Some(difference) = &stage.difference {

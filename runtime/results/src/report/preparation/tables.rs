@@ -5,7 +5,7 @@ use crate::present::table::{Column, Datum, Table};
 use crate::record::Verdict;
 use crate::report::preparation::known::{ExpectationSides, KnownTesting};
 use crate::report::preparation::mitm::{MitmTesting, milliseconds};
-use crate::report::preparation::sides::{MetricSides, RequirementSides, Values};
+use crate::report::preparation::sides::{MetricSides, RequirementSides, Values, VerdictCounts};
 
 fn values(values: Option<&Values>, unit: Option<&str>) -> Datum {
     values.map_or(Datum::Missing, |values| Datum::text(values.words(unit)))
@@ -231,7 +231,7 @@ pub(super) fn known_requirements(known: &KnownTesting) -> Table {
                 Datum::text(it.simulation.words()).into(),
             ];
             if lab.is_some() {
-                let words = it.lab.map_or_else(|| "–".to_owned(), |counts| counts.words());
+                let words = it.lab.map_or_else(|| "–".to_owned(), VerdictCounts::words);
                 row.push(Datum::text(words).bad_if(differs));
             }
             table.row(row);

@@ -21,6 +21,9 @@ pub fn text(preparation: &Preparation, options: TextOptions) -> String {
     if let Some(mitm) = mitm {
         heading(&mut text, "Topics through the relay", options);
         sentence(&mut text, &about_latency(mitm), options);
+        if let Some(about) = about_stages(mitm) {
+            sentence(&mut text, about, options);
+        }
         section(&mut text, "Stages", &tables::stages(mitm), options);
         section(&mut text, "Added by the relay", &tables::added(mitm), options);
         section(&mut text, "Drift of metrics", &tables::drifts(mitm), options);
@@ -64,6 +67,13 @@ pub(super) fn about_latency(mitm: &MitmTesting) -> String {
          they are not judged."
             .to_owned()
     }
+}
+
+/// What is said of a simulator for which all stages are alike.
+pub(super) fn about_stages(mitm: &MitmTesting) -> Option<&'static str> {
+    const ALIKE: &str = "This simulator has no way for its messages but the runner, so a stage only says which topics are \
+                         measured; of ROS 2 nodes, topics that are not relayed go past the relay.";
+    (!mitm.bypass).then_some(ALIKE)
 }
 
 fn heading(text: &mut String, title: &str, options: TextOptions) {

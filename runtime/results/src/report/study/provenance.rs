@@ -17,7 +17,11 @@ pub(in crate::report) fn provenance(body: &mut Markup, files: &[(&str, &Reposito
     body.open("tbody", &[]);
     for (part, repository) in files {
         let facts = repository.campaign();
-        let runs = repository.evaluated()?;
+        // Of runs without disturbance, the reference run is one.
+        let runs = match repository.task().undisturbed() {
+            Some(_) => repository.numbers()?.len(),
+            None => repository.evaluated()?,
+        };
         body.open("tr", &[]);
         body.element("th", &[], part);
         let folder = repository
