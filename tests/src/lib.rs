@@ -34,7 +34,8 @@ pub fn target() -> PathBuf {
     scratch().join("target")
 }
 
-/// The program `sesamec` of this workspace, with ROS 2 as in the rest of these tests, built if it is not up to date.
+/// The program `sesamec` of this workspace, with the transports that the rest of these tests has, built if it is not up
+/// to date.
 pub fn sesamec() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     PROGRAM.get_or_init(|| built(&SESAMEC))
@@ -52,8 +53,14 @@ pub fn kuka_cell_lab() -> &'static Path {
     PROGRAM.get_or_init(|| built(&["--package", "kuka_cell_lab"]))
 }
 
+/// The gearbox cell as a program that speaks SimlogAPI, built if it is not up to date.
+pub fn kuka_cell_simlog() -> &'static Path {
+    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+    PROGRAM.get_or_init(|| built(&["--package", "kuka_cell_simlog"]))
+}
+
 /// `sesamec`, as cargo is asked for it.
-const SESAMEC: [&str; 4] = ["--package", "sesame-codegen", "--features", "ros2"];
+const SESAMEC: [&str; 4] = ["--package", "sesame-codegen", "--features", "ros1,ros2,rosbridge,simlog"];
 
 /// The program that cargo builds when it is asked for this.
 fn built(arguments: &[&str]) -> PathBuf {

@@ -37,6 +37,7 @@ mod random_models;
 mod regeneration;
 mod search;
 mod select;
+mod served;
 mod shrink;
 mod stl;
 mod strategies;

@@ -1,0 +1,56 @@
+//! The gearbox cell over SimlogAPI, as a program that the space launches: a campaign as a user runs it.
+
+use std::fs;
+
+use sesame_tests::{Project, command, done, fresh_folder, kuka_cell_simlog, sesamec};
+
+/// A space of the served cell, in which one joint of the product arm may be disturbed.
+fn project(name: &str) -> Project {
+    let folder = fresh_folder(name);
+    let space = folder.join("served.sesame");
+    let text = format!(
+        "space served\n\
+         system {{\n\
+           simulator cell = simlog \"http://127.0.0.1:{{port}}\" {{ step 20ms }}\n\
+           launch \"{}\" \"--simlog\" \"127.0.0.1:{{port}}\" {{ ready when port \"{{port}}\" within 20s }}\n\
+           message SafetyZone {{ zone: text  level: real[mm] }}\n\
+           topic link0 = \"joints/R3200ProductMove/Link0/R/position\" : real[rad]\n\
+           topic zones = \"safetyzones/{{Z1,Z2,Z3}}\" : SafetyZone\n\
+           node plc   {{ publishes link0    every step link0 }}\n\
+           node r3200 {{ subscribes link0   publishes zones   every step zones }}\n\
+         }}\n\
+         metric nearest minimise default 5000mm = min(zones.level)\n\
+         metric disturbed minimise = fuzzing_time()\n\
+         operation jitter on link0 = random offset [-0.3rad, 0.3rad] within [0s, 20s]\n\
+         campaign close {{\n\
+           objectives nearest, disturbed\n\
+           operations jitter 1 per test\n\
+           activate by time\n\
+           search random {{ evaluations 4 }}\n\
+           end after 20s\n\
+         }}\n",
+        kuka_cell_simlog().display()
+    );
+    fs::write(&space, text).unwrap();
+    Project { space, runners: folder.join("runners"), folder }
+}
+
+#[test]
+fn a_campaign_over_simlog_finds_the_same_twice() {
+    let project = project("served");
+    let run = |workers: &str| {
+        let mut sesamec = command(sesamec());
+        sesamec.args(["run", "served.sesame", "--workers", workers]);
+        done(sesamec.current_dir(&project.folder)).expect(0)
+    };
+    let (first, second) = (run("1"), run("2"));
+    assert_eq!(first.digest(), second.digest());
+    let mut list = command(sesamec());
+    list.args(["list", "served.sesame", "--format", "json"]);
+    let listed = done(list.current_dir(&project.folder)).expect(0).out;
+    let listed: serde_json::Value = serde_json::from_str(&listed).unwrap();
+    let rows = listed.as_array().unwrap_or_else(|| panic!("{listed}"));
+    let said = |row: &serde_json::Value| row.to_string();
+    assert_eq!(rows.iter().filter(|row| said(row).contains("jitter")).count(), 4, "{listed}");
+    assert!(rows.iter().all(|row| !said(row).contains("crash")), "{listed}");
+}
