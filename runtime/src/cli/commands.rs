@@ -219,7 +219,10 @@ fn recorded(plan: CampaignPlan, record: bool) -> CampaignPlan {
 
 /// A plan in which so many topics pass through the relay.
 fn relaying(plan: CampaignPlan, relay: Option<u32>) -> CampaignPlan {
-    relay.map_or_else(|| plan.clone(), |first| plan.relaying(first))
+    match relay {
+        Some(first) => plan.relaying(first),
+        None => plan,
+    }
 }
 
 /// Serves a supervisor, in a lab if one is named.

@@ -98,7 +98,7 @@ impl<'a> Work<'a> {
         let folder = self.folder.join(name);
         let recorder = if folder.join(DATABASE).exists() {
             let known = Repository::open(&folder)?;
-            self.refuse_other(&known, task, plan, seed)?;
+            refuse_other(&known, task, plan, seed)?;
             if known.campaign().stop.is_some() {
                 return Ok(Some(known));
             }
@@ -119,21 +119,22 @@ impl<'a> Work<'a> {
         };
         perform(session, recorder, &folder, execution, files, self.interrupted, &again)
     }
+}
 
-    fn refuse_other(&self, known: &Repository, task: &Task, plan: &CampaignPlan, seed: u64) -> Result<(), Failure> {
-        let folder = shown(known.folder());
-        if let Some(difference) = known.plan().model_difference(plan) {
-            return Err(Failure(format!(
-                "the model has changed since {folder} was begun ({difference}); leave out `--resume` to begin anew"
-            )));
-        }
-        if known.task() != task || known.campaign().seed != seed {
-            return Err(Failure(format!(
-                "{folder} was begun with other options; give the same ones, or leave out `--resume` to begin anew"
-            )));
-        }
-        Ok(())
+/// Insists that results are of this task, plan and seed.
+fn refuse_other(known: &Repository, task: &Task, plan: &CampaignPlan, seed: u64) -> Result<(), Failure> {
+    let folder = shown(known.folder());
+    if let Some(difference) = known.plan().model_difference(plan) {
+        return Err(Failure(format!(
+            "the model has changed since {folder} was begun ({difference}); leave out `--resume` to begin anew"
+        )));
     }
+    if known.task() != task || known.campaign().seed != seed {
+        return Err(Failure(format!(
+            "{folder} was begun with other options; give the same ones, or leave out `--resume` to begin anew"
+        )));
+    }
+    Ok(())
 }
 
 /// What a command of preparatory testing is called with.
@@ -154,19 +155,16 @@ pub(super) fn carry_out(
     steps: impl FnOnce(&Work<'_>) -> Result<Option<Found>, Failure>,
 ) -> Result<ExitCode, Failure> {
     let Call { name, command, options, execution } = call;
-    let (folder, claim) = match &options.resume {
-        Some(folder) => {
-            let folder = run_folder(&session.results, folder);
-            if !folder.is_dir() {
-                return Err(Failure(format!("there is nothing to go on with: {} is no folder", shown(&folder))));
-            }
-            (folder, None)
+    let (folder, claim) = if let Some(folder) = &options.resume {
+        let folder = run_folder(&session.results, folder);
+        if !folder.is_dir() {
+            return Err(Failure(format!("there is nothing to go on with: {} is no folder", shown(&folder))));
         }
-        None => {
-            let results = options.results.as_deref().unwrap_or(&session.results);
-            let claim = record::claim_folder(results, name)?;
-            (claim.folder.clone(), Some(claim))
-        }
+        (folder, None)
+    } else {
+        let results = options.results.as_deref().unwrap_or(&session.results);
+        let claim = record::claim_folder(results, name)?;
+        (claim.folder.clone(), Some(claim))
     };
     let interrupted = interruptible()?;
     let work = Work { folder: folder.clone(), whole: &folder, command: &command, execution, interrupted: &interrupted };

@@ -206,7 +206,7 @@ fn text_and_page_show_everything_and_the_page_needs_nothing_but_itself() {
     assert_eq!(preparation.steps(), [("null", false), ("mitm", false)]);
     assert_eq!(preparation.objections().len(), 3, "{:?}", preparation.objections());
     let said = text(&preparation, OPTIONS);
-    for part in ["hall", "60.5 ± 0.707 s", "link0", "null failed", "mitm failed", "`known` is left out", "violated"] {
+    for part in ["hall", "60.50 ± 0.71 s", "link0", "null failed", "mitm failed", "`known` is left out", "violated"] {
         assert!(said.contains(part), "{part}:\n{said}");
     }
     preparation.known = Some(KnownTesting { lab: None, tests: Vec::new(), objections: Vec::new() });
