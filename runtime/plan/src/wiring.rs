@@ -122,8 +122,8 @@ impl CampaignPlan {
 
     /// The same plan with only the first so many of the [topics that operations can act on](CampaignPlan::relayable)
     /// passing through the relay. Of a system of ROS 2 nodes the others are not cut, so nothing is remapped for them,
-    /// except for those that are [needed in each step](CampaignPlan::needed_in_step); a simulator of another kind has no
-    /// way for its messages but the runner.
+    /// except for those that are [needed in each step](CampaignPlan::needed_in_step); a simulator of another kind has
+    /// no way for its messages but the runner.
     #[must_use]
     pub fn relaying(&self, first: u32) -> CampaignPlan {
         let relayed: Vec<TopicId> =
