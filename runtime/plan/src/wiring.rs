@@ -90,12 +90,24 @@ impl CampaignPlan {
         unclaimed
     }
 
+    /// Whether a topic passes through the relay in any case: in lock-step, nodes of ROS 2 hear what they answer, and
+    /// answer, through it, so that a step ends when all answers have come.
+    pub fn needed_in_step(&self, id: TopicId) -> bool {
+        let Transport::Ros2(ros2) = &self.simulator.transport else { return false };
+        let needs = |node: &Node| {
+            let answers = node.answers.iter().any(|answer| answer.with == id);
+            answers || !node.answers.is_empty() && node.subscribes.contains(&id)
+        };
+        ros2.step.is_some() && self.nodes.iter().any(needs)
+    }
+
     /// The topics that operations can act on, in declaration order; the two directions of a service are one. Of a
-    /// system of ROS 2 nodes they are the topics that are cut, for all operations of the space.
+    /// system of ROS 2 nodes they are the topics that are cut, for all operations of the space, without those that are
+    /// [needed in each step](CampaignPlan::needed_in_step).
     pub fn relayable(&self) -> Vec<Vec<TopicId>> {
         let acted_on = |id: TopicId| match self.simulator.transport.wiring() {
             [] => self.operations.iter().any(|operation| operation.topic == Some(id)),
-            wiring => wiring.get(id.index()).is_some_and(|wiring| wiring.cut),
+            wiring => wiring.get(id.index()).is_some_and(|wiring| wiring.cut) && !self.needed_in_step(id),
         };
         let mut found: Vec<Vec<TopicId>> = Vec::new();
         for (id, topic) in (0..).map(TopicId).zip(&self.topics).filter(|(id, _)| acted_on(*id)) {
@@ -112,15 +124,16 @@ impl CampaignPlan {
     }
 
     /// The same plan with only the first so many of the [topics that operations can act on](CampaignPlan::relayable)
-    /// passing through the relay. Of nodes in a middleware the others are not cut, so nothing is remapped for them;
-    /// a simulator of another kind has no way for its messages but the runner.
+    /// passing through the relay. Of nodes in a middleware the others are not cut, so nothing is remapped for them,
+    /// except for those that are [needed in each step](CampaignPlan::needed_in_step); a simulator of another kind has
+    /// no way for its messages but the runner.
     #[must_use]
     pub fn relaying(&self, first: u32) -> CampaignPlan {
         let relayed: Vec<TopicId> =
             self.relayable().into_iter().take(usize::try_from(first).unwrap_or(usize::MAX)).flatten().collect();
         let mut plan = self.clone();
         for (id, wiring) in (0..).map(TopicId).zip(plan.simulator.transport.wiring_mut()) {
-            if !relayed.contains(&id) {
+            if !relayed.contains(&id) && !self.needed_in_step(id) {
                 *wiring = Wiring::default();
             }
         }
@@ -252,6 +265,14 @@ mod tests {
         assert_eq!([cut(0), cut(1), cut(2), cut(3)], [ids(&[]), ids(&[0]), ids(&[0, 1]), ids(&[0, 1, 3, 4])]);
         assert!(plan.relaying(0).ros_args(None).is_empty(), "no remapping is asked for");
         assert_eq!(plan.relaying(9), plan);
+        // In lock-step, what is answered and the answers pass through the relay in any case.
+        let mut stepped = plan.clone();
+        stepped.nodes[1].answers = vec![crate::Answer { to: TopicId(1), with: TopicId(0) }];
+        let Transport::Ros2(ros2) = &mut stepped.simulator.transport else { unreachable!() };
+        ros2.step = Some(crate::Stepping { step_ns: 1, by: crate::StepBy::Topic { path: "/step".to_owned() } });
+        assert_eq!(stepped.relayable(), [ids(&[3, 4])]);
+        let cut: Vec<TopicId> = stepped.relaying(0).cut().map(|(id, ..)| id).collect();
+        assert_eq!(cut, ids(&[0, 1]));
         // Of another simulator, those of operations.
         let plan = testing::plan(vec![testing::operation(1, crate::OperationKind::Blackhole)]);
         assert_eq!(plan.relayable(), [ids(&[1])]);

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use sesame_plan::{Task, Undisturbed};
+use sesame_plan::{Task, TopicId, Undisturbed};
 use sesame_results::report::preparation;
 
 use crate::cli::execution::{ExecutionArgs, refuse_unfilled};
@@ -62,7 +62,14 @@ pub(super) fn mitm(session: &Session, options: &Options) -> Result<ExitCode, Fai
 
 /// Why there is nothing to relay.
 pub(super) fn nothing_to_relay(session: &Session) -> String {
-    format!("no operation of campaign `{}` acts on a topic, so nothing is relayed", session.plan.campaign.name)
+    let plan = &session.plan;
+    let campaign = &plan.campaign.name;
+    let needed = (0u32..).map(TopicId).take(plan.topics.len()).any(|id| plan.needed_in_step(id));
+    if needed {
+        format!("all topics that operations of campaign `{campaign}` act on pass through the relay in each step anyway")
+    } else {
+        format!("no operation of campaign `{campaign}` acts on a topic, so nothing is relayed")
+    }
 }
 
 /// Runs all stages and compares them; false if the user stopped it.

@@ -63,7 +63,7 @@ pub(super) fn about_latency(mitm: &MitmTesting) -> String {
     } else if judged {
         "Times are wall time, from the arrival of a message until it is passed on.".to_owned()
     } else {
-        "Times are wall time, from the arrival of a message until it is passed on. The space has no `relay budget`, so \
+        "Times are wall time, from the arrival of a message until it is passed on. The system has no `relay budget`, so \
          they are not judged."
             .to_owned()
     }
