@@ -27,7 +27,7 @@ pub use self::problem::Problem;
 pub use self::text::Templates;
 use crate::files::{File, Hook, Owner, Tree};
 use crate::names;
-use crate::plan::{OperationPlan, RunnerPlan};
+use crate::plan::{OperationPlan, RunnerPlan, runtime_feature};
 
 /// The version of the interface between generated code and the runtime that this generator writes for.
 const ABI: u32 = 3;
@@ -103,16 +103,6 @@ pub fn simulator_path(transport: &Transport) -> Option<Vec<&str>> {
     match transport {
         Transport::InProcess { path, .. } => Some(path.split("::").collect()),
         _ => None,
-    }
-}
-
-/// The feature of the runtime for a transport that not every runner has: its libraries take long to compile.
-fn feature(transport: &Transport) -> Option<&'static str> {
-    match transport {
-        Transport::InProcess { .. } | Transport::Process { .. } => None,
-        Transport::Ros2(_) | Transport::Rosbridge(_) | Transport::Ros1(_) => Some(transport.word()),
-        Transport::Simlog(simlog) if simlog.url.starts_with("https://") => Some("simlog-tls"),
-        Transport::Simlog(_) => Some("simlog"),
     }
 }
 
@@ -268,7 +258,7 @@ fn runner(runner: &RunnerPlan, environment: &Environment) -> Result<Tree, Proble
     let mut features = FEATURES.to_vec();
     let in_labs = plan.labs.iter().filter_map(|lab| lab.simulator.as_ref());
     let reached = std::iter::once(&plan.simulator).chain(in_labs);
-    let wanted: BTreeSet<&str> = reached.filter_map(|simulator| feature(&simulator.transport)).collect();
+    let wanted: BTreeSet<&str> = reached.filter_map(|simulator| runtime_feature(&simulator.transport)).collect();
     features.extend(wanted);
     let dependencies = package::with_features(&environment.dependencies, &features);
     tree.add(

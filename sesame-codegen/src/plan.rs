@@ -88,6 +88,28 @@ impl OperationPlan {
     }
 }
 
+/// The feature of the runtime for a transport that not every runner has: its libraries take long to compile.
+pub(crate) fn runtime_feature(transport: &Transport) -> Option<&'static str> {
+    match transport {
+        Transport::InProcess { .. } | Transport::Process { .. } => None,
+        Transport::Ros2(_) | Transport::Rosbridge(_) | Transport::Ros1(_) => Some(transport.word()),
+        Transport::Simlog(simlog) if simlog.url.starts_with("https://") => Some("simlog-tls"),
+        Transport::Simlog(_) => Some("simlog"),
+    }
+}
+
+/// Whether this command was built with a feature of the runtime: its own have the same names.
+fn is_built_in(feature: &str) -> bool {
+    let built_in = [
+        ("ros1", cfg!(feature = "ros1")),
+        ("ros2", cfg!(feature = "ros2")),
+        ("rosbridge", cfg!(feature = "rosbridge")),
+        ("simlog", cfg!(feature = "simlog")),
+        ("simlog-tls", cfg!(feature = "simlog-tls")),
+    ];
+    built_in.contains(&(feature, true))
+}
+
 impl RunnerPlan {
     /// The folder of the file that declares the simulator, as seen from that of the space; empty where they are one.
     pub fn system_folder(&self) -> &Path {
@@ -95,18 +117,11 @@ impl RunnerPlan {
     }
 
     /// Whether a runner of this campaign contains Rust that this command does not: the user's simulator or hooks, or
-    /// the transport of ROS 2 or SimlogAPI unless the command was built with it. Without, the plan says everything.
+    /// a transport that the command was built without. Without, the plan says everything.
     pub fn needs_rust(&self) -> bool {
-        let transport = match &self.plan.simulator.transport {
-            Transport::InProcess { .. } => true,
-            Transport::Process { .. } => false,
-            Transport::Ros2(_) => !cfg!(feature = "ros2"),
-            Transport::Rosbridge(_) => !cfg!(feature = "rosbridge"),
-            Transport::Ros1(_) => !cfg!(feature = "ros1"),
-            Transport::Simlog(simlog) if simlog.url.starts_with("https://") => !cfg!(feature = "simlog-tls"),
-            Transport::Simlog(_) => !cfg!(feature = "simlog"),
-        };
-        transport
+        let transport = &self.plan.simulator.transport;
+        matches!(transport, Transport::InProcess { .. })
+            || runtime_feature(transport).is_some_and(|feature| !is_built_in(feature))
             || self.hooks.iter().any(|hook| self.uses(hook))
             || self.operations.iter().any(|operation| self.applies(operation))
     }

@@ -9,6 +9,7 @@ mod bounds;
 mod foreign;
 mod limits;
 mod parse;
+mod phrases;
 mod syntax_error;
 mod text;
 mod token;

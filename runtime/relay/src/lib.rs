@@ -12,7 +12,7 @@ pub mod evaluate;
 pub mod files;
 pub mod fuzz;
 #[cfg(any(feature = "process", feature = "mcap", feature = "serve"))]
-pub mod json;
+mod json;
 #[cfg(feature = "programs")]
 pub mod lifecycle;
 pub mod message;

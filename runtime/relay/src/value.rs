@@ -127,6 +127,14 @@ impl Record {
         self.origin.as_deref()
     }
 
+    /// The message that it was decoded from, if no value was changed since, not even the sign of a zero.
+    pub fn unchanged(&self) -> Option<&Arc<[u8]>> {
+        let origin = self.origin.as_ref()?;
+        let same = origin.values.len() == self.values.len()
+            && origin.values.iter().zip(&self.values).all(|(before, now)| before.is_same(now));
+        same.then_some(&origin.bytes)
+    }
+
     /// Its values, in the order of its fields.
     pub fn values(&self) -> &[Value] {
         &self.values

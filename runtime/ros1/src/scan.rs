@@ -258,7 +258,7 @@ fn describe(header: &Header, types: &mut BTreeMap<String, FoundType>) {
         let mut found = Vec::new();
         for interface in texts.layout(name)? {
             let name = type_name(&interface.name);
-            // `time` and `duration` are no types of their own.
+            // `time` and `duration` are not messages.
             if name.starts_with("builtin_interfaces/") {
                 continue;
             }

@@ -13,8 +13,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use sesame_plan::{CampaignPlan, Channel, Clock, NodeId, Ros1};
-use sesame_relay::lifecycle::launch::{Part, Place};
+use sesame_plan::{CampaignPlan, Channel, Clock, Ros1};
+use sesame_relay::lifecycle::launch::Place;
 use sesame_relay::transport::bus::{Bus, Event, FOUND_AGAIN_WITHIN, Settings, on_bus};
 use sesame_relay::transport::{Connect, Transport, TransportError};
 use sesame_relay::value::Value;
@@ -78,9 +78,7 @@ fn in_ros(plan: &CampaignPlan, ros1: &Ros1, place: Place) -> Place {
     if ["ROS_IP", "ROS_HOSTNAME"].iter().all(|name| std::env::var_os(name).is_none()) {
         environment.push(("ROS_IP".to_owned(), "127.0.0.1".to_owned()));
     }
-    let parts = (0u32..).map(NodeId).take(plan.nodes.len());
-    let ros_args = parts.map(|node| (Part::Node(node), plan.ros_args(Some(node)))).collect();
-    Place { environment, ros_args, ..place }
+    Place { environment, ..place.remapping(plan) }
 }
 
 struct Ros1Bus {

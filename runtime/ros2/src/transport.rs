@@ -22,7 +22,7 @@ use std::time::{Duration, Instant};
 
 use sesame_base::time::SimTime;
 use sesame_plan::{CampaignPlan, NodeId, Ros2, TopicId};
-use sesame_relay::lifecycle::launch::{Launched, Part, Place};
+use sesame_relay::lifecycle::launch::{Launched, Place};
 use sesame_relay::relay::{Delivery, Exchange};
 use sesame_relay::simulator::Progress;
 use sesame_relay::transport::added::{AddedOnWire, join, objections};
@@ -96,24 +96,8 @@ enum Zero {
 
 impl System {
     fn new(plan: CampaignPlan, ros2: Ros2, folder: PathBuf) -> Self {
-        let place = Place::of_worker(folder);
-        // Workers are counted from 1.
-        let worker = u16::try_from(place.worker.saturating_sub(1)).unwrap_or(u16::MAX);
-        let domain = ros2.domain.saturating_add(worker);
-        let parts = (0u32..).map(NodeId).take(plan.nodes.len());
-        let ros_args = std::iter::once((Part::System, plan.ros_args(None)))
-            .chain(parts.map(|node| (Part::Node(node), plan.ros_args(Some(node)))));
-        let place = Place {
-            domain: domain.into(),
-            environment: vec![
-                ("ROS_DOMAIN_ID".to_owned(), domain.to_string()),
-                ("ROS_LOG_DIR".to_owned(), place.folder.join("ros").display().to_string()),
-                // Nothing beyond this machine is addressed.
-                ("ROS_AUTOMATIC_DISCOVERY_RANGE".to_owned(), "LOCALHOST".to_owned()),
-            ],
-            ros_args: ros_args.collect(),
-            ..place
-        };
+        let place = Place::of_worker(folder).remapping(&plan).in_domain(ros2.domain);
+        let domain = u16::try_from(place.domain).unwrap_or(u16::MAX);
         System {
             added: Vec::new(),
             wires: WireTable::new(&plan),

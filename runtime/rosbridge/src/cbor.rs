@@ -3,14 +3,14 @@
 use ciborium::Value as Cbor;
 use serde_json::{Map, Number, Value};
 
-/// Why bytes are no message.
+/// Why bytes are not a message.
 #[derive(Debug, thiserror::Error)]
 pub enum CborError {
-    /// They are no CBOR.
-    #[error("no CBOR: {0}")]
+    /// They are not CBOR.
+    #[error("not CBOR: {0}")]
     Syntax(String),
     /// They hold something that JSON does not.
-    #[error("{0} in CBOR is no part of a message")]
+    #[error("{0} in CBOR is not part of a message")]
     Kind(&'static str),
     /// A typed array does not end with an element.
     #[error("a typed array of {tag} has {length} bytes")]

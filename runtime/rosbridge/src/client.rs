@@ -286,7 +286,7 @@ async fn open(address: &Address) -> Result<Socket, ConnectError> {
 fn failed(address: &Address, error: &SocketError) -> ConnectError {
     let url = address.url.clone();
     match error {
-        // Somebody is there, and it is no TLS that it speaks, or not with us.
+        // A server is there, but it does not speak TLS, or not with us.
         SocketError::Io(error) if matches!(error.kind(), io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof) => {
             ConnectError::Refused { url, reason: format!("{error}; does it speak TLS?") }
         }

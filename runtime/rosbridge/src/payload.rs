@@ -60,7 +60,7 @@ impl Payloads {
             Value::Record(record) => match record.origin() {
                 Some(origin) => {
                     let text = std::str::from_utf8(&origin.bytes).expect("JSON was made of text");
-                    if same(&origin.values, record.values()) {
+                    if record.unchanged().is_some() {
                         return text.to_owned();
                     }
                     serde_json::from_str(text).expect("it was written as JSON")
@@ -87,8 +87,8 @@ impl Payloads {
             Type::Text => Value::from(json.as_str().ok_or_else(|| wrong("text"))?),
             Type::Point { .. } => {
                 let axis = |name: &str| {
-                    let part = json.get(name).ok_or_else(|| missing(name))?;
-                    real(part).ok_or_else(|| inside(mismatch("real", part), name))
+                    let part = json.get(name).ok_or_else(|| Mismatch::missing(name))?;
+                    real(part).ok_or_else(|| mismatch("real", part).inside(name))
                 };
                 if !json.is_object() {
                     return Err(wrong("point"));
@@ -97,7 +97,7 @@ impl Payloads {
             }
             Type::List { of } => match (json, &**of) {
                 (Json::Array(items), of) => {
-                    let item = |(at, item)| self.value(of, item).map_err(|it| inside(it, &format!("[{at}]")));
+                    let item = |(at, item)| self.value(of, item).map_err(|it| it.inside(&format!("[{at}]")));
                     Value::List(items.iter().enumerate().map(item).collect::<Result<_, _>>()?)
                 }
                 (Json::String(text), Type::Int { .. }) => {
@@ -113,13 +113,13 @@ impl Payloads {
                 for (name, value) in entries {
                     let name = in_ros2(name, entries);
                     values.push(match declared.iter().find(|field| field.name == name) {
-                        Some(field) => self.value(&field.ty, value).map_err(|it| inside(it, name))?,
+                        Some(field) => self.value(&field.ty, value).map_err(|it| it.inside(name))?,
                         None => Value::Undeclared(value.to_string().into()),
                     });
                 }
                 let there = |wanted: &str| entries.keys().any(|name| in_ros2(name, entries) == wanted);
                 if let Some(absent) = declared.iter().find(|field| !there(&field.name)) {
-                    return Err(missing(&absent.name));
+                    return Err(Mismatch::missing(&absent.name));
                 }
                 let names = entries.keys().map(|name| in_ros2(name, entries));
                 Value::Record(Record::new(&Fields::new(names), values))
@@ -187,9 +187,9 @@ fn blank(ty: &WireType, dialect: Dialect, known: &BTreeMap<String, Json>) -> Jso
 
 /// A type of ROS 2 as this ROS calls it: `geometry_msgs/msg/Twist` is `geometry_msgs/Twist` in ROS 1.
 pub fn type_name(interface: &str, dialect: Dialect) -> String {
-    match (dialect, interface.split_once('/').zip(interface.rsplit_once('/'))) {
-        (Dialect::Ros1, Some(((package, _), (_, name)))) => format!("{package}/{name}"),
-        _ => interface.to_owned(),
+    match dialect {
+        Dialect::Ros1 => sesame_interfaces::ros1::type_name(interface),
+        Dialect::Ros2 => interface.to_owned(),
     }
 }
 
@@ -254,11 +254,6 @@ fn byte(value: &Value) -> Option<u8> {
     }
 }
 
-/// Whether nothing was changed, not even the sign of a zero.
-fn same(before: &[Value], now: &[Value]) -> bool {
-    before.len() == now.len() && before.iter().zip(now).all(|(before, now)| before.is_same(now))
-}
-
 fn mismatch(expected: &'static str, json: &Json) -> Mismatch {
     let found = match json {
         Json::Null => "null",
@@ -270,15 +265,6 @@ fn mismatch(expected: &'static str, json: &Json) -> Mismatch {
         Json::Object(_) => "an object",
     };
     Mismatch { path: Vec::new(), expected, found }
-}
-
-fn missing(name: &str) -> Mismatch {
-    Mismatch { path: vec![name.to_owned()], expected: "a value", found: "nothing" }
-}
-
-fn inside(mut mismatch: Mismatch, name: &str) -> Mismatch {
-    mismatch.path.insert(0, name.to_owned());
-    mismatch
 }
 
 #[cfg(test)]

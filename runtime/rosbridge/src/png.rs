@@ -5,14 +5,14 @@ use std::io::Cursor;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 
-/// Why a picture is no text.
+/// Why a picture is not text.
 #[derive(Debug, thiserror::Error)]
 pub enum PictureError {
-    /// It is no base64.
-    #[error("the picture is no base64: {0}")]
+    /// It is not base64.
+    #[error("the picture is not base64: {0}")]
     Base64(#[from] base64::DecodeError),
-    /// It is no picture of the kind.
-    #[error("the picture is no PNG of this protocol: {0}")]
+    /// It is not a picture of the kind.
+    #[error("the picture is not a PNG of this protocol: {0}")]
     Png(#[from] png::DecodingError),
     /// It has other colours.
     #[error("the picture is not one of red, green and blue with eight bits each")]
@@ -20,7 +20,7 @@ pub enum PictureError {
     /// It would fill the memory.
     #[error("the picture holds more than {0} bytes")]
     Large(usize),
-    /// Its colours are no text.
+    /// Its colours are not text.
     #[error("the picture holds no text in UTF-8")]
     Text,
 }

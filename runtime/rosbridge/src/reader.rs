@@ -22,7 +22,7 @@ impl Default for Limits {
     }
 }
 
-/// Why a frame is no operation. The peer may go on with the next one.
+/// Why a frame is not an operation. The peer may go on with the next one.
 #[derive(Debug, thiserror::Error)]
 pub enum FrameError {
     /// It is too long.
@@ -33,11 +33,11 @@ pub enum FrameError {
         /// The most.
         most: usize,
     },
-    /// It is no JSON.
-    #[error("it is no JSON: {0}")]
+    /// It is not JSON.
+    #[error("it is not JSON: {0}")]
     Syntax(serde_json::Error),
     /// It says nothing that the protocol has.
-    #[error("`op` is {}", match op { Some(op) => format!("`{}`, which is no operation", op.escape_debug()), None => "missing".to_owned() })]
+    #[error("`op` is {}", match op { Some(op) => format!("`{}`, which is not an operation", op.escape_debug()), None => "missing".to_owned() })]
     Unknown {
         /// What it says.
         op: Option<String>,
@@ -50,13 +50,13 @@ pub enum FrameError {
         /// What is wrong.
         problem: String,
     },
-    /// It is no CBOR.
+    /// It is not CBOR.
     #[error(transparent)]
     Cbor(#[from] CborError),
-    /// It is a piece of no use.
+    /// It is a useless piece.
     #[error(transparent)]
     Piece(#[from] PieceError),
-    /// It is no picture of a text.
+    /// It is not a picture of a text.
     #[error(transparent)]
     Picture(#[from] PictureError),
     /// Pieces of pieces, or pictures of pictures.
@@ -198,10 +198,10 @@ mod tests {
     fn what_is_wrong_with_a_frame_is_said() {
         let said = |text: &str| read(text).unwrap_err().to_string();
         assert_eq!(said(r#"{"op":"publish","topic":"/a"}"#), "`publish`: missing field `msg`");
-        assert_eq!(said(r#"{"op":"explode"}"#), "`op` is `explode`, which is no operation");
+        assert_eq!(said(r#"{"op":"explode"}"#), "`op` is `explode`, which is not an operation");
         assert_eq!(said(r#"{"topic":"/a"}"#), "`op` is missing");
         assert_eq!(said("[1]"), "`op` is missing");
-        assert!(said("{").starts_with("it is no JSON: "));
+        assert!(said("{").starts_with("it is not JSON: "));
         assert!(said(r#"{"op":"advertise","topic":3,"type":"a/b"}"#).starts_with("`advertise`: invalid type"));
         let mut small = Reader::new(Limits { operation: 10, pieces: 100 });
         assert_eq!(small.text(r#"{"op":"unsubscribe"}"#).unwrap_err().to_string(), "it has 20 bytes, more than 10");

@@ -7,8 +7,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use sesame_plan::{CampaignPlan, Channel, Clock, Dialect, NodeId, Rosbridge};
-use sesame_relay::lifecycle::launch::{Part, Place};
+use sesame_plan::{CampaignPlan, Channel, Clock, Dialect, Rosbridge};
+use sesame_relay::lifecycle::launch::Place;
 use sesame_relay::transport::bus::secret::{Token, trusted};
 use sesame_relay::transport::bus::{Bus, Event, FOUND_AGAIN_WITHIN, Settings, on_bus};
 use sesame_relay::transport::{Connect, Transport, TransportError};
@@ -44,22 +44,14 @@ fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
 
 /// Where launched programs run: as they would for a runner that is a node of ROS itself.
 fn place(plan: &CampaignPlan, rosbridge: &Rosbridge, folder: &Path) -> Place {
-    let place = Place::of_worker(folder.to_owned());
-    let domain = u32::from(rosbridge.domain) + place.worker.saturating_sub(1);
-    let logs = ("ROS_LOG_DIR".to_owned(), place.folder.join("ros").display().to_string());
-    let environment = match rosbridge.dialect {
-        Dialect::Ros1 => vec![logs],
-        Dialect::Ros2 => vec![
-            logs,
-            ("ROS_DOMAIN_ID".to_owned(), domain.to_string()),
-            // Nothing beyond this machine is addressed.
-            ("ROS_AUTOMATIC_DISCOVERY_RANGE".to_owned(), "LOCALHOST".to_owned()),
-        ],
-    };
-    let nodes = (0u32..).map(NodeId).take(plan.nodes.len());
-    let ros_args = std::iter::once((Part::System, plan.ros_args(None)))
-        .chain(nodes.map(|node| (Part::Node(node), plan.ros_args(Some(node)))));
-    Place { domain, environment, ros_args: ros_args.collect(), ..place }
+    let place = Place::of_worker(folder.to_owned()).remapping(plan);
+    match rosbridge.dialect {
+        Dialect::Ros1 => {
+            let logs = ("ROS_LOG_DIR".to_owned(), place.folder.join("ros").display().to_string());
+            Place { environment: vec![logs], ..place }
+        }
+        Dialect::Ros2 => place.in_domain(rosbridge.domain),
+    }
 }
 
 struct Bridge {

@@ -339,7 +339,7 @@ impl Client {
         let answer = Answer { url: url.clone(), what: what.clone(), receiver };
         self.handle.spawn(async move {
             let answered = call.await.map_err(|status| ClientError::of(&url, &what, &status));
-            // Whoever asked may have given up.
+            // The caller may have given up.
             sender.send(answered).ok();
         });
         answer

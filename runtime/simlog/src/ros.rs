@@ -56,7 +56,7 @@ pub(crate) fn write(value: &Value, like: &RosMessage) -> Result<RosMessage, Mism
 
 /// When a message was published, by its own stamp, in nanoseconds.
 ///
-/// The original platform took the nanoseconds for the whole time. So does this if there are no seconds.
+/// The original platform took the nanoseconds for the whole time. This does the same if the seconds are zero.
 pub(crate) fn stamp(message: &RosMessage) -> Option<u64> {
     let header = match message.content.as_ref()? {
         Content::TimeStamp(header) => Some(header),

@@ -25,6 +25,7 @@ use sesame_plan::{CampaignPlan, Simlog};
 use sesame_relay::lifecycle::launch::{Launched, Place};
 use sesame_relay::relay::{Delivery, Exchange};
 use sesame_relay::simulator::Progress;
+use sesame_relay::transport::bus::secret::trusted;
 use sesame_relay::transport::{Capabilities, Connect, Incidents, Transport, TransportError};
 
 use self::lines::Lines;
@@ -107,12 +108,7 @@ impl System {
     fn options(&self) -> Result<Options, TransportError> {
         let port = self.launched.port();
         let url = |url: &String| port.map_or_else(|| url.clone(), |port| url.replace("{port}", &port.to_string()));
-        let ca = match &self.settings.ca {
-            None => None,
-            Some(file) => Some(std::fs::read(self.folder.join(file)).map_err(|error| {
-                TransportError::Wiring(format!("the certificates `{file}` cannot be read: {error}"))
-            })?),
-        };
+        let ca = self.settings.ca.as_ref().map(|file| trusted(file, &self.folder)).transpose()?;
         Ok(Options {
             topics_url: self.settings.topics_url.as_ref().map(url),
             ca,

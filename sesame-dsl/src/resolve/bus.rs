@@ -30,10 +30,16 @@ impl Schemes {
 
 impl<'a> Resolver<'a> {
     pub(super) fn bus(&mut self, name: &Name, bus: &'a ast::Bus) -> Option<Transport> {
-        if bus.kind == BusKind::Simlog {
-            return self.simlog(name, bus);
+        match bus.kind {
+            BusKind::Rosbridge => self.rosbridge(bus),
+            BusKind::Ros1 => self.ros1(bus),
+            BusKind::Simlog => self.simlog(name, bus),
         }
-        let address = self.address(&bus.address, bus);
+    }
+
+    /// Nodes of ROS behind a bridge.
+    fn rosbridge(&mut self, bus: &'a ast::Bus) -> Option<Transport> {
+        let url = self.address(&bus.address, bus);
         let clock = self.simulator_clock(&bus.clocks);
         let reset = self.reset_service(&bus.resets);
         let domain = match self.single(&bus.domains, "domain") {
@@ -54,19 +60,18 @@ impl<'a> Resolver<'a> {
             self.report(diagnostic);
             return None;
         }
-        let remote = Remote { url: address?, token, trust };
-        Some(match bus.kind {
-            BusKind::Rosbridge => Transport::Rosbridge {
-                remote,
-                domain: domain?,
-                dialect,
-                compression,
-                clock: clock?,
-                reset: reset.ok()?,
-            },
-            BusKind::Ros1 => Transport::Ros1 { master: remote.url, clock: clock?, reset: reset.ok()? },
-            BusKind::Simlog => unreachable!("it has a way of its own"),
-        })
+        let remote = Remote { url: url?, token, trust };
+        let (domain, clock, reset) = (domain?, clock?, reset.ok()?);
+        Some(Transport::Rosbridge { remote, domain, dialect, compression, clock, reset })
+    }
+
+    /// Nodes of ROS 1.
+    fn ros1(&mut self, bus: &'a ast::Bus) -> Option<Transport> {
+        let master = self.address(&bus.address, bus);
+        let clock = self.simulator_clock(&bus.clocks);
+        let reset = self.reset_service(&bus.resets);
+        self.single(&bus.types, "types");
+        Some(Transport::Ros1 { master: master?, clock: clock?, reset: reset.ok()? })
     }
 
     /// A simulator that speaks `SimlogAPI`.

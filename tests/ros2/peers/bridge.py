@@ -60,7 +60,7 @@ def main() -> None:
                         break
                 time.sleep(0.05)
             print("listening", flush=True)
-            # Whoever started this closes its input at the end, or is gone.
+            # The program that started this closes its input at the end, or is gone.
             sys.stdin.read()
         finally:
             server.terminate()

@@ -84,6 +84,28 @@ impl Place {
             in_runner: true,
         }
     }
+
+    /// The same for nodes of ROS, which `{ros-args}` remaps.
+    pub fn remapping(self, plan: &CampaignPlan) -> Self {
+        let nodes = (0u32..).map(NodeId).take(plan.nodes.len());
+        let ros_args = std::iter::once((Part::System, plan.ros_args(None)))
+            .chain(nodes.map(|node| (Part::Node(node), plan.ros_args(Some(node)))));
+        Place { ros_args: ros_args.collect(), ..self }
+    }
+
+    /// The same for nodes of ROS 2, in the domain of this worker; `first` is that of the first one. Nothing beyond this
+    /// machine is addressed.
+    pub fn in_domain(self, first: u16) -> Self {
+        // Workers are counted from 1.
+        let before = u16::try_from(self.worker.saturating_sub(1)).unwrap_or(u16::MAX);
+        let domain = first.saturating_add(before);
+        let environment = vec![
+            ("ROS_DOMAIN_ID".to_owned(), domain.to_string()),
+            ("ROS_LOG_DIR".to_owned(), self.folder.join("ros").display().to_string()),
+            ("ROS_AUTOMATIC_DISCOVERY_RANGE".to_owned(), "LOCALHOST".to_owned()),
+        ];
+        Place { domain: domain.into(), environment, ..self }
+    }
 }
 
 /// How long the end of everything that a plan launches may take.

@@ -58,5 +58,5 @@ pub(crate) fn read(connection: &mut Connection, deadline: Instant) -> io::Result
     }
     body.truncate(most);
     let first = head.lines().next().unwrap_or_default().to_owned();
-    String::from_utf8(body).map(|body| (first, body)).map_err(|_| invalid("its body is no UTF-8"))
+    String::from_utf8(body).map(|body| (first, body)).map_err(|_| invalid("its body is not UTF-8"))
 }

@@ -3,8 +3,9 @@
 use sesame_base::time::SimTime;
 use sesame_plan::testing::{minimal, node, test_of, topic};
 use sesame_plan::{
-    Command, Interface, InterfaceField, Launch, Node, Ready, ReadyWhen, TopicId, Type, WireType, Wiring,
+    Command, Interface, InterfaceField, Launch, Node, NodeId, Ready, ReadyWhen, TopicId, Type, WireType, Wiring,
 };
+use sesame_relay::lifecycle::launch::Part;
 use sesame_relay::metric::MetricTable;
 use sesame_relay::relay::Relay;
 use sesame_relay::wire::WireTable;

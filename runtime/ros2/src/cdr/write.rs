@@ -21,10 +21,8 @@ pub(super) fn write(layout: &Layout, selection: &Selection, message: &Value) -> 
         output.message(layout, layout.message(), message);
         return Ok(output.bytes.into());
     };
-    let changed = record.values().len() != origin.values.len()
-        || record.values().iter().zip(&origin.values).any(|(now, before)| !now.is_same(before));
-    if !changed {
-        return Ok(Arc::clone(&origin.bytes));
+    if let Some(bytes) = record.unchanged() {
+        return Ok(Arc::clone(bytes));
     }
     let mut input = Input::new(&origin.bytes)?;
     let mut output = Output { bytes: origin.bytes[..HEADER].to_vec(), little: input.little };

@@ -28,7 +28,7 @@ pub struct Options {
     pub topics_url: Option<String>,
     /// The version of the protocol.
     pub version: SimlogVersion,
-    /// The certificates (PEM) of whoever vouches for an `https://` URL.
+    /// The certificates (PEM) of the authorities that vouch for an `https://` URL.
     pub ca: Option<Vec<u8>>,
     /// Sent with each call (`authorization: Bearer …`).
     pub token: Option<String>,

@@ -53,7 +53,7 @@ fn over_tls(endpoint: Endpoint, ca: Option<&[u8]>) -> Result<Endpoint, String> {
     use tonic::transport::{Certificate, ClientTlsConfig};
 
     let Some(ca) = ca else {
-        return Err("it needs a file with the certificates of whoever vouches for it (`ca`)".to_owned());
+        return Err("it needs a file with the certificates of the authorities that vouch for it (`trust`)".to_owned());
     };
     let settings = ClientTlsConfig::new().ca_certificate(Certificate::from_pem(ca));
     endpoint.tls_config(settings).map_err(|error| root(&error))

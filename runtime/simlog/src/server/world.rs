@@ -60,7 +60,7 @@ impl<S: Simulator, F: FnMut(&Setup, &mut Bus<'_>) -> Result<S, SimulatorError>> 
         World { names, seed, start, run: None, ended: false, subscribers, initial }
     }
 
-    /// Answers calls until there is nobody left to call. Whoever calls may have given up before the answer.
+    /// Answers calls until no caller is left. A caller may have given up before the answer.
     pub(super) fn serve(&mut self, requests: &Receiver<Request>) {
         while let Ok(request) = requests.recv() {
             match request {

@@ -22,7 +22,7 @@ pub(crate) struct Peer {
 }
 
 impl Peer {
-    /// Starts one of the simulators; `None` if there is no Python for it.
+    /// Starts one of the simulators; `None` without a Python for it.
     pub(crate) fn start(script: &str, arguments: &[&str]) -> Option<Peer> {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests");
         let mut child = Command::new(python()?)

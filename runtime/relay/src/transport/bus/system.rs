@@ -35,6 +35,8 @@ pub(super) struct System {
     launched: Launched,
     connected: bool,
     lines: Vec<Line>,
+    /// Where the deliveries of a wire go: the positions of a line and of its sink.
+    sinks: BTreeMap<Wire, (usize, usize)>,
     now: SimTime,
     zero: Zero,
     /// When the clock went on last.
@@ -89,6 +91,7 @@ impl System {
             bus,
             connected: false,
             lines: Vec::new(),
+            sinks: BTreeMap::new(),
             now: SimTime::ZERO,
             zero: Zero::Wall(Instant::now()),
             ticked: Instant::now(),
@@ -111,6 +114,12 @@ impl System {
             self.is_own()?;
             self.lines = lines(&self.plan, relay.wires());
             self.lines.extend(service_lines(&self.plan, relay.wires()));
+            let sinks = self
+                .lines
+                .iter()
+                .enumerate()
+                .flat_map(|(at, line)| line.sinks.iter().enumerate().map(move |(sink, of)| (of.wire, (at, sink))));
+            self.sinks = sinks.collect();
             self.launched.start(seed)?;
             self.assemble()?;
         }
@@ -324,14 +333,10 @@ impl System {
 
     /// Publishes what is delivered; what was only listened to stays where it is.
     fn deliver(&mut self) -> Result<(), TransportError> {
-        for Delivery { wire, index, value } in mem::take(&mut self.deliveries) {
-            let sinks = self.lines.iter().enumerate().filter_map(|(at, line)| {
-                line.sinks.iter().position(|sink| sink.wire == wire).map(|sink| (at, sink, line.wire))
-            });
-            for (line, sink, of) in sinks {
-                let call = self.calls.get(&(of, index)).copied();
-                self.bus.publish(line, sink, &value, call)?;
-            }
+        for Delivery { wire, index, value } in self.deliveries.drain(..) {
+            let Some(&(line, sink)) = self.sinks.get(&wire) else { continue };
+            let call = self.calls.get(&(self.lines[line].wire, index)).copied();
+            self.bus.publish(line, sink, &value, call)?;
         }
         Ok(())
     }
