@@ -16,6 +16,8 @@ pub(crate) enum Vendor {
     Fleet,
     /// A server and a client of rosbridge.
     Rosbridge,
+    /// ROS 1, of the system.
+    Ros1,
 }
 
 impl Vendor {
@@ -26,6 +28,7 @@ impl Vendor {
             Vendor::Cyclone => "SESAME_ROS2_CYCLONE",
             Vendor::Fleet => "SESAME_ROS2_FLEET",
             Vendor::Rosbridge => "SESAME_ROSBRIDGE",
+            Vendor::Ros1 => "SESAME_ROS1",
         }
     }
 

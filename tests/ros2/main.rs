@@ -15,6 +15,7 @@ mod examples;
 mod faults;
 mod links;
 mod lock_step;
+mod prepared;
 mod rosbridge;
 mod soak;
 mod vendors;

@@ -11,6 +11,8 @@
 pub mod cbor;
 #[cfg(feature = "client")]
 pub mod client;
+#[cfg(feature = "client")]
+mod echo;
 pub mod fragment;
 mod operation;
 #[cfg(feature = "client")]

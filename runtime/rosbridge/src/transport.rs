@@ -16,6 +16,7 @@ use sesame_relay::value::Value;
 use sesame_relay::wire::Line;
 
 use crate::client::{Address, Client, ConnectError, Incoming};
+use crate::echo::Echoes;
 use crate::operation::{Compression, Level, Operation};
 use crate::payload::{Payloads, type_name};
 
@@ -71,6 +72,8 @@ struct Bridge {
     count: u64,
     /// Topics of which a message did not fit.
     misfits: BTreeSet<String>,
+    /// What is awaited back from the bridge, if the plan has a relay budget.
+    echoes: Option<Echoes>,
 }
 
 /// A call of a service that the runner offers.
@@ -84,7 +87,15 @@ struct Call {
 /// What a topic is for.
 #[derive(Debug, Clone, Copy)]
 enum Heard {
-    Source { line: usize, source: usize },
+    Source {
+        line: usize,
+        source: usize,
+    },
+    /// On which the runner publishes: what comes from there went through the bridge.
+    Sink {
+        line: usize,
+        sink: usize,
+    },
     Clock,
 }
 
@@ -103,6 +114,7 @@ impl Bridge {
             calls: BTreeMap::new(),
             count: 0,
             misfits: BTreeSet::new(),
+            echoes: plan.simulator.lifecycle.relay_budget.map(|_| Echoes::default()),
         }
     }
 
@@ -159,6 +171,12 @@ impl Bridge {
                             queue_size: None,
                         });
                     }
+                    if self.echoes.is_some() {
+                        for (sink, of) in line.sinks.iter().enumerate() {
+                            self.topics.insert(of.path.clone(), Heard::Sink { line: at, sink });
+                            client.stand(&subscribe(&of.path, ty.clone()));
+                        }
+                    }
                     for (source, of) in line.sources.iter().enumerate() {
                         self.topics.insert(of.path.clone(), Heard::Source { line: at, source });
                         client.stand(&subscribe(&of.path, ty.clone()));
@@ -201,6 +219,10 @@ impl Bridge {
         match operation {
             Operation::Publish { topic, msg, .. } => match self.topics.get(&topic) {
                 Some(&Heard::Source { line, source }) => self.message(line, source, None, &msg, arrived),
+                Some(&Heard::Sink { line, sink }) => {
+                    let back = self.echoes.as_mut().and_then(|echoes| echoes.heard(line, sink, &msg, arrived));
+                    Ok(back.map(|added| Event::Returned { line, added }))
+                }
                 Some(Heard::Clock) => Ok(Some(match clock(&msg) {
                     Some(nanos) => Event::Clock(nanos),
                     None => Event::Note(format!("a message on the clock `{topic}` is none of a clock")),
@@ -338,6 +360,9 @@ impl Bus for Bridge {
         self.lines = lines.to_vec();
         self.calls.clear();
         self.misfits.clear();
+        if let Some(echoes) = &mut self.echoes {
+            echoes.clear();
+        }
         self.introduce(&client);
         self.client = Some(client);
         self.connected = now();
@@ -363,7 +388,22 @@ impl Bus for Bridge {
 
     fn publish(&mut self, line: usize, sink: usize, value: &Value, call: Option<u64>) -> Result<(), TransportError> {
         let text = self.payloads.write(self.lines[line].topic, value);
+        if let Some(echoes) = self.echoes.as_mut().filter(|_| self.lines[line].channel == Channel::Topic)
+            && let Ok(message) = serde_json::from_str(&text)
+        {
+            echoes.published(line, sink, &message);
+        }
         self.publish_text(line, sink, &text, call)
+    }
+
+    fn hears_itself(&self) -> bool {
+        self.echoes.is_some()
+    }
+
+    fn came(&mut self, line: usize, sink: usize, arrived: Instant) {
+        if let Some(echoes) = &mut self.echoes {
+            echoes.came(line, sink, arrived);
+        }
     }
 
     fn reset(&mut self, within: Duration) -> Result<(), TransportError> {

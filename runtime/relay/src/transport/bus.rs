@@ -54,6 +54,16 @@ pub trait Bus {
         true
     }
 
+    /// Whether it hears what it publishes on topics, so that the way through a server can be measured: only a bus with
+    /// a server in the way does, and only for a plan with a relay budget.
+    fn hears_itself(&self) -> bool {
+        false
+    }
+
+    /// The message that was published last on a sink had come to the runner at this moment, and no operation delayed
+    /// it. A bus that hears itself says in an [`Event::Returned`] how long it took until the message came back.
+    fn came(&mut self, _line: usize, _sink: usize, _arrived: Instant) {}
+
     /// Sets the simulator to time zero, if the plan names a service for it.
     fn reset(&mut self, _within: Duration) -> Result<(), TransportError> {
         Ok(())
@@ -84,6 +94,13 @@ pub enum Event {
     },
     /// The clock of the simulator shows so many nanoseconds.
     Clock(i64),
+    /// A message that was passed on came back through the server: what the relay and the server added to its way.
+    Returned {
+        /// The position of its line.
+        line: usize,
+        /// From its arrival at the runner until its return.
+        added: Duration,
+    },
     /// Something for the user to know, in a sentence.
     Note(String),
 }

@@ -5,12 +5,12 @@ use std::mem;
 use std::time::{Duration, Instant};
 
 use sesame_base::time::SimTime;
-use sesame_plan::{CampaignPlan, TopicId};
+use sesame_plan::{CampaignPlan, Channel, TopicId};
 
 use crate::lifecycle::launch::{Launched, Place, Probe};
 use crate::relay::{Delivery, Exchange};
 use crate::simulator::Progress;
-use crate::transport::added::{Added, AddedOnWire, objections};
+use crate::transport::added::{Added, AddedOnWire, FEWEST, objections};
 use crate::transport::bus::{Bus, Event, Settings};
 use crate::transport::{Capabilities, Incidents, Transport, TransportError};
 use crate::wire::{Line, Wire, WireTable, lines, service_lines};
@@ -49,6 +49,8 @@ pub(super) struct System {
     calls: BTreeMap<(Wire, u64), u64>,
     incidents: Incidents,
     added: Added,
+    /// The same with the way through a server, if the bus hears itself.
+    returned: Added,
     /// What was taken of that, and nobody has asked for.
     judged: Vec<AddedOnWire>,
     wires: WireTable,
@@ -101,6 +103,7 @@ impl System {
             calls: BTreeMap::new(),
             incidents: Incidents::default(),
             added: Added::default(),
+            returned: Added::default(),
             judged: Vec::new(),
             wires: WireTable::new(plan),
             said: BTreeSet::new(),
@@ -215,6 +218,7 @@ impl System {
                 (*first, *latest) = ((*first).min(nanos), (*latest).max(nanos));
             }
             Event::Note(note) => self.note(note),
+            Event::Returned { .. } => {}
         }
         Ok(())
     }
@@ -278,14 +282,17 @@ impl System {
             None => self.launched.check()?,
             Some(Event::Note(note)) => self.note(note),
             Some(Event::Clock(nanos)) => self.tick(nanos, until, relay)?,
+            Some(Event::Returned { line, added }) => self.returned.record(self.lines[line].wire, added),
             Some(Event::Message { line, source, value, call, arrived }) => {
                 self.message(line, source, value, call, relay);
-                let of = &self.lines[line];
-                let passes = |delivery: &Delivery| of.sinks.iter().any(|sink| sink.wire == delivery.wire);
-                let measured = self.deliveries.iter().any(passes).then_some(of.wire);
+                let sink_of = |delivery: &Delivery| self.sinks.get(&delivery.wire).filter(|(of, _)| *of == line);
+                let passed: Vec<usize> = self.deliveries.iter().filter_map(sink_of).map(|&(_, sink)| sink).collect();
                 self.deliver()?;
-                if let Some(wire) = measured {
-                    self.added.record(wire, arrived.elapsed());
+                for &sink in &passed {
+                    self.bus.came(line, sink, arrived);
+                }
+                if !passed.is_empty() {
+                    self.added.record(self.lines[line].wire, arrived.elapsed());
                 }
             }
         }
@@ -347,13 +354,30 @@ impl System {
         }
     }
 
-    /// Takes what the relay has added, and notes if that is more than its budget.
+    /// Takes what the relay has added, with the way through a server if messages came back from it, and notes if that
+    /// is more than its budget.
     fn judge_budget(&mut self) {
-        let added = self.added.take(&self.wires);
+        let mut added = self.added.take(&self.wires);
+        let returned = self.returned.take(&self.wires);
+        for kept in &mut added {
+            if let Some(whole) = returned.iter().find(|it| it.path == kept.path) {
+                kept.latencies.clone_from(&whole.latencies);
+            } else if self.bus.hears_itself() && self.is_topic(&kept.path) && kept.latencies.messages() >= FEWEST {
+                self.note(format!(
+                    "what is published on `{}` does not come back from the server: what the relay adds is measured \
+                     without the way through the server",
+                    kept.path
+                ));
+            }
+        }
         if let Some(budget) = self.plan.simulator.lifecycle.relay_budget {
             self.incidents.notes.append(&mut objections(budget, &added));
         }
         self.judged.extend(added);
+    }
+
+    fn is_topic(&self, path: &str) -> bool {
+        self.lines.iter().any(|line| line.channel == Channel::Topic && line.path == path)
     }
 
     /// Ends the connection, and all that was started.

@@ -1,0 +1,162 @@
+//! Preparatory testing over each middleware whose nodes run freely, as a user does it: `sesamec prepare` launches real
+//! nodes, relays one topic more in each stage, and ends in a page.
+
+use std::fs;
+use std::path::PathBuf;
+
+use serde_json::Value;
+use sesame_tests::{Done, command, done, fresh_folder, sesamec, workspace};
+
+use crate::environment::{Domain, Vendor};
+
+/// A node that publishes an angle, in a world of one middleware.
+struct World {
+    folder: PathBuf,
+    /// Held for as long as it is used.
+    _domain: Domain,
+}
+
+/// What differs between middlewares.
+struct Middleware {
+    /// The simulator, after its name.
+    simulator: String,
+    /// What launches the system besides the talker.
+    launch: String,
+    python: PathBuf,
+    talker: &'static str,
+}
+
+/// A program as a launch declares it.
+fn quoted(words: &[&str]) -> String {
+    words.iter().map(|word| format!("{word:?} ")).collect()
+}
+
+impl Middleware {
+    fn ros2(domain: &Domain) -> Option<Self> {
+        Some(Middleware {
+            simulator: format!("ros2 {{ domain {} }}", domain.number),
+            launch: String::new(),
+            python: Vendor::Jazzy.python()?,
+            talker: "tests/ros2/peers/talker.py",
+        })
+    }
+
+    /// Behind a bridge that holds everything back by so many seconds.
+    fn rosbridge(domain: &Domain, late: Option<&str>) -> Option<Self> {
+        let (python, bridge) = (Vendor::Jazzy.python()?, Vendor::Rosbridge.python()?);
+        let program = workspace().join("tests/ros2/peers/bridge.py");
+        let ros = Vendor::environment(&python).display().to_string();
+        let mut words = vec![bridge.to_str()?, program.to_str()?, "--ros", &ros, "--port", "{port}", "--stay"];
+        words.extend(late.iter().flat_map(|&late| ["--late", late]));
+        let launch = format!("launch {} {{ ready when line \"listening\" within 30s }}", quoted(&words));
+        let simulator = format!("rosbridge \"ws://127.0.0.1:{{port}}\" {{ domain {} }}", domain.number);
+        Some(Middleware { simulator, launch, python, talker: "tests/ros2/peers/talker.py" })
+    }
+
+    fn ros1() -> Option<Self> {
+        let launch = "launch \"roscore\" \"-p\" \"{port}\" { ready when port \"{port}\" within 30s }";
+        Some(Middleware {
+            simulator: "ros1 \"http://127.0.0.1:{port}\"".to_owned(),
+            launch: launch.to_owned(),
+            python: Vendor::Ros1.python()?,
+            talker: "tests/ros1/peers/talker.py",
+        })
+    }
+}
+
+impl World {
+    /// One whose relay may add so much.
+    fn new(name: &str, domain: Domain, middleware: &Middleware, budget: &str) -> World {
+        let Middleware { simulator, launch, python, talker } = middleware;
+        let folder = fresh_folder(name);
+        let talker = workspace().join(talker);
+        let talker = quoted(&[&python.display().to_string(), &talker.display().to_string(), "{ros-args}"]);
+        let text = format!(
+            "space angles\n\
+             system {{\n\
+               simulator robot = {simulator}\n\
+               {launch}\n\
+               relay budget {{ latency {budget} }}\n\
+               message Angle = \"std_msgs/msg/Float64\" {{ data: real[rad] }}\n\
+               topic angle = \"/angle\" : Angle\n\
+               node talker {{ publishes angle  launch {talker} {{ ready when topic angle within 30s }} }}\n\
+             }}\n\
+             metric furthest maximise default 0rad = max(angle.data) outbound\n\
+             metric swing = max(abs(angle.data))\n\
+             requirement R1 \"It stays near\" = furthest <= 2rad\n\
+             requirement R2 \"It swings\" = swing >= 0.1rad\n\
+             operation lean on angle.data = bias [0rad, 5rad]\n\
+             test leaning {{ lean bias 3rad from 0s to 2s  expect furthest >= 2.5rad }}\n\
+             campaign first {{\n\
+               objectives furthest\n\
+               operations lean 1 per test\n\
+               search     random {{ evaluations 2 }}\n\
+               end        after 2s\n\
+             }}\n"
+        );
+        fs::write(folder.join("angles.sesame"), text).expect("a space can be written");
+        World { folder, _domain: domain }
+    }
+
+    fn sesamec(&self, arguments: &[&str]) -> Done {
+        done(command(sesamec()).args(arguments).current_dir(&self.folder))
+    }
+
+    /// `sesamec prepare` with its page: what was found.
+    fn prepare(&self, code: i32) -> Value {
+        let said = self.sesamec(&["prepare", "angles.sesame", "--runs", "1", "--format", "json"]).expect(code);
+        let page = fs::read_to_string(self.folder.join("runners/first/results/prepare/report.html"));
+        let page = page.expect("it ends in a page");
+        assert!(page.contains("id=\"null\"") && page.contains("id=\"mitm\""), "{page}");
+        serde_json::from_str(&said.out).expect("it is JSON")
+    }
+}
+
+/// It is ready, and what was added to the topic was measured: to how many messages, and how long to every second one.
+#[track_caller]
+fn is_ready(found: &Value) {
+    assert_eq!(found["passed"], true, "{found:#}");
+    let stages = found["mitm"]["stages"].as_array().expect("there are stages");
+    assert_eq!(stages.len(), 2, "nothing is relayed, then the angle is: {found:#}");
+    let topics = stages[1]["added"].as_array().expect("topics are relayed");
+    assert_eq!(topics[0]["topic"], "angle", "{found:#}");
+    assert!(topics[0]["messages"].as_u64().is_some_and(|count| count > 200), "{found:#}");
+    println!("added to one message in two: {} s", topics[0]["p50"]);
+    assert_eq!(found["known"]["tests"][0]["expectations"][0]["simulation"], "satisfied", "{found:#}");
+}
+
+#[test]
+fn nodes_of_ros_2_are_prepared() {
+    let domain = Domain::free();
+    let Some(middleware) = Middleware::ros2(&domain) else { return };
+    is_ready(&World::new("prepared_ros2", domain, &middleware, "500ms").prepare(0));
+}
+
+#[test]
+fn nodes_of_ros_1_are_prepared() {
+    let Some(middleware) = Middleware::ros1() else { return };
+    is_ready(&World::new("prepared_ros1", Domain::free(), &middleware, "500ms").prepare(0));
+}
+
+#[test]
+fn nodes_behind_a_bridge_are_prepared() {
+    let domain = Domain::free();
+    let Some(middleware) = Middleware::rosbridge(&domain, None) else { return };
+    is_ready(&World::new("prepared_rosbridge", domain, &middleware, "500ms").prepare(0));
+}
+
+#[test]
+fn a_bridge_that_takes_20_ms_more_exceeds_a_budget_of_5_ms_and_no_campaign_runs_then() {
+    let domain = Domain::free();
+    let Some(middleware) = Middleware::rosbridge(&domain, Some("0.02")) else { return };
+    let world = World::new("prepared_late", domain, &middleware, "5ms");
+    let found = world.prepare(3);
+    let stage = &found["mitm"]["stages"][1];
+    let objection = stage["objections"][0].as_str().expect("it has an objection");
+    assert!(objection.contains("the budget is 5 ms latency"), "{found:#}");
+    assert!(stage["added"][0]["p50"].as_f64().is_some_and(|added| added >= 0.02), "{found:#}");
+    assert_eq!(found["known"], Value::Null, "what follows makes no sense");
+    let refused = world.sesamec(&["run", "angles.sesame"]).expect(1);
+    assert!(refused.err.contains("exceeded the relay budget"), "{}", refused.err);
+    assert!(refused.err.contains("--over-budget"), "{}", refused.err);
+}
