@@ -28,7 +28,8 @@ struct Middleware {
 
 /// A program as a launch declares it.
 fn quoted(words: &[&str]) -> String {
-    words.iter().map(|word| format!("{word:?} ")).collect()
+    let quoted: Vec<String> = words.iter().map(|word| format!("{word:?}")).collect();
+    quoted.join(" ")
 }
 
 impl Middleware {
