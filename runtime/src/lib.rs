@@ -51,6 +51,8 @@ pub use sesame_simlog::server as simlog_server;
 
 /// How a runner reaches its simulator.
 pub mod transport {
+    #[cfg(feature = "mqtt")]
+    pub use sesame_mqtt::mqtt;
     pub use sesame_relay::transport::*;
     #[cfg(feature = "ros1")]
     pub use sesame_ros1::ros1;

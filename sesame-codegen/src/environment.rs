@@ -456,7 +456,11 @@ fn simulator_dependency(
             }
             return Ok(None);
         }
-        Transport::Ros2(_) | Transport::Rosbridge(_) | Transport::Ros1(_) | Transport::Simlog(_) => return Ok(None),
+        Transport::Ros2(_)
+        | Transport::Rosbridge(_)
+        | Transport::Ros1(_)
+        | Transport::Mqtt(_)
+        | Transport::Simlog(_) => return Ok(None),
     };
     let name = path.first().copied().unwrap_or_default().to_owned();
     let listed = dependencies.keys().any(|key| key.replace('-', "_") == name);

@@ -141,7 +141,8 @@ fn not_used(space: &Space, sources: &SourceMap) -> Vec<String> {
         Transport::Process { step_ns: None, .. }
         | Transport::Ros2 { step: None, .. }
         | Transport::Rosbridge { .. }
-        | Transport::Ros1 { .. } => None,
+        | Transport::Ros1 { .. }
+        | Transport::Mqtt { .. } => None,
     };
     if let (Some(budget), Some(why)) = (&space.lifecycle.relay_budget, unmeasured) {
         notes.push(format!("`relay budget` ({}) has no effect: {why}", at(budget.span)));

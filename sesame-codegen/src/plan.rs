@@ -92,7 +92,9 @@ impl OperationPlan {
 pub(crate) fn runtime_feature(transport: &Transport) -> Option<&'static str> {
     match transport {
         Transport::InProcess { .. } | Transport::Process { .. } => None,
-        Transport::Ros2(_) | Transport::Rosbridge(_) | Transport::Ros1(_) => Some(transport.word()),
+        Transport::Ros2(_) | Transport::Rosbridge(_) | Transport::Ros1(_) | Transport::Mqtt(_) => {
+            Some(transport.word())
+        }
         Transport::Simlog(simlog) if simlog.url.starts_with("https://") => Some("simlog-tls"),
         Transport::Simlog(_) => Some("simlog"),
     }
@@ -101,6 +103,7 @@ pub(crate) fn runtime_feature(transport: &Transport) -> Option<&'static str> {
 /// Whether this command was built with a feature of the runtime: its own have the same names.
 fn is_built_in(feature: &str) -> bool {
     let built_in = [
+        ("mqtt", cfg!(feature = "mqtt")),
         ("ros1", cfg!(feature = "ros1")),
         ("ros2", cfg!(feature = "ros2")),
         ("rosbridge", cfg!(feature = "rosbridge")),

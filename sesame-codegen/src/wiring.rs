@@ -10,7 +10,7 @@ pub fn text(plan: &CampaignPlan) -> String {
     const STRING: &str = "a string takes all text";
     match &plan.simulator.transport {
         Transport::Ros2(_) | Transport::Rosbridge(Rosbridge { dialect: Dialect::Ros2, .. }) => {}
-        Transport::Rosbridge(_) | Transport::Ros1(_) => return names(plan),
+        Transport::Rosbridge(_) | Transport::Ros1(_) | Transport::Mqtt(_) => return names(plan),
         Transport::InProcess { .. } | Transport::Process { .. } | Transport::Simlog(_) => {
             return format!("`{}` brings all messages itself: nothing is remapped\n", plan.simulator.name);
         }

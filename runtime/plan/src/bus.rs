@@ -1,8 +1,8 @@
-//! A system whose messages go over a bus: a server of rosbridge, a ROS 1 master.
+//! A system whose messages go over a bus: a server of rosbridge, a broker of MQTT, a ROS 1 master.
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Clock, Interface, Wiring};
+use crate::{Clock, Interface, NodeId, Wiring};
 
 /// Where a bus is, and what a runner shows to be let in.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -97,6 +97,44 @@ impl Compression {
     fn is_default(&self) -> bool {
         *self == Compression::default()
     }
+}
+
+/// A system whose messages go over brokers of MQTT.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Mqtt {
+    /// The broker of all nodes that have none of their own.
+    pub broker: Broker,
+    /// Brokers of nodes. A message goes from the broker of its publisher to those of its subscribers, under the same
+    /// name where these differ; where they do not, publishers of topics that are cut publish on `TOPIC/undisturbed`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub brokers: Vec<(NodeId, Broker)>,
+    /// How surely messages arrive.
+    pub quality: Quality,
+    /// How each topic of the plan is cut, in their order.
+    pub wiring: Vec<Wiring>,
+}
+
+/// A broker of MQTT.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Broker {
+    /// Where it is; its token is the password.
+    pub remote: Remote,
+    /// The name with which the password goes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub user: Option<String>,
+}
+
+/// How surely a message of MQTT arrives: its quality of service.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Quality {
+    /// Quality 0: if nothing goes wrong.
+    AtMostOnce,
+    /// Quality 1: perhaps several times.
+    #[default]
+    AtLeastOnce,
+    /// Quality 2.
+    ExactlyOnce,
 }
 
 /// Nodes of ROS 1.

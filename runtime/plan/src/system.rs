@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Launch, Lifecycle, MessageId, Ros1, Ros2, Rosbridge, Simlog, TopicId, Wiring};
+use crate::{Launch, Lifecycle, MessageId, Mqtt, Ros1, Ros2, Rosbridge, Simlog, TopicId, Wiring};
 
 /// The simulator, and how the runner reaches it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -45,6 +45,8 @@ pub enum Transport {
     Rosbridge(Rosbridge),
     /// Nodes of ROS 1.
     Ros1(Ros1),
+    /// A system whose messages go over brokers of MQTT.
+    Mqtt(Mqtt),
     /// A simulator that speaks SimlogAPI.
     Simlog(Simlog),
 }
@@ -58,6 +60,7 @@ impl Transport {
             Transport::Ros2(_) => "ros2",
             Transport::Rosbridge(_) => "rosbridge",
             Transport::Ros1(_) => "ros1",
+            Transport::Mqtt(_) => "mqtt",
             Transport::Simlog(_) => "simlog",
         }
     }
@@ -69,6 +72,7 @@ impl Transport {
             Transport::Ros2(ros2) => &mut ros2.wiring,
             Transport::Rosbridge(rosbridge) => &mut rosbridge.wiring,
             Transport::Ros1(ros1) => &mut ros1.wiring,
+            Transport::Mqtt(mqtt) => &mut mqtt.wiring,
         }
     }
 
@@ -79,6 +83,7 @@ impl Transport {
             Transport::Ros2(ros2) => &ros2.wiring,
             Transport::Rosbridge(rosbridge) => &rosbridge.wiring,
             Transport::Ros1(ros1) => &ros1.wiring,
+            Transport::Mqtt(mqtt) => &mqtt.wiring,
         }
     }
 }

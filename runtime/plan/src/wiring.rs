@@ -1,5 +1,6 @@
 //! Who is remapped, so that the messages of topics that are cut pass through the relay.
 
+use crate::brokers::BrokerAt;
 use crate::{CampaignPlan, Channel, Node, NodeId, Topic, TopicId, Transport, Wiring};
 
 /// A name of a topic or service that a node knows under another name.
@@ -27,6 +28,9 @@ impl CampaignPlan {
         let mut remappings: Vec<Remapping> = Vec::new();
         for (topic, declared, wiring) in self.cut() {
             let Some(end) = end(node, id, topic, declared.channel, wiring) else { continue };
+            if end == "undisturbed" && !self.shares_broker(self.broker_of(id), topic) {
+                continue;
+            }
             let ends = declared.paths.iter().map(|path| Remapping { from: path.clone(), to: format!("{path}/{end}") });
             let new: Vec<Remapping> =
                 ends.filter(|new| remappings.iter().all(|known| known.from != new.from)).collect();
@@ -76,7 +80,7 @@ impl CampaignPlan {
                         && it.paths == declared.paths
                         && self.nodes.iter().any(|node| is_source(node, other, it.channel))
                 });
-            if claimed || served {
+            if claimed || served || !self.shares_broker(0, topic) {
                 continue;
             }
             for path in &declared.paths {
@@ -138,6 +142,19 @@ impl CampaignPlan {
             }
         }
         plan
+    }
+
+    fn broker_of(&self, id: NodeId) -> BrokerAt {
+        if let Transport::Mqtt(mqtt) = &self.simulator.transport { mqtt.of(id) } else { 0 }
+    }
+
+    /// Whether subscribers of a topic are at this broker, so that its publishers there need another name. Elsewhere than
+    /// in MQTT all are at one place.
+    fn shares_broker(&self, broker: BrokerAt, topic: TopicId) -> bool {
+        match &self.simulator.transport {
+            Transport::Mqtt(mqtt) => mqtt.subscribers(self, topic).contains(&broker),
+            _ => true,
+        }
     }
 
     /// The topics that are cut.

@@ -4,6 +4,8 @@
 //! infinity: instead of a real they are the strings `"NaN"`, `"Infinity"` and `"-Infinity"`. Parts that the space does
 //! not declare are kept byte for byte.
 
+#[cfg(feature = "process")]
+mod codec;
 #[cfg(any(feature = "process", feature = "mcap"))]
 mod declared;
 
@@ -12,6 +14,8 @@ use std::io::Write as _;
 use crate::message::Mismatch;
 use crate::value::Value;
 
+#[cfg(feature = "process")]
+pub use codec::Codec;
 #[cfg(any(feature = "process", feature = "mcap"))]
 pub(crate) use declared::{Shapes, decode};
 

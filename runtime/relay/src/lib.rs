@@ -12,7 +12,7 @@ pub mod evaluate;
 pub mod files;
 pub mod fuzz;
 #[cfg(any(feature = "process", feature = "mcap", feature = "serve"))]
-mod json;
+pub mod json;
 #[cfg(feature = "programs")]
 pub mod lifecycle;
 pub mod message;

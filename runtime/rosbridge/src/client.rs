@@ -17,6 +17,7 @@ use std::time::{Duration, Instant};
 
 use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{SinkExt as _, StreamExt as _};
+use sesame_relay::transport::bus::tls;
 use tokio::net::TcpStream;
 use tokio::sync::mpsc;
 use tokio_tungstenite::tungstenite::client::IntoClientRequest as _;
@@ -268,7 +269,7 @@ async fn open(address: &Address) -> Result<Socket, ConnectError> {
         request.headers_mut().insert(AUTHORIZATION, header);
     }
     let connector = match &address.trusted {
-        Some(pem) => Some(Connector::Rustls(trusting(pem).map_err(refused)?)),
+        Some(pem) => Some(Connector::Rustls(tls::client(Some(pem)).map_err(refused)?)),
         None => None,
     };
     let limits = WebSocketConfig::default().max_message_size(Some(Limits::default().operation));
@@ -304,25 +305,6 @@ fn failed(address: &Address, error: &SocketError) -> ConnectError {
         }
         error => ConnectError::Refused { url, reason: error.to_string() },
     }
-}
-
-/// TLS that trusts these authorities only.
-fn trusting(pem: &[u8]) -> Result<Arc<rustls::ClientConfig>, String> {
-    use rustls::pki_types::CertificateDer;
-    use rustls::pki_types::pem::PemObject as _;
-    let mut authorities = rustls::RootCertStore::empty();
-    for certificate in CertificateDer::pem_slice_iter(pem) {
-        let certificate = certificate.map_err(|error| format!("a trusted certificate cannot be read: {error}"))?;
-        authorities.add(certificate).map_err(|error| format!("a trusted certificate cannot be used: {error}"))?;
-    }
-    if authorities.is_empty() {
-        return Err("the file of trusted certificates has none".to_owned());
-    }
-    let provider = Arc::new(rustls::crypto::ring::default_provider());
-    let config = rustls::ClientConfig::builder_with_provider(provider)
-        .with_safe_default_protocol_versions()
-        .map_err(|error| error.to_string())?;
-    Ok(Arc::new(config.with_root_certificates(authorities).with_no_client_auth()))
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use sesame_plan::{CampaignPlan, Channel, Clock, Dialect, Rosbridge};
 use sesame_relay::lifecycle::launch::Place;
+use sesame_relay::transport::bus::echo::Echoes;
 use sesame_relay::transport::bus::secret::{Token, trusted};
 use sesame_relay::transport::bus::{Bus, Event, FOUND_AGAIN_WITHIN, Settings, on_bus};
 use sesame_relay::transport::{Connect, Transport, TransportError};
@@ -16,7 +17,7 @@ use sesame_relay::value::Value;
 use sesame_relay::wire::Line;
 
 use crate::client::{Address, Client, ConnectError, Incoming};
-use crate::echo::Echoes;
+use crate::echo::content;
 use crate::operation::{Compression, Level, Operation};
 use crate::payload::{Payloads, type_name};
 
@@ -220,7 +221,7 @@ impl Bridge {
             Operation::Publish { topic, msg, .. } => match self.topics.get(&topic) {
                 Some(&Heard::Source { line, source }) => self.message(line, source, None, &msg, arrived),
                 Some(&Heard::Sink { line, sink }) => {
-                    let back = self.echoes.as_mut().and_then(|echoes| echoes.heard(line, sink, &msg, arrived));
+                    let back = self.echoes.as_mut().and_then(|echoes| echoes.heard(line, sink, content(&msg), arrived));
                     Ok(back.map(|added| Event::Returned { line, added }))
                 }
                 Some(Heard::Clock) => Ok(Some(match clock(&msg) {
@@ -391,7 +392,7 @@ impl Bus for Bridge {
         if let Some(echoes) = self.echoes.as_mut().filter(|_| self.lines[line].channel == Channel::Topic)
             && let Ok(message) = serde_json::from_str(&text)
         {
-            echoes.published(line, sink, &message);
+            echoes.published(line, sink, content(&message));
         }
         self.publish_text(line, sink, &text, call)
     }

@@ -118,7 +118,11 @@ pub(super) fn problems(plans: &[RunnerPlan], dependencies: &BTreeMap<String, tom
                 let nul = std::iter::once(program).chain(arguments).any(|text| text.contains('\0'));
                 (program.is_empty() || nul).then_some(Problem::SimulatorProgram)
             }
-            Transport::Ros2(_) | Transport::Rosbridge(_) | Transport::Ros1(_) | Transport::Simlog(_) => None,
+            Transport::Ros2(_)
+            | Transport::Rosbridge(_)
+            | Transport::Ros1(_)
+            | Transport::Mqtt(_)
+            | Transport::Simlog(_) => None,
         };
         let lifecycle = &plan.simulator.lifecycle;
         let launches = plan.nodes.iter().filter_map(|node| node.launch.as_ref()).chain(&lifecycle.launch);

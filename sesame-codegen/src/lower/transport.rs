@@ -2,10 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use sesame_dsl::model::{self, Space, TopicId};
+use sesame_dsl::model::{self, NodeId, Space, TopicId};
 use sesame_plan as plan;
 
-use super::id::topic_id;
+use super::id::{node_id, topic_id};
 use super::ros2::{interfaces, wirings};
 
 /// The way to a simulator of a space: its own, or that of a lab.
@@ -36,6 +36,14 @@ pub(super) fn transport(space: &Space, transport: &model::Transport) -> plan::Tr
         model::Transport::Ros1 { master, clock, reset } => {
             let (interfaces, wiring) = (interfaces(space), wiring());
             plan::Transport::Ros1(plan::Ros1 { master, clock, reset, interfaces, wiring })
+        }
+        model::Transport::Mqtt { broker, quality } => {
+            let of_node = |(id, node): (NodeId, &model::Node)| {
+                let remote = plan::Remote { url: node.broker.clone()?, ..broker.remote.clone() };
+                Some((node_id(id), plan::Broker { remote, user: broker.user.clone() }))
+            };
+            let brokers = space.nodes.iter().filter_map(of_node).collect();
+            plan::Transport::Mqtt(plan::Mqtt { broker, brokers, quality, wiring: wiring() })
         }
         model::Transport::Simlog { url, topics_url, step_ns, protocol, names, marker, settle_ns, trust: ca } => {
             let acted_on: BTreeSet<TopicId> = space.operations.values().filter_map(model::Operation::topic).collect();

@@ -4,7 +4,7 @@ use super::declaration::Declaration;
 use super::ids::{MessageId, TopicId};
 use crate::span::Span;
 use crate::units::Unit;
-use sesame_plan::{Channel, Clock, Compression, Dialect, Remote, SimlogVersion, Stepping, WireNames};
+use sesame_plan::{Broker, Channel, Clock, Compression, Dialect, Quality, Remote, SimlogVersion, Stepping, WireNames};
 
 /// The simulator under test.
 #[derive(Debug, Clone, PartialEq)]
@@ -71,6 +71,13 @@ pub enum Transport {
         clock: Clock,
         /// The service that resets it, absolute; `None` for one that is launched again.
         reset: Option<String>,
+    },
+    /// A system whose messages go over brokers of MQTT.
+    Mqtt {
+        /// The broker of all nodes that have none of their own.
+        broker: Broker,
+        /// How surely messages arrive. Default at least once.
+        quality: Quality,
     },
     /// A simulator that speaks `SimlogAPI`, stepped in lock-step.
     Simlog {
@@ -230,6 +237,8 @@ pub struct Node {
     pub answers: Vec<(TopicId, TopicId)>,
     /// On which topics it publishes one message in every step of the simulator.
     pub every_step: Vec<TopicId>,
+    /// The address of its broker, where it is not that of the simulator.
+    pub broker: Option<String>,
 }
 
 /// A value inside the messages of a topic.

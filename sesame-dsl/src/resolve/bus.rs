@@ -1,6 +1,6 @@
 //! Systems whose messages go over a bus: addresses, and what is shown to whoever is there.
 
-use sesame_plan::{Dialect, Remote, SimlogVersion, WireNames};
+use sesame_plan::{Broker, Dialect, Remote, Secret, SimlogVersion, WireNames};
 
 use super::Resolver;
 use crate::diagnostic::{Code, Diagnostic};
@@ -24,6 +24,9 @@ impl Schemes {
             BusKind::Simlog => {
                 Schemes { plain: "http://", encrypted: Some("https://"), example: "http://127.0.0.1:8089" }
             }
+            BusKind::Mqtt => {
+                Schemes { plain: "mqtt://", encrypted: Some("mqtts://"), example: "mqtt://127.0.0.1:1883" }
+            }
         }
     }
 }
@@ -33,6 +36,7 @@ impl<'a> Resolver<'a> {
         match bus.kind {
             BusKind::Rosbridge => self.rosbridge(bus),
             BusKind::Ros1 => self.ros1(bus),
+            BusKind::Mqtt => self.mqtt(bus),
             BusKind::Simlog => self.simlog(name, bus),
         }
     }
@@ -50,10 +54,7 @@ impl<'a> Resolver<'a> {
         let dialect = self.single(&bus.dialects, "dialect").copied().unwrap_or_default();
         let compression = self.single(&bus.compressions, "compression").copied().unwrap_or_default();
         let trust = self.single(&bus.trusts, "trust").map(|file| file.text.clone());
-        let token = self.single(&bus.secrets, "token").map(|secret| match secret {
-            ast::Secret::Environment(name) => sesame_plan::Secret::Environment { name: name.text.clone() },
-            ast::Secret::File(path) => sesame_plan::Secret::File { path: path.text.clone() },
-        });
+        let token = self.secret(bus, "token");
         if let (Dialect::Ros1, Some((span, _))) = (dialect, bus.domains.first()) {
             let title = "ROS 1 has no domains".to_owned();
             let diagnostic = Diagnostic::new(Code::NOT_ROS, *span, title).label("remove it, or `dialect ros1`");
@@ -72,6 +73,42 @@ impl<'a> Resolver<'a> {
         let reset = self.reset_service(&bus.resets);
         self.single(&bus.types, "types");
         Some(Transport::Ros1 { master: master?, clock: clock?, reset: reset.ok()? })
+    }
+
+    /// A system whose messages go over brokers of MQTT.
+    fn mqtt(&mut self, bus: &'a ast::Bus) -> Option<Transport> {
+        let url = self.address(&bus.address, bus);
+        let quality = self.single(&bus.qualities, "quality").copied().unwrap_or_default();
+        let user = self.single(&bus.users, "user").map(|user| user.text.clone());
+        let trust = self.single(&bus.trusts, "trust").map(|file| file.text.clone());
+        let token = self.secret(bus, "password");
+        let broker = Broker { remote: Remote { url: url?, token, trust }, user };
+        Some(Transport::Mqtt { broker, quality })
+    }
+
+    /// The address of a node's own broker, if it has one. An error was reported.
+    pub(super) fn broker_of(&mut self, node: &'a ast::Node) -> Result<Option<String>, ()> {
+        let Some(written) = self.single(&node.brokers, "broker") else { return Ok(None) };
+        match (self.kind(), self.ast_bus()) {
+            (_, Some(bus)) if bus.kind == BusKind::Mqtt => self.address(written, bus).map(Some).ok_or(()),
+            (Some((kind, simulator)), _) => {
+                let title = format!("simulator kind `{kind}` has no brokers");
+                let diagnostic = Diagnostic::new(Code::BAD_ADDRESS, written.span, title)
+                    .label("only nodes of an `mqtt` simulator have a broker; remove it")
+                    .secondary(simulator, "the simulator is declared here");
+                self.report(diagnostic);
+                Err(())
+            }
+            (None, _) => Err(()),
+        }
+    }
+
+    /// What a system wants to be shown, if anything.
+    fn secret(&mut self, bus: &'a ast::Bus, word: &str) -> Option<Secret> {
+        self.single(&bus.secrets, word).map(|secret| match secret {
+            ast::Secret::Environment(name) => Secret::Environment { name: name.text.clone() },
+            ast::Secret::File(path) => Secret::File { path: path.text.clone() },
+        })
     }
 
     /// A simulator that speaks `SimlogAPI`.
@@ -176,7 +213,9 @@ fn malformed(rest: &str) -> Option<String> {
         return Some(format!("expected a host and a port without `{}`", c.escape_default()));
     }
     if rest.contains('@') {
-        return Some("a name or password in an address would be in every log; write `token`".into());
+        return Some(
+            "a name or password in an address would be in every log; write `user`, `password` or `token`".into(),
+        );
     }
     if host(rest).is_empty() {
         return Some("expected a host after the scheme".to_owned());

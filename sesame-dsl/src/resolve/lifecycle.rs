@@ -15,6 +15,7 @@ pub(super) struct RestOfNode {
     pub(super) launch: Option<model::Launch>,
     pub(super) answers: Vec<(TopicId, TopicId)>,
     pub(super) every_step: Vec<TopicId>,
+    pub(super) broker: Option<String>,
 }
 
 impl<'a> Resolver<'a> {
@@ -114,7 +115,14 @@ impl<'a> Resolver<'a> {
                 _ => every_step = None,
             }
         }
-        Some(RestOfNode { named: named?, launch: launch?, answers: answers?, every_step: every_step? })
+        let broker = self.broker_of(node);
+        Some(RestOfNode {
+            named: named?,
+            launch: launch?,
+            answers: answers?,
+            every_step: every_step?,
+            broker: broker.ok()?,
+        })
     }
 
     /// A topic of an answer, which is among those that the node says it publishes or subscribes to.

@@ -81,6 +81,7 @@ impl<'a> Resolver<'a> {
             ast::Transport::Bus(bus) => match bus.kind {
                 BusKind::Rosbridge => "rosbridge",
                 BusKind::Ros1 => "ros1",
+                BusKind::Mqtt => "mqtt",
                 BusKind::Simlog => "simlog",
             },
         };

@@ -142,6 +142,7 @@ impl<'a> Resolver<'a> {
                 launch: rest.launch,
                 answers: rest.answers,
                 every_step: rest.every_step,
+                broker: rest.broker,
             });
             self.system.nodes.push(resolved);
         }

@@ -194,6 +194,16 @@ pub(super) const BLOCKS: &[Block] = &[
         ],
     ),
     Block::settings(
+        Rule::mqtt_settings,
+        "mqtt",
+        &[
+            Member::new(Rule::setting_quality, "quality"),
+            Member::new(Rule::setting_user, "user"),
+            Member::like(Rule::setting_password, "password", "password from"),
+            Member::new(Rule::setting_trust, "trust"),
+        ],
+    ),
+    Block::settings(
         Rule::simlog_settings,
         "simlog",
         &[
@@ -234,6 +244,7 @@ pub(super) const BLOCKS: &[Block] = &[
             Member::new(Rule::launch, "launch"),
             Member::new(Rule::answers, "answers"),
             Member::like(Rule::every_step, "every", "every step"),
+            Member::new(Rule::broker, "broker"),
         ],
     },
     Block {

@@ -21,7 +21,7 @@ impl CampaignPlan {
             Transport::InProcess { step_ns, .. } => Some(*step_ns),
             Transport::Process { step_ns, .. } => *step_ns,
             Transport::Ros2(ros2) => ros2.step.as_ref().map(|step| step.step_ns),
-            Transport::Rosbridge(_) | Transport::Ros1(_) => None,
+            Transport::Rosbridge(_) | Transport::Ros1(_) | Transport::Mqtt(_) => None,
             Transport::Simlog(simlog) => Some(simlog.step_ns),
         };
         at("transport.step_ns", require(step_ns != Some(0), || "must be positive".to_owned()))?;
@@ -41,6 +41,14 @@ impl CampaignPlan {
             Transport::Ros1(ros1) => {
                 at("transport.master", name(&ros1.master))?;
                 at("transport", sound_interfaces(&ros1.interfaces))?;
+                at("transport", self.sound_wiring(&simulator.transport))?;
+            }
+            Transport::Mqtt(mqtt) => {
+                at("transport.broker.remote.url", name(&mqtt.broker.remote.url))?;
+                each("transport.brokers", &mqtt.brokers, |(node, broker)| {
+                    self.has_node(*node)?;
+                    name(&broker.remote.url)
+                })?;
                 at("transport", self.sound_wiring(&simulator.transport))?;
             }
             Transport::Simlog(simlog) => at("transport", self.sound_simlog(simlog))?,
@@ -118,7 +126,7 @@ impl CampaignPlan {
 
     fn has_a_clock(&self) -> bool {
         let clock = match &self.simulator.transport {
-            Transport::InProcess { .. } | Transport::Process { .. } | Transport::Simlog(_) => {
+            Transport::InProcess { .. } | Transport::Process { .. } | Transport::Mqtt(_) | Transport::Simlog(_) => {
                 return false;
             }
             Transport::Ros2(ros2) => &ros2.clock,
@@ -139,7 +147,7 @@ impl CampaignPlan {
             Transport::Rosbridge(rosbridge) => &rosbridge.interfaces,
             Transport::Ros1(ros1) => &ros1.interfaces,
             // It may be for a lab.
-            Transport::InProcess { .. } | Transport::Process { .. } | Transport::Simlog(_) => {
+            Transport::InProcess { .. } | Transport::Process { .. } | Transport::Mqtt(_) | Transport::Simlog(_) => {
                 return interface.map_or(Ok(()), name);
             }
         };

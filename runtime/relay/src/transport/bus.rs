@@ -10,10 +10,13 @@
 
 #![expect(clippy::disallowed_methods, reason = "an adapter: it waits for other processes")]
 
+pub mod echo;
 pub mod secret;
 mod system;
 #[cfg(test)]
 mod tests;
+#[cfg(feature = "tls")]
+pub mod tls;
 
 use std::time::{Duration, Instant};
 

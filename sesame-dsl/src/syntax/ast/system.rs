@@ -3,7 +3,7 @@
 use super::lifecycle::{Command, Launch, RelayBudget};
 use super::words::{Count, Head, Name, Quantity, Text, UnitName};
 use crate::span::Span;
-use sesame_plan::{Compression, Dialect};
+use sesame_plan::{Compression, Dialect, Quality};
 
 #[derive(Debug)]
 pub(crate) struct System {
@@ -77,6 +77,9 @@ pub(crate) struct Bus {
     pub(crate) resets: Vec<(Span, Text)>,
     pub(crate) dialects: Vec<(Span, Dialect)>,
     pub(crate) compressions: Vec<(Span, Compression)>,
+    pub(crate) qualities: Vec<(Span, Quality)>,
+    pub(crate) users: Vec<(Span, Text)>,
+    /// A token or a password.
     pub(crate) secrets: Vec<(Span, Secret)>,
     pub(crate) trusts: Vec<(Span, Text)>,
     pub(crate) steps: Vec<(Span, Quantity)>,
@@ -98,6 +101,7 @@ pub(crate) struct Bus {
 pub(crate) enum BusKind {
     Rosbridge,
     Ros1,
+    Mqtt,
     Simlog,
 }
 
@@ -201,6 +205,8 @@ pub(crate) struct Node {
     pub(crate) launches: Vec<(Span, Launch)>,
     pub(crate) answers: Vec<(Span, Vec<Answer>)>,
     pub(crate) every_step: Vec<(Span, Vec<Name>)>,
+    /// Where it is connected, if not where the simulator is.
+    pub(crate) brokers: Vec<(Span, Text)>,
 }
 
 /// What a node publishes for each message that it receives.

@@ -8,7 +8,7 @@ use crate::syntax::ast::{
     Answer, Bus, BusKind, Clock, Field, Head, InProcess, Message, Name, Node, Process, Ros2, Secret, Service,
     Simulator, StepBy, StepChannel, Stepping, System, Text, Topic, Transport, Type, TypeKind,
 };
-use sesame_plan::{Compression, Dialect};
+use sesame_plan::{Compression, Dialect, Quality};
 
 impl Reader<'_> {
     pub(super) fn system(&mut self, pair: &Pair<'_>) -> System {
@@ -48,7 +48,8 @@ impl Reader<'_> {
             self.unsupported(&unsupported);
             return Simulator { head, transport: None };
         }
-        let kinds = [Rule::in_process, Rule::process, Rule::ros2, Rule::rosbridge, Rule::ros1, Rule::simlog];
+        let kinds =
+            [Rule::in_process, Rule::process, Rule::ros2, Rule::rosbridge, Rule::ros1, Rule::mqtt, Rule::simlog];
         let kind = first_of(pair, &kinds).expect("a simulator has a kind");
         let transport = match kind.as_rule() {
             Rule::process => Transport::Process(self.process(&kind)),
@@ -56,6 +57,7 @@ impl Reader<'_> {
             Rule::rosbridge => Transport::Bus(Box::new(self.bus(&kind, BusKind::Rosbridge, Rule::rosbridge_settings))),
             Rule::ros1 => Transport::Bus(Box::new(self.bus(&kind, BusKind::Ros1, Rule::ros1_settings))),
             Rule::simlog => Transport::Bus(Box::new(self.bus(&kind, BusKind::Simlog, Rule::simlog_settings))),
+            Rule::mqtt => Transport::Bus(Box::new(self.bus(&kind, BusKind::Mqtt, Rule::mqtt_settings))),
             _ => Transport::InProcess(self.in_process(&kind)),
         };
         Simulator { head, transport: Some(transport) }
@@ -132,6 +134,8 @@ impl Reader<'_> {
             resets: vec![],
             dialects: vec![],
             compressions: vec![],
+            qualities: vec![],
+            users: vec![],
             secrets: vec![],
             trusts: vec![],
             steps: vec![],
@@ -163,6 +167,17 @@ impl Reader<'_> {
                 Rule::setting_compression => {
                     bus.compressions.push((span, if has(Rule::k_cbor) { Compression::Cbor } else { Compression::Png }));
                 }
+                Rule::setting_quality => {
+                    let quality = if has(Rule::k_at_most_once) {
+                        Quality::AtMostOnce
+                    } else if has(Rule::k_at_least_once) {
+                        Quality::AtLeastOnce
+                    } else {
+                        Quality::ExactlyOnce
+                    };
+                    bus.qualities.push((span, quality));
+                }
+                Rule::setting_user => bus.users.push((span, text(reader))),
                 Rule::setting_trust => bus.trusts.push((span, text(reader))),
                 Rule::setting_step => bus.steps.push((span, quantity(reader))),
                 Rule::setting_protocol => {
@@ -272,6 +287,7 @@ impl Reader<'_> {
             launches: vec![],
             answers: vec![],
             every_step: vec![],
+            brokers: vec![],
         };
         self.members(pair, |reader, member| {
             let span = reader.keyword_span(&member);
@@ -280,6 +296,7 @@ impl Reader<'_> {
                 Rule::subscribes => node.subscribes.push((span, reader.names(&member))),
                 Rule::launch => node.launches.push((span, reader.launch(&member))),
                 Rule::every_step => node.every_step.push((span, reader.names(&member))),
+                Rule::broker => node.brokers.push((span, reader.text_of(&expect_child(&member, Rule::text)))),
                 _ => {
                     let answers = children(&member, Rule::answer).map(|answer| {
                         let mut names = children(&answer, Rule::name).map(|name| reader.name(&name));

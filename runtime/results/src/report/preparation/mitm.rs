@@ -140,7 +140,7 @@ pub fn mitm(stages: &[Repository]) -> Result<MitmTesting, RecordError> {
 fn is_stepped(plan: &CampaignPlan) -> bool {
     match &plan.simulator.transport {
         Transport::InProcess { .. } | Transport::Simlog(_) => true,
-        Transport::Rosbridge(_) | Transport::Ros1(_) => false,
+        Transport::Rosbridge(_) | Transport::Ros1(_) | Transport::Mqtt(_) => false,
         Transport::Process { step_ns, .. } => step_ns.is_some(),
         Transport::Ros2(ros2) => ros2.step.is_some(),
     }

@@ -1,0 +1,76 @@
+//! Vehicles that speak VDA 5050 and their control, each at a broker of their own: orders are finished undisturbed, and
+//! late or never under disturbances.
+
+use std::fs;
+
+use serde_json::Value;
+use sesame_tests::{Done, command, done, fresh_folder, sesamec, workspace};
+
+use crate::peers::{Broker, packages};
+
+#[test]
+fn vehicles_finish_their_orders_and_under_disturbances_they_are_late_or_never_heard_of_again() {
+    let Some(packages) = packages() else { return };
+    let folder = fresh_folder("mqtt_fleet");
+    let [vehicles, control] = [Broker::start(&folder), Broker::start(&folder)].map(|it| (it.port, it));
+    let program = workspace().join("tests/mqtt/fleet.js").display().to_string();
+    let text = format!(
+        "space fleet\n\
+         system {{\n\
+           simulator fleet = mqtt \"mqtt://127.0.0.1:{vehicles}\" {{ quality at_least_once }}\n\
+           relay budget {{ latency 500ms }}\n\
+           message Order    {{ orderId: text }}\n\
+           message State    {{ orderId: text  lastNodeSequenceId: int }}\n\
+           message Presence {{ connectionState: text }}\n\
+           message Finished {{ order: int  seconds: real[s] }}\n\
+           topic order      = \"uagv/v2/acme/{{agv0,agv1,agv2}}/order\"      : Order\n\
+           topic state      = \"uagv/v2/acme/{{agv0,agv1,agv2}}/state\"      : State\n\
+           topic connection = \"uagv/v2/acme/{{agv0,agv1,agv2}}/connection\" : Presence\n\
+           topic finished   = \"fleet/finished\"                           : Finished\n\
+           node vehicles {{\n\
+             publishes state, connection  subscribes order\n\
+             launch \"node\" \"{program}\" \"vehicles\" \"{vehicles}\" {{ ready when line \"ready\" within 30s }}\n\
+           }}\n\
+           node control {{\n\
+             publishes order, finished  subscribes state, connection  broker \"mqtt://127.0.0.1:{control}\"\n\
+             launch \"node\" \"{program}\" \"control\" \"{control}\" {{ ready when line \"ready\" within 30s }}\n\
+           }}\n\
+           node report {{ subscribes finished  broker \"mqtt://127.0.0.1:{control}\" }}\n\
+         }}\n\
+         metric slowest  maximise default 60s = max(finished.seconds)\n\
+         metric arrived  = max(state.lastNodeSequenceId)\n\
+         requirement R1 \"Orders are finished soon\" = slowest <= 4.5s\n\
+         operation late on order = latency [0s, 10s]\n\
+         operation lost on state = blackhole\n\
+         test late_orders {{ late delay 3s from 0s to 8s  expect slowest >= 5s }}\n\
+         test lost_states {{ lost from 0s to 8s  expect slowest >= 60s }}\n\
+         campaign first {{\n\
+           objectives slowest\n\
+           operations late, lost 1 per test\n\
+           search     random {{ evaluations 2 }}\n\
+           end        after 8s\n\
+         }}\n",
+        vehicles = vehicles.0,
+        control = control.0,
+    );
+    fs::write(folder.join("fleet.sesame"), text).expect("a space can be written");
+    let sesamec = |arguments: &[&str]| -> Done {
+        let mut sesamec = command(sesamec());
+        sesamec.env("NODE_PATH", packages.join("node_modules"));
+        done(sesamec.args(arguments).current_dir(&folder))
+    };
+    let said = sesamec(&["prepare", "fleet.sesame", "--runs", "1", "--format", "json"]).expect(0);
+    let found: Value = serde_json::from_str(&said.out).expect("it is JSON");
+    println!("{found:#}");
+    assert_eq!(found["passed"], true, "{found:#}");
+    let tests = found["known"]["tests"].as_array().expect("both are run");
+    let slowest = |test: &Value| {
+        let metrics = test["metrics"].as_array().expect("metrics are measured");
+        metrics.iter().find(|it| it["metric"] == "slowest").expect("it is among them")["simulation"]["mean"].as_f64()
+    };
+    assert!(slowest(&tests[0]).is_some_and(|seconds| (5.0..8.0).contains(&seconds)), "late: {found:#}");
+    assert_eq!(slowest(&tests[1]), Some(60.0), "never: {found:#}");
+    let page = fs::read_to_string(folder.join("runners/first/results/prepare/report.html"));
+    assert!(page.expect("it ends in a page").contains("id=\"known\""));
+    drop((vehicles.1, control.1));
+}
