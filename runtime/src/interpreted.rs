@@ -28,6 +28,8 @@ pub struct Interpreted {
 /// The transport to the simulator of a plan, which is no part of the runner.
 pub(crate) fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
     let connect = match &plan.simulator.transport {
+        #[cfg(feature = "mqtt")]
+        sesame_plan::Transport::Mqtt(_) => sesame_mqtt::mqtt(folder.to_owned()),
         #[cfg(feature = "ros1")]
         sesame_plan::Transport::Ros1(_) => sesame_ros1::ros1(folder.to_owned()),
         #[cfg(feature = "ros2")]

@@ -38,7 +38,6 @@ fn vehicles_finish_their_orders_and_under_disturbances_they_are_late_or_never_he
            node report {{ subscribes finished  broker \"mqtt://127.0.0.1:{control}\" }}\n\
          }}\n\
          metric slowest  maximise default 60s = max(finished.seconds)\n\
-         metric arrived  = max(state.lastNodeSequenceId)\n\
          requirement R1 \"Orders are finished soon\" = slowest <= 4.5s\n\
          operation late on order = latency [0s, 10s]\n\
          operation lost on state = blackhole\n\

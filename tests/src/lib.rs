@@ -60,7 +60,7 @@ pub fn kuka_cell_simlog() -> &'static Path {
 }
 
 /// `sesamec`, as cargo is asked for it.
-const SESAMEC: [&str; 4] = ["--package", "sesame-codegen", "--features", "ros1,ros2,rosbridge,simlog"];
+const SESAMEC: [&str; 4] = ["--package", "sesame-codegen", "--features", "mqtt,ros1,ros2,rosbridge,simlog"];
 
 /// The program that cargo builds when it is asked for this.
 fn built(arguments: &[&str]) -> PathBuf {

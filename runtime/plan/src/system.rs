@@ -86,6 +86,25 @@ impl Transport {
             Transport::Mqtt(mqtt) => &mqtt.wiring,
         }
     }
+
+    /// The address of the one system that all workers would use; `None` if each has its own, with which several can run
+    /// at a time.
+    pub fn shared_address(&self) -> Option<&str> {
+        let addresses: Vec<&str> = match self {
+            Transport::InProcess { .. } | Transport::Process { .. } | Transport::Ros2(_) => Vec::new(),
+            Transport::Rosbridge(rosbridge) => vec![&rosbridge.remote.url],
+            Transport::Ros1(ros1) => vec![&ros1.master],
+            Transport::Mqtt(mqtt) => mqtt.all().into_iter().map(|broker| broker.remote.url.as_str()).collect(),
+            Transport::Simlog(simlog) => vec![&simlog.url],
+        };
+        addresses.into_iter().find(|address| is_shared(address))
+    }
+}
+
+/// Whether an address is the same for all workers: it has none of the placeholders for which each has a value of its
+/// own.
+pub fn is_shared(address: &str) -> bool {
+    !["{port}", "{worker}", "{domain}"].iter().any(|own| address.contains(own))
 }
 
 /// A named message type.

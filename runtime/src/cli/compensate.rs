@@ -262,7 +262,7 @@ fn fitted(
     let longest = fitted_to.iter().chain(held_out).map(|test| Ok(limit(&campaign.test(test.number)?)));
     let longest = longest.collect::<Result<Vec<_>, Failure>>()?.into_iter().max().unwrap_or(Duration::from_secs(60));
     let mut pool = Pool::start(&PoolSettings {
-        workers: usize::try_from(options.execution.workers()).unwrap_or(1),
+        workers: usize::try_from(options.execution.workers(&session.plan)).unwrap_or(1),
         program: session.program.clone().recording(true),
         directory: scratch.path().to_owned(),
         timeout: options.execution.timeout().unwrap_or(longest),

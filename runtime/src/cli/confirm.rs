@@ -80,7 +80,7 @@ pub(super) fn confirm(session: &Session, options: &Options) -> Result<ExitCode, 
     let folder = repository.folder().to_owned();
     drop(repository);
 
-    let mut recorder = Recorder::reopen(&folder, options.execution.workers())?;
+    let mut recorder = Recorder::reopen(&folder, options.execution.workers(&session.plan))?;
     let files = claim_files(&session.runner, plan)?;
     refuse_unfilled(&session.runner, plan, true)?;
     let settings = options.execution.settings(session, seed, &files);

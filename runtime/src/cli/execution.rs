@@ -36,7 +36,8 @@ const MOST_WORKERS: usize = 512;
 /// How tests are run.
 #[derive(Debug, Default, Args)]
 pub(super) struct ExecutionArgs {
-    /// How many worker processes, at most 512; by default one per processor, and never more than tests
+    /// How many worker processes, at most 512; by default one per processor, and never more than tests. It is always one
+    /// where all would use the same system: an address without `{port}` or `{worker}`
     #[arg(long, value_name = "N", value_parser = workers)]
     workers: Option<NonZeroUsize>,
     /// Seconds of wall time after which a test is stopped; by default 20 times the reference run, at least 60
@@ -99,16 +100,23 @@ pub(super) fn seconds(text: &str) -> Result<Duration, String> {
 
 impl ExecutionArgs {
     /// The number of workers, for the record.
-    pub(super) fn workers(&self) -> u32 {
-        u32::try_from(self.processes()).unwrap_or(u32::MAX)
+    pub(super) fn workers(&self, plan: &CampaignPlan) -> u32 {
+        u32::try_from(self.processes(plan)).unwrap_or(u32::MAX)
     }
 
     /// What a campaign is told of it.
     pub(super) fn settings(&self, session: &Session, seed: u64, files: &Files) -> Settings {
         // A file that is changed is changed for every simulator.
-        let workers = if files.may_change { 1 } else { self.processes() };
+        let workers = if files.may_change { 1 } else { self.processes(&session.plan) };
         if self.workers.is_some_and(|asked| asked.get() > workers) {
-            say(format_args!("note: tests run one at a time, since operations may change files"));
+            let since = match session.plan.simulator.transport.shared_address() {
+                Some(address) => format!(
+                    "all workers would use the one system at `{address}`; `{{port}}` or `{{worker}}` in an address gives \
+                     each its own"
+                ),
+                None => "operations may change files".to_owned(),
+            };
+            say(format_args!("note: tests run one at a time, since {since}"));
         }
         Settings {
             seed,
@@ -132,7 +140,11 @@ impl ExecutionArgs {
         self.timeout
     }
 
-    fn processes(&self) -> usize {
+    /// One where all would use the same system, whatever is asked for.
+    fn processes(&self, plan: &CampaignPlan) -> usize {
+        if plan.simulator.transport.shared_address().is_some() {
+            return 1;
+        }
         let processors = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get).min(MOST_WORKERS);
         self.workers.map_or_else(processors, NonZeroUsize::get)
     }
@@ -228,7 +240,7 @@ pub(super) fn begin(
         say(format_args!("note: an earlier run is unfinished; this continues it:\n    {resume}"));
     }
     let folder = claim.folder.clone();
-    Ok((Recorder::create_in(claim, plan, task, seed, execution.workers())?, folder))
+    Ok((Recorder::create_in(claim, plan, task, seed, execution.workers(plan))?, folder))
 }
 
 /// Runs a campaign to its end and says what was found.
@@ -270,7 +282,7 @@ pub(super) fn perform(
     let (plan, seed) = (campaign.plan.clone(), campaign.seed);
     let mut settings = execution.settings(session, seed, &files);
     settings.program = settings.program.recording(plan.campaign.record.is_some());
-    let mut display = Display::new(&plan, seed, execution.workers());
+    let mut display = Display::new(&plan, seed, execution.workers(&plan));
     let end = run_campaign(&plan, recorder, &settings, &folder.join("workers"), interrupted, &mut |event, progress| {
         display.update(event, progress);
     });

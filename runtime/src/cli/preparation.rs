@@ -103,7 +103,7 @@ impl<'a> Work<'a> {
                 return Ok(Some(known));
             }
             drop(known);
-            Recorder::resume(&folder, execution.workers())?
+            Recorder::resume(&folder, execution.workers(plan))?
         } else {
             let (recorder, made) = begin(session, &self.folder, name, plan, task, seed, execution)?;
             if made != folder {

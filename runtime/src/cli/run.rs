@@ -103,7 +103,7 @@ pub(super) fn resume(session: &Session, options: &ResumeOptions) -> Result<ExitC
             Failure(format!("there is nothing to go on with: no run in {} is unfinished", results.display()))
         })?,
     };
-    let recorder = Recorder::resume(&folder, options.execution.workers())?;
+    let recorder = Recorder::resume(&folder, options.execution.workers(&session.plan))?;
     let task = recorder.repository().task().clone();
     #[cfg(feature = "process")]
     if let Some(lab) = task.lab() {

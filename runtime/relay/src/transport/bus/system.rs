@@ -5,7 +5,7 @@ use std::mem;
 use std::time::{Duration, Instant};
 
 use sesame_base::time::SimTime;
-use sesame_plan::{CampaignPlan, Channel, TopicId};
+use sesame_plan::{CampaignPlan, Channel, TopicId, is_shared};
 
 use crate::lifecycle::launch::{Launched, Place, Probe};
 use crate::relay::{Delivery, Exchange};
@@ -158,8 +158,7 @@ impl System {
     /// A bus without placeholders in its address serves one worker.
     fn is_own(&self) -> Result<(), TransportError> {
         let worker = self.launched.worker();
-        let shared = |address: &&String| !["{port}", "{worker}", "{domain}"].iter().any(|own| address.contains(own));
-        match self.settings.addresses.iter().find(shared) {
+        match self.settings.addresses.iter().find(|address| is_shared(address)) {
             Some(address) if worker > 1 => {
                 let problem = format!(
                     "all workers would use the one system at `{address}`, and worker {worker} is not the first; give \
