@@ -16,6 +16,8 @@ pub(crate) enum Vendor {
     Fleet,
     /// A server and a client of rosbridge.
     Rosbridge,
+    /// Servers and clients of SimlogAPI, by grpcio.
+    Simlog,
 }
 
 impl Vendor {
@@ -26,6 +28,7 @@ impl Vendor {
             Vendor::Cyclone => "SESAME_ROS2_CYCLONE",
             Vendor::Fleet => "SESAME_ROS2_FLEET",
             Vendor::Rosbridge => "SESAME_ROSBRIDGE",
+            Vendor::Simlog => "SESAME_SIMLOG",
         }
     }
 

@@ -16,6 +16,7 @@ mod faults;
 mod links;
 mod lock_step;
 mod rosbridge;
+mod simlog;
 mod soak;
 mod vendors;
 mod watch;
