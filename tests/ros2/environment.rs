@@ -18,6 +18,8 @@ pub(crate) enum Vendor {
     Rosbridge,
     /// ROS 1, of the system.
     Ros1,
+    /// Servers and clients of SimlogAPI, by grpcio.
+    Simlog,
 }
 
 impl Vendor {
@@ -29,6 +31,7 @@ impl Vendor {
             Vendor::Fleet => "SESAME_ROS2_FLEET",
             Vendor::Rosbridge => "SESAME_ROSBRIDGE",
             Vendor::Ros1 => "SESAME_ROS1",
+            Vendor::Simlog => "SESAME_SIMLOG",
         }
     }
 

@@ -17,15 +17,15 @@ use crate::peer::Peer;
 use crate::relaying::plans;
 
 /// A copy of an example in a folder and in domains of its own.
-struct Example {
-    space: PathBuf,
+pub(crate) struct Example {
+    pub(crate) space: PathBuf,
     /// Held for as long as they are used: one for each of two workers.
     _domains: Domain,
 }
 
 impl Example {
     /// Its copy, with some of its text replaced.
-    fn new(name: &str, vendor: Vendor, folder: &str, changes: &[(&str, &str)]) -> Option<Example> {
+    pub(crate) fn new(name: &str, vendor: Vendor, folder: &str, changes: &[(&str, &str)]) -> Option<Example> {
         let python = vendor.python()?;
         let folder = fresh_folder(folder);
         let example = workspace().join("examples").join(name);
@@ -53,12 +53,12 @@ impl Example {
         Some(Example { space, _domains: domain })
     }
 
-    fn folder(&self) -> &Path {
+    pub(crate) fn folder(&self) -> &Path {
         self.space.parent().expect("a file lies in a folder")
     }
 
     /// `sesamec` with a subcommand on the space, and afterwards no process of the system is left.
-    fn sesamec(&self, subcommand: &str, campaign: &str, arguments: &[&str]) -> Done {
+    pub(crate) fn sesamec(&self, subcommand: &str, campaign: &str, arguments: &[&str]) -> Done {
         let mut sesamec = command(sesamec());
         sesamec.arg(subcommand).arg(&self.space).args(["--campaign", campaign]).args(arguments);
         let done = done(sesamec.current_dir(self.folder()));
@@ -67,7 +67,7 @@ impl Example {
     }
 
     /// Tests of the latest run with what was measured in them, by number.
-    fn tests(&self, campaign: &str) -> Vec<Value> {
+    pub(crate) fn tests(&self, campaign: &str) -> Vec<Value> {
         let listed = self.sesamec("list", campaign, &["--format", "json"]).expect(0);
         let listed: Value = serde_json::from_str(&listed.out).expect("it is JSON");
         listed["tests"].as_array().expect("tests are listed").clone()

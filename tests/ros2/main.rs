@@ -17,6 +17,7 @@ mod links;
 mod lock_step;
 mod prepared;
 mod rosbridge;
+mod simlog;
 mod soak;
 mod vendors;
 mod watch;
