@@ -1,8 +1,8 @@
 //! Systems of MQTT as a user meets them: brokers of mosquitto, vehicles that speak VDA 5050, and clients in JavaScript,
 //! with the runner between them.
 //!
-//! `SESAME_MQTT` names a folder with the peers of `package.json`; `./test` makes it. Without it, or without mosquitto, a
-//! test says that it is skipped, and fails with `CI=true`.
+//! `SESAME_MQTT` names a folder with the peers of `package.json`; `./test` makes it. Without it, or without mosquitto,
+//! a test says that it is skipped, and fails with `CI=true`.
 #![cfg(all(test, unix))]
 
 mod fleet;

@@ -170,8 +170,10 @@ fn repeating_a_test_of_a_system_that_runs_freely_states_its_spread() {
     let ran: Value = serde_json::from_str(&ran.out).unwrap();
     let spread = ran["spreads"].as_array().unwrap().iter().find(|spread| spread["metric"] == "arm_distance").unwrap();
     let number = |field: &str| spread[field].as_f64().unwrap_or_else(|| panic!("no `{field}` in {spread}"));
-    assert!(number("deviation") > 0.0, "nothing that runs freely comes out the same to the last bit: {spread}");
-    assert!(number("deviation") < 0.02, "{spread}");
+    assert_eq!(spread["count"], 3, "{spread}");
+    assert!(number("min") <= number("mean") && number("mean") <= number("max"), "{spread}");
+    // It may be zero: where a biased arm comes to rest does not depend on when its messages came.
+    assert!((0.0..0.02).contains(&number("deviation")), "{spread}");
     // With 14.7 cm if undisturbed.
     assert!(number("max") < 0.1, "{spread}");
 }

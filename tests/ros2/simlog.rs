@@ -54,10 +54,11 @@ impl Disturbed {
             let operation = line.strip_prefix("operation ").and_then(|rest| rest.split(' ').next());
             operation.is_none_or(|name| names.contains(&name))
         });
-        let kept: String = kept.map(|line| format!("{line}\n")).collect();
+        let kept: Vec<&str> = kept.collect();
+        let kept = kept.join("\n");
         let population = evaluations.min(10);
         format!(
-            "{kept}campaign both {{\n  objectives fuzzing_time, arm_distance, worker_distance\n\
+            "{kept}\ncampaign both {{\n  objectives fuzzing_time, arm_distance, worker_distance\n\
              observes   left_cycle, right_cycle, zone_breaches, closeness\n  operations {}   1..3 per test\n\
              activate   by time\n\
              search     nsga2 {{ population {population}  evaluations {evaluations}  seed 42 }}\n\

@@ -1,8 +1,10 @@
-//! Systems whose messages go over brokers of MQTT, as fleets of mobile robots do: the runner is a client of each broker.
+//! Systems whose messages go over brokers of MQTT, as fleets of mobile robots do. The runner is a client of each
+//! broker.
 //!
 //! A message goes from the broker of its publisher to those of its subscribers. Where these are different ones, all
-//! names stay as they are; where they are one, publishers of topics that are cut publish on `TOPIC/undisturbed`, and the
-//! relay on `TOPIC`. Payloads are JSON. What nobody changed goes on byte for byte, with its retain flag and properties.
+//! names stay as they are; where they are one, publishers of topics that are cut publish on `TOPIC/undisturbed`,
+//! and the relay on `TOPIC`. Payloads are JSON. What nobody changed goes on byte for byte, with its retain flag and
+//! properties.
 
 mod address;
 mod connection;

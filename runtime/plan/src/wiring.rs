@@ -148,8 +148,8 @@ impl CampaignPlan {
         if let Transport::Mqtt(mqtt) = &self.simulator.transport { mqtt.of(id) } else { 0 }
     }
 
-    /// Whether subscribers of a topic are at this broker, so that its publishers there need another name. Elsewhere than
-    /// in MQTT all are at one place.
+    /// Whether subscribers of a topic are at this broker, so that its publishers there need another name. Only systems
+    /// of MQTT have more places than one.
     fn shares_broker(&self, broker: BrokerAt, topic: TopicId) -> bool {
         match &self.simulator.transport {
             Transport::Mqtt(mqtt) => mqtt.subscribers(self, topic).contains(&broker),

@@ -36,8 +36,8 @@ const MOST_WORKERS: usize = 512;
 /// How tests are run.
 #[derive(Debug, Default, Args)]
 pub(super) struct ExecutionArgs {
-    /// How many worker processes, at most 512; by default one per processor, and never more than tests. It is always one
-    /// where all would use the same system: an address without `{port}` or `{worker}`
+    /// How many worker processes, at most 512; by default one per processor, and never more than tests. It is always
+    /// one where all would use the same system: an address without `{port}` or `{worker}`
     #[arg(long, value_name = "N", value_parser = workers)]
     workers: Option<NonZeroUsize>,
     /// Seconds of wall time after which a test is stopped; by default 20 times the reference run, at least 60
