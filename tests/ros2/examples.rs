@@ -242,16 +242,21 @@ fn what_a_scan_of_the_running_cell_writes_is_run_with_a_campaign_below_it() {
     let running = programs.map(|words| Peer::start_in(&example, &python, &domain, words[0], &words[1..]));
     let number = domain.number.to_string();
     let share = Vendor::share(&python);
-    // Nodes may take long to start, so it is looked until all are there.
+    // Nodes may take long to start, and on a busy machine to answer, so it is looked longer and longer until all are
+    // there.
     let mut scanned = String::new();
-    for _ in 0..10 {
+    let is_there = |scanned: &str| {
+        ["/cell\"", "/left_controller\"", "/right_controller\"", " Hz"].iter().all(|part| scanned.contains(part))
+    };
+    for seconds in ["3", "5", "8", "13", "21", "34"] {
         let mut scan = command(sesamec());
-        scan.args(["scan", "ros2", "--domain", &number, "--seconds", "3", "--types"]).arg(&share);
+        scan.args(["scan", "ros2", "--domain", &number, "--seconds", seconds, "--types"]).arg(&share);
         scanned = done(scan.current_dir(&folder)).expect(0).out;
-        if ["/cell\"", "/left_controller\"", "/right_controller\"", " Hz"].iter().all(|part| scanned.contains(part)) {
+        if is_there(&scanned) {
             break;
         }
     }
+    assert!(is_there(&scanned), "nodes are missing:\n{scanned}");
     drop(running);
 
     let space = folder.join("cell.sesame");
