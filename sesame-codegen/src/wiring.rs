@@ -15,7 +15,7 @@ pub fn text(plan: &CampaignPlan) -> String {
             return format!("`{}` brings all messages itself: nothing is remapped\n", plan.simulator.name);
         }
     }
-    let mut out = String::new();
+    let mut out = proxies(plan);
     for (id, node) in (0..).map(NodeId).zip(&plan.nodes) {
         let arguments = plan.ros_args(Some(id));
         if arguments.is_empty() {
@@ -41,7 +41,7 @@ pub fn text(plan: &CampaignPlan) -> String {
 /// The names under which publishers and distinguished subscribers are, for middleware without `ros2 run`.
 fn names(plan: &CampaignPlan) -> String {
     const STRING: &str = "a string takes all text";
-    let mut out = String::new();
+    let mut out = proxies(plan);
     for (id, node) in (0..).map(NodeId).zip(&plan.nodes) {
         let remappings = plan.remappings(id);
         if !remappings.is_empty() {
@@ -56,6 +56,20 @@ fn names(plan: &CampaignPlan) -> String {
     }
     if out.is_empty() {
         out.push_str("# no operation acts on a topic: nothing is remapped\n");
+    }
+    out
+}
+
+/// Where clients of a bridge connect that are one node each: the proxies change their names.
+fn proxies(plan: &CampaignPlan) -> String {
+    const STRING: &str = "a string takes all text";
+    let mut out = String::new();
+    for (id, node) in (0..).map(NodeId).zip(&plan.nodes) {
+        if let Some(proxy) = plan.proxy_of(id) {
+            writeln!(out, "# node {}: its clients connect to the proxy, and nothing is remapped", node.name)
+                .expect(STRING);
+            writeln!(out, "{}", proxy.url).expect(STRING);
+        }
     }
     out
 }

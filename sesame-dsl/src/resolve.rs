@@ -40,6 +40,7 @@ mod nodes;
 mod parts;
 mod physical;
 mod placeholders;
+mod proxy;
 mod quantity;
 mod region;
 mod resource;

@@ -16,6 +16,7 @@ mod faults;
 mod links;
 mod lock_step;
 mod prepared;
+mod proxies;
 mod rosbridge;
 mod simlog;
 mod soak;

@@ -1,5 +1,7 @@
 //! A runner between peers, in this process: a space as text, and its system driven by hand or by whole runs.
 
+use std::path::PathBuf;
+
 use sesame_base::observation::Observation;
 use sesame_base::time::SimTime;
 use sesame_codegen::frontend::{Look, SESAME};
@@ -79,7 +81,11 @@ pub(crate) struct System {
 
 impl System {
     pub(crate) fn new(plan: CampaignPlan) -> Self {
-        let folder = workspace().join("tests/ros2");
+        System::in_folder(plan, workspace().join("tests/ros2"))
+    }
+
+    /// One whose plan names files in a folder.
+    pub(crate) fn in_folder(plan: CampaignPlan, folder: PathBuf) -> Self {
         let connect = match &plan.simulator.transport {
             sesame_plan::Transport::Rosbridge(_) => sesame_rosbridge::rosbridge(folder),
             _ => sesame_ros2::ros2(folder),
@@ -129,6 +135,16 @@ impl System {
             }
         }
         relay.finish(self.transport.now())
+    }
+
+    /// Begins a run, which is to fail: how.
+    pub(crate) fn reset(&mut self) -> String {
+        let wires = WireTable::new(&self.plan);
+        let metrics = MetricTable::new(&self.plan, &wires, &[]).expect("the metrics need no hooks");
+        let test = Test::default();
+        let mut relay = Relay::new(&self.plan, &wires, &test, metrics.start(), &[]).expect("the test fits the plan");
+        relay.begin();
+        self.transport.reset(1, &mut relay).expect_err("the system is not complete").to_string()
     }
 
     pub(crate) fn plan(&self) -> &CampaignPlan {

@@ -13,15 +13,15 @@ use crate::environment::{Domain, Vendor};
 use crate::peer::Peer;
 use crate::relaying::{System, plan, space};
 
-const JOINTS: &str = "sensor_msgs/msg/JointState";
+pub(crate) const JOINTS: &str = "sensor_msgs/msg/JointState";
 
 /// A server of rosbridge. Dropping it ends it.
-struct Server {
+pub(crate) struct Server {
     child: Child,
 }
 
 impl Server {
-    fn start(pythons: &Pythons, domain: &Domain, port: u16) -> Self {
+    pub(crate) fn start(pythons: &Pythons, domain: &Domain, port: u16) -> Self {
         let mut child = Command::new(&pythons.bridge)
             .arg(workspace().join("tests/ros2/peers/bridge.py"))
             .arg("--ros")
@@ -54,18 +54,18 @@ impl Drop for Server {
     }
 }
 
-struct Pythons {
+pub(crate) struct Pythons {
     jazzy: PathBuf,
-    bridge: PathBuf,
+    pub(crate) bridge: PathBuf,
 }
 
 impl Pythons {
-    fn find() -> Option<Self> {
+    pub(crate) fn find() -> Option<Self> {
         Some(Pythons { jazzy: Vendor::Jazzy.python()?, bridge: Vendor::Rosbridge.python()? })
     }
 }
 
-fn free_port() -> u16 {
+pub(crate) fn free_port() -> u16 {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).expect("there is a free port");
     listener.local_addr().expect("it has an address").port()
 }

@@ -55,10 +55,49 @@ pub struct Rosbridge {
     /// for one that is launched again for each test.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reset: Option<String>,
+    /// Where clients connect that do not connect to the server itself.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub proxies: Vec<Proxy>,
     /// The layouts of all messages, each after those that it contains.
     pub interfaces: Vec<Interface>,
     /// How each topic of the plan is cut, in their order.
     pub wiring: Vec<Wiring>,
+}
+
+impl Rosbridge {
+    /// Its address, and those of its proxies.
+    pub fn addresses(&self) -> Vec<&str> {
+        let proxies = self.proxies.iter().map(|proxy| proxy.url.as_str());
+        std::iter::once(self.remote.url.as_str()).chain(proxies).collect()
+    }
+}
+
+/// An address at which the runner stands for a server of rosbridge: whoever connects there is one node, and finds the
+/// topics that are cut under their own names.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Proxy {
+    /// The node that its clients are.
+    pub node: NodeId,
+    /// Its address, for example `ws://127.0.0.1:9190`. It may contain placeholders as that of a [`Remote`].
+    pub url: String,
+    /// What clients have to show; `None` if everybody is let in.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub token: Option<Secret>,
+    /// What it shows to clients, for `wss://`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub identity: Option<Identity>,
+    /// Whether it may be reached from other machines.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub public: bool,
+}
+
+/// What a server of TLS shows to its clients: files in PEM, relative to the folder of the `.sesame` file.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Identity {
+    /// Its certificate, and those of the authorities between it and one that clients trust.
+    pub certificate: String,
+    /// Its private key.
+    pub key: String,
 }
 
 /// Which ROS is behind a bridge: they differ in the names of types and of the parts of a time.

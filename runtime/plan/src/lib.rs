@@ -64,7 +64,7 @@ pub use system::*;
 pub use task::*;
 pub use test::*;
 pub use validate::PlanError;
-pub use wiring::Remapping;
+pub use wiring::{Remapping, Renamed};
 
 /// The version of this schema. A runner refuses a plan of another version: both come from one release.
 pub const SCHEMA: u32 = 2;

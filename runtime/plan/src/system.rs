@@ -92,7 +92,7 @@ impl Transport {
     pub fn shared_address(&self) -> Option<&str> {
         let addresses: Vec<&str> = match self {
             Transport::InProcess { .. } | Transport::Process { .. } | Transport::Ros2(_) => Vec::new(),
-            Transport::Rosbridge(rosbridge) => vec![&rosbridge.remote.url],
+            Transport::Rosbridge(rosbridge) => rosbridge.addresses(),
             Transport::Ros1(ros1) => vec![&ros1.master],
             Transport::Mqtt(mqtt) => mqtt.all().into_iter().map(|broker| broker.remote.url.as_str()).collect(),
             Transport::Simlog(simlog) => vec![&simlog.url],

@@ -1,7 +1,7 @@
 //! Who is remapped, so that the messages of topics that are cut pass through the relay.
 
 use crate::brokers::BrokerAt;
-use crate::{CampaignPlan, Channel, Node, NodeId, Topic, TopicId, Transport, Wiring};
+use crate::{CampaignPlan, Channel, Node, NodeId, Proxy, Topic, TopicId, Transport, Wiring};
 
 /// A name of a topic or service that a node knows under another name.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -19,13 +19,28 @@ impl Remapping {
     }
 }
 
+/// The names that differ between the clients of a proxy and the server behind it.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Renamed {
+    /// Of topics, where they publish.
+    pub publishes: Vec<Remapping>,
+    /// Of topics, where they subscribe.
+    pub subscribes: Vec<Remapping>,
+    /// Of services that they offer.
+    pub serves: Vec<Remapping>,
+}
+
 impl CampaignPlan {
     /// What a node is remapped to: what it publishes, and what it subscribes to where operations distinguish it. Of a
     /// service that is cut, the server is remapped. Each name once; where a node both publishes a topic and
-    /// subscribes to it, that of a publisher counts.
+    /// subscribes to it, that of a publisher counts. A node behind a proxy needs none: the proxy
+    /// [changes its names](CampaignPlan::renamed).
     pub fn remappings(&self, id: NodeId) -> Vec<Remapping> {
         let node = &self.nodes[id.index()];
         let mut remappings: Vec<Remapping> = Vec::new();
+        if self.proxy_of(id).is_some() {
+            return remappings;
+        }
         for (topic, declared, wiring) in self.cut() {
             let Some(end) = end(node, id, topic, declared.channel, wiring) else { continue };
             if end == "undisturbed" && !self.shares_broker(self.broker_of(id), topic) {
@@ -37,6 +52,39 @@ impl CampaignPlan {
             remappings.extend(new);
         }
         remappings
+    }
+
+    /// The proxy at which the programs of a node connect, if there is one.
+    pub fn proxy_of(&self, id: NodeId) -> Option<&Proxy> {
+        let Transport::Rosbridge(rosbridge) = &self.simulator.transport else { return None };
+        rosbridge.proxies.iter().find(|proxy| proxy.node == id)
+    }
+
+    /// What a proxy changes in the names that clients use who are this node. A node is told apart as a publisher and as
+    /// a subscriber. What it publishes without having declared it passes through the relay too, as long as operations
+    /// do not tell the publishers of that topic apart.
+    pub fn renamed(&self, id: NodeId) -> Renamed {
+        let node = &self.nodes[id.index()];
+        let mut renamed = Renamed::default();
+        for (topic, declared, wiring) in self.cut() {
+            let named = |end: &str| {
+                let end = |path: &String| Remapping { from: path.clone(), to: format!("{path}/{end}") };
+                declared.paths.iter().map(end).collect::<Vec<_>>()
+            };
+            if declared.channel != Channel::Topic {
+                renamed.serves.extend(named("undisturbed"));
+                continue;
+            }
+            if wiring.publishers.contains(&id) {
+                renamed.publishes.extend(named(&format!("from/{}", node.name)));
+            } else if wiring.publishers.is_empty() || node.publishes.contains(&topic) {
+                renamed.publishes.extend(named("undisturbed"));
+            }
+            if wiring.subscribers.contains(&id) {
+                renamed.subscribes.extend(named(&format!("to/{}", node.name)));
+            }
+        }
+        renamed
     }
 
     /// The arguments that remap a node, or for `None` all nodes of a program that starts several: none if nothing is
@@ -194,7 +242,7 @@ fn is_source(node: &Node, topic: TopicId, channel: Channel) -> bool {
 mod tests {
     use super::*;
     use crate::testing::{self, minimal, topic};
-    use crate::{Clock, Ros1, Ros2, Transport, Type};
+    use crate::{Clock, Compression, Dialect, Remote, Ros1, Ros2, Rosbridge, Transport, Type};
 
     fn plan() -> CampaignPlan {
         let mut plan = minimal();
@@ -255,6 +303,42 @@ mod tests {
         assert_eq!(all.len(), 1 + 2 * 6);
         assert_eq!(plan.ros_args(Some(NodeId(2))), ["--ros-args", "-r", "/grip:=/grip/undisturbed"]);
         assert!(minimal().ros_args(None).is_empty());
+    }
+
+    #[test]
+    fn a_node_behind_a_proxy_is_renamed_there_and_not_remapped() {
+        let mut plan = plan();
+        let Transport::Ros2(ros2) = plan.simulator.transport else { panic!("it is a system of ROS 2") };
+        let proxy = |node: u32| Proxy {
+            node: NodeId(node),
+            url: format!("ws://127.0.0.1:919{node}"),
+            token: None,
+            identity: None,
+            public: false,
+        };
+        plan.simulator.transport = Transport::Rosbridge(Rosbridge {
+            remote: Remote { url: "ws://127.0.0.1:9090".to_owned(), token: None, trust: None },
+            domain: 0,
+            dialect: Dialect::Ros2,
+            compression: Compression::None,
+            clock: ros2.clock,
+            reset: None,
+            proxies: vec![proxy(0), proxy(1)],
+            interfaces: Vec::new(),
+            wiring: ros2.wiring,
+        });
+        assert!(rules(&plan, 0).is_empty() && rules(&plan, 1).is_empty());
+        assert_eq!(rules(&plan, 2), ["/grip:=/grip/undisturbed"], "it is not behind a proxy");
+        assert_eq!(plan.simulator.transport.shared_address(), Some("ws://127.0.0.1:9090"));
+        let of = |remappings: &[Remapping]| remappings.iter().map(Remapping::rule).collect::<Vec<_>>();
+        let arm = plan.renamed(NodeId(0));
+        let joints = ["/a/joints:=/a/joints/undisturbed", "/b/joints:=/b/joints/undisturbed"];
+        assert_eq!(of(&arm.publishes), [joints[0], joints[1], "/commands:=/commands/from/arm"]);
+        assert_eq!(of(&arm.subscribes), ["/a/joints:=/a/joints/to/arm", "/b/joints:=/b/joints/to/arm"]);
+        let drive = plan.renamed(NodeId(1));
+        assert_eq!(of(&drive.publishes), joints, "who publishes commands is told apart, and it is not declared to");
+        assert!(drive.subscribes.is_empty());
+        assert_eq!(drive.serves[0].rule(), "/grip:=/grip/undisturbed");
     }
 
     #[test]

@@ -1,5 +1,8 @@
 //! Messages in CBOR: a frame of bytes with the same operation, in which lists of numbers are typed arrays (RFC 8746).
 
+#[cfg(feature = "client")]
+pub(crate) mod replace;
+
 use ciborium::Value as Cbor;
 use serde_json::{Map, Number, Value};
 

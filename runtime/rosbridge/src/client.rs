@@ -39,7 +39,7 @@ const CONNECT_WITHIN: Duration = Duration::from_secs(5);
 /// How long to wait before a lost connection is tried again.
 const PAUSE: Duration = Duration::from_millis(50);
 
-type Socket = WebSocketStream<MaybeTlsStream<TcpStream>>;
+pub(crate) type Socket = WebSocketStream<MaybeTlsStream<TcpStream>>;
 
 /// Where a bridge is, and how it is reached.
 #[derive(Clone)]
@@ -259,7 +259,8 @@ async fn close(sink: &mut SplitSink<Socket, Frame>) {
     tokio::time::timeout(Duration::from_millis(200), sink.close()).await.ok();
 }
 
-async fn open(address: &Address) -> Result<Socket, ConnectError> {
+/// Connects once.
+pub(crate) async fn open(address: &Address) -> Result<Socket, ConnectError> {
     let refused = |reason: String| ConnectError::Refused { url: address.url.clone(), reason };
     let mut request = address.url.as_str().into_client_request().map_err(|error| refused(error.to_string()))?;
     if let Some(token) = &address.token {

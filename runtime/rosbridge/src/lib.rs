@@ -5,8 +5,8 @@
 //! ([`fragment`]), and what is to be small as a picture ([`png`]). [`Reader`] makes operations of frames, whatever way
 //! they come. No input makes it panic or keep more than [`Limits`] says.
 //!
-//! With the feature `client`, `client` is a connection to a bridge, `payload` turns messages into values, and
-//! `rosbridge` is the transport to the nodes behind it.
+//! With the feature `client`, `client` is a connection to a bridge, `payload` turns messages into values, `rosbridge`
+//! is the transport to the nodes behind it, and `proxy` is where other clients connect that are to be disturbed.
 
 pub mod cbor;
 #[cfg(feature = "client")]
@@ -18,6 +18,8 @@ mod operation;
 #[cfg(feature = "client")]
 pub mod payload;
 pub mod png;
+#[cfg(feature = "client")]
+mod proxy;
 mod reader;
 #[cfg(feature = "client")]
 mod transport;

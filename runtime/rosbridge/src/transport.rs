@@ -3,15 +3,15 @@
 //! Publishers of topics that are cut publish on `TOPIC/undisturbed`, and the relay on `TOPIC`. Of a service that is
 //! cut, the server is on `SERVICE/undisturbed`, and the runner offers `SERVICE` in its place.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use sesame_plan::{CampaignPlan, Channel, Clock, Dialect, Rosbridge};
 use sesame_relay::lifecycle::launch::Place;
 use sesame_relay::transport::bus::echo::Echoes;
-use sesame_relay::transport::bus::secret::{Token, trusted};
-use sesame_relay::transport::bus::{Bus, Event, FOUND_AGAIN_WITHIN, Settings, on_bus};
+use sesame_relay::transport::bus::secret::{Token, identity, trusted};
+use sesame_relay::transport::bus::{Bus, Event, FOUND_AGAIN_WITHIN, Settings, on_bus, tls};
 use sesame_relay::transport::{Connect, Transport, TransportError};
 use sesame_relay::value::Value;
 use sesame_relay::wire::Line;
@@ -20,6 +20,7 @@ use crate::client::{Address, Client, ConnectError, Incoming};
 use crate::echo::content;
 use crate::operation::{Compression, Level, Operation};
 use crate::payload::{Payloads, type_name};
+use crate::proxy::{Proxies, Proxy};
 
 /// How long a bridge may take to find the nodes behind it, once it is subscribed to: it does not say when it has.
 const SETTLE: Duration = Duration::from_millis(500);
@@ -39,7 +40,7 @@ fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
     let settings = Settings {
         has_clock: matches!(rosbridge.clock, Clock::Topic { .. }),
         resets: rosbridge.reset.is_some(),
-        addresses: vec![rosbridge.remote.url.clone()],
+        addresses: rosbridge.addresses().into_iter().map(str::to_owned).collect(),
     };
     on_bus(plan, Box::new(Bridge::new(plan, rosbridge, folder)), settings, place(plan, rosbridge, folder))
 }
@@ -63,6 +64,10 @@ struct Bridge {
     payloads: Payloads,
     lines: Vec<Line>,
     client: Option<Client>,
+    /// Where other clients connect, once it listens.
+    proxies: Option<Proxies>,
+    /// What they reported.
+    reported: VecDeque<String>,
     /// Where it is, with placeholders filled.
     url: String,
     connected: Instant,
@@ -109,6 +114,8 @@ impl Bridge {
             folder: folder.to_owned(),
             lines: Vec::new(),
             client: None,
+            proxies: None,
+            reported: VecDeque::new(),
             url: String::new(),
             connected: now(),
             topics: BTreeMap::new(),
@@ -119,14 +126,36 @@ impl Bridge {
         }
     }
 
-    fn address(&self) -> Result<Address, TransportError> {
+    fn address(&self, url: String) -> Result<Address, TransportError> {
         let remote = &self.settings.remote;
         let token = remote.token.as_ref().map(|secret| Token::read(secret, &self.folder)).transpose()?;
         Ok(Address {
-            url: self.url.clone(),
+            url,
             token: token.map(|token| token.reveal().to_owned()),
             trusted: remote.trust.as_ref().map(|path| trusted(path, &self.folder)).transpose()?,
             found_again_within: FOUND_AGAIN_WITHIN,
+        })
+    }
+
+    /// A proxy with all that it needs read.
+    fn proxy(&self, proxy: &sesame_plan::Proxy, fill: &dyn Fn(&str) -> String) -> Result<Proxy, TransportError> {
+        let node = self.plan.node(proxy.node).name.clone();
+        let tls = match &proxy.identity {
+            Some(files) => {
+                let (certificate, key) = identity(files, &self.folder)?;
+                let problem = |problem| TransportError::Wiring(format!("the proxy of node `{node}`: {problem}"));
+                Some(tls::server(&certificate, &key).map_err(problem)?)
+            }
+            None => None,
+        };
+        Ok(Proxy {
+            url: fill(&proxy.url),
+            token: proxy.token.as_ref().map(|secret| Token::read(secret, &self.folder)).transpose()?,
+            tls,
+            public: proxy.public,
+            renamed: self.plan.renamed(proxy.node),
+            bridge: self.address(fill(&self.settings.remote.url))?,
+            node,
         })
     }
 
@@ -351,9 +380,18 @@ const CALL: &str = "sesame call ";
 const RESET: &str = "sesame reset";
 
 impl Bus for Bridge {
+    fn listen(&mut self, address: &dyn Fn(&str) -> String) -> Result<(), TransportError> {
+        if self.proxies.is_some() || self.settings.proxies.is_empty() {
+            return Ok(());
+        }
+        let proxies = self.settings.proxies.iter().map(|proxy| self.proxy(proxy, address));
+        self.proxies = Some(Proxies::listen(proxies.collect::<Result<_, _>>()?)?);
+        Ok(())
+    }
+
     fn connect(&mut self, lines: &[Line], address: &dyn Fn(&str) -> String) -> Result<bool, TransportError> {
         self.url = address(&self.settings.remote.url);
-        let client = match Client::connect(&self.address()?) {
+        let client = match Client::connect(&self.address(self.url.clone())?) {
             Ok(client) => client,
             Err(ConnectError::NoAnswer { .. }) => return Ok(false),
             Err(refused) => return Err(TransportError::Wiring(refused.to_string())),
@@ -371,11 +409,20 @@ impl Bus for Bridge {
     }
 
     fn missing(&mut self) -> Vec<String> {
-        let settled = self.connected.elapsed() >= SETTLE;
-        if settled { Vec::new() } else { vec!["the bridge has just been subscribed to".to_owned()] }
+        let mut missing = self.proxies.as_ref().map_or_else(Vec::new, |proxies| proxies.missing(SETTLE));
+        if self.connected.elapsed() < SETTLE {
+            missing.push("the bridge has just been subscribed to".to_owned());
+        }
+        missing
     }
 
     fn receive(&mut self, timeout: Duration) -> Result<Option<Event>, TransportError> {
+        if let Some(proxies) = &self.proxies {
+            self.reported.extend(proxies.notes());
+        }
+        if let Some(note) = self.reported.pop_front() {
+            return Ok(Some(Event::Note(note)));
+        }
         let limit = now() + timeout;
         loop {
             let Some(incoming) = self.client()?.receive(limit.saturating_duration_since(now())) else {

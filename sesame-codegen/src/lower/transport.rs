@@ -20,7 +20,7 @@ pub(super) fn transport(space: &Space, transport: &model::Transport) -> plan::Tr
             let wiring = wirings(space, step.is_some());
             plan::Transport::Ros2(plan::Ros2 { domain, clock, step, reset, interfaces: interfaces(space), wiring })
         }
-        model::Transport::Rosbridge { remote, domain, dialect, compression, clock, reset } => {
+        model::Transport::Rosbridge { remote, domain, dialect, compression, clock, reset, proxies } => {
             let (interfaces, wiring) = (interfaces(space), wiring());
             plan::Transport::Rosbridge(plan::Rosbridge {
                 remote,
@@ -29,6 +29,7 @@ pub(super) fn transport(space: &Space, transport: &model::Transport) -> plan::Tr
                 compression,
                 clock,
                 reset,
+                proxies: proxies.into_iter().map(proxy).collect(),
                 interfaces,
                 wiring,
             })
@@ -61,4 +62,9 @@ pub(super) fn transport(space: &Space, transport: &model::Transport) -> plan::Tr
             })
         }
     }
+}
+
+fn proxy(proxy: model::Proxy) -> plan::Proxy {
+    let model::Proxy { node, url, token, identity, public } = proxy;
+    plan::Proxy { node: node_id(node), url, token, identity, public }
 }

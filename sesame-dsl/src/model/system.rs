@@ -1,10 +1,12 @@
 //! The system under test: simulator, messages, topics, nodes.
 
 use super::declaration::Declaration;
-use super::ids::{MessageId, TopicId};
+use super::ids::{MessageId, NodeId, TopicId};
 use crate::span::Span;
 use crate::units::Unit;
-use sesame_plan::{Broker, Channel, Clock, Compression, Dialect, Quality, Remote, SimlogVersion, Stepping, WireNames};
+use sesame_plan::{
+    Broker, Channel, Clock, Compression, Dialect, Identity, Quality, Remote, Secret, SimlogVersion, Stepping, WireNames,
+};
 
 /// The simulator under test.
 #[derive(Debug, Clone, PartialEq)]
@@ -62,6 +64,8 @@ pub enum Transport {
         clock: Clock,
         /// The service that resets it, absolute; `None` for one that is launched again.
         reset: Option<String>,
+        /// Where clients connect that are one node each. Each node has at most one.
+        proxies: Vec<Proxy>,
     },
     /// Nodes of ROS 1.
     Ros1 {
@@ -239,6 +243,21 @@ pub struct Node {
     pub every_step: Vec<TopicId>,
     /// The address of its broker, where it is not that of the simulator.
     pub broker: Option<String>,
+}
+
+/// An address at which clients of a bridge are one node.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Proxy {
+    /// The node.
+    pub node: NodeId,
+    /// Its address, with a port. Beyond this machine it is one of TLS, with a token, and public.
+    pub url: String,
+    /// What clients have to show; `None` if everybody is let in.
+    pub token: Option<Secret>,
+    /// What it shows to clients; there if the address is one of TLS.
+    pub identity: Option<Identity>,
+    /// Whether it may be reached from other machines.
+    pub public: bool,
 }
 
 /// A value inside the messages of a topic.

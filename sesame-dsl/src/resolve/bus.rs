@@ -54,7 +54,8 @@ impl<'a> Resolver<'a> {
         let dialect = self.single(&bus.dialects, "dialect").copied().unwrap_or_default();
         let compression = self.single(&bus.compressions, "compression").copied().unwrap_or_default();
         let trust = self.single(&bus.trusts, "trust").map(|file| file.text.clone());
-        let token = self.secret(bus, "token");
+        let token = self.secret(&bus.secrets, "token");
+        let proxies = self.proxies(&bus.proxies);
         if let (Dialect::Ros1, Some((span, _))) = (dialect, bus.domains.first()) {
             let title = "ROS 1 has no domains".to_owned();
             let diagnostic = Diagnostic::new(Code::NOT_ROS, *span, title).label("remove it, or `dialect ros1`");
@@ -63,7 +64,7 @@ impl<'a> Resolver<'a> {
         }
         let remote = Remote { url: url?, token, trust };
         let (domain, clock, reset) = (domain?, clock?, reset.ok()?);
-        Some(Transport::Rosbridge { remote, domain, dialect, compression, clock, reset })
+        Some(Transport::Rosbridge { remote, domain, dialect, compression, clock, reset, proxies: proxies? })
     }
 
     /// Nodes of ROS 1.
@@ -81,7 +82,7 @@ impl<'a> Resolver<'a> {
         let quality = self.single(&bus.qualities, "quality").copied().unwrap_or_default();
         let user = self.single(&bus.users, "user").map(|user| user.text.clone());
         let trust = self.single(&bus.trusts, "trust").map(|file| file.text.clone());
-        let token = self.secret(bus, "password");
+        let token = self.secret(&bus.secrets, "password");
         let broker = Broker { remote: Remote { url: url?, token, trust }, user };
         Some(Transport::Mqtt { broker, quality })
     }
@@ -103,9 +104,9 @@ impl<'a> Resolver<'a> {
         }
     }
 
-    /// What a system wants to be shown, if anything.
-    fn secret(&mut self, bus: &'a ast::Bus, word: &str) -> Option<Secret> {
-        self.single(&bus.secrets, word).map(|secret| match secret {
+    /// What is to be shown, if anything.
+    pub(super) fn secret(&mut self, secrets: &'a [(Span, ast::Secret)], word: &str) -> Option<Secret> {
+        self.single(secrets, word).map(|secret| match secret {
             ast::Secret::Environment(name) => Secret::Environment { name: name.text.clone() },
             ast::Secret::File(path) => Secret::File { path: path.text.clone() },
         })
@@ -169,11 +170,29 @@ impl<'a> Resolver<'a> {
 
     /// An address: its scheme, a host, and a port. A secret goes over plain text on this machine only.
     fn address(&mut self, written: &Text, bus: &ast::Bus) -> Option<String> {
+        let Schemes { plain, encrypted, .. } = Schemes::of(bus.kind);
+        let (scheme, host) = self.well_formed(written, bus.kind)?;
+        if let (Some(encrypted), Some((span, _))) = (encrypted, bus.secrets.first())
+            && scheme == plain
+            && !is_here(host)
+        {
+            let title = format!("a secret would go to `{host}` in plain text");
+            let diagnostic = Diagnostic::new(Code::BAD_ADDRESS, written.span, title)
+                .label(format!("expected `{encrypted}` for an address beyond this machine"))
+                .secondary(*span, "the secret is named here");
+            self.report(diagnostic);
+            return None;
+        }
+        Some(written.text.clone())
+    }
+
+    /// The scheme and the host of an address of a kind.
+    pub(super) fn well_formed<'t>(&mut self, written: &'t Text, kind: BusKind) -> Option<(&'static str, &'t str)> {
         // An empty text was reported where it was read.
         if written.text.trim().is_empty() {
             return None;
         }
-        let Schemes { plain, encrypted, example } = Schemes::of(bus.kind);
+        let Schemes { plain, encrypted, example } = Schemes::of(kind);
         let scheme = [Some(plain), encrypted].into_iter().flatten().find(|scheme| written.text.starts_with(scheme));
         let problem = match scheme {
             None => {
@@ -191,19 +210,7 @@ impl<'a> Resolver<'a> {
             self.report(diagnostic.note(format!("for example `\"{example}\"`")));
             return None;
         }
-        let host = scheme.map_or("", |scheme| host(&written.text[scheme.len()..]));
-        if let (Some(encrypted), Some((span, _))) = (encrypted, bus.secrets.first())
-            && scheme == Some(plain)
-            && !is_here(host)
-        {
-            let title = format!("a secret would go to `{host}` in plain text");
-            let diagnostic = Diagnostic::new(Code::BAD_ADDRESS, written.span, title)
-                .label(format!("expected `{encrypted}` for an address beyond this machine"))
-                .secondary(*span, "the secret is named here");
-            self.report(diagnostic);
-            return None;
-        }
-        Some(written.text.clone())
+        scheme.map(|scheme| (scheme, host(&written.text[scheme.len()..])))
     }
 }
 
@@ -240,7 +247,7 @@ fn host(rest: &str) -> &str {
 }
 
 /// Whether a host is this machine, whatever the network says.
-fn is_here(host: &str) -> bool {
+pub(super) fn is_here(host: &str) -> bool {
     host == "localhost" || host.parse::<std::net::IpAddr>().is_ok_and(|address| address.is_loopback())
 }
 

@@ -182,6 +182,17 @@ pub(super) const BLOCKS: &[Block] = &[
             Member::new(Rule::setting_compression, "compression"),
             Member::like(Rule::setting_token, "token", "token from"),
             Member::new(Rule::setting_trust, "trust"),
+            Member::new(Rule::proxy, "proxy"),
+        ],
+    ),
+    Block::settings(
+        Rule::proxy_settings,
+        "proxy",
+        &[
+            Member::like(Rule::setting_token, "token", "token from"),
+            Member::new(Rule::setting_certificate, "certificate"),
+            Member::new(Rule::setting_key, "key"),
+            Member::new(Rule::setting_public, "public"),
         ],
     ),
     Block::settings(

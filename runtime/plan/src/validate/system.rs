@@ -35,6 +35,10 @@ impl CampaignPlan {
             }
             Transport::Rosbridge(rosbridge) => {
                 at("transport.remote.url", name(&rosbridge.remote.url))?;
+                each("transport.proxies", &rosbridge.proxies, |proxy| {
+                    at("node", self.has_node(proxy.node))?;
+                    at("url", name(&proxy.url))
+                })?;
                 at("transport", sound_interfaces(&rosbridge.interfaces))?;
                 at("transport", self.sound_wiring(&simulator.transport))?;
             }

@@ -183,6 +183,15 @@ impl Launched {
         self.seed = seed;
         self.alarm = Alarm::default();
         self.killed = false;
+        self.reserve_port()?;
+        if let Some(command) = &self.terminate {
+            self.pending = Some(Terminate::pending(self.program(command, Part::System), shown(command)));
+        }
+        self.begin()
+    }
+
+    /// Reserves the port that `{port}` stands for, if programs ask for it and there is none yet.
+    pub fn reserve_port(&mut self) -> Result<(), TransportError> {
         if self.port.is_none() && self.asks_for_port() {
             let reserved = Port::reserve(self.place.worker).map_err(|error| TransportError::LaunchFailed {
                 what: "`{port}`".to_owned(),
@@ -191,10 +200,7 @@ impl Launched {
             });
             self.port = Some(reserved?);
         }
-        if let Some(command) = &self.terminate {
-            self.pending = Some(Terminate::pending(self.program(command, Part::System), shown(command)));
-        }
-        self.begin()
+        Ok(())
     }
 
     /// Whether all programs are ready; to be asked until they are. Starts programs whose turn has come. `asked` is

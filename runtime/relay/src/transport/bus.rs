@@ -33,6 +33,12 @@ use self::system::System;
 ///
 /// Errors end the run; what concerns one message only is an [`Event::Note`].
 pub trait Bus {
+    /// Opens what programs connect to that are launched after it. It is called before each launch, and what is open
+    /// stays open until the bus is dropped. `address` is as for [`connect`](Self::connect).
+    fn listen(&mut self, _address: &dyn Fn(&str) -> String) -> Result<(), TransportError> {
+        Ok(())
+    }
+
     /// Connects, listens to each source of the lines, and gets ready to publish on each sink. `address` fills
     /// placeholders of addresses (`{port}`, `{worker}`, `{domain}`) with what this worker has. If nothing answers yet,
     /// this returns false after a moment (at most 100 ms), and is called again until `connect` succeeds or time is up.

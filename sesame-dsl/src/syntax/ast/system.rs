@@ -82,6 +82,7 @@ pub(crate) struct Bus {
     /// A token or a password.
     pub(crate) secrets: Vec<(Span, Secret)>,
     pub(crate) trusts: Vec<(Span, Text)>,
+    pub(crate) proxies: Vec<Proxy>,
     pub(crate) steps: Vec<(Span, Quantity)>,
     pub(crate) protocols: Vec<(Span, Count)>,
     /// The address of a server of topics.
@@ -103,6 +104,19 @@ pub(crate) enum BusKind {
     Ros1,
     Mqtt,
     Simlog,
+}
+
+/// An address at which clients of a bridge are one node.
+#[derive(Debug)]
+pub(crate) struct Proxy {
+    pub(crate) node: Name,
+    pub(crate) address: Text,
+    /// What clients have to show.
+    pub(crate) secrets: Vec<(Span, Secret)>,
+    pub(crate) certificates: Vec<(Span, Text)>,
+    pub(crate) keys: Vec<(Span, Text)>,
+    /// That it may be reached from other machines.
+    pub(crate) publics: Vec<(Span, ())>,
 }
 
 /// Where a secret is kept.

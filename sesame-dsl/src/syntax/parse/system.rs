@@ -5,7 +5,7 @@ use sesame_grammar::Rule;
 use super::reader::{Pair, Reader, child, children, expect_child, first_of};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::syntax::ast::{
-    Answer, Bus, BusKind, Clock, Field, Head, InProcess, Message, Name, Node, Process, Ros2, Secret, Service,
+    Answer, Bus, BusKind, Clock, Field, Head, InProcess, Message, Name, Node, Process, Proxy, Ros2, Secret, Service,
     Simulator, StepBy, StepChannel, Stepping, System, Text, Topic, Transport, Type, TypeKind,
 };
 use sesame_plan::{Compression, Dialect, Quality};
@@ -138,6 +138,7 @@ impl Reader<'_> {
             users: vec![],
             secrets: vec![],
             trusts: vec![],
+            proxies: vec![],
             steps: vec![],
             protocols: vec![],
             topics: vec![],
@@ -179,6 +180,7 @@ impl Reader<'_> {
                 }
                 Rule::setting_user => bus.users.push((span, text(reader))),
                 Rule::setting_trust => bus.trusts.push((span, text(reader))),
+                Rule::proxy => bus.proxies.push(reader.proxy(&setting)),
                 Rule::setting_step => bus.steps.push((span, quantity(reader))),
                 Rule::setting_protocol => {
                     bus.protocols.push((span, reader.count(&expect_child(&setting, Rule::number))));
@@ -195,6 +197,29 @@ impl Reader<'_> {
             }
         });
         bus
+    }
+
+    fn proxy(&mut self, pair: &Pair<'_>) -> Proxy {
+        let mut proxy = Proxy {
+            node: self.name(&expect_child(pair, Rule::name)),
+            address: self.text_of(&expect_child(pair, Rule::text)),
+            secrets: vec![],
+            certificates: vec![],
+            keys: vec![],
+            publics: vec![],
+        };
+        let Some(settings) = child(pair, Rule::proxy_settings) else { return proxy };
+        self.members(&settings, |reader, setting| {
+            let span = reader.keyword_span(&setting);
+            let text = |reader: &mut Self| reader.text_of(&expect_child(&setting, Rule::text));
+            match setting.as_rule() {
+                Rule::setting_certificate => proxy.certificates.push((span, text(reader))),
+                Rule::setting_key => proxy.keys.push((span, text(reader))),
+                Rule::setting_public => proxy.publics.push((span, ())),
+                _ => proxy.secrets.push((span, reader.secret(&expect_child(&setting, Rule::secret)))),
+            }
+        });
+        proxy
     }
 
     fn folders(&mut self, setting: &Pair<'_>) -> Vec<Text> {

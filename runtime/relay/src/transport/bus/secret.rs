@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
-use sesame_plan::Secret;
+use sesame_plan::{Identity, Secret};
 
 use crate::transport::TransportError;
 
@@ -50,6 +50,14 @@ impl fmt::Debug for Token {
 pub fn trusted(path: &str, folder: &Path) -> Result<Vec<u8>, TransportError> {
     file(&folder.join(path))
         .map_err(|reason| wrong(format!("the trusted certificates in `{path}` cannot be read: {reason}")))
+}
+
+/// What a server of ours shows to its clients, from files relative to this folder: its certificate and its key.
+pub fn identity(identity: &Identity, folder: &Path) -> Result<(Vec<u8>, Vec<u8>), TransportError> {
+    let read = |what: &str, path: &str| {
+        file(&folder.join(path)).map_err(|reason| wrong(format!("the {what} in `{path}` cannot be read: {reason}")))
+    };
+    Ok((read("certificate", &identity.certificate)?, read("key", &identity.key)?))
 }
 
 fn file(path: &Path) -> Result<Vec<u8>, String> {

@@ -123,6 +123,9 @@ impl System {
                 .enumerate()
                 .flat_map(|(at, line)| line.sinks.iter().enumerate().map(move |(sink, of)| (of.wire, (at, sink))));
             self.sinks = sinks.collect();
+            self.launched.reserve_port()?;
+            let launched = &self.launched;
+            self.bus.listen(&|address| launched.fill(address))?;
             self.launched.start(seed)?;
             self.assemble()?;
         }
