@@ -1,4 +1,6 @@
-//! What the benchmarks share: the plan of a small space with one topic of each kind.
+//! What the benchmarks share: the plan of a small space with one topic of each kind, and ways through middleware.
+
+pub mod ways;
 
 use sesame_codegen::lower::lower;
 use sesame_dsl::source::SourceMap;

@@ -94,6 +94,25 @@ fn lines_between<'a>(text: &'a str, from: &str, to: &str) -> impl Iterator<Item 
     lines.lines().skip(1)
 }
 
+/// What nodes of ROS 2 change to have numbers of 32 bits in their messages, as SimlogAPI has.
+const OF_32_BITS: [(&str, &str, &str); 5] = [
+    ("cell.py", "= cell.physics.position(arm)", "= np.float32(cell.physics.position(arm)).tolist()"),
+    ("cell.py", "= cell.physics.velocity(arm)", "= np.float32(cell.physics.velocity(arm)).tolist()"),
+    ("controller.py", "np.array(message.position)", "np.float32(message.position).astype(float)"),
+    ("controller.py", "np.array(message.velocity)", "np.float32(message.velocity).astype(float)"),
+    ("controller.py", "effort=torques.tolist()", "effort=np.float32(torques).tolist()"),
+];
+
+/// Changes the programs of an example so.
+fn change(example: &Example, changes: &[(&str, &str, &str)]) {
+    for (program, from, to) in changes {
+        let path = example.folder().join(program);
+        let text = fs::read_to_string(&path).expect("a program can be read");
+        assert!(text.contains(from), "{program} has no `{from}`");
+        fs::write(path, text.replace(from, to)).expect("a program can be written");
+    }
+}
+
 /// Copies of the example with a campaign over each protocol: that of ROS 2, and that of SimlogAPI.
 fn cells(name: &str, disturbed: &Disturbed, evaluations: u32) -> Option<[Example; 2]> {
     let simlog = Vendor::Simlog.python()?;
@@ -168,11 +187,13 @@ fn disturbances_of_what_controllers_say_and_are_granted_come_to_the_same_over_si
 }
 
 /// Forty tests of ten seconds of the cell, which are to take less than 40 s; twice as much on a machine with something
-/// else to do.
+/// else to do. What 32 bits leave out grows where arms swing past each other (up to 1.7e-5 in one test of forty), so the
+/// nodes of ROS 2 have numbers of 32 bits here, too.
 #[test]
 #[ignore = "takes three minutes, and builds an optimised sesamec"]
 fn forty_tests_over_simlog_are_quick_and_come_to_the_same_as_over_ros2() {
     let Some(cells) = cells("iiwa_forty", &HEARD, 40) else { return };
+    change(&cells[0], &OF_32_BITS);
     let [ros2, grpc] = cells.each_ref().map(|cell| {
         let mut run = command(optimised_sesamec());
         run.arg("run").arg(&cell.space).args(["--", "--workers", "2"]);
@@ -183,8 +204,7 @@ fn forty_tests_over_simlog_are_quick_and_come_to_the_same_as_over_ros2() {
     eprintln!("forty tests: {:.1} s over ROS 2, {:.1} s over SimlogAPI", ros2.0, grpc.0);
     assert_eq!(ros2.1.len(), grpc.1.len());
     for (of_ros2, of_grpc) in ros2.1.iter().zip(&grpc.1) {
-        // What 32 bits leave out grows where arms swing past each other: of forty tests, one was apart by 1.7e-5.
-        assert_alike(of_ros2, of_grpc, 1e-4);
+        assert_alike(of_ros2, of_grpc, 1e-5);
     }
     assert!(grpc.0 < 80.0, "forty tests took {:.1} s", grpc.0);
 }

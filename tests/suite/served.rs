@@ -21,7 +21,9 @@ fn project(name: &str) -> Project {
          }}\n\
          metric nearest minimise default 5000mm = min(zones.level)\n\
          metric disturbed minimise = fuzzing_time()\n\
+         requirement R1 \"It stays away\" = nearest >= 1mm\n\
          operation jitter on link0 = random offset [-0.3rad, 0.3rad] within [0s, 20s]\n\
+         test leaning {{ jitter random offset [0.3rad, 0.3rad] from 0s to 5s  expect disturbed >= 4s }}\n\
          campaign close {{\n\
            objectives nearest, disturbed\n\
            operations jitter 1 per test\n\
@@ -55,4 +57,19 @@ fn a_campaign_over_simlog_finds_the_same_twice() {
     // What is disturbed matters to the cell.
     let nearest = |row: &serde_json::Value| row["measured"]["nearest"].to_string();
     assert!(rows.iter().any(|row| nearest(row) != nearest(&rows[0])), "{listed}");
+}
+
+#[test]
+fn a_simulator_that_speaks_simlog_is_prepared() {
+    let project = project("served_prepared");
+    let mut sesamec = command(sesamec());
+    sesamec.args(["prepare", "served.sesame", "--runs", "1", "--format", "json"]);
+    let said = done(sesamec.current_dir(&project.folder)).expect(0).out;
+    let found: serde_json::Value = serde_json::from_str(&said).unwrap();
+    assert_eq!((&found["passed"], &found["mitm"]["lock_stepped"]), (&true.into(), &true.into()), "{found:#}");
+    let stages = found["mitm"]["stages"].as_array().unwrap_or_else(|| panic!("{found:#}"));
+    assert_eq!(stages.len(), 2, "nothing is relayed, then the joint is: {found:#}");
+    assert_eq!(found["known"]["tests"][0]["expectations"][0]["simulation"], "satisfied", "{found:#}");
+    let page = fs::read_to_string(project.runners.join("close/results/prepare/report.html")).unwrap();
+    assert!(["id=\"null\"", "id=\"mitm\"", "id=\"known\""].iter().all(|section| page.contains(section)));
 }

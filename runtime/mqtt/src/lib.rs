@@ -8,6 +8,7 @@
 
 mod address;
 mod connection;
+mod quick_ack;
 mod routes;
 mod session;
 mod transport;

@@ -16,6 +16,7 @@ use tokio::sync::mpsc;
 use tokio_rustls::TlsConnector;
 
 use crate::connection::{Account, Passed, Received};
+use crate::quick_ack::QuickAck;
 
 /// The largest packet that is taken, in bytes.
 const PACKET_LIMIT: u32 = 4 << 20;
@@ -274,7 +275,7 @@ async fn read(socket: &mut Box<dyn Socket>, incoming: &mut BytesMut) -> Result<P
 async fn open(account: &Account) -> Result<Box<dyn Socket>, End> {
     let address = &account.address;
     let socket = TcpStream::connect((address.host.as_str(), address.port)).await.map_err(|error| broken(&error))?;
-    socket.set_nodelay(true).map_err(|error| broken(&error))?;
+    let socket = QuickAck::new(socket).map_err(|error| broken(&error))?;
     let Some(config) = &account.tls else { return Ok(Box::new(socket)) };
     let name = ServerName::try_from(address.host.clone())
         .map_err(|_| End::Refused(format!("`{}` is no name that a certificate can have", address.host)))?;
