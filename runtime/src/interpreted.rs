@@ -25,7 +25,7 @@ pub struct Interpreted {
     pub simulator: PathBuf,
 }
 
-/// The transport to the simulator of a plan, which is no part of the runner.
+/// The transport to the simulator of a plan, which is not part of the runner.
 pub(crate) fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
     let connect = match &plan.simulator.transport {
         #[cfg(feature = "mqtt")]

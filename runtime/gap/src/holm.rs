@@ -3,7 +3,7 @@
 /// Adjusted p values after Holm's step-down procedure [Holm 1979], in the order of the given ones, each in `0..=1`.
 ///
 /// To reject what is at most α keeps the probability of any false rejection at α or below, however the questions depend
-/// on each other. Questions that have no p value are no part of the family and are left out before.
+/// on each other. Questions that have no p value are not part of the family and are left out before.
 pub fn adjusted(p: &[f64]) -> Vec<f64> {
     assert!(p.iter().all(|p| (0.0..=1.0).contains(p)), "p values are probabilities");
     let mut order: Vec<usize> = (0..p.len()).collect();

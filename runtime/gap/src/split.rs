@@ -44,7 +44,7 @@ pub struct Split {
     pub p: f64,
 }
 
-/// Fewer tests on a side are no part of the space, but single tests.
+/// Fewer tests on a side are not part of the space, but single tests.
 const LEAST: usize = 2;
 
 /// The best of all ranges with two tests or more inside and outside; `None` if there is none.

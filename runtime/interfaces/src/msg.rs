@@ -44,14 +44,14 @@ fn part<'a>(
         let end = rest.find(|c: char| !c.is_ascii_alphanumeric() && c != '_').unwrap_or(rest.len());
         let (field, rest) = rest.split_at(end);
         if !is_name(field) {
-            return Err(wrong(format!("`{}` is no name of a field", rest.split_whitespace().next().unwrap_or(field))));
+            return Err(wrong(format!("`{}` is not a field name", rest.split_whitespace().next().unwrap_or(field))));
         }
         if let Some(value) = rest.trim_start().strip_prefix('=') {
             constants.push(Constant { name: field.to_owned(), value: constant(&ty, value) });
             continue;
         }
         if !rest.is_empty() && !rest.starts_with(|c: char| c.is_whitespace() || c == '#') {
-            return Err(wrong(format!("`{field}{rest}` is no name of a field")));
+            return Err(wrong(format!("`{field}{rest}` is not a field name")));
         }
         if fields.iter().any(|other| other.name == field) {
             return Err(wrong(format!("field `{field}` is there twice")));
@@ -91,7 +91,7 @@ pub(crate) fn array(written: &str, element: &dyn Fn(&str) -> Result<WireType, St
     let length = length.strip_suffix(']').ok_or_else(|| format!("type `{written}` has no `]` at its end"))?;
     let number = |length: &str| {
         let number = length.parse().ok().filter(|&number: &u32| (1..=LONGEST_ARRAY).contains(&number));
-        number.ok_or_else(|| format!("`{length}` is no length of an array from 1 to {LONGEST_ARRAY}"))
+        number.ok_or_else(|| format!("`{length}` is not the length of an array from 1 to {LONGEST_ARRAY}"))
     };
     match (length, length.strip_prefix("<=")) {
         ("", _) => Ok(WireType::Sequence { of, bound: None }),

@@ -133,7 +133,7 @@ fn lines(text: &str, first: usize) -> Result<Vec<Line<'_>>, DefinitionError> {
         };
         let name = name.trim();
         if !is_name(name) {
-            return Err(wrong(format!("`{name}` is no name of a field")));
+            return Err(wrong(format!("`{name}` is not a field name")));
         }
         lines.push(Line { at, ty, name, value });
     }
@@ -174,7 +174,7 @@ fn wire_type(package: &str, written: &str) -> Result<WireType, String> {
         let is_type = element.contains('/') || element.starts_with(|first: char| first.is_ascii_uppercase());
         let name = message(package, written).map(|name| interface(&name));
         let name = name.filter(|name| is_type && element.split('/').count() <= 2 && name.split('/').all(is_name));
-        name.map(|name| WireType::Interface { name }).ok_or_else(|| format!("`{element}` is no type of ROS 1"))
+        name.map(|name| WireType::Interface { name }).ok_or_else(|| format!("`{element}` is not a type of ROS 1"))
     })
 }
 

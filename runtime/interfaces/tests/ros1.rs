@@ -59,7 +59,7 @@ fn a_service_is_two_messages_and_nothing_is_nothing() {
     assert_eq!((request.name.as_str(), request.fields.len()), ("std_srvs/srv/Trigger_Request", 0));
     assert_eq!((reply.name.as_str(), reply.fields.len()), ("std_srvs/srv/Trigger_Response", 2));
     let error = ros1::srv("p", "S", "int8 a\n---\nint8 b\nint9 c").unwrap_err();
-    assert_eq!(error.to_string(), "line 4: `int9` is no type of ROS 1");
+    assert_eq!(error.to_string(), "line 4: `int9` is not a type of ROS 1");
 }
 
 #[test]
@@ -83,12 +83,12 @@ fn what_is_wrong_is_said_with_its_line() {
     let problem = |text: &str| ros1::msg("p", "M", text).unwrap_err().to_string();
     assert_eq!(problem("\nint8"), "line 2: `int8` has no name");
     assert!(ros1::msg("p", "M", "tf/tfMessage a").is_ok());
-    assert_eq!(problem("a/b/C[] a"), "line 1: `a/b/C` is no type of ROS 1");
-    assert_eq!(problem("wstring a"), "line 1: `wstring` is no type of ROS 1");
-    assert_eq!(problem("string<=4 a"), "line 1: `string<=4` is no type of ROS 1");
-    assert_eq!(problem("int8 a b"), "line 1: `a b` is no name of a field");
+    assert_eq!(problem("a/b/C[] a"), "line 1: `a/b/C` is not a type of ROS 1");
+    assert_eq!(problem("wstring a"), "line 1: `wstring` is not a type of ROS 1");
+    assert_eq!(problem("string<=4 a"), "line 1: `string<=4` is not a type of ROS 1");
+    assert_eq!(problem("int8 a b"), "line 1: `a b` is not a field name");
     assert_eq!(problem("int8 a\nint8 a"), "line 2: field `a` is there twice");
-    assert_eq!(problem("int8[x] a"), "line 1: `x` is no length of an array from 1 to 16777216");
+    assert_eq!(problem("int8[x] a"), "line 1: `x` is not the length of an array from 1 to 16777216");
     assert_eq!(ros1::srv("p", "S", "int8 a").unwrap_err().problem, "a line `---` between request and reply is missing");
 }
 

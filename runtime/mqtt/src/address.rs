@@ -17,7 +17,7 @@ impl Address {
         let (tls, rest) = match (url.strip_prefix("mqtt://"), url.strip_prefix("mqtts://")) {
             (Some(rest), _) => (false, rest),
             (_, Some(rest)) => (true, rest),
-            _ => return Err(format!("`{url}` is no address of a broker; write `mqtt://HOST:PORT`")),
+            _ => return Err(format!("`{url}` is not the address of a broker; write `mqtt://HOST:PORT`")),
         };
         let rest = rest.trim_end_matches('/');
         let (host, port) = match rest.strip_prefix('[').and_then(|it| it.split_once(']')) {

@@ -264,7 +264,7 @@ async fn read(socket: &mut Box<dyn Socket>, incoming: &mut BytesMut) -> Result<P
         match Packet::read(incoming, Some(PACKET_LIMIT)) {
             Ok(packet) => return Ok(packet),
             Err(PacketError::InsufficientBytes(missing)) => incoming.reserve(missing),
-            Err(error) => return Err(End::Broken(format!("it sends what is no packet: {error}"))),
+            Err(error) => return Err(End::Broken(format!("it sends something that is not a packet: {error}"))),
         }
         if socket.read_buf(incoming).await.map_err(|error| broken(&error))? == 0 {
             return Err(End::Broken("it closed the connection".to_owned()));
@@ -278,7 +278,7 @@ async fn open(account: &Account) -> Result<Box<dyn Socket>, End> {
     let socket = QuickAck::new(socket).map_err(|error| broken(&error))?;
     let Some(config) = &account.tls else { return Ok(Box::new(socket)) };
     let name = ServerName::try_from(address.host.clone())
-        .map_err(|_| End::Refused(format!("`{}` is no name that a certificate can have", address.host)))?;
+        .map_err(|_| End::Refused(format!("`{}` is not a name that a certificate can have", address.host)))?;
     // Somebody is there, so a handshake that fails would fail again.
     let secured = TlsConnector::from(std::sync::Arc::clone(config)).connect(name, socket).await;
     let refused =

@@ -7,7 +7,7 @@ use crate::{Bound, Dimension, Fit, MetricId, Simulator};
 
 /// A lab in which chosen tests are run on real robots.
 ///
-/// It changes nothing of what a campaign does, so it is no part of a plan's [meaning](crate::CampaignPlan::meaning).
+/// It changes nothing of what a campaign does, so it is not part of a plan's [meaning](crate::CampaignPlan::meaning).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Lab {
     /// Its name in the space.

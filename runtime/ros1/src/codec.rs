@@ -68,7 +68,7 @@ impl Codec {
         write::write(&self.layout, &self.selection, message)
     }
 
-    /// Where a layout that others have differs from this one, in a phrase. The number in headers is no difference.
+    /// Where a layout that others have differs from this one, in a phrase. The number in headers makes no difference.
     pub(crate) fn difference(&self, interfaces: &[Interface], name: &str) -> Option<String> {
         match Layout::new(interfaces, name) {
             Ok(other) => self.layout.difference(&other),

@@ -42,7 +42,7 @@ pub(crate) fn subscribe(
     let [Value::Text(_), Value::Text(host), Value::Int(port)] = place.items() else {
         return Err(absent("it does not say where it publishes".to_owned()));
     };
-    let port = u16::try_from(*port).map_err(|_| absent(format!("{port} is no port")))?;
+    let port = u16::try_from(*port).map_err(|_| absent(format!("{port} is not a port")))?;
     let ours = [
         ("callerid", caller),
         ("md5sum", ANY),

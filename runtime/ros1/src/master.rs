@@ -85,7 +85,7 @@ pub(crate) fn ask(at: &Address, method: &str, parameters: &[Value], stop: &Stop)
         [Value::Int(_), why, ..] => {
             Err(AskError::Refused { at: at.to_string(), why: why.text().unwrap_or_default().to_owned() })
         }
-        _ => Err(silent("its answer is no code, message and value".to_owned())),
+        _ => Err(silent("its answer is not a code, a message and a value".to_owned())),
     }
 }
 

@@ -116,7 +116,7 @@ pub struct FoundField {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ScanError {
     /// This is no address.
-    #[error("`{0}` is no address of a master, such as `http://127.0.0.1:11311`")]
+    #[error("`{0}` is not the address of a master, such as `http://127.0.0.1:11311`")]
     Address(String),
     /// The master does not answer.
     #[error(transparent)]

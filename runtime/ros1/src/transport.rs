@@ -162,7 +162,9 @@ impl Bus for Ros1Bus {
     fn connect(&mut self, lines: &[Line], address: &dyn Fn(&str) -> String) -> Result<bool, TransportError> {
         let master = address(&self.ros1.master);
         let at = Address::read(&master).ok_or_else(|| {
-            TransportError::Wiring(format!("`{master}` is no address of a master, such as `http://127.0.0.1:11311`"))
+            TransportError::Wiring(format!(
+                "`{master}` is not the address of a master, such as `http://127.0.0.1:11311`"
+            ))
         })?;
         let started = Node::start(&at, &self.name).map_err(|error| TransportError::Wiring(error.to_string()))?;
         let Some(node) = started else { return Ok(false) };

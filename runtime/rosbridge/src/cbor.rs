@@ -60,7 +60,7 @@ fn json(value: &Cbor, depth: usize) -> Result<Value, CborError> {
         Cbor::Map(entries) => {
             let mut fields = Map::new();
             for (key, value) in entries {
-                let Cbor::Text(key) = key else { return Err(CborError::Kind("a key that is no text")) };
+                let Cbor::Text(key) = key else { return Err(CborError::Kind("a key that is not text")) };
                 fields.insert(key.clone(), json(value, depth + 1)?);
             }
             Value::Object(fields)

@@ -80,7 +80,7 @@ pub enum ConnectError {
 pub enum Incoming {
     /// An operation, and when it arrived.
     Operation(Box<Operation>, Instant),
-    /// A frame that is no operation, in words. The connection goes on.
+    /// A frame that is not an operation, in words. The connection goes on.
     Malformed(String),
     /// The connection was lost for this long, and is there again.
     FoundAgain(Duration),

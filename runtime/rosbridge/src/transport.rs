@@ -232,7 +232,7 @@ impl Bridge {
         match incoming {
             Incoming::Operation(operation, arrived) => self.operation(*operation, arrived),
             Incoming::Malformed(problem) => Ok(Some(Event::Note(format!(
-                "the bridge at `{}` sent something that is no part of its protocol: {problem}",
+                "the bridge at `{}` sent something that is not part of its protocol: {problem}",
                 self.url
             )))),
             Incoming::FoundAgain(after) => Ok(Some(Event::Note(format!(

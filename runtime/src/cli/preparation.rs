@@ -158,7 +158,7 @@ pub(super) fn carry_out(
     let (folder, claim) = if let Some(folder) = &options.resume {
         let folder = run_folder(&session.results, folder);
         if !folder.is_dir() {
-            return Err(Failure(format!("there is nothing to go on with: {} is no folder", shown(&folder))));
+            return Err(Failure(format!("there is nothing to go on with: {} is not a folder", shown(&folder))));
         }
         (folder, None)
     } else {

@@ -189,7 +189,7 @@ fn each_thing_that_later_code_relies_on_is_asked_for() {
     ];
     let of_simlog: &[Altered] = &[
         (|plan| simlog(plan).step_ns = 0, "simulator.transport.step_ns: must be positive"),
-        (|plan| simlog(plan).step_ns = 1_500_000, "step_ns: is 1500000, which is no whole number of milliseconds"),
+        (|plan| simlog(plan).step_ns = 1_500_000, "step_ns: is 1500000, which is not a whole number of milliseconds"),
         (|plan| simlog(plan).url = "localhost:8089".to_owned(), "simulator.transport.url: is `localhost:8089`, not"),
         (|plan| simlog(plan).url = "https://".to_owned(), "simulator.transport.url: is `https://`, not"),
         (|plan| simlog(plan).topics_url = Some("there".to_owned()), "simulator.transport.topics_url: is `there`, not"),

@@ -427,9 +427,9 @@ fn number(element: &Element, name: &str, default: f64) -> Result<f64, String> {
 
 fn integer(element: &Element, name: &str) -> Result<i64, String> {
     let Some(text) = element.get(name) else { return Ok(0) };
-    text.trim()
-        .parse()
-        .map_err(|_| format!("`{name}` of this `{}` is `{}`, which is no whole number", element.tag, printable(text)))
+    text.trim().parse().map_err(|_| {
+        format!("`{name}` of this `{}` is `{}`, which is not a whole number", element.tag, printable(text))
+    })
 }
 
 fn count(element: &Element, name: &str) -> Result<u32, String> {

@@ -172,7 +172,7 @@ impl Source {
                 Ok(event) => event,
                 Err(_) if self.reader.get_ref().left == 0 => {
                     let what = format!(
-                        "what begins here has more than {} MiB, which is no part of a testing space; leave it out of the file",
+                        "what begins here has more than {} MiB, which is not part of a testing space; leave it out of the file",
                         LARGEST >> 20
                     );
                     return Err(self.broken(what));

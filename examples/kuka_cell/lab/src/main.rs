@@ -57,7 +57,7 @@ fn reality(arguments: &[String]) -> Result<Reality, String> {
             continue;
         }
         let value = arguments.next().map(String::as_str);
-        let value = value.ok_or_else(|| format!("`{option}` needs a value, or is no option"))?;
+        let value = value.ok_or_else(|| format!("`{option}` needs a value, or is not an option"))?;
         match option.as_str() {
             "--latency" => reality.latency = SimTime::from_seconds(not_negative(option, value)? / 1000.0),
             "--noise" => reality.noise_share = not_negative(option, value)?,
@@ -111,7 +111,7 @@ mod tests {
     #[test]
     fn wrong_arguments_are_named() {
         let wrong = |arguments: &[&str]| read(arguments).unwrap_err();
-        assert_eq!(wrong(&["--latency"]), "`--latency` needs a value, or is no option");
+        assert_eq!(wrong(&["--latency"]), "`--latency` needs a value, or is not an option");
         assert_eq!(wrong(&["--latency", "-1"]), "`--latency` is from 0 to 1000000, not -1");
         assert_eq!(wrong(&["--noise", "NaN"]), "`NaN` is no number for `--noise`");
         assert_eq!(wrong(&["--zone-shift", "1,2"]), "`--zone-shift` takes three numbers");

@@ -62,13 +62,13 @@ fn read(arguments: &[String]) -> Result<Arguments, String> {
             noisy = true;
             continue;
         }
-        let value = arguments.next().ok_or_else(|| format!("`{option}` needs a value, or is no option"))?;
+        let value = arguments.next().ok_or_else(|| format!("`{option}` needs a value, or is not an option"))?;
         match option.as_str() {
             "--simlog" => {
-                let parsed = value.parse().map_err(|_| format!("`{value}` is no address with a port"))?;
+                let parsed = value.parse().map_err(|_| format!("`{value}` is not an address with a port"))?;
                 address = Some(parsed);
             }
-            "--seed" => seed = value.parse().map_err(|_| format!("`{value}` is no seed"))?,
+            "--seed" => seed = value.parse().map_err(|_| format!("`{value}` is not a seed"))?,
             _ => return Err(format!("there is no option `{option}`")),
         }
     }
@@ -97,9 +97,9 @@ mod tests {
     fn wrong_arguments_are_named() {
         let wrong = |arguments: &[&str]| said(arguments).unwrap_err();
         assert_eq!(wrong(&[]), "`--simlog` does not say where to listen");
-        assert_eq!(wrong(&["--simlog"]), "`--simlog` needs a value, or is no option");
-        assert_eq!(wrong(&["--simlog", "here"]), "`here` is no address with a port");
-        assert_eq!(wrong(&["--seed", "-1"]), "`-1` is no seed");
+        assert_eq!(wrong(&["--simlog"]), "`--simlog` needs a value, or is not an option");
+        assert_eq!(wrong(&["--simlog", "here"]), "`here` is not an address with a port");
+        assert_eq!(wrong(&["--seed", "-1"]), "`-1` is not a seed");
         assert_eq!(wrong(&["--warp", "9"]), "there is no option `--warp`");
     }
 }

@@ -85,7 +85,7 @@ impl CampaignPlan {
         at("url", is_url(url))?;
         at("topics_url", topics_url.as_deref().map_or(Ok(()), is_url))?;
         let whole = step_ns.is_multiple_of(MILLISECOND);
-        at("step_ns", require(whole, || format!("is {step_ns}, which is no whole number of milliseconds")))?;
+        at("step_ns", require(whole, || format!("is {step_ns}, which is not a whole number of milliseconds")))?;
         // Else whoever publishes what is injected would hear it again.
         let apart = names.cut != names.injected && !names.injected.is_empty();
         at("names.injected", require(apart, || "names the same topic as what it replaces".to_owned()))?;

@@ -274,7 +274,7 @@ mod tests {
         let read = apart.entered_runs().unwrap();
         let read: Vec<_> = read.iter().map(|it| (it.test, it.of, it.run, it.provenance.operator.as_deref())).collect();
         assert_eq!(read, [(1, 1, 1, None), (2, 2, 1, Some("Ada")), (3, 1, 2, None)]);
-        assert_eq!(apart.digest().unwrap(), together.digest().unwrap(), "who made the runs is no part of it");
+        assert_eq!(apart.digest().unwrap(), together.digest().unwrap(), "who made the runs is not part of it");
     }
 
     #[test]

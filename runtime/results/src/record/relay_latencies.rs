@@ -1,6 +1,6 @@
 //! The table of what the relay added to the way of messages, run by run and wire by wire.
 //!
-//! It is wall time, so it is no part of the digest. It is only there if it was measured: in runs without disturbance,
+//! It is wall time, so it is not part of the digest. It is only there if it was measured: in runs without disturbance,
 //! of a simulator that nobody steps.
 
 use rusqlite::Connection;

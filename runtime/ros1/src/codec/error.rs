@@ -66,7 +66,7 @@ pub enum CodecError {
         bound: usize,
     },
     /// What is to be written is no message.
-    #[error("it is no message but {0}")]
+    #[error("it is not a message but {0}")]
     NoMessage(&'static str),
 }
 

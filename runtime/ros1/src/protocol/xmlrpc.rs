@@ -30,7 +30,7 @@ impl Value {
         if let Value::Text(text) = self { Some(text) } else { None }
     }
 
-    /// The elements of a list; none of what is no list.
+    /// The elements of a list; none if it is not a list.
     pub(crate) fn items(&self) -> &[Value] {
         if let Value::List(items) = self { items } else { &[] }
     }
@@ -101,7 +101,7 @@ pub(crate) fn read_answer(text: &str) -> Result<Value, String> {
 
 fn document(text: &str) -> Result<Document<'_>, String> {
     let options = ParsingOptions { nodes_limit: MOST_NODES, ..ParsingOptions::default() };
-    Document::parse_with_options(text, options).map_err(|error| format!("it is no XML: {error}"))
+    Document::parse_with_options(text, options).map_err(|error| format!("it is not XML: {error}"))
 }
 
 fn write_parameters(parameters: &[Value], out: &mut String) {
@@ -127,7 +127,7 @@ fn value(node: Node<'_, '_>, depth: usize) -> Result<Value, String> {
     let Some(typed) = node.children().find(Node::is_element) else { return Ok(text(node).into()) };
     let content = text(typed);
     match typed.tag_name().name() {
-        "int" | "i4" => content.trim().parse().map(Value::Int).map_err(|_| format!("`{content}` is no number")),
+        "int" | "i4" => content.trim().parse().map(Value::Int).map_err(|_| format!("`{content}` is not a number")),
         "boolean" => Ok(Value::Bool(content.trim() == "1")),
         "array" => {
             let data = child(typed, "data").ok_or("an array has no data")?;
@@ -214,7 +214,7 @@ mod tests {
                      </member><member><name>faultString</name><value><string>no &lt;such&gt; method</string></value>\
                      </member></struct></value></fault></methodResponse>";
         assert_eq!(read_answer(fault).unwrap_err(), "it reports: faultCode 1 faultString no <such> method");
-        assert!(read_answer("<methodResponse>").unwrap_err().starts_with("it is no XML: "));
+        assert!(read_answer("<methodResponse>").unwrap_err().starts_with("it is not XML: "));
         assert!(read_answer("<!DOCTYPE a [<!ENTITY b \"c\">]><methodResponse/>").is_err(), "nothing is expanded");
         let deep = format!("{}{}", "<array><data><value>".repeat(50), "</value></data></array>".repeat(50));
         let deep = format!("<methodResponse><params><param><value>{deep}</value></param></params></methodResponse>");

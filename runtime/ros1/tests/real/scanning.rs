@@ -25,7 +25,7 @@ fn a_scan_finds_nodes_topics_services_and_the_layouts_of_messages() {
 #[test]
 fn without_a_master_there_is_nothing_to_scan() {
     let error = |master: &str| scan(master, Duration::from_secs(1)).unwrap_err().to_string();
-    assert_eq!(error("localhost"), "`localhost` is no address of a master, such as `http://127.0.0.1:11311`");
+    assert_eq!(error("localhost"), "`localhost` is not the address of a master, such as `http://127.0.0.1:11311`");
     let nobody = format!("127.0.0.1:{}", free_port());
     let said = error(&format!("http://{nobody}"));
     assert!(said.starts_with(&format!("`{nobody}` does not answer: ")), "{said}");

@@ -61,7 +61,7 @@ pub enum CodecError {
         bound: u32,
     },
     /// What is to be written is no message.
-    #[error("it is no message but {0}")]
+    #[error("it is not a message but {0}")]
     NoMessage(&'static str),
 }
 

@@ -119,7 +119,7 @@ async fn towards_bridge<S: AsyncRead + AsyncWrite + Unpin>(
             // Some bridges take a text as bytes too.
             Frame::Binary(bytes) => match std::str::from_utf8(bytes) {
                 Ok(text) => from_client(text),
-                Err(_) => refused(None, "bytes that are no text in UTF-8"),
+                Err(_) => refused(None, "bytes that are not UTF-8"),
             },
             Frame::Close(_) => return Gone::Client,
             Frame::Ping(_) | Frame::Pong(_) | Frame::Frame(_) => continue,

@@ -79,7 +79,7 @@ impl<S: Simulator, F: FnMut(&Setup, &mut Bus<'_>) -> Result<S, SimulatorError>> 
     fn begin(&mut self, milliseconds: i64) -> Result<(), Status> {
         let step = milliseconds.checked_mul(1_000_000).filter(|nanoseconds| *nanoseconds > 0);
         let Some(step) = step else {
-            return Err(Status::invalid_argument(format!("{milliseconds} ms is no length of a step")));
+            return Err(Status::invalid_argument(format!("{milliseconds} ms is not a valid step length")));
         };
         let setup = Setup::new(self.seed, SimTime::from_nanos(step));
         self.run = None;

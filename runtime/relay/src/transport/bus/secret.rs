@@ -63,7 +63,7 @@ pub fn identity(identity: &Identity, folder: &Path) -> Result<(Vec<u8>, Vec<u8>)
 fn file(path: &Path) -> Result<Vec<u8>, String> {
     let metadata = std::fs::metadata(path).map_err(|error| error.to_string())?;
     if !metadata.is_file() {
-        return Err("it is no file".to_owned());
+        return Err("it is not a file".to_owned());
     }
     if metadata.len() > MOST {
         return Err(format!("it has more than {MOST} bytes"));
@@ -100,6 +100,6 @@ mod tests {
         );
         assert!(said(Secret::File { path: "none".to_owned() }).starts_with("the secret in `none` cannot be read: "));
         assert_eq!(said(Secret::File { path: "empty".to_owned() }), "the secret of the simulator is empty");
-        assert_eq!(said(Secret::File { path: ".".to_owned() }), "the secret in `.` cannot be read: it is no file");
+        assert_eq!(said(Secret::File { path: ".".to_owned() }), "the secret in `.` cannot be read: it is not a file");
     }
 }
