@@ -48,7 +48,8 @@ pub(crate) fn run(size: Size) {
         let command = command.env("ROS_MASTER_URI", &master).env("ROS_IP", "127.0.0.1").env("ROS_HOME", home.path());
         Program::start(command)
     };
-    let _core = start(Command::new("roscore").args(["-p", &port.to_string()]));
+    // Without the node that collects logs, which `roscore` starts besides.
+    let _master = start(Command::new("rosmaster").args(["--core", "-p", &port.to_string()]));
     listens(port);
     let _relay = start(Command::new(RELAY).args(["/bare/undisturbed", "/bare"]));
     let plan = plan(&space(&format!("ros1 \"{master}\""), JOINTS, JOINT));
