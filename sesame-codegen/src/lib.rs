@@ -21,7 +21,10 @@ pub mod names;
 pub mod output;
 pub mod plan;
 pub mod project;
-#[cfg(all(feature = "cli", any(feature = "ros2", test)))]
+#[cfg(all(
+    feature = "cli",
+    any(feature = "mqtt", feature = "ros1", feature = "ros2", feature = "rosbridge", feature = "simlog", test)
+))]
 mod scan;
 pub mod unfilled;
 #[cfg(feature = "cli")]

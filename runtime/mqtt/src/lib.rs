@@ -9,6 +9,7 @@
 mod address;
 mod connection;
 mod routes;
+pub mod scan;
 mod session;
 mod transport;
 

@@ -7,6 +7,7 @@
 mod arrivals;
 mod facts;
 mod guess;
+mod payloads;
 mod samples;
 
 pub use arrivals::Arrivals;
@@ -14,6 +15,7 @@ pub use facts::{
     Facts, FoundAction, FoundField, FoundNode, FoundService, FoundTopic, FoundType, LeftOut, System, TypeSource,
 };
 pub use guess::{Conventions, Guess};
+pub use payloads::Payloads;
 pub use samples::Samples;
 
 /// The type of clocks in ROS.

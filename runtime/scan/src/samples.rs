@@ -59,6 +59,11 @@ impl Samples {
         self.root.values()
     }
 
+    /// How many places there are in what is kept.
+    pub(crate) fn parts(&self) -> usize {
+        self.parts
+    }
+
     /// Whether the payloads of two topics look as if they were of one type: objects that share half of the names of
     /// their fields or more, or values of the same kinds.
     pub fn resemble(&self, other: &Samples) -> bool {

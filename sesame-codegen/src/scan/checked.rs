@@ -1,6 +1,8 @@
 //! What is written passes its check.
 
-use sesame_ros2::scan::Facts;
+use std::collections::BTreeSet;
+
+use sesame_scan::{Facts, System};
 
 use super::text::{Origin, space};
 use super::types::Types;
@@ -21,7 +23,8 @@ pub(crate) fn checked_space(
     if check(&text).errors > 0 {
         // Some layouts are too large for the language, or wrong in a way that only the language knows.
         for ty in types.facts() {
-            let topics: Vec<_> = facts.topics.iter().filter(|topic| topic.ty == ty.name).take(1).cloned().collect();
+            let topics: Vec<_> =
+                facts.topics.iter().filter(|topic| topic.ty.as_deref() == Some(&ty.name)).take(1).cloned().collect();
             let alone = Facts { topics, nodes: Vec::new(), services: Vec::new(), actions: Vec::new(), ..facts.clone() };
             let checked = check(&space(&alone, types, origin));
             if checked.errors > 0 {
@@ -38,6 +41,14 @@ pub(crate) fn checked_space(
         return Err(mistake(&checked.diagnostics));
     }
     (language.format)(FILE, &text, Look::Short).map_err(|found| mistake(&found.diagnostics))
+}
+
+/// Whether a space could have this simulator with these settings: an address that is malformed, or to which a secret
+/// would go in plain text, is refused before anything is connected.
+pub(crate) fn check_settings(language: &Language, system: System, settings: &[String]) -> Result<(), String> {
+    let origin = Origin { folders: &[], services: &BTreeSet::new(), settings };
+    let checked = (language.check)(FILE, &space(&Facts::of(system), &Types::default(), origin), Look::Short);
+    if checked.errors == 0 { Ok(()) } else { Err(first_error(&checked.diagnostics)) }
 }
 
 /// What the first error says, without its place.

@@ -4,7 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use sesame_dsl::interfaces::{self, Folders, Interfaces};
 use sesame_plan::{Interface, InterfaceField, WireType};
-use sesame_ros2::scan::{Facts, FoundField, FoundType, TypeSource};
+use sesame_scan::{Facts, FoundField, FoundType, LeftOut, TypeSource};
+
+/// What a point is called that has no type of ROS.
+pub(super) const POINT: &str = "point";
 
 /// The most types that nodes may describe.
 const MOST: usize = 2000;
@@ -16,32 +19,52 @@ const DEEPEST: usize = 50;
 #[derive(Debug, Default)]
 pub(crate) struct Types {
     by_name: BTreeMap<String, Type>,
+    /// Types of topics that are no messages, by their words.
+    plain: BTreeMap<String, WireType>,
 }
 
 #[derive(Debug)]
 struct Type {
     source: TypeSource,
     fields: Vec<InterfaceField>,
+    left_out: Vec<LeftOut>,
     problem: Option<String>,
+}
+
+impl Type {
+    /// One with a layout.
+    fn of(source: TypeSource, fields: Vec<InterfaceField>) -> Self {
+        Type { source, fields, left_out: Vec::new(), problem: None }
+    }
+
+    /// One without.
+    fn unknown(problem: Option<String>) -> Self {
+        Type { source: TypeSource::Unknown, fields: Vec::new(), left_out: Vec::new(), problem }
+    }
 }
 
 impl Types {
     /// The types of all topics, as far as they are known or folders have them.
     pub(crate) fn of_topics(facts: &Facts, files: &dyn Interfaces, folders: Folders<'_>) -> Self {
         let mut types = Types::default();
-        for topic in &facts.topics {
-            types.look_up(&topic.ty, files, folders);
+        for ty in facts.topics.iter().filter_map(|topic| topic.ty.as_deref()) {
+            types.look_up(ty, files, folders);
         }
         types
+    }
+
+    /// Adds a type of ROS that needs no folder.
+    pub(super) fn add_known(&mut self, name: &str) {
+        self.look_up(name, &interfaces::NoInterfaces, Folders { written: &[], file: "" });
     }
 
     fn look_up(&mut self, name: &str, files: &dyn Interfaces, folders: Folders<'_>) {
         if self.by_name.contains_key(name) {
             return;
         }
-        let unknown = |problem: Option<String>| Type { source: TypeSource::Unknown, fields: Vec::new(), problem };
+        let unknown = Type::unknown;
         let of = |source, found: Vec<Interface>| match found.into_iter().next_back() {
-            Some(last) => Type { source, fields: last.fields, problem: None },
+            Some(last) => Type::of(source, last.fields),
             None => unknown(None),
         };
         let found = if interfaces::full_name(name, "msg").as_deref() != Some(name) {
@@ -77,8 +100,8 @@ impl Types {
             let Some(ty) = self.by_name.get_mut(&interface.name) else { continue };
             if ty.source == TypeSource::Unknown && ty.problem.is_none() {
                 *ty = match wrong_field(&interface.fields) {
-                    Some(problem) => Type { source: TypeSource::Unknown, fields: Vec::new(), problem: Some(problem) },
-                    None => Type { source: TypeSource::Node, fields: interface.fields.clone(), problem: None },
+                    Some(problem) => Type::unknown(Some(problem)),
+                    None => Type::of(TypeSource::Node, interface.fields.clone()),
                 };
             }
         }
@@ -121,8 +144,50 @@ impl Types {
     /// A type turned out to be of no use.
     pub(crate) fn refuse(&mut self, name: &str, problem: String) {
         if let Some(ty) = self.by_name.get_mut(name) {
-            *ty = Type { source: TypeSource::Unknown, fields: Vec::new(), problem: Some(problem) };
+            *ty = Type::unknown(Some(problem));
         }
+    }
+
+    /// Adds a message that payloads have in common, unless there is one of this name that has a layout.
+    pub(super) fn add_payload(&mut self, name: &str, fields: Vec<InterfaceField>, left_out: Vec<LeftOut>) {
+        if self.source(name) == TypeSource::Unknown {
+            let ty = Type { left_out, ..Type::of(TypeSource::Payloads, fields) };
+            self.by_name.insert(name.to_owned(), ty);
+        }
+    }
+
+    /// Gives a message that payloads have in common its fields.
+    pub(super) fn set_payload(&mut self, name: &str, fields: Vec<InterfaceField>, left_out: Vec<LeftOut>) {
+        if let Some(ty) = self.by_name.get_mut(name) {
+            (ty.fields, ty.left_out) = (fields, left_out);
+        }
+    }
+
+    /// Adds the type of topics that are no messages; gives its words.
+    pub(super) fn add_plain(&mut self, wire: WireType) -> String {
+        let words = interfaces::in_words(&wire);
+        self.plain.insert(words.clone(), wire);
+        words
+    }
+
+    /// Whether topics of this type are no messages.
+    pub(super) fn is_plain(&self, words: &str) -> bool {
+        self.plain.contains_key(words)
+    }
+
+    /// The type of topics that are no messages.
+    pub(super) fn wire(&self, words: &str) -> Option<&WireType> {
+        self.plain.get(words)
+    }
+
+    /// Whether there is a type of this name.
+    pub(super) fn has(&self, name: &str) -> bool {
+        self.by_name.contains_key(name)
+    }
+
+    /// The fields that payloads have and a space cannot declare.
+    pub(super) fn left_out(&self, name: &str) -> &[LeftOut] {
+        self.by_name.get(name).map(|ty| ty.left_out.as_slice()).unwrap_or_default()
     }
 
     /// Where the layout of a type comes from.
@@ -146,6 +211,9 @@ impl Types {
         if interfaces::is_time(name) {
             return Some("real[s]");
         }
+        if name == POINT {
+            return Some("point");
+        }
         let ty = self.by_name.get(name).filter(|ty| ty.source != TypeSource::Node)?;
         let layout = Interface { name: name.to_owned(), fields: ty.fields.clone() };
         interfaces::is_point(&layout).then_some("point")
@@ -155,6 +223,11 @@ impl Types {
     pub(crate) fn needed<'a>(&'a self, of_topics: impl IntoIterator<Item = &'a str>) -> Vec<&'a str> {
         let mut needed: Vec<&str> = Vec::new();
         for name in of_topics {
+            // What is plain itself is a list of messages, perhaps.
+            let name = match self.plain.get(name) {
+                Some(wire) => contained(wire).unwrap_or_default(),
+                None => name,
+            };
             if self.source(name) != TypeSource::Unknown && !needed.contains(&name) {
                 needed.push(name);
             }
@@ -162,7 +235,7 @@ impl Types {
         let mut at = 0;
         while let Some(&name) = needed.get(at) {
             at += 1;
-            if self.source(name) != TypeSource::Node {
+            if !matches!(self.source(name), TypeSource::Node | TypeSource::Payloads) {
                 continue;
             }
             for inner in self.fields(name).filter_map(|field| contained(&field.ty)) {
@@ -182,6 +255,7 @@ impl Types {
             name: name.clone(),
             source: ty.source,
             fields: self.fields(name).map(field).collect(),
+            left_out: ty.left_out.clone(),
             problem: ty.problem.clone(),
         };
         self.by_name.iter().map(of).collect()
