@@ -61,9 +61,12 @@ fn a_wrong_password_and_none_are_refused_and_the_right_one_is_not() {
     let wrong = said(&folder, &at, "user \"relay\"  password from file \"wrong\"");
     assert_eq!(wrong, refused("it does not accept the user or the password"));
     let none = said(&folder, &at, "");
-    assert_eq!(none, refused(
-        "it wants a user; add `user` and `password` to the simulator, or `--user` and `--password-env` to a scan"
-    ));
+    assert_eq!(
+        none,
+        refused(
+            "it wants a user; add `user` and `password` to the simulator, or `--user` and `--password-env` to a scan"
+        )
+    );
     assert_eq!(said(&folder, &at, "user \"relay\"  password from file \"right\""), Ok(()));
 }
 
