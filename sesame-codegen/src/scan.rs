@@ -19,7 +19,7 @@ mod text;
 mod topics;
 mod types;
 
-pub(crate) use checked::{FILE, check_settings, checked_space};
-pub(crate) use payloads::{by_payloads, types_by_payloads};
-pub(crate) use text::Origin;
-pub(crate) use types::Types;
+pub use checked::{FILE, check_settings, checked_space};
+pub use payloads::{by_payloads, types_by_payloads};
+pub use text::Origin;
+pub use types::Types;

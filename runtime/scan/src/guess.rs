@@ -105,12 +105,13 @@ impl Seen {
             let exactly = !self.more && self.fields.keys().map(String::as_str).eq(names.iter().copied());
             exactly && self.fields.values().all(|field| field.values() == self.objects)
         };
-        let numbers = |of: fn(&Seen) -> u64| self.fields.values().all(|field| of(field) == field.values());
-        if conventions.points && has(&["x", "y", "z"]) && numbers(Seen::numbers) {
+        let nulls = |field: &Seen| if conventions.null_is_nan { field.nulls } else { 0 };
+        let numbers = || self.fields.values().all(|field| field.numbers() + nulls(field) == field.values());
+        if conventions.points && has(&["x", "y", "z"]) && numbers() {
             return Ok(Guess::Point);
         }
         let is_time = has(&["nanosec", "sec"]) || has(&["nsecs", "secs"]);
-        if conventions.times && is_time && numbers(|field| field.wholes) {
+        if conventions.times && is_time && self.fields.values().all(|field| field.wholes == field.values()) {
             return Ok(Guess::Time);
         }
         let (mut fields, mut left_out) = (Vec::new(), Vec::new());

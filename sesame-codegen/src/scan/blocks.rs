@@ -28,6 +28,12 @@ pub(super) fn messages(system: &System, types: &Types, names: &BTreeMap<&str, St
              // whole numbers came there\n",
         );
     }
+    if is_ros && order.iter().any(|ty| types.source(ty) == TypeSource::Payloads) {
+        text.push_str(
+            "// decide: of messages with a block, whose fields are those that their JSON has in common: the sizes of\n\
+             // fields, `real` in the place of `int` where fractions may come, and the types of messages in messages\n",
+        );
+    }
     if is_ros && order.iter().any(|ty| !has_block(types, ty)) {
         text.push_str("// decide: units; `message NAME = \"TYPE\" { FIELD: real[m] }` gives a field its unit\n");
     }
@@ -38,18 +44,14 @@ pub(super) fn messages(system: &System, types: &Types, names: &BTreeMap<&str, St
             _ = writeln!(text, "{head}  // {}", fields_in_words(types, ty));
             continue;
         }
-        if is_ros {
-            text.push_str(match types.source(ty) {
-                TypeSource::Payloads => {
-                    "// decide: the units of its fields; their names and kinds are those of its messages in JSON, \
-                     which do not tell\n// their order, their sizes, and the types of messages in them\n"
-                }
-                _ => match system {
-                    System::Ros1 { .. } => "// decide: the units of its fields; a publisher described them\n",
-                    System::Rosbridge { .. } => "// decide: the units of its fields; the bridge described them\n",
-                    _ => "// decide: the units of its fields; a node described them\n",
-                },
-            });
+        let who = match (is_ros, types.source(ty), system) {
+            (false, ..) | (true, TypeSource::Payloads, _) => None,
+            (_, _, System::Ros1 { .. }) => Some("a publisher"),
+            (_, _, System::Rosbridge { .. }) => Some("the bridge"),
+            _ => Some("a node"),
+        };
+        if let Some(who) = who {
+            _ = writeln!(text, "// decide: the units of its fields; {who} described them");
         }
         _ = writeln!(text, "{head} {{");
         for field in types.fields(ty) {

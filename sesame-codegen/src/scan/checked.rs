@@ -9,10 +9,10 @@ use super::types::Types;
 use crate::frontend::{Language, Look};
 
 /// What the space is called while it is checked: a file in the current folder, to which its folders are relative.
-pub(crate) const FILE: &str = "scan.sesame";
+pub const FILE: &str = "scan.sesame";
 
 /// The space, formatted, which passes its check: types that do not are left out. An error is a mistake of this program.
-pub(crate) fn checked_space(
+pub fn checked_space(
     language: &Language,
     facts: &Facts,
     types: &mut Types,
@@ -45,7 +45,7 @@ pub(crate) fn checked_space(
 
 /// Whether a space could have this simulator with these settings: an address that is malformed, or to which a secret
 /// would go in plain text, is refused before anything is connected.
-pub(crate) fn check_settings(language: &Language, system: System, settings: &[String]) -> Result<(), String> {
+pub fn check_settings(language: &Language, system: System, settings: &[String]) -> Result<(), String> {
     let origin = Origin { folders: &[], services: &BTreeSet::new(), settings };
     let checked = (language.check)(FILE, &space(&Facts::of(system), &Types::default(), origin), Look::Short);
     if checked.errors == 0 { Ok(()) } else { Err(first_error(&checked.diagnostics)) }

@@ -67,7 +67,7 @@ pub(super) fn fold<'a>(topics: &[&'a FoundTopic]) -> Vec<Line<'a>> {
 
 /// Whether a part of a path can be written between the braces of a group.
 fn is_member(part: &str) -> bool {
-    !part.is_empty() && part.trim() == part && !part.contains(',')
+    !part.is_empty() && !part.contains(',')
 }
 
 fn quality(topic: &FoundTopic) -> Quality {

@@ -21,7 +21,7 @@ struct Alike {
 }
 
 /// Gives each topic the type that its payloads have in common with those of topics that look alike.
-pub(crate) fn by_payloads(facts: &mut Facts, payloads: &Payloads, conventions: Conventions) -> Types {
+pub fn by_payloads(facts: &mut Facts, payloads: &Payloads, conventions: Conventions) -> Types {
     let mut types = Types::default();
     for alike in alike(facts, payloads) {
         let first = &facts.topics[alike.topics[0]].path;
@@ -76,7 +76,7 @@ fn alike(facts: &Facts, payloads: &Payloads) -> Vec<Alike> {
 }
 
 /// Layouts of types of ROS that nobody described, from the payloads of their topics.
-pub(crate) fn types_by_payloads(types: &mut Types, facts: &Facts, payloads: &Payloads) {
+pub fn types_by_payloads(types: &mut Types, facts: &Facts, payloads: &Payloads) {
     for name in types.missing() {
         let mut samples = Samples::default();
         let of_type = facts.topics.iter().filter(|topic| topic.ty.as_deref() == Some(&name));

@@ -87,9 +87,9 @@ fn is_path(system: &System, path: &str) -> bool {
     if system.is_ros() {
         return is_ros_name(path);
     }
-    let fits = !path.trim().is_empty() && path.len() <= LONGEST;
     // A brace begins a group, and what is not visible is no text of a space.
-    fits && !path.contains(['{', '}']) && visible(path) == path && !path.contains(char::is_control)
+    let unsayable = |c: char| c.is_whitespace() || c.is_control() || matches!(c, '{' | '}');
+    !path.is_empty() && path.len() <= LONGEST && !path.contains(unsayable) && visible(path) == path
 }
 
 /// Whether this can be the name of a topic, a service or a node of ROS, with its `/` at the beginning.

@@ -15,17 +15,17 @@ use super::{blocks, sayable, simulator};
 
 /// Of what the space is made, besides what was found.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Origin<'a> {
+pub struct Origin<'a> {
     /// The folders with definitions of types, as they are written.
-    pub(crate) folders: &'a [String],
+    pub folders: &'a [String],
     /// The types of services that have a layout.
-    pub(crate) services: &'a BTreeSet<String>,
+    pub services: &'a BTreeSet<String>,
     /// Lines of the simulator that say how it was reached, such as where a secret is.
-    pub(crate) settings: &'a [String],
+    pub settings: &'a [String],
 }
 
 /// A space with its system, in need of formatting.
-pub(crate) fn space(facts: &Facts, types: &Types, origin: Origin<'_>) -> String {
+pub(super) fn space(facts: &Facts, types: &Types, origin: Origin<'_>) -> String {
     let mut unsaid = Unsaid::default();
     let system = &facts.system;
     let clock = simulator::clock(facts);

@@ -17,7 +17,7 @@ const DEEPEST: usize = 50;
 
 /// Types by their names.
 #[derive(Debug, Default)]
-pub(crate) struct Types {
+pub struct Types {
     by_name: BTreeMap<String, Type>,
     /// Types of topics that are no messages, by their words.
     plain: BTreeMap<String, WireType>,
@@ -45,7 +45,7 @@ impl Type {
 
 impl Types {
     /// The types of all topics, as far as they are known or folders have them.
-    pub(crate) fn of_topics(facts: &Facts, files: &dyn Interfaces, folders: Folders<'_>) -> Self {
+    pub fn of_topics(facts: &Facts, files: &dyn Interfaces, folders: Folders<'_>) -> Self {
         let mut types = Types::default();
         for ty in facts.topics.iter().filter_map(|topic| topic.ty.as_deref()) {
             types.look_up(ty, files, folders);
@@ -82,14 +82,14 @@ impl Types {
     }
 
     /// Types of which no folder has a definition, and nothing else is wrong.
-    pub(crate) fn missing(&self) -> Vec<String> {
+    pub fn missing(&self) -> Vec<String> {
         let missing = self.by_name.iter();
         let missing = missing.filter(|(_, ty)| ty.source == TypeSource::Unknown && ty.problem.is_none());
         missing.map(|(name, _)| name.clone()).collect()
     }
 
     /// Adds layouts as nodes describe them, by the type for which they were asked.
-    pub(crate) fn add_described(
+    pub fn add_described(
         &mut self,
         described: &BTreeMap<String, Vec<Interface>>,
         files: &dyn Interfaces,
@@ -142,7 +142,7 @@ impl Types {
     }
 
     /// A type turned out to be of no use.
-    pub(crate) fn refuse(&mut self, name: &str, problem: String) {
+    pub fn refuse(&mut self, name: &str, problem: String) {
         if let Some(ty) = self.by_name.get_mut(name) {
             *ty = Type::unknown(Some(problem));
         }
@@ -191,23 +191,23 @@ impl Types {
     }
 
     /// Where the layout of a type comes from.
-    pub(crate) fn source(&self, name: &str) -> TypeSource {
+    pub fn source(&self, name: &str) -> TypeSource {
         self.by_name.get(name).map_or(TypeSource::Unknown, |ty| ty.source)
     }
 
     /// The fields that a type has for people.
-    pub(crate) fn fields(&self, name: &str) -> impl Iterator<Item = &InterfaceField> {
+    pub fn fields(&self, name: &str) -> impl Iterator<Item = &InterfaceField> {
         let fields = self.by_name.get(name).map(|ty| ty.fields.as_slice()).unwrap_or_default();
         fields.iter().filter(|field| field.name != interfaces::NO_FIELDS)
     }
 
     /// Why a type cannot be used, in a clause.
-    pub(crate) fn problem(&self, name: &str) -> Option<&str> {
+    pub fn problem(&self, name: &str) -> Option<&str> {
         self.by_name.get(name)?.problem.as_deref()
     }
 
     /// What messages of a type are in the language where that is no message: times, and points that need no block.
-    pub(crate) fn plain(&self, name: &str) -> Option<&'static str> {
+    pub fn plain(&self, name: &str) -> Option<&'static str> {
         if interfaces::is_time(name) {
             return Some("real[s]");
         }
@@ -220,7 +220,7 @@ impl Types {
     }
 
     /// The types of these names that can be used, and those that the blocks of described types need, each once.
-    pub(crate) fn needed<'a>(&'a self, of_topics: impl IntoIterator<Item = &'a str>) -> Vec<&'a str> {
+    pub fn needed<'a>(&'a self, of_topics: impl IntoIterator<Item = &'a str>) -> Vec<&'a str> {
         let mut needed: Vec<&str> = Vec::new();
         for name in of_topics {
             // What is plain itself is a list of messages, perhaps.
@@ -248,7 +248,7 @@ impl Types {
     }
 
     /// All of them as facts.
-    pub(crate) fn facts(&self) -> Vec<FoundType> {
+    pub fn facts(&self) -> Vec<FoundType> {
         let field =
             |field: &InterfaceField| FoundField { name: field.name.clone(), ty: interfaces::in_words(&field.ty) };
         let of = |(name, ty): (&String, &Type)| FoundType {

@@ -25,6 +25,7 @@ pub(super) struct Definitions {
 
 impl Definitions {
     /// In the folders that are named, or else in these.
+    #[cfg(any(feature = "ros1", feature = "ros2", feature = "rosbridge"))]
     pub(super) fn new(named: &[PathBuf], others: impl Iterator<Item = PathBuf>) -> anyhow::Result<Self> {
         let folders: Vec<PathBuf> =
             if named.is_empty() { others.filter(|folder| folder.is_dir()).collect() } else { named.to_vec() };
@@ -44,6 +45,7 @@ impl Definitions {
     }
 
     /// None: the middleware has no types.
+    #[cfg(any(feature = "mqtt", feature = "simlog"))]
     pub(super) fn none() -> Self {
         Definitions { written: Vec::new(), files: Files::default() }
     }
@@ -67,17 +69,20 @@ impl Definitions {
 }
 
 /// The folders `share` of what is installed for ROS 2.
+#[cfg(any(feature = "ros2", feature = "rosbridge"))]
 pub(super) fn shares() -> impl Iterator<Item = PathBuf> {
     paths("AMENT_PREFIX_PATH").into_iter().map(|prefix| prefix.join("share"))
 }
 
 /// The absolute paths in a variable of the environment.
+#[cfg(any(feature = "ros1", feature = "ros2", feature = "rosbridge"))]
 pub(super) fn paths(variable: &str) -> Vec<PathBuf> {
     let paths = std::env::var_os(variable).unwrap_or_default();
     std::env::split_paths(&paths).filter(|path| path.is_absolute()).collect()
 }
 
 /// Where a secret is, if it is anywhere.
+#[cfg(any(feature = "mqtt", feature = "rosbridge"))]
 pub(super) fn secret(variable: Option<&String>, file: Option<&String>) -> Option<Secret> {
     match (variable, file) {
         (Some(name), _) => Some(Secret::Environment { name: name.clone() }),
@@ -87,6 +92,7 @@ pub(super) fn secret(variable: Option<&String>, file: Option<&String>) -> Option
 }
 
 /// The line of a simulator that says where a secret is.
+#[cfg(any(feature = "mqtt", feature = "rosbridge"))]
 pub(super) fn secret_line(word: &str, secret: &Secret) -> String {
     match secret {
         Secret::Environment { name } => format!("{word} from env {}", quoted(name)),
@@ -95,13 +101,9 @@ pub(super) fn secret_line(word: &str, secret: &Secret) -> String {
 }
 
 /// Refuses an address that no space could have, before anything is connected there.
+#[cfg(any(feature = "mqtt", feature = "ros1", feature = "rosbridge", feature = "simlog"))]
 pub(super) fn refuse_wrong_address(language: &Language, system: System, settings: &[String]) -> anyhow::Result<()> {
-    check_settings(language, system, settings).map_err(|problem| {
-        anyhow!(
-            "{problem}; the reference of the language says how an address looks, and that a secret goes over plain text \
-             to this machine only"
-        )
-    })
+    check_settings(language, system, settings).map_err(|problem| anyhow!(problem))
 }
 
 /// Prints the space, or what was found.

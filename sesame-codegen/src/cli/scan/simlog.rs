@@ -1,10 +1,10 @@
 //! `sesamec scan simlog`: listens to topics of a simulator, writes a space, and checks what it wrote.
 
-use std::path::PathBuf;
+use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use anyhow::{Context as _, bail};
+use anyhow::{anyhow, bail};
 use sesame_notation::quoted;
 use sesame_plan::{SimlogVersion, WireNames};
 use sesame_scan::System;
@@ -20,6 +20,9 @@ use crate::scan::by_payloads;
 
 /// The variable with the token that is sent with each call, if there is one.
 const TOKEN: &str = "SESAME_SIMLOG_TOKEN";
+
+/// The most bytes of a file with certificates.
+const MOST_CERTIFICATES: u64 = 1 << 20;
 
 /// `sesamec scan simlog`
 pub(super) fn scan(shell: Shell, language: &Language, arguments: &Simlog) -> anyhow::Result<ExitCode> {
@@ -67,8 +70,8 @@ pub(super) fn scan(shell: Shell, language: &Language, arguments: &Simlog) -> any
 fn topics(arguments: &Simlog) -> anyhow::Result<Vec<String>> {
     let mut named = arguments.topics.clone();
     if let Some(file) = &arguments.topics_from {
-        let text = input::read(file)
-            .map_err(|why| anyhow::anyhow!("the topics in {} cannot be read: {why}", file.display()))?;
+        let text =
+            input::text(file).map_err(|why| anyhow!("the topics in {} cannot be read: {why}", file.display()))?;
         named.extend(text.lines().map(|line| line.trim().to_owned()));
     }
     let mut topics: Vec<String> = Vec::new();
@@ -90,7 +93,6 @@ fn topics(arguments: &Simlog) -> anyhow::Result<Vec<String>> {
 }
 
 fn certificates(file: &str) -> anyhow::Result<Vec<u8>> {
-    let path = PathBuf::from(file);
-    let text = input::read(&path).map_err(|why| anyhow::anyhow!("{why}"));
-    Ok(text.with_context(|| format!("the trusted certificates in `{file}` cannot be read"))?.into_bytes())
+    input::bytes(Path::new(file), MOST_CERTIFICATES)
+        .map_err(|why| anyhow!("the trusted certificates in `{file}` cannot be read: {why}"))
 }
