@@ -10,10 +10,10 @@ use sesame_tests::fresh_folder;
 use crate::peers::{Broker, free_port, packages};
 use crate::relaying::{System, space};
 
-const SECRET: &str = "s3cret-of-the-fleet";
+pub(crate) const SECRET: &str = "s3cret-of-the-fleet";
 
 /// A password file of mosquitto with a user `relay`.
-fn passwords(folder: &Path) -> String {
+pub(crate) fn passwords(folder: &Path) -> String {
     let file = folder.join("passwords");
     let made = Command::new("mosquitto_passwd").args(["-b", "-c"]).arg(&file).args(["relay", SECRET]).status();
     assert!(made.expect("mosquitto_passwd starts").success());
