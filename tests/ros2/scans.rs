@@ -107,7 +107,8 @@ fn a_master_of_ros_1_and_its_nodes_say_what_they_are() {
     let start = |program: &mut Command| {
         program.current_dir(&folder).env("ROS_MASTER_URI", &uri).env("ROS_IP", "127.0.0.1");
         program.env("ROS_HOME", folder.join("home")).env("ROS_LOG_DIR", folder.join("log"));
-        program.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+        // Peers wait for a line before they publish, and end at the end of their input.
+        program.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null());
         Program(program.spawn().expect("programs of ROS 1 start"))
     };
     let nobody = in_folder(&folder, &["scan", "ros1", "--master", &uri]).expect(1);

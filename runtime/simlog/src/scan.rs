@@ -1,7 +1,8 @@
 //! What comes on topics of a simulator: messages, and what they have in common.
 //!
 //! The protocol lists no topics in either version, so whoever scans names them. Version 3 tells whether a topic exists,
-//! and what its value is now; version 2 tells nothing before a message comes. A step is taken only if that is asked for.
+//! and what its value is now; version 2 tells nothing before a message comes. A step is taken only if that is asked
+//! for.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
