@@ -10,6 +10,7 @@ mod comments;
 mod groups;
 mod named;
 mod nodes;
+mod origin;
 mod payloads;
 mod sayable;
 mod simulator;
@@ -20,6 +21,6 @@ mod topics;
 mod types;
 
 pub use checked::{FILE, check_settings, checked_space};
+pub use origin::Origin;
 pub use payloads::{by_payloads, types_by_payloads};
-pub use text::Origin;
 pub use types::Types;

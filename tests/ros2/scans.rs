@@ -153,7 +153,7 @@ fn a_master_of_ros_1_and_its_nodes_say_what_they_are() {
     passes(&folder, &space);
     let arguments = ["scan", "ros1", "--master", &uri, "--types", "/usr/share", "--seconds", "2"];
     let space = in_folder(&folder, &arguments).expect(0).out;
-    has(&space, &["    types \"/usr/share\"", "  message JointState = \"sensor_msgs/msg/JointState\"  // header"]);
+    has(&space, &["    types \"/usr/share\"", "  // header: std_msgs/msg/Header, name: string[]"]);
     passes(&folder, &space);
     let json = in_folder(&folder, &["scan", "ros1", "--master", &uri, "--seconds", "2", "--format", "json"]).expect(0);
     let json: Value = serde_json::from_str(&json.out).expect("it is JSON");

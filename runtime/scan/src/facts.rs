@@ -82,6 +82,15 @@ pub enum System {
 }
 
 impl System {
+    /// Of which ROS it is; ROS 2 where it is of none.
+    pub fn dialect(&self) -> Dialect {
+        match self {
+            System::Ros1 { .. } => Dialect::Ros1,
+            System::Rosbridge { dialect, .. } => *dialect,
+            System::Ros2 { .. } | System::Mqtt { .. } | System::Simlog { .. } => Dialect::Ros2,
+        }
+    }
+
     /// Whether its messages have types of ROS.
     pub fn is_ros(&self) -> bool {
         match self {

@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 
 use sesame_scan::{Facts, System};
 
-use super::text::{Origin, space};
+use super::origin::Origin;
+use super::text::space;
 use super::types::Types;
 use crate::frontend::{Language, Look};
 

@@ -7,7 +7,7 @@ use sesame_notation::quoted;
 use sesame_scan::{CLOCK, Facts, FoundService, FoundTopic, System, TypeSource};
 
 use super::comments::Unsaid;
-use super::text::Origin;
+use super::origin::Origin;
 use super::types::Types;
 
 /// Topics that the space can have.

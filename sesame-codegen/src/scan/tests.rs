@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use proptest::prelude::*;
 use serde_json::Value as Json;
 use sesame_dsl::interfaces::{Folders, Interfaces, wire_type};
-use sesame_plan::{Interface, InterfaceField};
+use sesame_plan::{Dialect, Interface, InterfaceField};
 use sesame_scan::{Conventions, Facts, FoundAction, FoundNode, FoundService, FoundTopic, Payloads, System};
 
 use super::{FILE, Origin, Types, by_payloads, check_settings, checked_space, types_by_payloads};
@@ -56,7 +56,7 @@ fn layout(name: &str, fields: &[(&str, &str)]) -> Interface {
 
 /// The space of what was found, with layouts that nodes described. It passes its check, and is formatted.
 fn written(facts: &Facts, described: &[Interface]) -> String {
-    let folders = Folders { written: &[], file: FILE };
+    let folders = Folders { written: &[], file: FILE, dialect: Dialect::Ros2 };
     let mut types = Types::of_topics(facts, &Made, folders);
     assert!(types.missing().iter().all(|name| facts.topics.iter().any(|topic| topic.ty.as_ref() == Some(name))));
     types.add_described(&BTreeMap::from([(String::new(), described.to_vec())]), &Made, folders);
@@ -236,9 +236,9 @@ fn a_bridge_without_rosapi_has_what_its_messages_have_in_common() {
         ty: Some("cell_msgs/msg/Silent".to_owned()),
         ..FoundTopic::default()
     });
-    let (url, dialect) = ("wss://hall:9090".to_owned(), sesame_plan::Dialect::Ros1);
+    let (url, dialect) = ("wss://hall:9090".to_owned(), Dialect::Ros1);
     let facts = Facts { seconds: 3.5, topics, ..Facts::of(System::Rosbridge { url, dialect, rosapi: false }) };
-    let mut types = Types::of_topics(&facts, &Made, Folders { written: &[], file: FILE });
+    let mut types = Types::of_topics(&facts, &Made, Folders { written: &[], file: FILE, dialect: Dialect::Ros2 });
     types_by_payloads(&mut types, &facts, &payloads);
     insta::assert_snapshot!(checked(&facts, types, &["token from env \"HALL_TOKEN\"", "trust \"hall.pem\""]));
 }
@@ -378,10 +378,10 @@ proptest! {
         for (at, topic) in topics.iter_mut().enumerate() {
             topic.ty = Some(format!("a/msg/T{}", at / 2));
         }
-        let dialect = sesame_plan::Dialect::Ros2;
+        let dialect = Dialect::Ros2;
         let system = System::Rosbridge { url: "ws://127.0.0.1:1".to_owned(), dialect, rosapi: false };
         let facts = Facts { topics, ..Facts::of(system) };
-        let mut types = Types::of_topics(&facts, &Made, Folders { written: &[], file: FILE });
+        let mut types = Types::of_topics(&facts, &Made, Folders { written: &[], file: FILE, dialect: Dialect::Ros2 });
         types_by_payloads(&mut types, &facts, &payloads);
         checked(&facts, types, &[]);
     }

@@ -1,6 +1,5 @@
 //! The text of a space from what was found.
 
-use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use sesame_notation::quoted;
@@ -9,20 +8,10 @@ use sesame_scan::Facts;
 use super::comments::Unsaid;
 use super::named::name_all;
 use super::nodes::nodes;
+use super::origin::Origin;
 use super::topics::{service_lines, topic_lines};
 use super::types::Types;
 use super::{blocks, sayable, simulator};
-
-/// Of what the space is made, besides what was found.
-#[derive(Debug, Clone, Copy)]
-pub struct Origin<'a> {
-    /// The folders with definitions of types, as they are written.
-    pub folders: &'a [String],
-    /// The types of services that have a layout.
-    pub services: &'a BTreeSet<String>,
-    /// Lines of the simulator that say how it was reached, such as where a secret is.
-    pub settings: &'a [String],
-}
 
 /// A space with its system, in need of formatting.
 pub(super) fn space(facts: &Facts, types: &Types, origin: Origin<'_>) -> String {

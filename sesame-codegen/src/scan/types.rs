@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use sesame_dsl::interfaces::{self, Folders, Interfaces};
-use sesame_plan::{Interface, InterfaceField, WireType};
+use sesame_plan::{Dialect, Interface, InterfaceField, WireType};
 use sesame_scan::{Facts, FoundField, FoundType, LeftOut, TypeSource};
 
 /// What a point is called that has no type of ROS.
@@ -55,7 +55,7 @@ impl Types {
 
     /// Adds a type of ROS that needs no folder.
     pub(super) fn add_known(&mut self, name: &str) {
-        self.look_up(name, &interfaces::NoInterfaces, Folders { written: &[], file: "" });
+        self.look_up(name, &interfaces::NoInterfaces, Folders { written: &[], file: "", dialect: Dialect::Ros2 });
     }
 
     fn look_up(&mut self, name: &str, files: &dyn Interfaces, folders: Folders<'_>) {

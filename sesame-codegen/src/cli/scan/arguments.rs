@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::super::arguments::ExplainFormat;
+use crate::cli::arguments::ExplainFormat;
 
 pub(super) const ROS_2: &str = "For example: sesamec scan ros2 --domain 40 --types /opt/ros/jazzy/share > cell.sesame\n\n\
                                 Nothing is published beyond what discovery needs; nodes are asked only for the layouts \

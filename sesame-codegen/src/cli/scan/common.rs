@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use anyhow::{Context as _, anyhow, bail};
 use sesame_dsl::interfaces::{self, Folders, Interfaces as _};
 use sesame_notation::quoted;
-use sesame_plan::Secret;
+use sesame_plan::{Dialect, Secret};
 use sesame_scan::{Facts, System};
 
 use crate::cli::arguments::ExplainFormat;
@@ -50,15 +50,17 @@ impl Definitions {
         Definitions { written: Vec::new(), files: Files::default() }
     }
 
-    pub(super) fn folders(&self) -> Folders<'_> {
-        Folders { written: &self.written, file: FILE }
+    /// As those of files of this ROS.
+    pub(super) fn folders(&self, dialect: Dialect) -> Folders<'_> {
+        Folders { written: &self.written, file: FILE, dialect }
     }
 
     /// The types of services that have layouts of requests and replies.
     fn services(&self, facts: &Facts) -> BTreeSet<String> {
+        let dialect = facts.system.dialect();
         let types: BTreeSet<&String> = facts.services.iter().filter_map(|service| service.ty.as_ref()).collect();
         let has_layout = |part: &str| {
-            interfaces::known(part).is_some() || matches!(self.files.find(self.folders(), part), Ok(Some(_)))
+            interfaces::known(part).is_some() || matches!(self.files.find(self.folders(dialect), part), Ok(Some(_)))
         };
         let has_layouts = |ty: &str| {
             interfaces::full_name(ty, "srv").as_deref() == Some(ty)

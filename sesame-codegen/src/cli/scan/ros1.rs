@@ -4,6 +4,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use anyhow::Context as _;
+use sesame_plan::Dialect;
 use sesame_scan::System;
 
 use super::arguments::Ros1;
@@ -31,8 +32,8 @@ pub(super) fn scan(shell: Shell, language: &Language, arguments: &Ros1) -> anyho
     let found = sesame_ros1::scan::scan(master, ASKING, Duration::from_secs_f64(seconds)).context(
         "no master of ROS 1 can be asked; start one with `roscore`, or name the one that runs with `--master`",
     )?;
-    let mut types = Types::of_topics(&found.facts, &definitions.files, definitions.folders());
-    types.add_described(&found.layouts, &definitions.files, definitions.folders());
+    let mut types = Types::of_topics(&found.facts, &definitions.files, definitions.folders(Dialect::Ros1));
+    types.add_described(&found.layouts, &definitions.files, definitions.folders(Dialect::Ros1));
     tell(
         shell,
         &found.facts,

@@ -4,6 +4,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use anyhow::Context as _;
+use sesame_plan::Dialect;
 use sesame_ros2::scan::Scanner;
 
 use super::arguments::Ros2;
@@ -24,13 +25,13 @@ pub(super) fn scan(shell: Shell, language: &Language, arguments: &Ros2) -> anyho
     shell.doing("Listening", format!("to domain {domain} on {reach} for {seconds} s"));
     scanner.listen(Duration::from_secs_f64(seconds))?;
     let facts = scanner.facts();
-    let mut types = Types::of_topics(&facts, &definitions.files, definitions.folders());
+    let mut types = Types::of_topics(&facts, &definitions.files, definitions.folders(Dialect::Ros2));
     let missing = types.missing();
     if !missing.is_empty() {
         let asked = if missing.len() == 1 { "a type".to_owned() } else { format!("{} types", missing.len()) };
         shell.doing("Asking", format!("nodes for the layout of {asked} that no folder has"));
         let described = scanner.describe(&facts, &missing, DESCRIBING)?;
-        types.add_described(&described, &definitions.files, definitions.folders());
+        types.add_described(&described, &definitions.files, definitions.folders(Dialect::Ros2));
     }
     drop(scanner);
     let network = if arguments.network { "" } else { ", and nodes on other machines are heard with `--network` only" };

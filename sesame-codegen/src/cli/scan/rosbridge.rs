@@ -44,11 +44,12 @@ pub(super) fn scan(shell: Shell, language: &Language, arguments: &Rosbridge) -> 
         );
     }
     scanner.add(&wanted);
-    let mut types = Types::of_topics(scanner.facts(), &definitions.files, definitions.folders());
+    let mut types =
+        Types::of_topics(scanner.facts(), &definitions.files, definitions.folders(scanner.facts().system.dialect()));
     let missing = types.missing();
     if !missing.is_empty() {
         let described = scanner.describe(&missing)?;
-        types.add_described(&described, &definitions.files, definitions.folders());
+        types.add_described(&described, &definitions.files, definitions.folders(scanner.facts().system.dialect()));
     }
     shell.doing("Listening", format!("to {} topics for {seconds} s", scanner.facts().topics.len()));
     scanner.listen(Duration::from_secs_f64(seconds))?;
