@@ -289,15 +289,18 @@ impl Scanner {
         }
     }
 
+    /// Whether this is a topic that it subscribed to.
+    fn listens_to(&self, topic: &str) -> bool {
+        self.facts.topics.iter().take(MOST_LISTENED).any(|known| known.path == topic)
+    }
+
     fn take(&mut self, incoming: Incoming) -> Result<(), ScanError> {
         match incoming {
             Incoming::Operation(operation, arrived) => match *operation {
-                Operation::Publish { topic, msg, .. } => {
-                    if self.facts.topics.iter().take(MOST_LISTENED).any(|known| known.path == topic) {
-                        let at = arrived.saturating_duration_since(self.begin);
-                        self.payloads.add(&topic, &msg);
-                        self.arrivals.entry(topic).or_default().add(at);
-                    }
+                Operation::Publish { topic, msg, .. } if self.listens_to(&topic) => {
+                    let at = arrived.saturating_duration_since(self.begin);
+                    self.payloads.add(&topic, &msg);
+                    self.arrivals.entry(topic).or_default().add(at);
                 }
                 Operation::Status { id: Some(id), level: Level::Error, msg } => {
                     if let Some(topic) = id.strip_prefix(TOPIC)
@@ -324,4 +327,5 @@ fn now() -> Instant {
 }
 
 #[cfg(test)]
+#[expect(clippy::disallowed_methods, clippy::disallowed_types, reason = "they have a server of their own")]
 mod tests;

@@ -36,27 +36,38 @@ pub enum Guess {
 }
 
 /// How a middleware writes in JSON what JSON does not have, and what the relay reads there.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Conventions {
-    /// An object of the numbers `x`, `y` and `z` is a point.
-    pub points: bool,
-    /// An object of `sec` and `nanosec`, or of `secs` and `nsecs`, is a time.
-    pub times: bool,
-    /// `null` in the place of a number is NaN.
-    pub null_is_nan: bool,
-    /// A payload may be any text, so that one of several kinds is a text.
-    pub any_text: bool,
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Conventions {
+    /// Payloads in JSON without a protocol around them.
+    Json,
+    /// Those of a bridge to ROS.
+    Rosbridge,
+    /// Those of SimlogAPI, version 2.
+    Simlog2,
+    /// Those of SimlogAPI, version 3.
+    Simlog3,
 }
 
 impl Conventions {
-    /// Those of payloads in JSON without a protocol around them.
-    pub const JSON: Conventions = Conventions { points: false, times: false, null_is_nan: false, any_text: false };
-    /// Those of a bridge to ROS.
-    pub const ROSBRIDGE: Conventions = Conventions { points: true, times: true, null_is_nan: true, any_text: false };
-    /// Those of SimlogAPI, version 2.
-    pub const SIMLOG_2: Conventions = Conventions { points: true, times: false, null_is_nan: false, any_text: true };
-    /// Those of SimlogAPI, version 3.
-    pub const SIMLOG_3: Conventions = Conventions { points: true, times: false, null_is_nan: false, any_text: false };
+    /// Whether an object of the numbers `x`, `y` and `z` is a point.
+    fn points(self) -> bool {
+        self != Conventions::Json
+    }
+
+    /// Whether an object of `sec` and `nanosec`, or of `secs` and `nsecs`, is a time.
+    fn times(self) -> bool {
+        self == Conventions::Rosbridge
+    }
+
+    /// Whether `null` in the place of a number is NaN.
+    fn null_is_nan(self) -> bool {
+        self == Conventions::Rosbridge
+    }
+
+    /// Whether a payload may be any text, so that one of several kinds is a text.
+    fn any_text(self) -> bool {
+        self == Conventions::Simlog2
+    }
 }
 
 impl Samples {
@@ -67,7 +78,7 @@ impl Samples {
         // What is text on the wire may be read as text, whatever it looks like.
         let of_texts = root.nulls + root.lists + root.objects + root.deep == 0;
         match guess {
-            Err(_) if conventions.any_text && of_texts && root.values() > 0 => Ok(Guess::Text),
+            Err(_) if conventions.any_text() && of_texts && root.values() > 0 => Ok(Guess::Text),
             guess => guess,
         }
     }
@@ -79,7 +90,7 @@ impl Seen {
         if all == 0 {
             return Err("nothing came".to_owned());
         }
-        let numbers = self.numbers() + if conventions.null_is_nan { self.nulls } else { 0 };
+        let numbers = self.numbers() + if conventions.null_is_nan() { self.nulls } else { 0 };
         if self.bools == all {
             Ok(Guess::Bool)
         } else if self.wholes == all {
@@ -105,13 +116,13 @@ impl Seen {
             let exactly = !self.more && self.fields.keys().map(String::as_str).eq(names.iter().copied());
             exactly && self.fields.values().all(|field| field.values() == self.objects)
         };
-        let nulls = |field: &Seen| if conventions.null_is_nan { field.nulls } else { 0 };
+        let nulls = |field: &Seen| if conventions.null_is_nan() { field.nulls } else { 0 };
         let numbers = || self.fields.values().all(|field| field.numbers() + nulls(field) == field.values());
-        if conventions.points && has(&["x", "y", "z"]) && numbers() {
+        if conventions.points() && has(&["x", "y", "z"]) && numbers() {
             return Ok(Guess::Point);
         }
         let is_time = has(&["nanosec", "sec"]) || has(&["nsecs", "secs"]);
-        if conventions.times && is_time && self.fields.values().all(|field| field.wholes == field.values()) {
+        if conventions.times() && is_time && self.fields.values().all(|field| field.wholes == field.values()) {
             return Ok(Guess::Time);
         }
         let (mut fields, mut left_out) = (Vec::new(), Vec::new());

@@ -145,8 +145,8 @@ impl Scan {
             }
         }
         let (protocol, conventions) = match options.version {
-            SimlogVersion::V2 => (2, Conventions::SIMLOG_2),
-            SimlogVersion::V3 => (3, Conventions::SIMLOG_3),
+            SimlogVersion::V2 => (2, Conventions::Simlog2),
+            SimlogVersion::V3 => (3, Conventions::Simlog3),
         };
         let system = System::Simlog { url: options.url.clone(), protocol, step_ms: wanted.step_ms, steps };
         let facts = Facts {
@@ -159,7 +159,6 @@ impl Scan {
     }
 }
 
-#[expect(clippy::disallowed_methods, reason = "an adapter: it waits for a simulator")]
 fn now() -> Instant {
     Instant::now()
 }

@@ -84,7 +84,7 @@ pub fn types_by_payloads(types: &mut Types, facts: &Facts, payloads: &Payloads) 
         if samples.count() == 0 {
             continue;
         }
-        match samples.guess(Conventions::ROSBRIDGE) {
+        match samples.guess(Conventions::Rosbridge) {
             Ok(Guess::Message { fields, left_out }) => {
                 message_of_ros(types, &name, fields, left_out);
             }

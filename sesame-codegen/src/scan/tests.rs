@@ -274,7 +274,7 @@ fn a_broker_has_topics_of_fleets_as_groups_and_messages_as_their_payloads() {
     topics[0].problem = Some("1 of 2 payloads are no JSON".to_owned());
     let system = System::Mqtt { url: "mqtt://127.0.0.1:1883".to_owned() };
     let mut facts = Facts { seconds: 5.0, topics, ..Facts::of(system) };
-    let types = by_payloads(&mut facts, &payloads, Conventions::JSON);
+    let types = by_payloads(&mut facts, &payloads, Conventions::Json);
     let text = checked(&facts, types, &["user \"scan\"", "password from file \"secret\""]);
     insta::assert_snapshot!(text);
 }
@@ -297,7 +297,7 @@ fn a_simulator_has_the_topics_that_were_named() {
     topics[0].can_be_cut = Some(false);
     let system = System::Simlog { url: "http://127.0.0.1:8089".to_owned(), protocol: 3, step_ms: 20, steps: 10 };
     let mut facts = Facts { seconds: 0.75, topics, ..Facts::of(system) };
-    let types = by_payloads(&mut facts, &payloads, Conventions::SIMLOG_2);
+    let types = by_payloads(&mut facts, &payloads, Conventions::Simlog2);
     insta::assert_snapshot!(checked(&facts, types, &["prefix \"SIM://\""]));
 }
 
@@ -360,9 +360,9 @@ proptest! {
         let (topics, payloads) = untyped(&published);
         let url = |scheme: &str| format!("{scheme}://127.0.0.1:1");
         let (system, conventions) = match which {
-            0 => (System::Mqtt { url: url("mqtt") }, Conventions::JSON),
-            1 => (System::Simlog { url: url("http"), protocol: 2, step_ms: 20, steps: 1 }, Conventions::SIMLOG_2),
-            _ => (System::Simlog { url: url("http"), protocol: 3, step_ms: 20, steps: 1 }, Conventions::SIMLOG_3),
+            0 => (System::Mqtt { url: url("mqtt") }, Conventions::Json),
+            1 => (System::Simlog { url: url("http"), protocol: 2, step_ms: 20, steps: 1 }, Conventions::Simlog2),
+            _ => (System::Simlog { url: url("http"), protocol: 3, step_ms: 20, steps: 1 }, Conventions::Simlog3),
         };
         let mut facts = Facts { topics, ..Facts::of(system) };
         let types = by_payloads(&mut facts, &payloads, conventions);

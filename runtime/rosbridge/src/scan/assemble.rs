@@ -98,8 +98,8 @@ impl Graph {
             if !is_node_of_the_system(&name) {
                 continue;
             }
-            let known = nodes.entry(name.clone()).or_default();
-            known.name = name.clone();
+            let new = FoundNode { name: name.clone(), ..FoundNode::default() };
+            let known = nodes.entry(name.clone()).or_insert(new);
             known.count += 1;
             let mut note = |paths: Vec<String>, list: fn(&mut FoundNode) -> &mut Vec<String>| {
                 let mut paths: Vec<String> = paths.into_iter().filter(|path| is_of_the_system(path)).collect();

@@ -57,16 +57,14 @@ pub(super) fn layouts(answer: &Json) -> Option<Vec<Interface>> {
     if typedefs.is_empty() || typedefs.len() > MOST_TYPES {
         return None;
     }
-    let layouts: Option<Vec<Option<Interface>>> = typedefs.iter().map(layout).collect();
-    Some(layouts?.into_iter().flatten().collect())
+    // A time is described as if it were a message.
+    let is_time = |typedef: &&Json| matches!(typedef.get("type").and_then(Json::as_str), Some("time" | "duration"));
+    typedefs.iter().filter(|typedef| !is_time(typedef)).map(layout).collect()
 }
 
-/// The layout of one type; nothing for a time, which is described as if it were a message.
-fn layout(typedef: &Json) -> Option<Option<Interface>> {
+/// The layout of one type.
+fn layout(typedef: &Json) -> Option<Interface> {
     let name = typedef.get("type")?.as_str()?;
-    if matches!(name, "time" | "duration") {
-        return Some(None);
-    }
     let list = |field: &str| typedef.get(field).and_then(Json::as_array);
     let (names, types, lengths) = (list("fieldnames")?, list("fieldtypes")?, list("fieldarraylen")?);
     if names.len() > MOST_FIELDS || names.len() != types.len() || names.len() != lengths.len() {
@@ -85,7 +83,7 @@ fn layout(typedef: &Json) -> Option<Option<Interface>> {
         };
         Some(InterfaceField { name: name.to_owned(), ty })
     });
-    Some(Some(Interface { name: interface(name), fields: fields.collect::<Option<_>>()? }))
+    Some(Interface { name: interface(name), fields: fields.collect::<Option<_>>()? })
 }
 
 /// The type of a value, in the words of either ROS; of a bounded sequence or text without the bound.

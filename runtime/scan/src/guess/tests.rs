@@ -44,7 +44,7 @@ fn a_state_has_the_fields_that_each_message_has() {
         json!({ "driving": true, "x": 7, "y": 2, "loads": [], "errors": [{ "id": "E2" }], "zone": "A", "a b": 1 }),
     ];
     assert_eq!(
-        said(&states, Conventions::JSON),
+        said(&states, Conventions::Json),
         "{ driving: bool  errors: list of { id: text  not level: only 1 of 2 objects have it }  x: int  y: real  \
          not a b: its name cannot be that of a field in a space  not loads: its lists were empty  \
          not zone: it came as null and a text }"
@@ -54,24 +54,24 @@ fn a_state_has_the_fields_that_each_message_has() {
 #[test]
 fn points_times_and_numbers_that_json_does_not_have_are_as_the_middleware_writes_them() {
     let at = [json!({ "x": 1.5, "y": 0, "z": "NaN" })];
-    assert_eq!(said(&at, Conventions::SIMLOG_3), "point");
-    assert_eq!(said(&at, Conventions::JSON), "{ x: real  y: int  z: text }");
+    assert_eq!(said(&at, Conventions::Simlog3), "point");
+    assert_eq!(said(&at, Conventions::Json), "{ x: real  y: int  z: text }");
     let stamped = [
         json!({ "stamp": { "sec": 1, "nanosec": 5 }, "level": null }),
         json!({ "stamp": { "sec": 2, "nanosec": 0 }, "level": 1 }),
     ];
-    assert_eq!(said(&stamped, Conventions::ROSBRIDGE), "{ level: real  stamp: time }");
+    assert_eq!(said(&stamped, Conventions::Rosbridge), "{ level: real  stamp: time }");
     assert_eq!(
-        said(&stamped, Conventions::JSON),
+        said(&stamped, Conventions::Json),
         "{ stamp: { nanosec: int  sec: int }  not level: it came as null and a number }"
     );
     let texts = [json!("none"), json!(0.5)];
-    assert_eq!(said(&texts, Conventions::SIMLOG_2), "text");
-    assert_eq!(said(&texts, Conventions::SIMLOG_3), "none: it came as a number and a text");
-    assert_eq!(said(&[json!(u64::MAX), json!(1)], Conventions::JSON), "real");
-    assert_eq!(said(&[], Conventions::SIMLOG_2), "none: nothing came");
+    assert_eq!(said(&texts, Conventions::Simlog2), "text");
+    assert_eq!(said(&texts, Conventions::Simlog3), "none: it came as a number and a text");
+    assert_eq!(said(&[json!(u64::MAX), json!(1)], Conventions::Json), "real");
+    assert_eq!(said(&[], Conventions::Simlog2), "none: nothing came");
     assert_eq!(
-        said(&[json!({}), json!({ "a": 1 })], Conventions::JSON),
+        said(&[json!({}), json!({ "a": 1 })], Conventions::Json),
         "none: its objects have no field that a space can declare, for example not `a`: only 1 of 2 objects have it"
     );
 }
@@ -82,7 +82,7 @@ fn whatever_comes_is_bounded() {
     for _ in 0..100 {
         deep = json!([deep]);
     }
-    assert!(said(&[deep], Conventions::JSON).contains("nested too deeply"));
+    assert!(said(&[deep], Conventions::Json).contains("nested too deeply"));
     let mut all = Samples::default();
     for number in 0..100_000 {
         all.add(&json!({ format!("field_{number}"): { "at": 1 }, "n".repeat(10_000): 1 }));
@@ -103,12 +103,13 @@ fn topics_resemble_each_other_if_most_fields_have_equal_names() {
 /// Whether the relay reads this as of this type: the rules of its codecs, without their code.
 fn fits(value: &Json, guess: &Guess, conventions: Conventions) -> bool {
     let is_word = |value: &Json| matches!(value.as_str(), Some("NaN" | "Infinity" | "-Infinity"));
-    let is_number = |value: &Json| value.is_number() || is_word(value) || (conventions.null_is_nan && value.is_null());
+    let is_number =
+        |value: &Json| value.is_number() || is_word(value) || (conventions.null_is_nan() && value.is_null());
     match guess {
         Guess::Bool => value.is_boolean(),
         Guess::Int => value.is_i64(),
         Guess::Real => is_number(value),
-        Guess::Text => value.is_string() || (conventions.any_text && (value.is_number() || value.is_boolean())),
+        Guess::Text => value.is_string() || (conventions.any_text() && (value.is_number() || value.is_boolean())),
         Guess::Point => ["x", "y", "z"].iter().all(|axis| value.get(axis).is_some_and(is_number)),
         Guess::Time => [["sec", "nanosec"], ["secs", "nsecs"]]
             .iter()
@@ -151,7 +152,7 @@ fn payloads() -> impl Strategy<Value = Vec<Json>> {
 proptest! {
     #[test]
     fn each_payload_is_of_the_type_that_all_have(payloads in payloads()) {
-        let all = [Conventions::JSON, Conventions::ROSBRIDGE, Conventions::SIMLOG_2, Conventions::SIMLOG_3];
+        let all = [Conventions::Json, Conventions::Rosbridge, Conventions::Simlog2, Conventions::Simlog3];
         for conventions in all {
             if let Ok(guess) = guess(&payloads, conventions) {
                 for payload in &payloads {
@@ -164,7 +165,7 @@ proptest! {
     #[test]
     fn payloads_of_one_shape_have_a_type(n in 1usize..5, x in any::<f32>(), text in "[a-z]*", truth in any::<bool>()) {
         let payload = json!({ "x": f64::from(x), "all": vec![json!({ "t": text, "b": truth }); n], "n": n });
-        let said = said(&vec![payload; n], Conventions::JSON);
+        let said = said(&vec![payload; n], Conventions::Json);
         let number = if x.is_finite() { "x: real" } else { "not x: it came as null" };
         let all = "{ all: list of { b: bool  t: text }  n: int  ";
         prop_assert_eq!(said, format!("{all}{number} }}"));

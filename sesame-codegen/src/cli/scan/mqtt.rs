@@ -37,7 +37,7 @@ pub(super) fn scan(shell: Shell, language: &Language, arguments: &Mqtt) -> anyho
         trust: arguments.trust.clone(),
         folder: PathBuf::new(),
     })?;
-    let types = by_payloads(&mut facts, &payloads, Conventions::JSON);
+    let types = by_payloads(&mut facts, &payloads, Conventions::Json);
     tell(shell, &facts, "nothing was published meanwhile, and nothing is retained; listen longer with `--seconds`");
     print(language, facts, types, &Definitions::none(), &settings, arguments.format)
 }
