@@ -3,6 +3,8 @@
 mod arguments;
 #[cfg(any(feature = "mqtt", feature = "ros1", feature = "ros2", feature = "rosbridge", feature = "simlog"))]
 mod common;
+#[cfg(any(feature = "ros1", feature = "ros2", feature = "rosbridge"))]
+mod definitions;
 #[cfg(feature = "mqtt")]
 mod mqtt;
 #[cfg(feature = "ros1")]
@@ -11,6 +13,8 @@ mod ros1;
 mod ros2;
 #[cfg(feature = "rosbridge")]
 mod rosbridge;
+#[cfg(any(feature = "mqtt", feature = "rosbridge"))]
+mod secrets;
 #[cfg(feature = "simlog")]
 mod simlog;
 

@@ -1,19 +1,21 @@
 //! `sesamec scan mqtt`: listens at a broker, writes a space, and checks what it wrote.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use anyhow::bail;
+use anyhow::{anyhow, bail};
 use sesame_mqtt::scan::{Found, Options};
 use sesame_notation::quoted;
 use sesame_scan::{Conventions, System};
 
 use super::arguments::Mqtt;
-use super::common::{Definitions, print, refuse_wrong_address, secret, secret_line, tell};
+use super::common::{print, tell};
+use super::secrets::{secret, secret_line};
 use crate::cli::shell::Shell;
 use crate::frontend::Language;
-use crate::scan::by_payloads;
+use crate::scan::{Origin, by_payloads, check_settings};
 
 /// `sesamec scan mqtt`
 pub(super) fn scan(shell: Shell, language: &Language, arguments: &Mqtt) -> anyhow::Result<ExitCode> {
@@ -26,7 +28,7 @@ pub(super) fn scan(shell: Shell, language: &Language, arguments: &Mqtt) -> anyho
     settings.extend(password.as_ref().map(|password| secret_line("password", password)));
     settings.extend(arguments.trust.as_ref().map(|file| format!("trust {}", quoted(file))));
     let (url, seconds) = (&arguments.url, arguments.seconds);
-    refuse_wrong_address(language, System::Mqtt { url: url.clone() }, &settings)?;
+    check_settings(language, System::Mqtt { url: url.clone() }, &settings).map_err(|problem| anyhow!(problem))?;
     shell.doing("Listening", format!("to {} at {url} for {seconds} s", arguments.topics.join(", ")));
     let Found { mut facts, payloads } = sesame_mqtt::scan::scan(&Options {
         url: url.clone(),
@@ -39,5 +41,6 @@ pub(super) fn scan(shell: Shell, language: &Language, arguments: &Mqtt) -> anyho
     })?;
     let types = by_payloads(&mut facts, &payloads, Conventions::Json);
     tell(shell, &facts, "nothing was published meanwhile, and nothing is retained; listen longer with `--seconds`");
-    print(language, facts, types, &Definitions::none(), &settings, arguments.format)
+    let origin = Origin { folders: &[], services: &BTreeSet::new(), settings: &settings };
+    print(language, facts, types, origin, arguments.format)
 }

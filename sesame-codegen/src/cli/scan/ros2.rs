@@ -8,17 +8,19 @@ use sesame_plan::Dialect;
 use sesame_ros2::scan::Scanner;
 
 use super::arguments::Ros2;
-use super::common::{Definitions, print, shares, tell};
+use super::common::{print, tell};
+use super::definitions::{Definitions, paths};
 use crate::cli::shell::Shell;
 use crate::frontend::Language;
-use crate::scan::Types;
+use crate::scan::{Origin, Types};
 
 /// How long nodes have to describe types.
 const DESCRIBING: Duration = Duration::from_secs(5);
 
 /// `sesamec scan ros2`
 pub(super) fn scan(shell: Shell, language: &Language, arguments: &Ros2) -> anyhow::Result<ExitCode> {
-    let definitions = Definitions::new(&arguments.types, shares())?;
+    let definitions =
+        Definitions::new(&arguments.types, paths("AMENT_PREFIX_PATH").map(|prefix| prefix.join("share")))?;
     let (domain, seconds) = (domain(arguments.domain)?, arguments.seconds);
     let mut scanner = Scanner::join(domain, arguments.network)?;
     let reach = if arguments.network { "the network" } else { "this machine" };
@@ -37,7 +39,9 @@ pub(super) fn scan(shell: Shell, language: &Language, arguments: &Ros2) -> anyho
     let network = if arguments.network { "" } else { ", and nodes on other machines are heard with `--network` only" };
     let nothing = format!("nothing runs in domain {domain}; the domain of a node is its ROS_DOMAIN_ID{network}");
     tell(shell, &facts, &nothing);
-    print(language, facts, types, &definitions, &[], arguments.format)
+    let services = definitions.services(&facts);
+    let origin = Origin { folders: &definitions.written, services: &services, settings: &[] };
+    print(language, facts, types, origin, arguments.format)
 }
 
 /// The domain that is named, or that of the environment.

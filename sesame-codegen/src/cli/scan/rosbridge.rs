@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use anyhow::{Context as _, bail};
+use anyhow::{Context as _, anyhow, bail};
 use sesame_dsl::interfaces::full_name;
 use sesame_notation::quoted;
 use sesame_plan::Dialect;
@@ -12,14 +12,17 @@ use sesame_rosbridge::scan::{Options, Scanner, Wanted};
 use sesame_scan::System;
 
 use super::arguments::{RosDialect, Rosbridge};
-use super::common::{Definitions, print, refuse_wrong_address, secret, secret_line, shares, tell};
+use super::common::{print, tell};
+use super::definitions::{Definitions, paths};
+use super::secrets::{secret, secret_line};
 use crate::cli::shell::Shell;
 use crate::frontend::Language;
-use crate::scan::{Types, types_by_payloads};
+use crate::scan::{Origin, Types, check_settings, types_by_payloads};
 
 /// `sesamec scan rosbridge`
 pub(super) fn scan(shell: Shell, language: &Language, arguments: &Rosbridge) -> anyhow::Result<ExitCode> {
-    let definitions = Definitions::new(&arguments.types, shares())?;
+    let definitions =
+        Definitions::new(&arguments.types, paths("AMENT_PREFIX_PATH").map(|prefix| prefix.join("share")))?;
     let wanted = arguments.topics.iter().map(|topic| wanted(topic)).collect::<anyhow::Result<Vec<_>>>()?;
     let token = secret(arguments.token_env.as_ref(), arguments.token_file.as_ref());
     let mut settings = Vec::new();
@@ -31,7 +34,7 @@ pub(super) fn scan(shell: Shell, language: &Language, arguments: &Rosbridge) -> 
     });
     let (url, seconds) = (&arguments.url, arguments.seconds);
     let system = System::Rosbridge { url: url.clone(), dialect: dialect.unwrap_or_default(), rosapi: false };
-    refuse_wrong_address(language, system, &settings)?;
+    check_settings(language, system, &settings).map_err(|problem| anyhow!(problem))?;
     let options = Options { url: url.clone(), token, trust: arguments.trust.clone(), folder: PathBuf::new() };
     let mut scanner =
         Scanner::connect(&options, dialect).context("there is no bridge to look at; start it, or name another one")?;
@@ -56,7 +59,9 @@ pub(super) fn scan(shell: Shell, language: &Language, arguments: &Rosbridge) -> 
     let (facts, payloads) = scanner.finish();
     types_by_payloads(&mut types, &facts, &payloads);
     tell(shell, &facts, "nothing is behind this bridge; is it in the domain, or at the master, of the nodes?");
-    print(language, facts, types, &definitions, &settings, arguments.format)
+    let services = definitions.services(&facts);
+    let origin = Origin { folders: &definitions.written, services: &services, settings: &settings };
+    print(language, facts, types, origin, arguments.format)
 }
 
 /// A topic that is named, with its type or without.

@@ -1,5 +1,6 @@
 //! `sesamec scan simlog`: listens to topics of a simulator, writes a space, and checks what it wrote.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -12,11 +13,11 @@ use sesame_simlog::client::Options;
 use sesame_simlog::scan::{Found, MOST_TOPICS, Wanted};
 
 use super::arguments::Simlog;
-use super::common::{Definitions, print, refuse_wrong_address, tell};
+use super::common::{print, tell};
 use crate::cli::shell::Shell;
 use crate::frontend::Language;
 use crate::input;
-use crate::scan::by_payloads;
+use crate::scan::{Origin, by_payloads, check_settings};
 
 /// The variable with the token that is sent with each call, if there is one.
 const TOKEN: &str = "SESAME_SIMLOG_TOKEN";
@@ -47,7 +48,7 @@ pub(super) fn scan(shell: Shell, language: &Language, arguments: &Simlog) -> any
     let (url, seconds) = (&arguments.url, arguments.seconds);
     let (steps, step_ms) = (arguments.steps.unwrap_or(0), arguments.step);
     let system = System::Simlog { url: url.clone(), protocol: arguments.protocol, step_ms, steps };
-    refuse_wrong_address(language, system, &settings)?;
+    check_settings(language, system, &settings).map_err(|problem| anyhow!(problem))?;
     let ca = arguments.trust.as_ref().map(|file| certificates(file)).transpose()?;
     let token = std::env::var(TOKEN).ok().filter(|token| !token.is_empty());
     let options = Options { topics_url: arguments.topics_at.clone(), ca, token, ..Options::new(url, version) };
@@ -63,7 +64,8 @@ pub(super) fn scan(shell: Shell, language: &Language, arguments: &Simlog) -> any
     let Found { mut facts, payloads, conventions } = sesame_simlog::scan::scan(&options, &wanted)?;
     let types = by_payloads(&mut facts, &payloads, conventions);
     tell(shell, &facts, "nothing was looked at");
-    print(language, facts, types, &Definitions::none(), &settings, arguments.format)
+    let origin = Origin { folders: &[], services: &BTreeSet::new(), settings: &settings };
+    print(language, facts, types, origin, arguments.format)
 }
 
 /// The topics that are named, each once.
