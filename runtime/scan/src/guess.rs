@@ -127,7 +127,8 @@ impl Seen {
         }
         let (mut fields, mut left_out) = (Vec::new(), Vec::new());
         for (name, field) in &self.fields {
-            let guess = if !is_name(name) {
+            // The language wants a letter or a digit in it.
+            let guess = if !is_name(name) || !name.contains(|c: char| c.is_ascii_alphanumeric()) {
                 Err("its name cannot be that of a field in a space".to_owned())
             } else if field.values() < self.objects {
                 Err(format!("only {} of {} objects have it", field.values(), self.objects))

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use sesame_scan::{Facts, System};
+use sesame_scan::{Facts, FoundTopic, System};
 
 use super::origin::Origin;
 use super::text::space;
@@ -23,13 +23,13 @@ pub fn checked_space(
     let text = space(facts, types, origin);
     if check(&text).errors > 0 {
         // Some layouts are too large for the language, or wrong in a way that only the language knows.
-        for ty in types.facts() {
-            let topics: Vec<_> =
-                facts.topics.iter().filter(|topic| topic.ty.as_deref() == Some(&ty.name)).take(1).cloned().collect();
-            let alone = Facts { topics, nodes: Vec::new(), services: Vec::new(), actions: Vec::new(), ..facts.clone() };
+        let of_topics: BTreeSet<&String> = facts.topics.iter().filter_map(|topic| topic.ty.as_ref()).collect();
+        for ty in of_topics {
+            let topic = FoundTopic { path: "/topic".to_owned(), ty: Some(ty.clone()), ..FoundTopic::default() };
+            let alone = Facts { topics: vec![topic], ..Facts::of(facts.system.clone()) };
             let checked = check(&space(&alone, types, origin));
             if checked.errors > 0 {
-                types.refuse(&ty.name, first_error(&checked.diagnostics));
+                types.refuse(ty, first_error(&checked.diagnostics));
             }
         }
     }

@@ -21,6 +21,8 @@ pub struct Types {
     by_name: BTreeMap<String, Type>,
     /// Types of topics that are no messages, by their words.
     plain: BTreeMap<String, WireType>,
+    /// Those of them that turned out to be of no use, with the reason.
+    refused: BTreeMap<String, String>,
 }
 
 #[derive(Debug)]
@@ -145,6 +147,8 @@ impl Types {
     pub fn refuse(&mut self, name: &str, problem: String) {
         if let Some(ty) = self.by_name.get_mut(name) {
             *ty = Type::unknown(Some(problem));
+        } else if self.plain.contains_key(name) {
+            self.refused.insert(name.to_owned(), problem);
         }
     }
 
@@ -203,7 +207,10 @@ impl Types {
 
     /// Why a type cannot be used, in a clause.
     pub fn problem(&self, name: &str) -> Option<&str> {
-        self.by_name.get(name)?.problem.as_deref()
+        match self.by_name.get(name) {
+            Some(ty) => ty.problem.as_deref(),
+            None => self.refused.get(name).map(String::as_str),
+        }
     }
 
     /// What messages of a type are in the language where that is no message: times, and points that need no block.
