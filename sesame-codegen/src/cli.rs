@@ -11,8 +11,6 @@ mod progress;
 mod results;
 mod runner;
 mod scan;
-#[cfg(feature = "ros2")]
-mod scan_ros2;
 mod search_space;
 mod select;
 mod shell;

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use sesame_dsl::interfaces::{Folders, Interfaces, known};
-use sesame_plan::{Interface, InterfaceField, WireType};
+use sesame_plan::{Dialect, Interface, InterfaceField, WireType};
 
 use crate::input::{self, Unreadable};
 
@@ -26,6 +26,8 @@ pub struct Definition {
     pub file: PathBuf,
     /// How it is written.
     pub format: Format,
+    /// Of which ROS it is.
+    pub dialect: Dialect,
     /// What it says.
     pub text: String,
 }
@@ -66,10 +68,12 @@ fn parse(name: &str, definition: &Definition) -> Result<Vec<Interface>, String> 
     let package = name.split('/').next().unwrap_or_default();
     let last = name.rsplit('/').next().unwrap_or_default();
     let text = definition.text.as_str();
-    let definitions = match definition.format {
-        Format::Msg => sesame_interfaces::msg(package, last, text).map(|one| vec![one]),
-        Format::Srv => sesame_interfaces::srv(package, last, text).map(Vec::from),
-        Format::Idl => sesame_interfaces::idl(text),
+    let definitions = match (definition.format, definition.dialect) {
+        (Format::Msg, Dialect::Ros1) => sesame_interfaces::ros1::msg(package, last, text).map(|one| vec![one]),
+        (Format::Srv, Dialect::Ros1) => sesame_interfaces::ros1::srv(package, last, text).map(Vec::from),
+        (Format::Msg, Dialect::Ros2) => sesame_interfaces::msg(package, last, text).map(|one| vec![one]),
+        (Format::Srv, Dialect::Ros2) => sesame_interfaces::srv(package, last, text).map(Vec::from),
+        (Format::Idl, _) => sesame_interfaces::idl(text),
     };
     let layout = |definition: sesame_interfaces::Definition| Interface {
         name: definition.name,
@@ -108,7 +112,7 @@ impl Files {
             Unreadable::System(error) => format!("{} cannot be read: {error}", file.display()),
             other => format!("{}: {other}", file.display()),
         })?;
-        let definition = Definition { file, format, text };
+        let definition = Definition { file, format, dialect: folders.dialect, text };
         (self.parse)(name, &definition).map(Some).map_err(|why| format!("{}: {why}", definition.file.display()))
     }
 
@@ -236,7 +240,7 @@ mod tests {
         }
         let file = folder.path().join("cell.sesame");
         let written = ["first".to_owned(), "second".to_owned()];
-        let folders = Folders { written: &written, file: file.to_str().unwrap() };
+        let folders = Folders { written: &written, file: file.to_str().unwrap(), dialect: Dialect::Ros2 };
         let found = Files::new(words).find(folders, name);
         let names = |found: Vec<Interface>| found.into_iter().map(|interface| interface.name).collect();
         found
@@ -277,7 +281,7 @@ mod tests {
         }
         let file = folder.path().join("cell.sesame");
         let written = [".".to_owned()];
-        let folders = Folders { written: &written, file: file.to_str().unwrap() };
+        let folders = Folders { written: &written, file: file.to_str().unwrap(), dialect: Dialect::Ros2 };
         let files = Files::default();
         let names = |name| {
             let found = files.find(folders, name).unwrap().unwrap();
@@ -287,6 +291,31 @@ mod tests {
         let expected = ["std_msgs/msg/Level", "a/msg/Joint", header[0], header[1], "a/srv/Move_Request"];
         assert_eq!(names("a/srv/Move_Request"), expected, "headers are known without a file");
         assert_eq!(names("a/srv/Move_Response"), ["a/srv/Move_Response"]);
+    }
+
+    #[test]
+    fn files_of_ros_1_have_its_types() {
+        let folder = tempfile::tempdir().unwrap();
+        for (path, text) in [
+            ("std_msgs/msg/Header.msg", "uint32 seq\ntime stamp\nstring frame_id\n"),
+            ("a/msg/Joint.msg", "Header header\nduration[] all\n"),
+            ("a/srv/Move.srv", "Joint to\n---\ntime at\n"),
+        ] {
+            let path = folder.path().join(path);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, text).unwrap();
+        }
+        let file = folder.path().join("cell.sesame");
+        let written = [".".to_owned()];
+        let folders = Folders { written: &written, file: file.to_str().unwrap(), dialect: Dialect::Ros1 };
+        let found = Files::default().find(folders, "a/srv/Move_Request").unwrap().unwrap();
+        let names: Vec<&str> = found.iter().map(|interface| interface.name.as_str()).collect();
+        let [time, duration] = ["Time", "Duration"].map(|name| format!("builtin_interfaces/msg/{name}"));
+        assert_eq!(names, [&time, "std_msgs/msg/Header", &duration, "a/msg/Joint", "a/srv/Move_Request"]);
+        assert_eq!(found[1].fields.len(), 3, "a header has its `seq` there");
+        let folders = Folders { dialect: Dialect::Ros2, ..folders };
+        let why = Files::default().find(folders, "a/msg/Joint").unwrap_err();
+        assert!(why.contains("ROS 1"), "{why}");
     }
 
     #[test]

@@ -21,8 +21,8 @@ pub mod names;
 pub mod output;
 pub mod plan;
 pub mod project;
-#[cfg(all(feature = "cli", any(feature = "ros2", test)))]
-mod scan;
+#[cfg(feature = "cli")]
+pub mod scan;
 pub mod unfilled;
 #[cfg(feature = "cli")]
 pub mod uses;

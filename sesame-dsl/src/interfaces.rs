@@ -2,7 +2,7 @@
 //!
 //! This crate reads no files, so whoever calls it hands over [`Interfaces`].
 
-use sesame_plan::{Interface, InterfaceField, Primitive, WireType};
+use sesame_plan::{Dialect, Interface, InterfaceField, Primitive, WireType};
 
 /// Where the layouts of ROS interfaces come from.
 pub trait Interfaces {
@@ -19,6 +19,8 @@ pub struct Folders<'a> {
     pub written: &'a [String],
     /// The name of the file that names them; they are relative to its folder.
     pub file: &'a str,
+    /// Of which ROS their files are: a `.msg` file of ROS 1 has types that ROS 2 does not have.
+    pub dialect: Dialect,
 }
 
 /// No files: only interfaces that need none are known.

@@ -9,3 +9,4 @@ mod fleet;
 mod peers;
 mod refusals;
 mod relaying;
+mod scanning;

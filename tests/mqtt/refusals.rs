@@ -10,10 +10,10 @@ use sesame_tests::fresh_folder;
 use crate::peers::{Broker, free_port, packages};
 use crate::relaying::{System, space};
 
-const SECRET: &str = "s3cret-of-the-fleet";
+pub(crate) const SECRET: &str = "s3cret-of-the-fleet";
 
 /// A password file of mosquitto with a user `relay`.
-fn passwords(folder: &Path) -> String {
+pub(crate) fn passwords(folder: &Path) -> String {
     let file = folder.join("passwords");
     let made = Command::new("mosquitto_passwd").args(["-b", "-c"]).arg(&file).args(["relay", SECRET]).status();
     assert!(made.expect("mosquitto_passwd starts").success());
@@ -61,7 +61,12 @@ fn a_wrong_password_and_none_are_refused_and_the_right_one_is_not() {
     let wrong = said(&folder, &at, "user \"relay\"  password from file \"wrong\"");
     assert_eq!(wrong, refused("it does not accept the user or the password"));
     let none = said(&folder, &at, "");
-    assert_eq!(none, refused("it wants a user; add `user` and `password` to the simulator"));
+    assert_eq!(
+        none,
+        refused(
+            "it wants a user; add `user` and `password` to the simulator, or `--user` and `--password-env` to a scan"
+        )
+    );
     assert_eq!(said(&folder, &at, "user \"relay\"  password from file \"right\""), Ok(()));
 }
 

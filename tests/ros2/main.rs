@@ -18,6 +18,7 @@ mod lock_step;
 mod prepared;
 mod proxies;
 mod rosbridge;
+mod scans;
 mod simlog;
 mod soak;
 mod vendors;

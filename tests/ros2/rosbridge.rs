@@ -2,7 +2,7 @@
 
 use std::io::{BufRead as _, BufReader, Read as _};
 use std::net::{Ipv4Addr, TcpListener};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -62,6 +62,11 @@ pub(crate) struct Pythons {
 impl Pythons {
     pub(crate) fn find() -> Option<Self> {
         Some(Pythons { jazzy: Vendor::Jazzy.python()?, bridge: Vendor::Rosbridge.python()? })
+    }
+
+    /// That of the nodes behind the bridge.
+    pub(crate) fn jazzy(&self) -> &Path {
+        &self.jazzy
     }
 }
 

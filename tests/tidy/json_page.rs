@@ -41,7 +41,7 @@ const PRINTED: [(&str, &str, &str, &str); 12] = [
         "sesame-dsl/src/diagnostic/render/json.rs",
     ),
     ("`sesamec explain NAME FILE`", "One object.", "Explained", "sesame-codegen/src/uses.rs"),
-    ("`sesamec scan ros2`", "One object.", "Facts", "runtime/ros2/src/scan/facts.rs"),
+    ("`sesamec scan`", "One object.", "Facts", "runtime/scan/src/facts.rs"),
 ];
 
 /// Crates whose types may be printed, by the folder of their sources.
@@ -51,7 +51,7 @@ const CRATES: [(&str, &str); 8] = [
     ("sesame_search", "runtime/search/src"),
     ("sesame_base", "runtime/base/src"),
     ("sesame_plan", "runtime/plan/src"),
-    ("sesame_ros2", "runtime/ros2/src"),
+    ("sesame_scan", "runtime/scan/src"),
     ("sesame_dsl", "sesame-dsl/src"),
     ("sesame_codegen", "sesame-codegen/src"),
 ];

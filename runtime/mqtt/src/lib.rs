@@ -10,6 +10,7 @@ mod address;
 mod connection;
 mod quick_ack;
 mod routes;
+pub mod scan;
 mod session;
 mod transport;
 

@@ -104,7 +104,8 @@ impl Session {
             ConnectReturnCode::NotAuthorized | ConnectReturnCode::BadUserNamePassword => {
                 return Err(End::Refused(match &account.user {
                     Some(_) => "it does not accept the user or the password".to_owned(),
-                    None => "it wants a user; add `user` and `password` to the simulator".to_owned(),
+                    None => "it wants a user; add `user` and `password` to the simulator, or `--user` and `--password-env` to a scan"
+                        .to_owned(),
                 }));
             }
             ConnectReturnCode::ServerBusy | ConnectReturnCode::ServerUnavailable => {

@@ -92,6 +92,22 @@ impl Connection {
         Ok(bytes)
     }
 
+    /// Reads a length and throws away as many bytes; whatever length was announced, it ends at the deadline.
+    pub(crate) fn skip_frame(&mut self, deadline: Instant) -> io::Result<()> {
+        let mut length = [0; 4];
+        self.read_exact(&mut length, Some(deadline))?;
+        let (mut left, mut bytes) = (u32::from_le_bytes(length) as usize, [0; 4096]);
+        while left > 0 {
+            if Instant::now() >= deadline {
+                return Err(ErrorKind::TimedOut.into());
+            }
+            let some = left.min(bytes.len());
+            self.read_exact(&mut bytes[..some], Some(deadline))?;
+            left -= some;
+        }
+        Ok(())
+    }
+
     pub(crate) fn write_all(&mut self, mut bytes: &[u8], deadline: Option<Instant>) -> io::Result<()> {
         while !bytes.is_empty() {
             match self.patient(deadline, |stream| stream.write(bytes))? {

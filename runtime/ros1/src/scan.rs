@@ -1,16 +1,18 @@
 //! What is at a master: nodes, topics, services, and the layouts of their messages.
 //!
-//! [`Facts`] are data that anybody can read. The master is asked who is there, and one publisher of each type what it
-//! publishes: it hands out the definition. Nothing is registered and nothing is published.
+//! The master is asked who is there, and publishers what they publish: they hand out the definitions of their types.
+//! Nothing is registered and nothing is published, but messages of publishers are counted for a while. Types have the
+//! names that a space has for them, which are those of ROS 2.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::thread;
 use std::time::{Duration, Instant};
 
-use serde::Serialize;
-use sesame_interfaces::ros1::type_name;
-use sesame_plan::WireType;
+use sesame_interfaces::ros1::interface;
+use sesame_plan::Interface;
+use sesame_scan::{Arrivals, Facts, FoundNode, FoundService, FoundTopic, System};
 
-use crate::connection::Stop;
+use crate::connection::{Connection, Stop};
 use crate::contact;
 use crate::definition::Texts;
 use crate::master::{Address, AskError, Master, State};
@@ -28,88 +30,19 @@ const LOGS: [&str; 2] = ["/rosout", "/rosout_agg"];
 /// The services that every node has.
 const EVERYWHERE: [&str; 2] = ["/get_loggers", "/set_logger_level"];
 
-/// What was seen at a master.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Facts {
-    /// The address of the master.
-    pub master: String,
-    /// The nodes, by name, without the one that collects logs.
-    pub nodes: Vec<FoundNode>,
-    /// The topics, by path, without those of logs.
-    pub topics: Vec<FoundTopic>,
-    /// The services, by path, without those that every node has.
-    pub services: Vec<FoundService>,
-    /// The types of the topics, and those that they contain, by name.
-    pub types: Vec<FoundType>,
-}
+/// How many topics are kept at most, and how many nodes and services.
+pub const MOST: usize = 10_000;
 
-/// A node.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
-pub struct FoundNode {
-    /// Its name with its namespace, for example `/cell/arm`.
-    pub name: String,
-    /// Whether it answers; the master also knows nodes that have ended without a word.
-    pub answers: bool,
-    /// The topics that it publishes.
-    pub publishes: Vec<String>,
-    /// The topics to which it subscribes.
-    pub subscribes: Vec<String>,
-    /// The services that it serves.
-    pub serves: Vec<String>,
-}
+/// The most publishers whose messages are counted.
+const MOST_COUNTED: usize = 200;
 
-/// A topic.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
-pub struct FoundTopic {
-    /// Its path.
-    pub path: String,
-    /// Its type as ROS 1 names it, for example `sensor_msgs/JointState`; `*` if nobody said it.
-    #[serde(rename = "type")]
-    pub ty: String,
-    /// Whether its publisher keeps the last message for late subscribers, if one was asked.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub latching: Option<bool>,
-    /// The node of each publisher.
-    pub publishers: Vec<String>,
-    /// The node of each subscriber.
-    pub subscribers: Vec<String>,
-}
-
-/// A service.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
-pub struct FoundService {
-    /// Its path.
-    pub path: String,
-    /// Its type, for example `std_srvs/Trigger`, if its server answers.
-    #[serde(rename = "type", skip_serializing_if = "Option::is_none")]
-    pub ty: Option<String>,
-    /// Its server.
-    pub servers: Vec<String>,
-}
-
-/// A type of messages.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct FoundType {
-    /// Its name, for example `sensor_msgs/JointState`.
-    pub name: String,
-    /// Its MD5, if its layout is known.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub md5: Option<String>,
-    /// Its fields in the order of the wire; none if its layout is unknown.
-    pub fields: Vec<FoundField>,
-    /// Why its layout is unknown.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub problem: Option<String>,
-}
-
-/// A field of a type.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct FoundField {
-    /// Its name.
-    pub name: String,
-    /// Its type, as in a `.msg` file.
-    #[serde(rename = "type")]
-    pub ty: String,
+/// What was found at a master.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Found {
+    /// All of it, but the types.
+    pub facts: Facts,
+    /// Types as publishers describe them, each after those that it contains.
+    pub layouts: BTreeMap<String, Vec<Interface>>,
 }
 
 /// Why nothing can be seen.
@@ -123,35 +56,76 @@ pub enum ScanError {
     Ask(#[from] AskError),
 }
 
-/// Looks at what is at a master. Nodes that were not asked within this time count as those that do not answer.
-pub fn scan(master: &str, within: Duration) -> Result<Facts, ScanError> {
+/// Looks at what is at a master, and counts messages for a while. Nodes that were not asked within the time for asking
+/// count as those that do not answer.
+pub fn scan(master: &str, asking: Duration, listening: Duration) -> Result<Found, ScanError> {
     let at = Address::read(master).ok_or_else(|| ScanError::Address(master.to_owned()))?;
     let asked = Master { at, caller: CALLER.to_owned(), uri: String::new(), stop: Stop::default() };
     let state = asked.state()?;
     let declared: BTreeMap<String, String> = asked.types()?.into_iter().collect();
-    let scan = Scan { master: asked, until: Instant::now() + within };
-    let mut nodes = nodes(&state);
+    let scan = Scan { master: asked, until: Instant::now() + asking };
+    let (mut nodes, mut topics) = (nodes(&state), topics(&state, &declared));
+    let mut services = services(&state);
+    let cut = [nodes.len(), topics.len(), services.len()].into_iter().any(|found| found > MOST);
+    nodes.truncate(MOST);
+    topics.truncate(MOST);
+    services.truncate(MOST);
     for node in &mut nodes {
-        node.answers = scan.has_time() && scan.master.is_alive(&node.name);
+        node.answers = Some(scan.has_time() && scan.master.is_alive(&node.name));
     }
-    let answering: BTreeSet<&str> = nodes.iter().filter(|node| node.answers).map(|node| node.name.as_str()).collect();
-    let mut topics = topics(&state, &declared);
-    let mut types = BTreeMap::new();
-    for topic in &mut topics {
-        let mut publishers = topic.publishers.iter().filter(|node| answering.contains(node.as_str()));
-        if let Some(header) = publishers.find_map(|node| scan.publisher(node, topic)) {
-            topic.latching = Some(header.is("latching"));
-            header.get("type").clone_into(&mut topic.ty);
-            describe(&header, &mut types);
+    for service in &mut services {
+        service.ty = scan.server(&service.path);
+    }
+    let answering: BTreeSet<&str> =
+        nodes.iter().filter(|node| node.answers == Some(true)).map(|node| node.name.as_str()).collect();
+    let mut layouts = BTreeMap::new();
+    let mut counted = Vec::new();
+    for (at, topic) in topics.iter_mut().enumerate() {
+        let names: BTreeSet<String> = topic.publishers.iter().cloned().collect();
+        let mut header = None;
+        for node in names.iter().filter(|node| answering.contains(node.as_str())) {
+            if header.is_some() && counted.len() >= MOST_COUNTED {
+                break;
+            }
+            let Some((connection, theirs)) = scan.publisher(node, topic) else { continue };
+            header.get_or_insert(theirs);
+            if counted.len() < MOST_COUNTED {
+                counted.push((at, connection));
+            }
         }
-        if topic.ty != ANY && !types.contains_key(&topic.ty) {
-            let problem = Some("nobody who publishes it says what it is".to_owned());
-            let found = FoundType { name: topic.ty.clone(), md5: None, fields: Vec::new(), problem };
-            types.insert(topic.ty.clone(), found);
+        if let Some(header) = header {
+            learn(topic, &header, &mut layouts);
         }
     }
-    let services = services(&state, |path| scan.server(path));
-    Ok(Facts { master: master.to_owned(), nodes, topics, services, types: types.into_values().collect() })
+    let heard = count(counted, listening);
+    for (at, arrivals) in heard {
+        topics[at].messages += arrivals.messages();
+        topics[at].rate = match (topics[at].rate, arrivals.rate()) {
+            (Some(one), Some(other)) => Some(one + other),
+            (one, other) => one.or(other),
+        };
+    }
+    let system = System::Ros1 { master: master.to_owned() };
+    let facts = Facts { seconds: listening.as_secs_f64(), cut, nodes, topics, services, ..Facts::of(system) };
+    Ok(Found { facts, layouts })
+}
+
+/// Counts the messages of publishers, each on a thread of its own, for so long. They are thrown away.
+fn count(publishers: Vec<(usize, Connection)>, listening: Duration) -> Vec<(usize, Arrivals)> {
+    let begin = Instant::now();
+    let one = |(at, mut connection): (usize, Connection)| {
+        let mut arrivals = Arrivals::default();
+        // One that always has something to read never waits, so its time is looked at here.
+        while begin.elapsed() < listening && connection.skip_frame(begin + listening).is_ok() {
+            arrivals.add(begin.elapsed());
+        }
+        (at, arrivals)
+    };
+    thread::scope(|scope| {
+        let threads: Vec<_> = publishers.into_iter().map(|publisher| scope.spawn(move || one(publisher))).collect();
+        // None of them panics.
+        threads.into_iter().filter_map(|thread| thread.join().ok()).collect()
+    })
 }
 
 struct Scan {
@@ -164,15 +138,15 @@ impl Scan {
         Instant::now() < self.until
     }
 
-    /// What a publisher says of a topic.
-    fn publisher(&self, node: &str, topic: &FoundTopic) -> Option<Header> {
+    /// What a publisher says of a topic, with the connection on which its messages follow.
+    fn publisher(&self, node: &str, topic: &FoundTopic) -> Option<(Connection, Header)> {
         if !self.has_time() {
             return None;
         }
         let uri = self.master.ask("lookupNode", &[node]).ok()?;
         let at = Address::read(uri.text()?)?;
-        let (_, header) = contact::subscribe(&at, [CALLER, &topic.path, &topic.ty], &self.master.stop).ok()?;
-        (header.get("error").is_empty() && !header.get("type").is_empty()).then_some(header)
+        let (connection, header) = contact::subscribe(&at, [CALLER, &topic.path, ANY], &self.master.stop).ok()?;
+        (header.get("error").is_empty() && !header.get("type").is_empty()).then_some((connection, header))
     }
 
     /// The type of a service, as its server says.
@@ -182,7 +156,8 @@ impl Scan {
         }
         let at = self.master.server(path).ok()??;
         let (_, header) = contact::serve(&at, [CALLER, path], true, &self.master.stop).ok()?;
-        Some(header.get("type").to_owned()).filter(|ty| !ty.is_empty())
+        let ty = header.get("type");
+        (!ty.is_empty()).then(|| interface(ty).replacen("/msg/", "/srv/", 1))
     }
 }
 
@@ -191,9 +166,11 @@ fn nodes(state: &State) -> Vec<FoundNode> {
     let mut add = |side: &[(String, Vec<String>)], list: fn(&mut FoundNode) -> &mut Vec<String>| {
         for (path, names) in side {
             for name in names.iter().filter(|name| *name != LOGGER) {
-                let node = nodes
-                    .entry(name.clone())
-                    .or_insert_with(|| FoundNode { name: name.clone(), ..FoundNode::default() });
+                let node = nodes.entry(name.clone()).or_insert_with(|| FoundNode {
+                    name: name.clone(),
+                    count: 1,
+                    ..FoundNode::default()
+                });
                 if !LOGS.contains(&path.as_str()) && !is_everywhere(path) {
                     list(node).push(path.clone());
                 }
@@ -218,7 +195,7 @@ fn topics(state: &State, declared: &BTreeMap<String, String>) -> Vec<FoundTopic>
         for (path, names) in side.iter().filter(|(path, _)| !LOGS.contains(&path.as_str())) {
             let topic = topics.entry(path.clone()).or_insert_with(|| FoundTopic {
                 path: path.clone(),
-                ty: declared.get(path).cloned().unwrap_or_else(|| ANY.to_owned()),
+                ty: declared.get(path).filter(|ty| *ty != ANY).map(|ty| interface(ty)),
                 ..FoundTopic::default()
             });
             list(topic).extend(names.iter().cloned());
@@ -230,12 +207,12 @@ fn topics(state: &State, declared: &BTreeMap<String, String>) -> Vec<FoundTopic>
     topics.into_values().collect()
 }
 
-fn services(state: &State, ty: impl Fn(&str) -> Option<String>) -> Vec<FoundService> {
+fn services(state: &State) -> Vec<FoundService> {
     let found = state.servers.iter().filter(|(path, _)| !is_everywhere(path));
     let service = |(path, servers): &(String, Vec<String>)| FoundService {
         path: path.clone(),
-        ty: ty(path),
         servers: servers.clone(),
+        ..FoundService::default()
     };
     let mut services: Vec<FoundService> = found.map(service).collect();
     services.sort_by(|one, other| one.path.cmp(&other.path));
@@ -247,55 +224,29 @@ fn is_everywhere(path: &str) -> bool {
     EVERYWHERE.iter().any(|end| path.ends_with(end))
 }
 
-/// Adds the type that a publisher hands out, and those that it contains.
-fn describe(header: &Header, types: &mut BTreeMap<String, FoundType>) {
-    let name = header.get("type");
-    if types.get(name).is_some_and(|known| known.problem.is_none()) {
+/// What a publisher says of its topic, and the layout of its type if it was not known before.
+fn learn(topic: &mut FoundTopic, header: &Header, layouts: &mut BTreeMap<String, Vec<Interface>>) {
+    let (name, md5) = (header.get("type"), header.get("md5sum"));
+    let ty = interface(name);
+    topic.latching = Some(header.is("latching"));
+    topic.hash = Some(md5.to_owned()).filter(|md5| md5.len() == 32 && md5.bytes().all(|it| it.is_ascii_hexdigit()));
+    topic.ty = Some(ty.clone());
+    if layouts.contains_key(&ty) {
         return;
     }
     let described = || {
         let texts = Texts::of_definition(name, header.get("message_definition"))?;
-        let mut found = Vec::new();
-        for interface in texts.layout(name)? {
-            let name = type_name(&interface.name);
-            // `time` and `duration` are not messages.
-            if name.starts_with("builtin_interfaces/") {
-                continue;
-            }
-            let fields = interface.fields.iter();
-            let fields = fields.map(|field| FoundField { name: field.name.clone(), ty: written(&field.ty) }).collect();
-            found.push(FoundType { md5: Some(texts.md5(&name)?), name, fields, problem: None });
-        }
-        Ok(found)
+        Ok((texts.md5(name)?, texts.layout(name)?))
     };
     match described() {
-        Ok(found) if found.last().and_then(|it| it.md5.as_deref()) == Some(header.get("md5sum")) => {
-            types.extend(found.into_iter().map(|found| (found.name.clone(), found)));
+        Ok((of_definition, layout)) if of_definition == md5 => {
+            layouts.insert(ty, layout);
         }
-        other => {
-            let problem = other.map_or_else(
-                |error: crate::definition::TypeError| error.to_string(),
-                |_| "its publisher hands out a definition that does not have its MD5".to_owned(),
-            );
-            let found = FoundType { name: name.to_owned(), md5: None, fields: Vec::new(), problem: Some(problem) };
-            types.insert(name.to_owned(), found);
+        Ok(_) => {
+            let problem = "its publisher hands out a definition that does not have its MD5";
+            topic.problem = Some(problem.to_owned());
         }
-    }
-}
-
-/// A type as a `.msg` file of ROS 1 writes it.
-fn written(ty: &WireType) -> String {
-    match ty {
-        WireType::Primitive { primitive } => format!("{primitive:?}").to_lowercase(),
-        WireType::String => "string".to_owned(),
-        WireType::WString => "wstring".to_owned(),
-        WireType::Interface { name } => match name.as_str() {
-            "builtin_interfaces/msg/Time" => "time".to_owned(),
-            "builtin_interfaces/msg/Duration" => "duration".to_owned(),
-            name => type_name(name),
-        },
-        WireType::Array { of, length } => format!("{}[{length}]", written(of)),
-        WireType::Sequence { of, .. } => format!("{}[]", written(of)),
+        Err(error) => topic.problem = Some(crate::definition::TypeError::to_string(&error)),
     }
 }
 
@@ -324,9 +275,10 @@ mod tests {
         assert_eq!(nodes[0].subscribes, ["/a", "/joints"]);
         assert_eq!(nodes[0].serves, ["/grip"]);
         let topics = topics(&state, &[("/joints".to_owned(), "sensor_msgs/JointState".to_owned())].into());
-        let shown: Vec<_> = topics.iter().map(|it| (it.path.as_str(), it.ty.as_str(), it.subscribers.len())).collect();
-        assert_eq!(shown, [("/a", "*", 1), ("/joints", "sensor_msgs/JointState", 2)]);
-        assert_eq!(services(&state, |_| None).len(), 1);
+        let shown: Vec<_> =
+            topics.iter().map(|it| (it.path.as_str(), it.ty.as_deref(), it.subscribers.len())).collect();
+        assert_eq!(shown, [("/a", None, 1), ("/joints", Some("sensor_msgs/msg/JointState"), 2)]);
+        assert_eq!(services(&state).len(), 1);
     }
 
     #[test]
@@ -334,15 +286,18 @@ mod tests {
         let text = "time at\nbyte[4] raw\nInner[] all\n\n=========================================================\
                     =======================\nMSG: p/Inner\nfloat64 x\n";
         let md5 = Texts::of_definition("p/M", text).unwrap().md5("p/M").unwrap();
-        let mut types = BTreeMap::new();
-        describe(&header(text, "0123"), &mut types);
-        let problem = types["p/M"].problem.clone().unwrap();
+        let mut layouts = BTreeMap::new();
+        let mut learned = |text: &str, md5: &str| {
+            let mut topic = FoundTopic::default();
+            learn(&mut topic, &header(text, md5), &mut layouts);
+            topic
+        };
+        let problem = learned(text, "0123").problem.unwrap();
         assert_eq!(problem, "its publisher hands out a definition that does not have its MD5");
-        describe(&header("Inner one", &md5), &mut types);
-        assert_eq!(types["p/M"].problem.clone().unwrap(), "there is no definition of `p/Inner`");
-        describe(&header(text, &md5), &mut types);
-        let fields: Vec<&str> = types["p/M"].fields.iter().map(|field| field.ty.as_str()).collect();
-        assert_eq!(fields, ["time", "int8[4]", "p/Inner[]"]);
-        assert_eq!(types.keys().collect::<Vec<_>>(), ["p/Inner", "p/M"]);
+        assert_eq!(learned("Inner one", &md5).problem.unwrap(), "there is no definition of `p/Inner`");
+        let topic = learned(text, &md5);
+        assert_eq!((topic.ty.as_deref(), topic.hash, topic.problem), (Some("p/msg/M"), Some(md5), None));
+        let names: Vec<&str> = layouts["p/msg/M"].iter().map(|interface| interface.name.as_str()).collect();
+        assert_eq!(names, ["builtin_interfaces/msg/Time", "p/msg/Inner", "p/msg/M"]);
     }
 }

@@ -12,6 +12,7 @@ mod graph;
 mod names;
 #[cfg(feature = "node")]
 mod parameters;
+#[cfg(feature = "node")]
 pub mod scan;
 #[cfg(feature = "node")]
 mod transport;

@@ -297,7 +297,8 @@ fn failed(address: &Address, error: &SocketError) -> ConnectError {
             let reason = if address.token.is_some() {
                 "it does not accept the token (401)".to_owned()
             } else {
-                "it wants a token (401); add `token from env \"NAME\"` to the simulator".to_owned()
+                "it wants a token (401); add `token from env \"NAME\"` to the simulator, or `--token-env NAME` to a scan"
+                    .to_owned()
             };
             ConnectError::Refused { url, reason }
         }
@@ -382,7 +383,7 @@ mod tests {
         let said = refused(&at("ws", address, Some("wrong-secret")));
         assert_eq!(said, format!("`ws://{address}` refused the connection: it does not accept the token (401)"));
         let said = refused(&at("ws", address, None));
-        assert!(said.ends_with("it wants a token (401); add `token from env \"NAME\"` to the simulator"), "{said}");
+        assert!(said.ends_with("it wants a token (401); add `token from env \"NAME\"` to the simulator, or `--token-env NAME` to a scan"), "{said}");
         refused(&at("wss", address, Some(SECRET)));
     }
 

@@ -22,6 +22,8 @@ pub mod png;
 mod proxy;
 mod reader;
 #[cfg(feature = "client")]
+pub mod scan;
+#[cfg(feature = "client")]
 mod transport;
 
 pub use operation::{Compression, Level, Operation};

@@ -23,7 +23,7 @@ use self::inbox::Inbox;
 use crate::message::Message;
 use crate::proto::simulator3::{SimStatus, StepRequest as StepRequest3};
 use crate::proto::v2::{InjectRequest, PubRequest, RosMessage, StepRequest, StepSizeRequest, TopicDescriptor};
-use crate::proto::v3::{self, SimlogMessage, Subscriber, SubscriptionRequest, TopicInfoRequest};
+use crate::proto::v3::{self, ReadRequest, SimlogMessage, Subscriber, SubscriptionRequest, TopicInfoRequest};
 
 pub use self::api::Options;
 pub use self::error::ClientError;
@@ -154,7 +154,7 @@ impl Client {
                 self.open(stream, name, async move { api.subscribe(topic).await.map(tonic::Response::into_inner) });
             }
             Api::V3 { .. } => {
-                self.has(name)?;
+                self.must_have(name)?;
                 self.subscribe(name, stream)?;
             }
         }
@@ -174,7 +174,7 @@ impl Client {
                 Ok((stream, injected.to_owned()))
             }
             Api::V3 { topics: mut api, .. } => {
-                self.has(name)?;
+                self.must_have(name)?;
                 let request =
                     v3::InjectRequest { target_path: name.to_owned(), shadow_path_prefix: injected.to_owned() };
                 let paths = self.call(&format!("to cut `{name}`"), async move {
@@ -289,14 +289,33 @@ impl Client {
         });
     }
 
-    /// Of version 3: that there is such a topic.
-    fn has(&self, name: &str) -> Result<(), ClientError> {
-        let Api::V3 { topics: mut api, .. } = self.api.clone() else { return Ok(()) };
+    /// Of version 3: whether there is such a topic. In version 2 nobody tells.
+    pub fn has(&self, name: &str) -> Result<bool, ClientError> {
+        let Api::V3 { topics: mut api, .. } = self.api.clone() else { return Ok(true) };
         let request = TopicInfoRequest { path: name.to_owned() };
         let info = self.call(&format!("topic `{name}`"), async move {
             api.get_topic_info(request).await.map(tonic::Response::into_inner)
         })?;
-        if info.exists { Ok(()) } else { Err(ClientError::NoTopic { url: self.url.clone(), name: name.to_owned() }) }
+        Ok(info.exists)
+    }
+
+    /// Of version 3: the latest message of a topic, if there was one. Version 2 does not tell.
+    pub fn read(&self, name: &str) -> Result<Vec<Message>, ClientError> {
+        let Api::V3 { topics: mut api, .. } = self.api.clone() else { return Ok(Vec::new()) };
+        let request = ReadRequest { path: vec![name.to_owned()] };
+        let answer =
+            self.call(
+                &format!("topic `{name}`"),
+                async move { api.read(request).await.map(tonic::Response::into_inner) },
+            )?;
+        Ok(answer.messages.into_iter().take(1).map(|message| Message::V3(Box::new(message))).collect())
+    }
+
+    fn must_have(&self, name: &str) -> Result<(), ClientError> {
+        if self.has(name)? {
+            return Ok(());
+        }
+        Err(ClientError::NoTopic { url: self.url.clone(), name: name.to_owned() })
     }
 
     /// Of version 3: adds a topic to the stream of all.

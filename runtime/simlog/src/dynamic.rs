@@ -7,6 +7,7 @@ use prost_types::{ListValue, Struct, Timestamp, Value as Dynamic};
 use sesame_relay::message::Mismatch;
 use sesame_relay::value::Value;
 
+use crate::json;
 use crate::proto::v3::SimlogMessage;
 use crate::shape::Shape;
 use crate::tree::Tree;
@@ -17,6 +18,11 @@ const EXACT: i128 = 1 << 53;
 /// The value of a message.
 pub(crate) fn read(shape: &Shape, message: &SimlogMessage) -> Result<Value, Mismatch> {
     message.value.as_ref().map_or(Tree::Nothing, tree).read(shape)
+}
+
+/// What a message says, as JSON.
+pub(crate) fn payload(message: &SimlogMessage) -> serde_json::Value {
+    json::json(&message.value.as_ref().map_or(Tree::Nothing, tree))
 }
 
 /// The same message with another value.

@@ -33,7 +33,8 @@ fn of(json: Value) -> Tree {
     }
 }
 
-fn json(tree: &Tree) -> Value {
+/// A tree as a value of JSON.
+pub(crate) fn json(tree: &Tree) -> Value {
     match tree {
         Tree::Nothing => Value::Null,
         Tree::Bool(truth) => Value::Bool(*truth),

@@ -14,6 +14,8 @@ mod json;
 mod message;
 pub mod proto;
 mod ros;
+#[cfg(feature = "client")]
+pub mod scan;
 #[cfg(feature = "server")]
 pub mod server;
 mod shape;

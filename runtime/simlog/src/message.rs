@@ -27,6 +27,14 @@ impl Message {
         }
     }
 
+    /// What it says, as JSON: of version 2 its content, or what its text is if that is JSON.
+    pub fn payload(&self) -> serde_json::Value {
+        match self {
+            Message::V2(message) => ros::payload(message),
+            Message::V3(message) => dynamic::payload(message),
+        }
+    }
+
     /// The same message with another value; what the value does not have stays, such as a time stamp. The mismatch says
     /// which field the wire cannot hold. Reals that have 32 bits on the wire are rounded to the nearest.
     pub fn with(&self, value: &Value) -> Result<Message, Mismatch> {

@@ -34,6 +34,19 @@ pub(crate) fn read(shape: &Shape, message: &RosMessage) -> Result<Value, Mismatc
     }
 }
 
+/// What a message says, as JSON. A text in quotes is a text like any other, with its quotes.
+pub(crate) fn payload(message: &RosMessage) -> serde_json::Value {
+    if let Some(content) = content(message) {
+        return json::json(&tree(content));
+    }
+    match json::read(message.value.trim()) {
+        Some(tree @ (Tree::Bool(_) | Tree::Int(_) | Tree::Real(_) | Tree::List(_) | Tree::Fields(_))) => {
+            json::json(&tree)
+        }
+        Some(Tree::Nothing | Tree::Text(_)) | None => message.value.clone().into(),
+    }
+}
+
 /// The same message with another value. Single numbers are rounded once, to the nearest.
 pub(crate) fn write(value: &Value, like: &RosMessage) -> Result<RosMessage, Mismatch> {
     let mut message = like.clone();

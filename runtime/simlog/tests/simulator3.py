@@ -30,6 +30,7 @@ class Simulator(services.SimlogAPIServicer, sim_services.SimServerAPIServicer):
         self.lock = threading.Lock()
         self.streams = {}
         self.paths = {}
+        self.latest = {}
         self.clock = 0
         self.steps = 0
         self.shadow = None
@@ -39,6 +40,7 @@ class Simulator(services.SimlogAPIServicer, sim_services.SimServerAPIServicer):
         stamp = timestamp_pb2.Timestamp(seconds=self.clock // 1000, nanos=self.clock % 1000 * 1_000_000)
         header = pb.SimlogHeader(timestamp=stamp, path=path)
         message = pb.SimlogMessage(header=header, value=json_format.ParseDict(value, struct_pb2.Value()))
+        self.latest[path] = message
         for uuid, paths in self.paths.items():
             if path in paths:
                 self.streams[uuid].put(message)
@@ -61,6 +63,11 @@ class Simulator(services.SimlogAPIServicer, sim_services.SimServerAPIServicer):
 
     def GetTopicInfo(self, request, context):
         return pb.TopicInfo(path=request.path, exists=request.path in TOPICS)
+
+    def Read(self, request, context):
+        with self.lock:
+            latest = [self.latest[path] for path in request.path if path in self.latest]
+        return pb.ReadResponse(messages=latest)
 
     def CreateSubscriber(self, request, context):
         with self.lock:

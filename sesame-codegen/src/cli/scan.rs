@@ -1,9 +1,26 @@
 //! `sesamec scan`: a space of what is running.
 
-use std::path::PathBuf;
+mod arguments;
+#[cfg(any(feature = "mqtt", feature = "ros1", feature = "ros2", feature = "rosbridge", feature = "simlog"))]
+mod common;
+#[cfg(any(feature = "ros1", feature = "ros2", feature = "rosbridge"))]
+mod definitions;
+#[cfg(feature = "mqtt")]
+mod mqtt;
+#[cfg(feature = "ros1")]
+mod ros1;
+#[cfg(feature = "ros2")]
+mod ros2;
+#[cfg(feature = "rosbridge")]
+mod rosbridge;
+#[cfg(any(feature = "mqtt", feature = "rosbridge"))]
+mod secrets;
+#[cfg(feature = "simlog")]
+mod simlog;
+
 use std::process::ExitCode;
 
-use super::arguments::ExplainFormat;
+use self::arguments::{Mqtt, Ros1, Ros2, Rosbridge, Simlog};
 use super::shell::Shell;
 use crate::frontend::Language;
 
@@ -11,53 +28,58 @@ use crate::frontend::Language;
 #[derive(Debug, clap::Subcommand)]
 pub(super) enum Scan {
     /// Listen to nodes of ROS 2, and print a space with their topics, services and messages.
-    #[command(after_help = EXAMPLE)]
+    #[command(after_help = arguments::ROS_2)]
     Ros2(Ros2),
-}
-
-const EXAMPLE: &str = "For example: sesamec scan ros2 --domain 40 --types /opt/ros/jazzy/share > cell.sesame\n\n\
-                       Nothing is published beyond what discovery needs; nodes are asked only for the layouts of types \
-                       that no folder has.";
-
-/// How nodes of ROS 2 are listened to.
-#[derive(Debug, clap::Args)]
-pub(super) struct Ros2 {
-    /// The domain; if omitted, `ROS_DOMAIN_ID`, or 0 if that is not set.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=232))]
-    pub(super) domain: Option<u16>,
-    /// How long to listen, in seconds of wall time: 2 to 3600. Discovery takes up to two of them.
-    #[arg(long, default_value_t = 5.0, value_name = "S", value_parser = seconds)]
-    pub(super) seconds: f64,
-    /// A folder of packages with the definitions of messages and services; may be repeated. If omitted, `share` in the
-    /// folders of `AMENT_PREFIX_PATH`.
-    #[arg(long, value_name = "FOLDER")]
-    pub(super) types: Vec<PathBuf>,
-    /// Listen to other machines as well, not to this one only.
-    #[arg(long)]
-    pub(super) network: bool,
-    /// A space, or what was found as one JSON object.
-    #[arg(long, value_enum, default_value_t)]
-    pub(super) format: ExplainFormat,
-}
-
-fn seconds(text: &str) -> Result<f64, String> {
-    let seconds = text.parse().map_err(|_| "expected a number of seconds".to_owned())?;
-    if (2.0..=3600.0).contains(&seconds) { Ok(seconds) } else { Err("expected 2 to 3600 seconds".to_owned()) }
+    /// Ask a master of ROS 1 and its nodes, and print a space with their topics, services and messages.
+    #[command(after_help = arguments::ROS_1)]
+    Ros1(Ros1),
+    /// Ask a server of rosbridge what is behind it, listen, and print a space with topics, services and messages.
+    #[command(after_help = arguments::ROSBRIDGE)]
+    Rosbridge(Rosbridge),
+    /// Listen at a broker of MQTT, and print a space with its topics and the messages that their payloads are.
+    #[command(after_help = arguments::MQTT)]
+    Mqtt(Mqtt),
+    /// Listen to topics of a simulator that speaks SimlogAPI, and print a space with them and their messages.
+    #[command(after_help = arguments::SIMLOG)]
+    Simlog(Simlog),
 }
 
 /// `sesamec scan`
-#[cfg(not(feature = "ros2"))]
-pub(super) fn scan(_: Shell, _: &Language, scan: &Scan) -> anyhow::Result<ExitCode> {
-    let Scan::Ros2(_) = scan;
-    anyhow::bail!(
-        "this sesamec was built without ROS 2; in a checkout of Sesame, `cargo install --path sesame-codegen --features \
-         ros2` installs one with it, and `cargo run --features ros2 -p sesame-codegen -- scan ros2` runs one"
-    )
-}
-
-/// `sesamec scan`
-#[cfg(feature = "ros2")]
+#[cfg_attr(
+    not(any(feature = "mqtt", feature = "ros1", feature = "ros2", feature = "rosbridge", feature = "simlog")),
+    expect(unused_variables, reason = "without any middleware there is nothing to scan")
+)]
 pub(super) fn scan(shell: Shell, language: &Language, scan: &Scan) -> anyhow::Result<ExitCode> {
-    let Scan::Ros2(arguments) = scan;
-    super::scan_ros2::scan(shell, language, arguments)
+    match scan {
+        #[cfg(feature = "ros2")]
+        Scan::Ros2(arguments) => ros2::scan(shell, language, arguments),
+        #[cfg(not(feature = "ros2"))]
+        Scan::Ros2(_) => without("ROS 2", "ros2"),
+        #[cfg(feature = "ros1")]
+        Scan::Ros1(arguments) => ros1::scan(shell, language, arguments),
+        #[cfg(not(feature = "ros1"))]
+        Scan::Ros1(_) => without("ROS 1", "ros1"),
+        #[cfg(feature = "rosbridge")]
+        Scan::Rosbridge(arguments) => rosbridge::scan(shell, language, arguments),
+        #[cfg(not(feature = "rosbridge"))]
+        Scan::Rosbridge(_) => without("rosbridge", "rosbridge"),
+        #[cfg(feature = "mqtt")]
+        Scan::Mqtt(arguments) => mqtt::scan(shell, language, arguments),
+        #[cfg(not(feature = "mqtt"))]
+        Scan::Mqtt(_) => without("MQTT", "mqtt"),
+        #[cfg(feature = "simlog")]
+        Scan::Simlog(arguments) => simlog::scan(shell, language, arguments),
+        #[cfg(not(feature = "simlog"))]
+        Scan::Simlog(_) => without("SimlogAPI", "simlog"),
+    }
+}
+
+/// Why a middleware cannot be looked at, and what to do.
+#[cfg(not(all(feature = "mqtt", feature = "ros1", feature = "ros2", feature = "rosbridge", feature = "simlog")))]
+fn without(what: &str, feature: &str) -> anyhow::Result<ExitCode> {
+    anyhow::bail!(
+        "this sesamec was built without {what}; in a checkout of Sesame, `cargo install --path sesame-codegen --features \
+         {feature}` installs one with it, and `cargo run --features {feature} -p sesame-codegen -- scan {feature}` runs \
+         one"
+    )
 }

@@ -1,4 +1,4 @@
-//! Messages of the space, each with a type of ROS.
+//! Messages of the space: with a type of ROS, or with the fields that payloads have in common.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -6,33 +6,72 @@ use std::fmt::Write as _;
 use sesame_dsl::interfaces::in_words;
 use sesame_notation::quoted;
 use sesame_plan::{InterfaceField, Primitive, WireType};
-use sesame_ros2::scan::TypeSource;
+use sesame_scan::{System, TypeSource};
 
+use super::comments::on_one_line;
 use super::types::Types;
 
 /// How many letters of a type's fields are shown in a comment.
 const LONGEST: usize = 50;
 
-/// A message of each type that needs one: with a block if no file has its layout, else with its fields in a comment.
-pub(super) fn messages(types: &Types, names: &BTreeMap<&str, String>, order: &[&str]) -> String {
+/// How many fields are named that a message does not have in the space.
+const MOST_LEFT_OUT: usize = 20;
+
+/// A message of each type that needs one: in ROS with a block if no file has its layout, else with its fields in a
+/// comment.
+pub(super) fn messages(system: &System, types: &Types, names: &BTreeMap<&str, String>, order: &[&str]) -> String {
+    let is_ros = system.is_ros();
     let mut text = String::new();
-    if order.iter().any(|ty| types.source(ty) != TypeSource::Node) {
+    if !is_ros && !order.is_empty() {
+        text.push_str(
+            "// decide: units, such as `real[m]`; and `real` in the place of `int` where fractions may come, too: only\n\
+             // whole numbers came there\n",
+        );
+    }
+    if is_ros && order.iter().any(|ty| types.source(ty) == TypeSource::Payloads) {
+        text.push_str(
+            "// decide: of messages with a block, whose fields are those that their JSON has in common: the sizes of\n\
+             // fields, `real` in the place of `int` where fractions may come, and the types of messages in messages\n",
+        );
+    }
+    if is_ros && order.iter().any(|ty| !has_block(types, ty)) {
         text.push_str("// decide: units; `message NAME = \"TYPE\" { FIELD: real[m] }` gives a field its unit\n");
     }
     for ty in order {
         let Some(name) = names.get(ty) else { continue };
-        let head = format!("message {name} = {}", quoted(ty));
-        if types.source(ty) != TypeSource::Node {
+        let head = if is_ros { format!("message {name} = {}", quoted(ty)) } else { format!("message {name}") };
+        if !has_block(types, ty) {
             _ = writeln!(text, "{head}  // {}", fields_in_words(types, ty));
             continue;
         }
-        _ = writeln!(text, "// decide: the units of its fields; a node described them\n{head} {{");
+        let who = match (is_ros, types.source(ty), system) {
+            (false, ..) | (true, TypeSource::Payloads, _) => None,
+            (_, _, System::Ros1 { .. }) => Some("a publisher"),
+            (_, _, System::Rosbridge { .. }) => Some("the bridge"),
+            _ => Some("a node"),
+        };
+        if let Some(who) = who {
+            _ = writeln!(text, "// decide: the units of its fields; {who} described them");
+        }
+        _ = writeln!(text, "{head} {{");
         for field in types.fields(ty) {
-            _ = writeln!(text, "{}: {}", field.name, in_language(types, names, field));
+            _ = writeln!(text, "{}: {}", field.name, in_language(is_ros, types, names, field));
+        }
+        let left_out = types.left_out(ty);
+        for out in left_out.iter().take(MOST_LEFT_OUT) {
+            _ = writeln!(text, "// decide: {}", on_one_line(&format!("`{}` is left out: {}", out.name, out.why)));
+        }
+        if left_out.len() > MOST_LEFT_OUT {
+            _ = writeln!(text, "// decide: {} more are left out", left_out.len() - MOST_LEFT_OUT);
         }
         text.push_str("}\n");
     }
     text
+}
+
+/// Whether the space says the fields of a type.
+fn has_block(types: &Types, ty: &str) -> bool {
+    matches!(types.source(ty), TypeSource::Node | TypeSource::Payloads)
 }
 
 /// The fields of a type in a few words.
@@ -49,10 +88,18 @@ fn fields_in_words(types: &Types, ty: &str) -> String {
     if words.is_empty() { "no fields".to_owned() } else { words }
 }
 
-/// The type of a field of a block.
-fn in_language(types: &Types, names: &BTreeMap<&str, String>, field: &InterfaceField) -> String {
+/// The type of a topic in the language.
+pub(super) fn topic_type(types: &Types, names: &BTreeMap<&str, String>, ty: &str) -> String {
+    match types.wire(ty) {
+        Some(wire) => language_type(types, names, wire),
+        None => names.get(ty).cloned().unwrap_or_default(),
+    }
+}
+
+/// The type of a field of a block. Only in ROS a field has a type of its own on the wire.
+fn in_language(is_ros: bool, types: &Types, names: &BTreeMap<&str, String>, field: &InterfaceField) -> String {
     let of = language_type(types, names, &field.ty);
-    if is_usual(&field.ty) { of } else { format!("{of} as {}", quoted(&in_words(&field.ty))) }
+    if !is_ros || is_usual(&field.ty) { of } else { format!("{of} as {}", quoted(&in_words(&field.ty))) }
 }
 
 fn language_type(types: &Types, names: &BTreeMap<&str, String>, ty: &WireType) -> String {

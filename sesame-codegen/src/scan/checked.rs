@@ -1,16 +1,19 @@
 //! What is written passes its check.
 
-use sesame_ros2::scan::Facts;
+use std::collections::BTreeSet;
 
-use super::text::{Origin, space};
+use sesame_scan::{Facts, FoundTopic, System};
+
+use super::origin::Origin;
+use super::text::space;
 use super::types::Types;
 use crate::frontend::{Language, Look};
 
 /// What the space is called while it is checked: a file in the current folder, to which its folders are relative.
-pub(crate) const FILE: &str = "scan.sesame";
+pub const FILE: &str = "scan.sesame";
 
 /// The space, formatted, which passes its check: types that do not are left out. An error is a mistake of this program.
-pub(crate) fn checked_space(
+pub fn checked_space(
     language: &Language,
     facts: &Facts,
     types: &mut Types,
@@ -20,12 +23,13 @@ pub(crate) fn checked_space(
     let text = space(facts, types, origin);
     if check(&text).errors > 0 {
         // Some layouts are too large for the language, or wrong in a way that only the language knows.
-        for ty in types.facts() {
-            let topics: Vec<_> = facts.topics.iter().filter(|topic| topic.ty == ty.name).take(1).cloned().collect();
-            let alone = Facts { topics, nodes: Vec::new(), services: Vec::new(), actions: Vec::new(), ..facts.clone() };
+        let of_topics: BTreeSet<&String> = facts.topics.iter().filter_map(|topic| topic.ty.as_ref()).collect();
+        for ty in of_topics {
+            let topic = FoundTopic { path: "/topic".to_owned(), ty: Some(ty.clone()), ..FoundTopic::default() };
+            let alone = Facts { topics: vec![topic], ..Facts::of(facts.system.clone()) };
             let checked = check(&space(&alone, types, origin));
             if checked.errors > 0 {
-                types.refuse(&ty.name, first_error(&checked.diagnostics));
+                types.refuse(ty, first_error(&checked.diagnostics));
             }
         }
     }
@@ -38,6 +42,14 @@ pub(crate) fn checked_space(
         return Err(mistake(&checked.diagnostics));
     }
     (language.format)(FILE, &text, Look::Short).map_err(|found| mistake(&found.diagnostics))
+}
+
+/// Whether a space could have this simulator with these settings: an address that is malformed, or to which a secret
+/// would go in plain text, is refused before anything is connected.
+pub fn check_settings(language: &Language, system: System, settings: &[String]) -> Result<(), String> {
+    let origin = Origin { folders: &[], services: &BTreeSet::new(), settings };
+    let checked = (language.check)(FILE, &space(&Facts::of(system), &Types::default(), origin), Look::Short);
+    if checked.errors == 0 { Ok(()) } else { Err(first_error(&checked.diagnostics)) }
 }
 
 /// What the first error says, without its place.

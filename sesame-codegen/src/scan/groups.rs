@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use sesame_ros2::scan::FoundTopic;
+use sesame_scan::FoundTopic;
 
 /// A topic of the space: one that was found, or several.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,22 +17,25 @@ pub(super) struct Line<'a> {
 
 /// What the members of a group have in common: the parts before and after the one that differs, the type, who
 /// publishes and who subscribes, and with which quality.
-type Common<'a> = (Vec<&'a str>, Vec<&'a str>, &'a str, &'a [String], &'a [String], (bool, bool));
+type Common<'a> = (Vec<&'a str>, Vec<&'a str>, Option<&'a str>, &'a [String], &'a [String], Quality);
+
+/// Whether it is reliable, transient local, latched, retained, and can be cut; and its quality of service.
+type Quality = ([Option<bool>; 5], Option<u8>);
 
 /// Folds topics into groups: if they have the same type, publishers, subscribers and quality, and differ in one part of
 /// their paths other than the last, which says what is published.
 pub(super) fn fold<'a>(topics: &[&'a FoundTopic]) -> Vec<Line<'a>> {
     let mut groups = BTreeMap::<Common<'a>, Vec<(usize, &'a str)>>::new();
     for (at, topic) in topics.iter().enumerate() {
-        let parts: Vec<&str> = topic.path.trim_start_matches('/').split('/').collect();
-        for differs in 0..parts.len() - 1 {
+        let parts: Vec<&str> = topic.path.split('/').collect();
+        for differs in (0..parts.len() - 1).filter(|differs| is_member(parts[*differs])) {
             let common = (
                 parts[..differs].to_vec(),
                 parts[differs + 1..].to_vec(),
-                topic.ty.as_str(),
+                topic.ty.as_deref(),
                 topic.publishers.as_slice(),
                 topic.subscribers.as_slice(),
-                (topic.reliable, topic.transient_local),
+                quality(topic),
             );
             groups.entry(common).or_default().push((at, parts[differs]));
         }
@@ -51,14 +54,25 @@ pub(super) fn fold<'a>(topics: &[&'a FoundTopic]) -> Vec<Line<'a>> {
         let differing: Vec<&str> = members.iter().map(|(_, part)| *part).collect();
         let group = format!("{{{}}}", differing.join(","));
         let parts: Vec<&str> = before.iter().copied().chain([group.as_str()]).chain(after.iter().copied()).collect();
-        let path = format!("/{}", parts.join("/"));
-        let name = before.iter().chain(&after).copied().collect::<Vec<_>>().join("/");
+        let path = parts.join("/");
+        let name: Vec<&str> = before.iter().chain(&after).copied().filter(|part| !part.is_empty()).collect();
+        let name = name.join("/");
         lines.insert(first, Line { path, name, topics: members.iter().map(|(at, _)| topics[*at]).collect() });
     }
     for (at, topic) in topics.iter().enumerate().filter(|(at, _)| !grouped[*at]) {
         lines.insert(at, Line { path: topic.path.clone(), name: topic.path.clone(), topics: vec![*topic] });
     }
     lines.into_values().collect()
+}
+
+/// Whether a part of a path can be written between the braces of a group.
+fn is_member(part: &str) -> bool {
+    !part.is_empty() && !part.contains(',')
+}
+
+fn quality(topic: &FoundTopic) -> Quality {
+    let FoundTopic { reliable, transient_local, latching, retained, can_be_cut, .. } = *topic;
+    ([reliable, transient_local, latching, retained, can_be_cut], topic.quality)
 }
 
 #[cfg(test)]
@@ -68,7 +82,7 @@ mod tests {
     fn topic(path: &str, publisher: &str) -> FoundTopic {
         FoundTopic {
             path: path.to_owned(),
-            ty: "T".to_owned(),
+            ty: Some("T".to_owned()),
             publishers: vec![publisher.to_owned()],
             ..FoundTopic::default()
         }
@@ -85,6 +99,10 @@ mod tests {
             topic("/robots/r2/state", "r2"),
             topic("/robots/r3/pose", "cell"),
             topic("/zones/r3/pose", "cell"),
+            topic("fleet/a/state", "cell"),
+            topic("fleet/b/state", "cell"),
+            topic("fleet/c,d/state", "cell"),
+            topic("fleet//state", "cell"),
         ];
         let lines = fold(&topics.iter().collect::<Vec<_>>());
         let lines: Vec<(&str, &str, usize)> =
@@ -96,6 +114,9 @@ mod tests {
             ("/robots/r1/state", "/robots/r1/state", 1),
             ("/robots/r2/state", "/robots/r2/state", 1),
             ("/zones/r3/pose", "/zones/r3/pose", 1),
+            ("fleet/{a,b}/state", "fleet/state", 2),
+            ("fleet/c,d/state", "fleet/c,d/state", 1),
+            ("fleet//state", "fleet//state", 1),
         ];
         assert_eq!(lines, expected);
     }

@@ -3,8 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use sesame_dsl::interfaces::{self, Folders, Interfaces};
-use sesame_plan::{Interface, InterfaceField, WireType};
-use sesame_ros2::scan::{Facts, FoundField, FoundType, TypeSource};
+use sesame_plan::{Dialect, Interface, InterfaceField, WireType};
+use sesame_scan::{Facts, FoundField, FoundType, LeftOut, TypeSource};
+
+/// What a point is called that has no type of ROS.
+pub(super) const POINT: &str = "point";
 
 /// The most types that nodes may describe.
 const MOST: usize = 2000;
@@ -14,34 +17,56 @@ const DEEPEST: usize = 50;
 
 /// Types by their names.
 #[derive(Debug, Default)]
-pub(crate) struct Types {
+pub struct Types {
     by_name: BTreeMap<String, Type>,
+    /// Types of topics that are no messages, by their words.
+    plain: BTreeMap<String, WireType>,
+    /// Those of them that turned out to be of no use, with the reason.
+    refused: BTreeMap<String, String>,
 }
 
 #[derive(Debug)]
 struct Type {
     source: TypeSource,
     fields: Vec<InterfaceField>,
+    left_out: Vec<LeftOut>,
     problem: Option<String>,
+}
+
+impl Type {
+    /// One with a layout.
+    fn of(source: TypeSource, fields: Vec<InterfaceField>) -> Self {
+        Type { source, fields, left_out: Vec::new(), problem: None }
+    }
+
+    /// One without.
+    fn unknown(problem: Option<String>) -> Self {
+        Type { source: TypeSource::Unknown, fields: Vec::new(), left_out: Vec::new(), problem }
+    }
 }
 
 impl Types {
     /// The types of all topics, as far as they are known or folders have them.
-    pub(crate) fn of_topics(facts: &Facts, files: &dyn Interfaces, folders: Folders<'_>) -> Self {
+    pub fn of_topics(facts: &Facts, files: &dyn Interfaces, folders: Folders<'_>) -> Self {
         let mut types = Types::default();
-        for topic in &facts.topics {
-            types.look_up(&topic.ty, files, folders);
+        for ty in facts.topics.iter().filter_map(|topic| topic.ty.as_deref()) {
+            types.look_up(ty, files, folders);
         }
         types
+    }
+
+    /// Adds a type of ROS that needs no folder.
+    pub(super) fn add_known(&mut self, name: &str) {
+        self.look_up(name, &interfaces::NoInterfaces, Folders { written: &[], file: "", dialect: Dialect::Ros2 });
     }
 
     fn look_up(&mut self, name: &str, files: &dyn Interfaces, folders: Folders<'_>) {
         if self.by_name.contains_key(name) {
             return;
         }
-        let unknown = |problem: Option<String>| Type { source: TypeSource::Unknown, fields: Vec::new(), problem };
+        let unknown = Type::unknown;
         let of = |source, found: Vec<Interface>| match found.into_iter().next_back() {
-            Some(last) => Type { source, fields: last.fields, problem: None },
+            Some(last) => Type::of(source, last.fields),
             None => unknown(None),
         };
         let found = if interfaces::full_name(name, "msg").as_deref() != Some(name) {
@@ -59,14 +84,14 @@ impl Types {
     }
 
     /// Types of which no folder has a definition, and nothing else is wrong.
-    pub(crate) fn missing(&self) -> Vec<String> {
+    pub fn missing(&self) -> Vec<String> {
         let missing = self.by_name.iter();
         let missing = missing.filter(|(_, ty)| ty.source == TypeSource::Unknown && ty.problem.is_none());
         missing.map(|(name, _)| name.clone()).collect()
     }
 
     /// Adds layouts as nodes describe them, by the type for which they were asked.
-    pub(crate) fn add_described(
+    pub fn add_described(
         &mut self,
         described: &BTreeMap<String, Vec<Interface>>,
         files: &dyn Interfaces,
@@ -77,8 +102,8 @@ impl Types {
             let Some(ty) = self.by_name.get_mut(&interface.name) else { continue };
             if ty.source == TypeSource::Unknown && ty.problem.is_none() {
                 *ty = match wrong_field(&interface.fields) {
-                    Some(problem) => Type { source: TypeSource::Unknown, fields: Vec::new(), problem: Some(problem) },
-                    None => Type { source: TypeSource::Node, fields: interface.fields.clone(), problem: None },
+                    Some(problem) => Type::unknown(Some(problem)),
+                    None => Type::of(TypeSource::Node, interface.fields.clone()),
                 };
             }
         }
@@ -119,32 +144,82 @@ impl Types {
     }
 
     /// A type turned out to be of no use.
-    pub(crate) fn refuse(&mut self, name: &str, problem: String) {
+    pub fn refuse(&mut self, name: &str, problem: String) {
         if let Some(ty) = self.by_name.get_mut(name) {
-            *ty = Type { source: TypeSource::Unknown, fields: Vec::new(), problem: Some(problem) };
+            *ty = Type::unknown(Some(problem));
+        } else if self.plain.contains_key(name) {
+            self.refused.insert(name.to_owned(), problem);
         }
     }
 
+    /// Adds a message that payloads have in common, unless there is one of this name that has a layout.
+    pub(super) fn add_payload(&mut self, name: &str, fields: Vec<InterfaceField>, left_out: Vec<LeftOut>) {
+        if self.source(name) == TypeSource::Unknown {
+            let ty = Type { left_out, ..Type::of(TypeSource::Payloads, fields) };
+            self.by_name.insert(name.to_owned(), ty);
+        }
+    }
+
+    /// Gives a message that payloads have in common its fields.
+    pub(super) fn set_payload(&mut self, name: &str, fields: Vec<InterfaceField>, left_out: Vec<LeftOut>) {
+        if let Some(ty) = self.by_name.get_mut(name) {
+            (ty.fields, ty.left_out) = (fields, left_out);
+        }
+    }
+
+    /// Adds the type of topics that are no messages; gives its words.
+    pub(super) fn add_plain(&mut self, wire: WireType) -> String {
+        let words = interfaces::in_words(&wire);
+        self.plain.insert(words.clone(), wire);
+        words
+    }
+
+    /// Whether topics of this type are no messages.
+    pub(super) fn is_plain(&self, words: &str) -> bool {
+        self.plain.contains_key(words)
+    }
+
+    /// The type of topics that are no messages.
+    pub(super) fn wire(&self, words: &str) -> Option<&WireType> {
+        self.plain.get(words)
+    }
+
+    /// Whether there is a type of this name.
+    pub(super) fn has(&self, name: &str) -> bool {
+        self.by_name.contains_key(name)
+    }
+
+    /// The fields that payloads have and a space cannot declare.
+    pub(super) fn left_out(&self, name: &str) -> &[LeftOut] {
+        self.by_name.get(name).map(|ty| ty.left_out.as_slice()).unwrap_or_default()
+    }
+
     /// Where the layout of a type comes from.
-    pub(crate) fn source(&self, name: &str) -> TypeSource {
+    pub fn source(&self, name: &str) -> TypeSource {
         self.by_name.get(name).map_or(TypeSource::Unknown, |ty| ty.source)
     }
 
     /// The fields that a type has for people.
-    pub(crate) fn fields(&self, name: &str) -> impl Iterator<Item = &InterfaceField> {
+    pub fn fields(&self, name: &str) -> impl Iterator<Item = &InterfaceField> {
         let fields = self.by_name.get(name).map(|ty| ty.fields.as_slice()).unwrap_or_default();
         fields.iter().filter(|field| field.name != interfaces::NO_FIELDS)
     }
 
     /// Why a type cannot be used, in a clause.
-    pub(crate) fn problem(&self, name: &str) -> Option<&str> {
-        self.by_name.get(name)?.problem.as_deref()
+    pub fn problem(&self, name: &str) -> Option<&str> {
+        match self.by_name.get(name) {
+            Some(ty) => ty.problem.as_deref(),
+            None => self.refused.get(name).map(String::as_str),
+        }
     }
 
     /// What messages of a type are in the language where that is no message: times, and points that need no block.
-    pub(crate) fn plain(&self, name: &str) -> Option<&'static str> {
+    pub fn plain(&self, name: &str) -> Option<&'static str> {
         if interfaces::is_time(name) {
             return Some("real[s]");
+        }
+        if name == POINT {
+            return Some("point");
         }
         let ty = self.by_name.get(name).filter(|ty| ty.source != TypeSource::Node)?;
         let layout = Interface { name: name.to_owned(), fields: ty.fields.clone() };
@@ -152,9 +227,14 @@ impl Types {
     }
 
     /// The types of these names that can be used, and those that the blocks of described types need, each once.
-    pub(crate) fn needed<'a>(&'a self, of_topics: impl IntoIterator<Item = &'a str>) -> Vec<&'a str> {
+    pub fn needed<'a>(&'a self, of_topics: impl IntoIterator<Item = &'a str>) -> Vec<&'a str> {
         let mut needed: Vec<&str> = Vec::new();
         for name in of_topics {
+            // What is plain itself is a list of messages, perhaps.
+            let name = match self.plain.get(name) {
+                Some(wire) => contained(wire).unwrap_or_default(),
+                None => name,
+            };
             if self.source(name) != TypeSource::Unknown && !needed.contains(&name) {
                 needed.push(name);
             }
@@ -162,7 +242,7 @@ impl Types {
         let mut at = 0;
         while let Some(&name) = needed.get(at) {
             at += 1;
-            if self.source(name) != TypeSource::Node {
+            if !matches!(self.source(name), TypeSource::Node | TypeSource::Payloads) {
                 continue;
             }
             for inner in self.fields(name).filter_map(|field| contained(&field.ty)) {
@@ -175,13 +255,14 @@ impl Types {
     }
 
     /// All of them as facts.
-    pub(crate) fn facts(&self) -> Vec<FoundType> {
+    pub fn facts(&self) -> Vec<FoundType> {
         let field =
             |field: &InterfaceField| FoundField { name: field.name.clone(), ty: interfaces::in_words(&field.ty) };
         let of = |(name, ty): (&String, &Type)| FoundType {
             name: name.clone(),
             source: ty.source,
             fields: self.fields(name).map(field).collect(),
+            left_out: ty.left_out.clone(),
             problem: ty.problem.clone(),
         };
         self.by_name.iter().map(of).collect()

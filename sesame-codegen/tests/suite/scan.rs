@@ -13,13 +13,56 @@ fn text(bytes: &[u8]) -> &str {
     std::str::from_utf8(bytes).unwrap()
 }
 
-#[cfg(not(feature = "ros2"))]
+/// What each middleware is told that it needs, besides options.
+const MIDDLEWARES: [(&str, bool, &[&str]); 5] = [
+    ("ros2", cfg!(feature = "ros2"), &[]),
+    ("ros1", cfg!(feature = "ros1"), &[]),
+    ("rosbridge", cfg!(feature = "rosbridge"), &["ws://127.0.0.1:1"]),
+    ("mqtt", cfg!(feature = "mqtt"), &["mqtt://127.0.0.1:1"]),
+    ("simlog", cfg!(feature = "simlog"), &["http://127.0.0.1:1"]),
+];
+
 #[test]
-fn without_ros_2_it_says_how_to_get_a_sesamec_with_it() {
+fn without_a_middleware_it_says_how_to_get_a_sesamec_with_it() {
     let folder = tempfile::tempdir().unwrap();
-    let scanned = sesamec(folder.path(), &["scan", "ros2"]);
-    assert_eq!((scanned.status.code(), text(&scanned.stdout)), (Some(1), ""));
-    assert!(text(&scanned.stderr).contains("--features ros2"), "{}", text(&scanned.stderr));
+    for (middleware, _, needed) in MIDDLEWARES.into_iter().filter(|(_, linked, _)| !linked) {
+        let scanned = sesamec(folder.path(), &[&["scan", middleware], needed].concat());
+        assert_eq!((scanned.status.code(), text(&scanned.stdout)), (Some(1), ""));
+        let remedy = format!("--features {middleware}");
+        assert!(text(&scanned.stderr).contains(&remedy), "{}", text(&scanned.stderr));
+    }
+}
+
+#[test]
+fn an_address_that_no_space_could_have_is_refused_before_anything_is_connected() {
+    let folder = tempfile::tempdir().unwrap();
+    let refused = |arguments: &[&str], why: &str| {
+        let scanned = sesamec(folder.path(), &[&["scan"], arguments].concat());
+        assert_eq!((scanned.status.code(), text(&scanned.stdout)), (Some(1), ""), "{arguments:?}");
+        assert!(text(&scanned.stderr).contains(why), "{}", text(&scanned.stderr));
+    };
+    if cfg!(feature = "rosbridge") {
+        refused(&["rosbridge", "http://localhost"], "expected an address that begins with `ws://` or `wss://`");
+        let secret = ["rosbridge", "ws://hall.example:9090", "--token-env", "NO_SUCH_SECRET"];
+        refused(&secret, "a secret would go to `hall.example` in plain text");
+        refused(&["rosbridge", "ws://127.0.0.1:1", "--topic", "/a:b"], "names no type of ROS");
+        let nowhere = ["rosbridge", "ws://127.0.0.1:1", "--token-env", "SESAME_NO_SUCH_SECRET"];
+        refused(&nowhere, "the secret in the environment variable `SESAME_NO_SUCH_SECRET` is missing");
+    }
+    if cfg!(feature = "mqtt") {
+        refused(&["mqtt", "mqtt://user:word@localhost"], "a name or password in an address would be in every log");
+        refused(&["mqtt", "mqtt://127.0.0.1:1", "--topics", ""], "`#` stands for all topics");
+        refused(&["mqtt", "mqtt://127.0.0.1:1"], "no broker answers at `mqtt://127.0.0.1:1`");
+    }
+    if cfg!(feature = "simlog") {
+        refused(&["simlog", "http://127.0.0.1:1"], "name each with `--topic NAME`");
+        refused(&["simlog", "tcp://127.0.0.1:1", "--topic", "a"], "expected an address that begins with `http://`");
+        refused(&["simlog", "http://127.0.0.1:1", "--topics-from", "nowhere"], "the topics in nowhere cannot be read");
+    }
+    if cfg!(feature = "ros1") {
+        refused(&["ros1", "--master", "localhost"], "expected an address that begins with `http://`");
+        refused(&["ros1", "--master", "http://127.0.0.1:1"], "start one with `roscore`");
+    }
 }
 
 #[cfg(feature = "ros2")]

@@ -1,5 +1,7 @@
 //! A system of ROS 2: the settings of its simulator, and the names that ROS permits.
 
+use sesame_plan::Dialect;
+
 use super::Resolver;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{Clock, StepBy, Stepping, Transport};
@@ -23,6 +25,15 @@ impl<'a> Resolver<'a> {
         match &self.simulators().next()?.transport {
             Some(ast::Transport::Bus(bus)) => Some(bus),
             _ => None,
+        }
+    }
+
+    /// Of which ROS the simulator is; ROS 2 where it is of none.
+    pub(super) fn dialect(&self) -> Dialect {
+        match self.ast_bus() {
+            Some(bus) if bus.kind == BusKind::Ros1 => Dialect::Ros1,
+            Some(bus) => bus.dialects.first().map(|(_, dialect)| *dialect).unwrap_or_default(),
+            None => Dialect::Ros2,
         }
     }
 

@@ -118,7 +118,7 @@ impl<'a> Resolver<'a> {
             .flat_map(|(span, folders)| folders.iter().map(move |folder| (*span, folder.text.clone())));
         let (spans, written): (Vec<Span>, Vec<String>) = types.unzip();
         let file = spans.first().map_or("", |span| self.sources.file(span.file).name());
-        match self.interfaces.find(Folders { written: &written, file }, name) {
+        match self.interfaces.find(Folders { written: &written, file, dialect: self.dialect() }, name) {
             Ok(Some(found)) if found.last().is_some_and(|last| last.name == name) => Ok(Some(found)),
             Ok(_) => Ok(None),
             Err(why) => {

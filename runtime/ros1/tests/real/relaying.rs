@@ -129,7 +129,7 @@ fn nodes_of_roscpp_are_relayed_too() {
 fn await_subscriber(core: &Core) {
     let limit = Instant::now() + Duration::from_secs(20);
     loop {
-        let facts = sesame_ros1::scan::scan(&core.uri(), Duration::ZERO).unwrap();
+        let facts = sesame_ros1::scan::scan(&core.uri(), Duration::ZERO, Duration::ZERO).unwrap().facts;
         if facts.topics.iter().any(|topic| topic.path == "/peer" && !topic.subscribers.is_empty()) {
             // It is registered, and connects next.
             std::thread::sleep(Duration::from_secs(1));

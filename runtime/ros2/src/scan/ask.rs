@@ -6,9 +6,9 @@ use std::time::{Duration, Instant};
 use rustdds::rpc::SampleIdentity;
 use rustdds::{GUID, SequenceNumber};
 use sesame_plan::Interface;
+use sesame_scan::Facts;
 
 use super::described::{Descriptions, SERVICE};
-use super::facts::Facts;
 use super::listen::now;
 use crate::dds::{DdsError, Participant, ReaderId, Sample, WriterId, mirrored};
 use crate::names;
@@ -110,7 +110,7 @@ fn service(node: &str) -> String {
 
 /// Whom to ask about a type; `None` if nobody announces its hash.
 fn question<'a>(facts: &'a Facts, name: &'a str) -> Option<Question<'a>> {
-    let topics = || facts.topics.iter().filter(|topic| topic.ty == name);
+    let topics = || facts.topics.iter().filter(|topic| topic.ty.as_deref() == Some(name));
     let hash = topics().find_map(|topic| topic.hash.as_deref())?;
     let mut nodes = Vec::new();
     let publishers = topics().flat_map(|topic| &topic.publishers);

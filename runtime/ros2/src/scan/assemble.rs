@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::NOBODY;
-use super::facts::{Facts, FoundAction, FoundNode, FoundService, FoundTopic};
+use sesame_scan::{Arrivals, Facts, FoundAction, FoundNode, FoundService, FoundTopic, NOBODY, System};
+
 use crate::names::{self, Kind};
 
 /// A publisher or subscriber.
@@ -19,13 +19,6 @@ pub(super) struct Seen {
     pub(super) reliable: bool,
     pub(super) transient_local: bool,
     pub(super) hash: Option<String>,
-}
-
-/// The messages of a topic: how many arrived, and in how many seconds from the first to the last.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Heard {
-    pub(super) messages: u64,
-    pub(super) seconds: f64,
 }
 
 /// The services that every node has, by their last part.
@@ -44,9 +37,10 @@ const ACTION: &str = "/_action/";
 
 /// What these publishers and subscribers are in ROS; `heard` is by topic and type in DDS.
 pub(super) fn assemble(
+    system: System,
     seen: &[Seen],
     names: impl IntoIterator<Item = String>,
-    heard: &BTreeMap<(String, String), Heard>,
+    heard: &BTreeMap<(String, String), Arrivals>,
 ) -> Facts {
     let mut topics = BTreeMap::<(&str, String), FoundTopic>::new();
     let mut services = BTreeMap::<(&str, String), FoundService>::new();
@@ -75,8 +69,12 @@ pub(super) fn assemble(
             let key = (seen.topic.clone(), seen.type_name.clone());
             let found = topics.entry((path, ty.clone())).or_insert_with(|| topic(path, ty, heard.get(&key).copied()));
             if seen.publishes {
-                found.reliable = seen.reliable && (found.publishers.is_empty() || found.reliable);
-                found.transient_local = seen.transient_local && (found.publishers.is_empty() || found.transient_local);
+                // Those that do not offer it decide.
+                for (all, one) in
+                    [(&mut found.reliable, seen.reliable), (&mut found.transient_local, seen.transient_local)]
+                {
+                    *all = Some(one && all.unwrap_or(true));
+                }
                 found.publishers.push(by);
             } else {
                 found.subscribers.push(by);
@@ -87,7 +85,7 @@ pub(super) fn assemble(
         let ty = service_type(&ty);
         let found = services.entry((path, ty.clone())).or_insert_with(|| FoundService {
             path: path.to_owned(),
-            ty,
+            ty: Some(ty),
             ..FoundService::default()
         });
         // A server subscribes to requests, a client publishes them; replies say nothing more.
@@ -108,22 +106,18 @@ pub(super) fn assemble(
         service.clients.sort();
     }
     let nodes = nodes(names, &topics, &services);
-    Facts {
-        domain: 0,
-        seconds: 0.0,
-        cut: false,
-        nodes,
-        topics,
-        services,
-        actions: actions.into_values().collect(),
-        types: Vec::new(),
-    }
+    Facts { nodes, topics, services, actions: actions.into_values().collect(), ..Facts::of(system) }
 }
 
-fn topic(path: &str, ty: String, heard: Option<Heard>) -> FoundTopic {
+fn topic(path: &str, ty: String, heard: Option<Arrivals>) -> FoundTopic {
     let heard = heard.unwrap_or_default();
-    let rate = (heard.messages > 1 && heard.seconds > 0.0).then(|| (heard.messages - 1) as f64 / heard.seconds);
-    FoundTopic { path: path.to_owned(), ty, messages: heard.messages, rate, ..FoundTopic::default() }
+    FoundTopic {
+        path: path.to_owned(),
+        ty: Some(ty),
+        messages: heard.messages(),
+        rate: heard.rate(),
+        ..FoundTopic::default()
+    }
 }
 
 /// All nodes with what they do.
@@ -196,6 +190,8 @@ pub(super) fn type_hash(user_data: &[u8]) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
 
     fn seen(publishes: bool, topic: &str, type_name: &str, node: Option<&str>) -> Seen {
@@ -235,8 +231,10 @@ mod tests {
             seen(true, "rt/go/_action/status", "action_msgs::msg::dds_::GoalStatusArray_", Some("/arm")),
         ];
         let names = ["/arm", "/arm", "/driver", "/_ros2cli_7"].map(str::to_owned);
-        let heard = [(("rt/b".to_owned(), double.to_owned()), Heard { messages: 11, seconds: 2.0 })];
-        let facts = assemble(&all, names, &heard.into());
+        let mut arrivals = Arrivals::default();
+        (0..11).for_each(|number| arrivals.add(Duration::from_millis(200 * number)));
+        let heard = [(("rt/b".to_owned(), double.to_owned()), arrivals)];
+        let facts = assemble(System::Ros2 { domain: 7 }, &all, names, &heard.into());
         insta::assert_debug_snapshot!(facts);
     }
 

@@ -6,9 +6,9 @@ use std::time::{Duration, Instant};
 use rustdds::QosPolicies;
 use rustdds::policy::{Durability, History, Reliability};
 use sesame_plan::Interface;
+use sesame_scan::{Arrivals, Facts, System};
 
-use super::assemble::{Heard, Seen, assemble, type_hash};
-use super::facts::Facts;
+use super::assemble::{Seen, assemble, type_hash};
 use super::{MOST_ENDPOINTS, ask};
 use crate::dds::{DdsError, Endpoint, Participant, ReaderId};
 use crate::graph::{DISCOVERY_TOPIC, DISCOVERY_TYPE, NodeInfo, Nodes};
@@ -45,15 +45,7 @@ pub struct Scanner {
     participants: BTreeSet<crate::graph::Gid>,
     /// The topics whose messages are counted, by their names and types in DDS.
     counted: BTreeMap<(String, String), ReaderId>,
-    heard: BTreeMap<ReaderId, Counted>,
-}
-
-/// Messages of a topic.
-#[derive(Debug, Clone, Copy)]
-struct Counted {
-    messages: u64,
-    first: Instant,
-    last: Instant,
+    heard: BTreeMap<ReaderId, Arrivals>,
 }
 
 impl Scanner {
@@ -93,10 +85,7 @@ impl Scanner {
             let arrived = now();
             for received in received.drain(..) {
                 if received.reader != self.info_reader {
-                    let new = Counted { messages: 0, first: arrived, last: arrived };
-                    let counted = self.heard.entry(received.reader).or_insert(new);
-                    counted.messages += 1;
-                    counted.last = arrived;
+                    self.heard.entry(received.reader).or_default().add(self.listened + (arrived - start));
                 } else if let Some((participant, nodes)) = self.info.read(received.sample.0)
                     && (self.participants.len() < MOST_PARTICIPANTS || self.participants.contains(&participant))
                 {
@@ -151,14 +140,11 @@ impl Scanner {
         let mut seen: Vec<Seen> = seen.collect();
         seen.sort_by(|a, b| (&a.topic, &a.type_name, &a.node).cmp(&(&b.topic, &b.type_name, &b.node)));
         seen.truncate(MOST_ENDPOINTS);
-        let heard = self.counted.iter().filter_map(|(key, reader)| {
-            let counted = self.heard.get(reader)?;
-            let seconds = (counted.last - counted.first).as_secs_f64();
-            Some((key.clone(), Heard { messages: counted.messages, seconds }))
-        });
+        let heard = self.counted.iter().filter_map(|(key, reader)| Some((key.clone(), *self.heard.get(reader)?)));
         let names = self.nodes.iter().map(|node| node.name.clone());
-        let facts = assemble(&seen, names.take(MOST_ENDPOINTS), &heard.collect());
-        Facts { domain: self.domain, seconds: self.listened.as_secs_f64(), cut: all > MOST_ENDPOINTS, ..facts }
+        let system = System::Ros2 { domain: self.domain };
+        let facts = assemble(system, &seen, names.take(MOST_ENDPOINTS), &heard.collect());
+        Facts { seconds: self.listened.as_secs_f64(), cut: all > MOST_ENDPOINTS, ..facts }
     }
 
     /// The layouts of types, from nodes that have topics of them: each with those that it contains, the type itself

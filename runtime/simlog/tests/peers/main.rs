@@ -9,6 +9,7 @@ mod peer;
 mod recorder;
 
 mod client;
+mod scanning;
 mod served;
 #[cfg(feature = "tls")]
 mod tls;

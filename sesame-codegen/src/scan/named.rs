@@ -1,0 +1,77 @@
+//! The names in the space that stand for what was found.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use sesame_legacy::Names;
+use sesame_notation::quoted;
+use sesame_scan::{Facts, FoundNode, FoundService, FoundTopic};
+
+use super::comments::Unsaid;
+use super::groups::{Line, fold};
+use super::sayable::is_ros_name;
+
+/// All names.
+pub(super) struct Named<'a> {
+    pub(super) simulator: String,
+    /// Messages by their types.
+    pub(super) messages: BTreeMap<&'a str, String>,
+    /// Topics as the space has them.
+    pub(super) topics: Vec<(String, Line<'a>)>,
+    pub(super) services: Vec<(String, &'a FoundService)>,
+    pub(super) nodes: Vec<(String, &'a FoundNode)>,
+}
+
+/// Names all that the space can say; nodes that it cannot become comments.
+pub(super) fn name_all<'a>(
+    facts: &'a Facts,
+    needed: &[&'a str],
+    topics: &[&'a FoundTopic],
+    services: &[&'a FoundService],
+    unsaid: &mut Unsaid,
+) -> Named<'a> {
+    let mut names = Names::default();
+    let last = |path: &str| path.rsplit('/').next().unwrap_or_default().to_owned();
+    let topics: Vec<_> = fold(topics).into_iter().map(|line| (names.take(&line.name, "topic"), line)).collect();
+    let services: Vec<_> = services.iter().map(|service| (service_name(&mut names, &service.path), *service)).collect();
+    let mut nodes = Vec::new();
+    for node in &facts.nodes {
+        if is_ros_name(&node.name) {
+            nodes.push((names.take(&node.name, "node"), node));
+        } else {
+            unsaid.decide(&format!("node {} has no name of ROS", quoted(&node.name)));
+        }
+    }
+    let simulator = names.take("robots", "simulator");
+    // Messages differ from each other in more than case, but from all else only as texts.
+    let others: BTreeSet<&str> = topics
+        .iter()
+        .map(|(name, _)| name.as_str())
+        .chain(services.iter().map(|(name, _)| name.as_str()))
+        .chain(nodes.iter().map(|(name, _)| name.as_str()))
+        .chain([simulator.as_str()])
+        .collect();
+    let mut of_messages = Names::default();
+    let mut message = |ty: &str| loop {
+        let name = of_messages.take(&last(ty), "Message");
+        if !others.contains(name.as_str()) {
+            return name;
+        }
+    };
+    let messages = needed.iter().map(|ty| (*ty, message(ty))).collect();
+    Named { simulator, messages, topics, services, nodes }
+}
+
+/// A name for a service, whose requests and replies have names that begin with it.
+fn service_name(names: &mut Names, path: &str) -> String {
+    let path: String = path.chars().take(40).collect();
+    loop {
+        let name = names.take(&path, "service");
+        let [request, reply] = ["request", "reply"].map(|end| {
+            let wanted = format!("{name}_{end}");
+            names.take(&wanted, "service") == wanted
+        });
+        if request && reply {
+            return name;
+        }
+    }
+}
