@@ -23,7 +23,7 @@ fn project(name: &str) -> Project {
          metric disturbed minimise = fuzzing_time()\n\
          requirement R1 \"It stays away\" = nearest >= 1mm\n\
          operation jitter on link0 = random offset [-0.3rad, 0.3rad] within [0s, 20s]\n\
-         test leaning {{ jitter random offset [0.3rad, 0.3rad] from 0s to 5s  expect disturbed >= 4s }}\n\
+         test leaning {{ jitter offset [0.3rad, 0.3rad] from 0s to 5s  expect disturbed >= 4s }}\n\
          campaign close {{\n\
            objectives nearest, disturbed\n\
            operations jitter 1 per test\n\

@@ -156,7 +156,9 @@ fn what_cannot_be_done_is_said() {
     let mut client = Client::connect(&Options::new(&url, SimlogVersion::V2)).expect("it listens");
     let said = client.step().unwrap_err().to_string();
     assert!(said.contains("no run has begun"), "{said}");
-    for (milliseconds, why) in [(0, "no length of a step"), (-5, "no length of a step"), (5000, "steps are too long")] {
+    for (milliseconds, why) in
+        [(0, "not a valid step length"), (-5, "not a valid step length"), (5000, "steps are too long")]
+    {
         let said = client.set_step(milliseconds).unwrap_err().to_string();
         assert!(said.contains(why), "{said}");
     }
