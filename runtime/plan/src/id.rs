@@ -31,6 +31,10 @@ id!(
     NodeId
 );
 id!(
+    /// A runtime monitor: position in the plan's list of monitors.
+    MonitorId
+);
+id!(
     /// A metric: position in [`crate::CampaignPlan::metrics`].
     MetricId
 );
