@@ -8,12 +8,13 @@
 //!   plan and begin before the campaign's end;
 //! - metrics: its objectives, those it observes, its condition variables, and those of all requirements, of the labs,
 //!   and of the conditions and expectations of these tests;
-//! - all labs of the space.
+//! - all runtime monitors and all labs of the space.
 
 mod condition;
 mod formula;
 mod id;
 mod lab;
+mod monitor;
 mod operation;
 mod robustness;
 mod ros2;
@@ -69,6 +70,7 @@ pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str)
             tests.map(|&id| selection.test(space, &space.tests[id], declared.end_after)).collect()
         },
         campaign: selection.campaign(space, declared),
+        monitors: space.eddis.values().map(|eddi| monitor::monitor(space, eddi)).collect(),
         labs: space.physicals.values().map(|lab| selection.lab(space, lab)).collect(),
         compensation: None,
     };

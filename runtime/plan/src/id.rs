@@ -31,7 +31,7 @@ id!(
     NodeId
 );
 id!(
-    /// A runtime monitor: position in the plan's list of monitors.
+    /// A runtime monitor: position in [`crate::CampaignPlan::monitors`].
     MonitorId
 );
 id!(

@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::formula::Condition;
-use crate::{FieldRef, Input, MonitorId, Side, TopicId};
+use crate::{FieldRef, Input, MonitorId, MonitorPart, MonitorState, Side, TopicId};
 
 /// A runtime monitor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -14,8 +14,10 @@ pub struct Monitor {
     /// Its doc comment.
     pub doc: String,
     /// Where it publishes its state: a topic that carries a `bool` (whether any guarantee holds), an `int` (the
-    /// integrity of the strongest one that holds, 0 if none does) or a `text` (its name).
-    pub publishes: TopicId,
+    /// integrity of the strongest one that holds, 0 if none does) or a `text` (its name). `None` for an external
+    /// monitor, which is a part of the system: its evidence is what that part says, and the runner only scores it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub publishes: Option<TopicId>,
     /// Guarantees of other monitors on which it relies. No monitor relies on itself by any chain of demands.
     pub demands: Vec<Demand>,
     /// What it watches; at least one.
@@ -26,6 +28,31 @@ pub struct Monitor {
     pub otherwise: SafeState,
     /// Line of its declaration, from 1.
     pub line: u32,
+}
+
+impl Monitor {
+    /// The most monitors of a plan, and the most demands, pieces of evidence, and guarantees of one of them.
+    pub const MOST_PARTS: usize = 1_000;
+    /// The most gates of all guarantees of one monitor together, those inside of others included.
+    pub const MOST_GATES: usize = 10_000;
+
+    /// The state that a position names.
+    pub fn state_name(&self, state: MonitorState) -> &str {
+        match state {
+            MonitorState::Guarantee(at) => &self.guarantees[at as usize].name,
+            MonitorState::Otherwise => &self.otherwise.name,
+        }
+    }
+
+    /// The name of a part.
+    pub fn part_name(&self, part: MonitorPart) -> &str {
+        match part {
+            MonitorPart::Evidence(at) => &self.evidence[at as usize].name,
+            MonitorPart::Demand(at) => &self.demands[at as usize].name,
+            MonitorPart::Guarantee(at) => self.state_name(MonitorState::Guarantee(at)),
+            MonitorPart::Otherwise => self.state_name(MonitorState::Otherwise),
+        }
+    }
 }
 
 /// A guarantee of another monitor.
@@ -111,6 +138,40 @@ pub enum Gate {
     },
 }
 
+impl Gate {
+    /// The most gates that are inside of each other: a piece of evidence alone is one. A plan is JSON, whose readers
+    /// limit its depth.
+    pub const MOST_DEPTH: usize = 30;
+
+    /// The gates that it combines; none of evidence and demands.
+    pub fn parts(&self) -> &[Gate] {
+        match self {
+            Gate::Evidence(_) | Gate::Demand(_) => &[],
+            Gate::All(parts) | Gate::Any(parts) | Gate::AtLeast { of: parts, .. } => parts,
+        }
+    }
+
+    /// How many of its parts must hold; `None` for evidence and demands.
+    pub fn needed(&self) -> Option<usize> {
+        match self {
+            Gate::Evidence(_) | Gate::Demand(_) => None,
+            Gate::All(parts) => Some(parts.len()),
+            Gate::Any(_) => Some(1),
+            Gate::AtLeast { count, .. } => Some(*count as usize),
+        }
+    }
+
+    /// How many gates are inside of each other, this one included.
+    pub fn depth(&self) -> usize {
+        1 + self.parts().iter().map(Gate::depth).max().unwrap_or(0)
+    }
+
+    /// How many gates it consists of, this one included.
+    pub fn size(&self) -> usize {
+        1 + self.parts().iter().map(Gate::size).sum::<usize>()
+    }
+}
+
 /// The state of a monitor in which no guarantee holds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SafeState {
@@ -118,7 +179,7 @@ pub struct SafeState {
     pub name: String,
     /// Its doc comment.
     pub doc: String,
-    /// What is sent each time that a guarantee is lost and none is left.
+    /// What is sent each time that a guarantee is lost and none is left; `None` of an external monitor.
     pub mitigation: Option<Mitigation>,
 }
 

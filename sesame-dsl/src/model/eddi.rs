@@ -1,8 +1,9 @@
 //! Runtime monitors: conditional safety certificates that watch evidence and publish which guarantee holds.
 
-use super::declaration::Declaration;
 use sesame_plan::Condition;
+pub use sesame_plan::{Gate, MitigationValue, Stale, StaleIs};
 
+use super::declaration::Declaration;
 use super::formula::Input;
 use super::ids::{EddiId, TopicId};
 use super::system::FieldPath;
@@ -50,24 +51,6 @@ pub struct Evidence {
     pub stale: Option<Stale>,
 }
 
-/// When evidence is too old.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stale {
-    /// Longest time since the last message of any of its topics, in seconds; positive.
-    pub after: f64,
-    /// What it is then.
-    pub is: StaleIs,
-}
-
-/// What stale evidence is taken for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StaleIs {
-    /// It does not hold.
-    False,
-    /// Nobody knows.
-    Unknown,
-}
-
 /// Something a monitor can vouch for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Guarantee {
@@ -77,19 +60,6 @@ pub struct Guarantee {
     pub integrity: u32,
     /// What it needs.
     pub gate: Gate,
-}
-
-/// What a guarantee needs, in three-valued logic.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Gate {
-    /// Evidence, by its position in [`Eddi::evidence`].
-    Evidence(usize),
-    /// A demand, by its position in [`Eddi::demands`].
-    Demand(usize),
-    /// All of two or more.
-    All(Vec<Gate>),
-    /// At least one of two or more.
-    Any(Vec<Gate>),
 }
 
 /// What holds when no guarantee does.
@@ -107,16 +77,5 @@ pub struct Mitigation {
     /// What is set.
     pub field: FieldPath,
     /// What it is set to, of the field's type and in its unit.
-    pub value: Literal,
-}
-
-/// A value written in a space.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Literal {
-    /// True or false.
-    Bool(bool),
-    /// A number; whole where the field is.
-    Number(f64),
-    /// A text.
-    Text(String),
+    pub value: MitigationValue,
 }

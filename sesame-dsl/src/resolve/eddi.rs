@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::eddi::{Demand, Eddi, Evidence, Gate, Guarantee, Literal, Mitigation, Otherwise, Stale, StaleIs};
+use crate::model::eddi::{
+    Demand, Eddi, Evidence, Gate, Guarantee, Mitigation, MitigationValue, Otherwise, Stale, StaleIs,
+};
 use crate::model::{EddiId, Id as _, TopicId, Type};
 use crate::similar::most_similar;
 use crate::span::Span;
@@ -17,8 +19,8 @@ type Members<'a> = BTreeMap<&'a str, (Member, Span)>;
 
 #[derive(Clone, Copy)]
 enum Member {
-    Evidence(usize),
-    Demand(usize),
+    Evidence(u32),
+    Demand(u32),
     /// A guarantee, or the state when none holds.
     State,
 }
@@ -77,8 +79,8 @@ impl<'a> Resolver<'a> {
 
     fn members_of_eddi(&mut self, eddi: &'a written::Eddi) -> Members<'a> {
         let mut members: Members<'a> = BTreeMap::new();
-        let demands = eddi.demands.iter().enumerate().map(|(at, it)| (&it.head.name, Member::Demand(at)));
-        let evidence = eddi.evidence.iter().enumerate().map(|(at, it)| (&it.head.name, Member::Evidence(at)));
+        let demands = (0..).zip(&eddi.demands).map(|(at, it)| (&it.head.name, Member::Demand(at)));
+        let evidence = (0..).zip(&eddi.evidence).map(|(at, it)| (&it.head.name, Member::Evidence(at)));
         let states = eddi.guarantees.iter().map(|guarantee| &guarantee.head.name);
         let states = states.chain(eddi.otherwise.iter().map(|(_, it)| &it.head.name));
         let mut all: Vec<_> = demands.chain(evidence).chain(states.map(|name| (name, Member::State))).collect();
@@ -324,17 +326,18 @@ impl<'a> Resolver<'a> {
         let (field, ty) = self.field(path)?;
         let what = format!("`{}`", self.text(path.span));
         let value = match (value, ty) {
-            (written::Mitigation::Truth(truth, _), Type::Bool) => Literal::Bool(*truth),
-            (written::Mitigation::Text(text), Type::Text) => Literal::Text(text.text.clone()),
+            (written::Mitigation::Truth(truth, _), Type::Bool) => MitigationValue::Bool(*truth),
+            (written::Mitigation::Text(text), Type::Text) => MitigationValue::Text(text.text.clone()),
             (written::Mitigation::Number(number), Type::Real(unit)) => {
-                Literal::Number(self.value(number, unit.as_ref(), &what)?)
+                MitigationValue::Real(self.value(number, unit.as_ref(), &what)?)
             }
             (written::Mitigation::Number(number), Type::Int(unit)) => {
                 let value = self.value(number, unit.as_ref(), &what)?;
                 if !self.whole(value, number.span, &what) {
                     return None;
                 }
-                Literal::Number(value)
+                #[expect(clippy::cast_possible_truncation, reason = "it is whole and at most 2^53")]
+                MitigationValue::Int(value as i64)
             }
             (value, ty) => {
                 let span = match value {

@@ -59,7 +59,7 @@ impl<'p> MetricTable<'p> {
         for (at, metric) in plan.metrics.iter().enumerate() {
             let topics: Vec<TopicId> = match &metric.source {
                 MetricSource::Hook { topics } => topics.clone(),
-                MetricSource::FuzzingTime => Vec::new(),
+                MetricSource::FuzzingTime | MetricSource::Monitor { .. } => Vec::new(),
                 MetricSource::Last { input } => vec![input.topic],
                 MetricSource::Robustness { robustness: Robustness { inputs, .. } }
                 | MetricSource::Formula { formula: Formula { inputs, .. } } => {

@@ -61,7 +61,7 @@ pub fn wanted(plan: &CampaignPlan, topic: TopicId) -> Wanted {
                 &formula.inputs
             }
             MetricSource::Robustness { robustness } => &robustness.inputs,
-            MetricSource::Hook { .. } | MetricSource::FuzzingTime => &[],
+            MetricSource::Hook { .. } | MetricSource::FuzzingTime | MetricSource::Monitor { .. } => &[],
         };
         for input in inputs {
             read(&input.field);
