@@ -190,7 +190,7 @@ fn summary(space: &Space) -> String {
     let counts = [
         (space.campaigns.iter().count(), "campaign"),
         (space.operations.iter().count(), "operation"),
-        (space.metrics.iter().count(), "metric"),
+        (space.metrics.values().filter(|metric| !metric.is_of_part()).count(), "metric"),
         (space.requirements.iter().count(), "requirement"),
     ];
     let counted = counts.map(|(n, what)| if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") });

@@ -89,6 +89,7 @@ fn hooks(space: &Space) -> Vec<HookPlan> {
             inputs: topics.iter().map(|&id| topic_id(id)).collect(),
         }),
         model::MetricSource::FuzzingTime
+        | model::MetricSource::Monitor(..)
         | model::MetricSource::Last(_)
         | model::MetricSource::Robustness(_)
         | model::MetricSource::Formula(_) => None,
@@ -109,6 +110,7 @@ fn trend(metric: &model::Metric) -> Option<plan::Trend> {
             plan::Aggregate::Min { .. } => Some(plan::Trend::Falling),
             plan::Aggregate::Last { .. } | plan::Aggregate::Mean { .. } => None,
         },
+        model::MetricSource::Monitor(_, score) => score.trend(),
         model::MetricSource::Last(_) | model::MetricSource::Robustness(_) => None,
     }
 }
@@ -131,6 +133,9 @@ fn metric(metric: &model::Metric) -> plan::Metric {
             model::MetricSource::Last(input) => plan::MetricSource::Last { input: formula::field(input) },
             model::MetricSource::Robustness(of) => {
                 plan::MetricSource::Robustness { robustness: robustness::robustness(of) }
+            }
+            model::MetricSource::Monitor(of, score) => {
+                plan::MetricSource::Monitor { monitor: monitor::monitor_id(*of), score: *score }
             }
             model::MetricSource::Formula(of) => plan::MetricSource::Formula { formula: formula::formula(of) },
         },

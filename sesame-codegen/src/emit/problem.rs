@@ -103,7 +103,8 @@ pub(super) fn problems(plans: &[RunnerPlan], dependencies: &BTreeMap<String, tom
             }
         }
         for metric in plan.metrics.iter().map(|metric| &metric.name).chain(hooks.iter().map(|hook| &hook.metric)) {
-            check("metric", metric);
+            // A part of a monitor is named with its monitor before a dot.
+            metric.split('.').for_each(|name| check("metric", name));
         }
     }
     for RunnerPlan { plan, .. } in plans {

@@ -4,14 +4,14 @@ use sesame_dsl::model::eddi::{self, Eddi};
 use sesame_dsl::model::{EddiId, Id as _, Space};
 use sesame_plan as plan;
 
-use super::formula::{field, inputs};
+use super::formula::{field, inputs, side};
 use super::id::{raw, topic_id};
 
 pub(super) fn monitor(space: &Space, monitor: &Eddi) -> plan::Monitor {
     plan::Monitor {
         name: monitor.declaration.name.clone(),
         doc: monitor.declaration.doc.clone(),
-        publishes: Some(topic_id(monitor.publishes)),
+        publishes: monitor.publishes.map(topic_id),
         demands: monitor.demands.iter().map(|demand| demanded(space, demand)).collect(),
         evidence: monitor.evidence.iter().map(evidence).collect(),
         guarantees: monitor.guarantees.iter().map(guarantee).collect(),
@@ -24,7 +24,7 @@ pub(super) fn monitor(space: &Space, monitor: &Eddi) -> plan::Monitor {
     }
 }
 
-fn monitor_id(id: EddiId) -> plan::MonitorId {
+pub(super) fn monitor_id(id: EddiId) -> plan::MonitorId {
     plan::MonitorId(raw(id.index()))
 }
 
@@ -45,7 +45,7 @@ fn evidence(evidence: &eddi::Evidence) -> plan::Evidence {
         condition: evidence.condition.clone(),
         held: evidence.held,
         stale: evidence.stale,
-        side: plan::Side::Outbound,
+        side: side(!evidence.inbound),
     }
 }
 

@@ -6,10 +6,9 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::model::condition::{
     Comparison, Condition, ConditionSpace, Constraint, Integers, Operand, ValueRange, Variable,
 };
-use crate::model::{Activation, Aggregate, BinaryFunction, End, Expression, Id as _, Metric, MetricId, MetricSource};
-use crate::model::{Range, UnaryFunction};
+use crate::model::{Activation, End, Id as _, Metric, MetricId, MetricSource, Range};
 use crate::span::Span;
-use crate::syntax::ast::{self, ByCondition, Contained, ExpressionKind, Relation, Trigger, TriggerEnd};
+use crate::syntax::ast::{self, ByCondition, Contained, ExpressionKind, PrefixWord, Relation, Trigger, TriggerEnd};
 use crate::units::{Unit, convert, dimension};
 
 const EXAMPLE: &str = "expected a comparison such as `near_zone1 > 2`";
@@ -64,6 +63,14 @@ impl<'a> Resolver<'a> {
             ExpressionKind::All(parts) => (parts, true),
             ExpressionKind::Any(parts) => (parts, false),
             ExpressionKind::Compare(left, by, right) => return self.comparison(expression, left, *by, right),
+            ExpressionKind::Field(path) if self.is_true_or_false(path) => return self.truth_of(path, true),
+            ExpressionKind::Prefixed(prefixes, of)
+                if prefixes.iter().all(|prefix| prefix.word == PrefixWord::Not)
+                    && let ExpressionKind::Field(path) = &of.kind
+                    && self.is_true_or_false(path) =>
+            {
+                return self.truth_of(path, prefixes.len() % 2 == 0);
+            }
             kind => {
                 let written = self.text(expression.span);
                 let title = match kind {
@@ -79,6 +86,28 @@ impl<'a> Resolver<'a> {
         let parts: Vec<Condition> = parts.into_iter().collect::<Option<_>>()?;
         let join = if all { Condition::And } else { Condition::Or };
         parts.into_iter().reduce(|left, right| join(Box::new(left), Box::new(right)))
+    }
+
+    /// Whether a path means a metric that is true or false: a part of a monitor, or a metric of whether one holds.
+    fn is_true_or_false(&self, path: &ast::Path) -> bool {
+        let metric = match self.names.get(path.topic.text.as_str()) {
+            Some(definition) if path.fields.is_empty() && definition.kind == Kind::Metric => {
+                self.metrics[definition.index].as_ref()
+            }
+            _ => None,
+        };
+        metric.is_some_and(Self::is_truth) || self.is_part(path)
+    }
+
+    /// Whether a metric that is true or false is this. One that is neither yet is not.
+    fn truth_of(&mut self, path: &'a ast::Path, truth: bool) -> Option<Condition> {
+        let index = match path.fields.as_slice() {
+            [] => self.find(&path.topic, Kind::Metric)?,
+            _ => self.metric_of_path(path)?,
+        };
+        let (left, right) = (Operand::Variable(MetricId::from_index(index)), number_of(truth));
+        self.open_outcome(path.span, (left, right), Comparison::Equal)?;
+        Some(Condition::Compare { left, by: Comparison::Equal, right })
     }
 
     fn comparison(
@@ -126,6 +155,14 @@ impl<'a> Resolver<'a> {
             (Side::Number(number), Side::Metric(metric)) => {
                 (Operand::Number(self.in_unit_of(metric, right.span, number)?), Operand::Variable(metric))
             }
+            (Side::Metric(metric), Side::Truth(truth)) if self.equals_truth(metric, by) => {
+                (Operand::Variable(metric), number_of(truth))
+            }
+            (Side::Truth(truth), Side::Metric(metric)) if self.equals_truth(metric, by) => {
+                (number_of(truth), Operand::Variable(metric))
+            }
+            (Side::Truth(_), _) => return self.no_metric(left),
+            (_, Side::Truth(_)) => return self.no_metric(right),
         };
         self.open_outcome(whole.span, compared, by)?;
         let (left, right) = compared;
@@ -161,6 +198,10 @@ impl<'a> Resolver<'a> {
     fn side(&mut self, side: &'a ast::Expression) -> Option<Side<'a>> {
         match &side.kind {
             ExpressionKind::Number(quantity) => Some(Side::Number(quantity)),
+            ExpressionKind::Truth(truth) => Some(Side::Truth(*truth)),
+            ExpressionKind::Field(path) if self.is_part(path) => {
+                self.metric_of_path(path).map(|index| Side::Metric(MetricId::from_index(index)))
+            }
             ExpressionKind::Field(path) if path.fields.is_empty() => {
                 let before = self.diagnostics.len();
                 let found = self.find(&path.topic, Kind::Metric);
@@ -176,34 +217,42 @@ impl<'a> Resolver<'a> {
                 self.known_during_a_test(id, side.span)?;
                 Some(Side::Metric(id))
             }
-            kind => {
-                let written = self.text(side.span);
-                let title = match kind {
-                    ExpressionKind::Field(_) | ExpressionKind::Members(..) => {
-                        format!("`{written}` is not a metric")
-                    }
-                    ExpressionKind::Truth(_)
-                    | ExpressionKind::Compare(..)
-                    | ExpressionKind::All(_)
-                    | ExpressionKind::Any(_) => {
-                        format!("`{written}` is a condition, not a metric")
-                    }
-                    ExpressionKind::Text(_) => format!("`{written}` is a text, but metrics are numbers"),
-                    _ => format!("`{written}` is an expression, not a metric"),
-                };
-                let note = match kind {
+            _ => self.no_metric(side),
+        }
+    }
+
+    /// Whether a metric is true or false, and compared for being equal to one of these.
+    fn equals_truth(&self, metric: MetricId, by: Comparison) -> bool {
+        by == Comparison::Equal && Self::is_truth(self.metric_of(metric))
+    }
+
+    /// Reports a side of a comparison that is neither a metric nor a number.
+    fn no_metric<T>(&mut self, side: &ast::Expression) -> Option<T> {
+        let kind = &side.kind;
+        let written = self.text(side.span);
+        let title = match kind {
+            ExpressionKind::Field(_) | ExpressionKind::Members(..) => {
+                format!("`{written}` is not a metric")
+            }
+            ExpressionKind::Truth(_)
+            | ExpressionKind::Compare(..)
+            | ExpressionKind::All(_)
+            | ExpressionKind::Any(_) => {
+                format!("`{written}` is a condition, not a metric")
+            }
+            ExpressionKind::Text(_) => format!("`{written}` is a text, but metrics are numbers"),
+            _ => format!("`{written}` is an expression, not a metric"),
+        };
+        let note = match kind {
                     ExpressionKind::Text(_) => format!(
                         "a condition compares metrics; `when tower == {written} then time` is a metric, and so is `when tower != {written} then time`: the greater of the two is the state that holds"
                     ),
                     _ => "a condition compares metrics; declare one for what you want to compare, for example `metric near = last(near1.level)`".to_owned(),
                 };
-                let diagnostic = Diagnostic::new(Code::NOT_A_CONDITION, side.span, title)
-                    .label("expected a metric or a number")
-                    .note(note);
-                self.report(diagnostic);
-                None
-            }
-        }
+        let diagnostic =
+            Diagnostic::new(Code::NOT_A_CONDITION, side.span, title).label("expected a metric or a number").note(note);
+        self.report(diagnostic);
+        None
     }
 
     /// A robustness is known when the test has ended, so no condition can read it.
@@ -253,7 +302,7 @@ impl<'a> Resolver<'a> {
     fn open_outcome(&mut self, span: Span, (left, right): (Operand, Operand), by: Comparison) -> Option<()> {
         let known = [left, right].map(|side| match side {
             Operand::Number(number) => ValueRange::exactly(number),
-            Operand::Variable(metric) => known_of(self.metric_of(metric)),
+            Operand::Variable(metric) => self.known_of(self.metric_of(metric)),
         });
         let Some(outcome) = known[0].outcome(by, known[1]) else { return Some(()) };
         let mut diagnostic =
@@ -278,11 +327,10 @@ impl<'a> Resolver<'a> {
         let found = self.find_all(&by.variables, Kind::Metric);
         let mut variables = Some(Vec::new());
         for (name, range) in by.variables.iter().zip(&by.ranges) {
-            let index = self
-                .names
-                .get(name.text.as_str())
-                .filter(|definition| definition.kind == Kind::Metric)
-                .map(|definition| definition.index);
+            // Mistakes in names are reported already.
+            let reported = self.diagnostics.len();
+            let index = self.find(name, Kind::Metric);
+            self.diagnostics.truncate(reported);
             let variable = index.and_then(|index| self.variable(name, MetricId::from_index(index), range.as_ref()));
             match (&mut variables, variable) {
                 (Some(variables), Some(variable)) => variables.push(variable),
@@ -339,7 +387,7 @@ impl<'a> Resolver<'a> {
 
     fn variable(&mut self, name: &'a ast::Name, id: MetricId, range: Option<&'a ast::Range>) -> Option<Variable> {
         let metric = self.metrics[id.index()].as_ref()?;
-        let own = known_of(metric);
+        let own = self.known_of(metric);
         self.known_during_a_test(id, name.span)?;
         let metric = self.metric_of(id);
         let (unit, initial, declared) = (metric.unit.clone(), metric.initial, metric.declaration.span);
@@ -501,45 +549,12 @@ impl<'a> Resolver<'a> {
 enum Side<'a> {
     Number(&'a ast::Quantity),
     Metric(MetricId),
+    Truth(bool),
 }
 
-/// What is known of a metric's values before any test, its initial value included.
-fn known_of(metric: &Metric) -> ValueRange {
-    let from_zero = match &metric.source {
-        // It needs no message, so it has a value from the beginning.
-        MetricSource::FuzzingTime => return ValueRange { low: 0.0, high: f64::INFINITY },
-        MetricSource::Formula(formula) => match &formula.aggregate {
-            Aggregate::Count { .. } | Aggregate::Duration { .. } => true,
-            // Over groups and keys these are the least, the greatest or the sum of values that are not negative.
-            Aggregate::Last { of } | Aggregate::Min { of } | Aggregate::Max { of } | Aggregate::Mean { of } => {
-                never_negative(of)
-            }
-        },
-        MetricSource::Hook(_) | MetricSource::Last(_) | MetricSource::Robustness(_) => false,
-    };
-    if !from_zero {
-        return ValueRange::NOTHING;
-    }
-    ValueRange { low: metric.initial.map_or(0.0, |initial| initial.min(0.0)), high: f64::INFINITY }
-}
-
-fn never_negative(expression: &Expression) -> bool {
-    match expression {
-        Expression::Constant(value) => *value >= 0.0,
-        Expression::Absolute(_)
-        | Expression::Distance(_)
-        | Expression::Time
-        | Expression::Unary { function: UnaryFunction::Sqrt | UnaryFunction::Exp | UnaryFunction::Acos, .. }
-        | Expression::Binary { function: BinaryFunction::Hypot, .. } => true,
-        Expression::Sum(of) | Expression::Product(of) | Expression::Min(of) => of.iter().all(never_negative),
-        Expression::Max(of) => of.iter().any(never_negative),
-        Expression::Divide { value, by } => never_negative(value) && never_negative(by),
-        Expression::Input(_)
-        | Expression::Negate(_)
-        | Expression::SignedDistance(_)
-        | Expression::Unary { .. }
-        | Expression::Binary { .. } => false,
-    }
+/// A truth as the value of a metric.
+fn number_of(truth: bool) -> Operand {
+    Operand::Number(f64::from(u8::from(truth)))
 }
 
 /// The fewest comparisons that contain these: a comparison has at most two variables, or a variable and a number.
