@@ -134,6 +134,46 @@ mod tests {
     }
 
     #[test]
+    fn external_monitors_arrive_as_evidence_of_what_they_say_and_scores_with_units_and_trends() {
+        let more = r#"
+            topic plc = "plc/state" : int  topic plug = "plug" : bool  topic word = "word" : text }
+            eddi numbers external on plc { guarantee weak integrity 2  guarantee strong integrity 7  otherwise none }
+            eddi truth   external on plug { guarantee high integrity 1  otherwise low }
+            eddi words   external on word { guarantee ready integrity 1  otherwise waits }
+            eddi own     external { evidence e = plug inbound  evidence f = plc > 3  evidence g = plug
+                                    guarantee ok integrity 1 = 2 of (e, f, g)  otherwise bad }
+            requirement R1 "it is slow" = fastest <= 2m/s
+            metric missed maximise = missed_hazards(transport, R1)
+            metric alarms maximise = false_alarms(transport, R1) within 1min
+            metric lead = lead_time(transport, R1)
+            metric slow_for = time_in(transport.slow)
+            metric rolling = holds(conveyor.rolls)
+            test worst { lose loss 10% when not transport.sees until numbers.strong }
+        "#;
+        let text = CELL.replacen(
+            "topic limit    = \"plc/limit\"       : int\n        }",
+            &format!("topic limit = \"plc/limit\" : int {more}"),
+            1,
+        );
+        let text =
+            text.replace("objectives fastest", "objectives fastest  observes missed, alarms, lead, slow_for, rolling");
+        let plan = lowered(&text);
+        let lines = plan.monitors[..4].iter().map(|it| serde_json::to_string(it).unwrap());
+        let scores = plan.metrics.iter().map(|it| {
+            let source = serde_json::to_string(&it.source).unwrap();
+            format!("{} {:?} {:?} {source}", it.name, it.unit, it.trend)
+        });
+        insta::assert_snapshot!(lines.chain(scores).collect::<Vec<_>>().join("\n"));
+    }
+
+    #[test]
+    fn the_deepest_guarantee_can_be_read_again_from_the_plan() {
+        let nested = format!("{}(sees or stopped){}", "2 of (stopped, sees, ".repeat(14), " or brakes_ok)".repeat(14));
+        let text = CELL.replace("brakes_ok and (sees or stopped)", &nested);
+        assert_eq!(lowered(&text).monitors[0].guarantees[1].gate.depth(), Gate::MOST_DEPTH);
+    }
+
+    #[test]
     fn a_space_without_monitors_has_the_plan_that_it_had_before_there_were_any() {
         let begin = CELL.find("        /// Watches").unwrap();
         let end = CELL.find("        metric fastest").unwrap();

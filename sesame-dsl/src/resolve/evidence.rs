@@ -276,7 +276,7 @@ impl<'a> Resolver<'a> {
 
     /// How many of so many parts are to hold.
     fn enough(&mut self, whole: &ast::Expression, count: ast::Count, parts: usize) -> Option<u32> {
-        let found = self.count(count, 1, "how many parts must hold")?;
+        let found = self.count(count, 1, "the number of parts that must hold")?;
         if parts < 2 {
             let title = format!("`{}` has one part only", self.text(whole.span));
             let label = "expected two or more between the parentheses";
