@@ -9,7 +9,8 @@
 //! 5. [`fuzz`] resolves operations ([`disturbance`] their targets and parameters, [`custom`] those in the user's code)
 //!    and tests
 //! 6. [`campaign`] resolves campaigns, whose inherited clauses [`inherit`] has copied before all else; [`condition`]
-//!    resolves the conditions of tests and the building blocks of campaigns' conditions, by what is [`known`] of metrics
+//!    resolves the conditions of tests and the building blocks of campaigns' conditions, by what is [`known`] of
+//!    metrics; [`contained`] what operations require of such conditions
 //! 7. [`physical`] resolves labs, and [`lifecycle`] the rest of a system's clauses
 //!
 //! Each pass reports all it finds. A declaration with a mistake is `None` from then on, and references to it are not
@@ -21,6 +22,7 @@ mod campaign;
 mod collect;
 mod condition;
 mod confirmation;
+mod contained;
 mod coverage;
 mod custom;
 mod depth;

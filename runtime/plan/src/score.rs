@@ -112,9 +112,8 @@ impl Score {
             | Score::TimeIn { .. }
             | Score::Changes
             | Score::Mitigations => Some(Trend::Rising),
-            Score::ShortestStay => Some(Trend::Falling),
-            // A test has one hazard of a requirement, so this has one value.
-            Score::LeadTime { .. } => Some(Trend::Falling),
+            // A test has one hazard of a requirement, so the lead time has one value.
+            Score::ShortestStay | Score::LeadTime { .. } => Some(Trend::Falling),
             Score::Integrity | Score::Holds { .. } => None,
         }
     }

@@ -564,12 +564,12 @@ fn monitors() -> (String, CampaignPlan) {
         "#;
     let parts = ["low", "flat", "safe", "fast", "slow", "halted"].map(|part| format!("transport.{part}")).join(", ");
     let text = format!(
-        r#"{system} operation biased on level = bias [-1mm, 3mm]
+        r"{system} operation biased on level = bias [-1mm, 3mm]
            operation lied on state = stuck at [0, 3]
            operation cut on plc = blackhole
            campaign look {{ objectives m0, m1  operations biased, lied, cut 1 per test
                            observes {parts}
-                           search random {{ evaluations 1 }}  end after 5s }}"#
+                           search random {{ evaluations 1 }}  end after 5s }}"
     );
     (system.to_owned(), plan(&text))
 }
@@ -581,9 +581,9 @@ fn parts_of_monitors_are_written_in_conditions_and_read_back() {
     let parts = ["low", "flat", "safe", "fast", "slow", "halted"].map(|part| format!("transport.{part}"));
     assert_eq!(names, parts);
     assert_eq!(like.monitors.len(), 2);
-    let test = r#"test worst { biased bias 1mm when not transport.low until transport.low
+    let test = r"test worst { biased bias 1mm when not transport.low until transport.low
                                cut when transport.fast == true and 0 < plc_monitor.safe for 2s
-                               expect transport.halted == 1 }"#;
+                               expect transport.halted == 1 }";
     let operations = "operation biased on level = bias [-1mm, 3mm]  operation cut on plc = blackhole";
     let campaign = "campaign look { objectives m0  operations biased, cut 1..2 per test
                     activate by condition over transport.low, plc_monitor.not_safe

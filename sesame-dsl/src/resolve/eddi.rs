@@ -46,13 +46,12 @@ impl<'a> Resolver<'a> {
         self.not_too_many(&eddi.evidence, "pieces of evidence", |evidence| evidence.head.name.span);
         self.not_too_many(&eddi.guarantees, "guarantees", |guarantee| guarantee.head.name.span);
         let demands: Vec<_> = eddi.demands.iter().map(|demand| self.demand(demand)).collect();
-        let evidence = match said_by {
-            Some(path) => self.evidence_of_states(eddi, path),
-            None => {
-                // All are resolved, so that a mistake in one does not hide one in another.
-                let evidence: Vec<_> = eddi.evidence.iter().map(|evidence| self.evidence(evidence)).collect();
-                evidence.into_iter().collect()
-            }
+        let evidence = if let Some(path) = said_by {
+            self.evidence_of_states(eddi, path)
+        } else {
+            // All are resolved, so that a mistake in one does not hide one in another.
+            let evidence: Vec<_> = eddi.evidence.iter().map(|evidence| self.evidence(evidence)).collect();
+            evidence.into_iter().collect()
         };
         let mut guarantees = self.guarantees(eddi, &members, said_by);
         if eddi.otherwise.is_empty() && !eddi.has_errors {

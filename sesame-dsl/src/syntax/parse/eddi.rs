@@ -7,13 +7,12 @@ use crate::syntax::ast::eddi::{Demand, Eddi, Evidence, Guarantee, Mitigation, Ot
 
 impl Reader<'_> {
     pub(super) fn eddi(&mut self, pair: &Pair<'_>) -> Eddi {
-        let state = match child(pair, Rule::state_topic) {
-            Some(published) => State::Published(self.name(&expect_child(&published, Rule::name))),
-            None => {
-                let external = expect_child(pair, Rule::external);
-                let on = child(&external, Rule::path).map(|path| self.path(&path));
-                State::External(self.keyword_span(&external), on)
-            }
+        let state = if let Some(published) = child(pair, Rule::state_topic) {
+            State::Published(self.name(&expect_child(&published, Rule::name)))
+        } else {
+            let external = expect_child(pair, Rule::external);
+            let on = child(&external, Rule::path).map(|path| self.path(&path));
+            State::External(self.keyword_span(&external), on)
         };
         let mut eddi = Eddi {
             head: self.head(pair),
