@@ -1,0 +1,8 @@
+//! Monitors compared with naive ones that know nothing but the whole history.
+
+#![expect(clippy::unwrap_used, reason = "in tests, and in what is only for tests")]
+#![expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the numbers of tests are small")]
+
+mod naive;
+mod random;
+mod run;
