@@ -6,6 +6,7 @@
 //! that holds, or the safe state if none does. A *decision* is a change of its state.
 //!
 //! - [`network`]: monitors compiled together, and a run of them: observations in, decisions out.
+//! - [`why`]: the evidence that decided.
 //! - [`truth`], [`gate`], [`evidence`]: what these are made of.
 //!
 //! Nothing here knows messages or topics: whoever uses it evaluates the conditions of evidence and says what they came
@@ -16,6 +17,7 @@ pub mod evidence;
 pub mod gate;
 pub mod network;
 pub mod truth;
+pub mod why;
 
 pub use network::{Changes, Decision, EvidenceChange, EvidenceId, Invalid, Network, Run, State};
 pub use truth::Truth;

@@ -7,6 +7,7 @@ mod decide;
 mod run;
 mod timers;
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use sesame_plan::{Gate, Monitor, MonitorId};
@@ -118,6 +119,7 @@ impl Network {
                 guarantors.push(id);
             }
         }
+        let mut demanded: BTreeMap<(MonitorId, u32), NodeIndex> = BTreeMap::new();
         for (rank, &id) in (0..).zip(&order) {
             let monitor = &monitors[id.index()];
             let demands = monitor.demands.iter().map(|demand| {
@@ -125,9 +127,11 @@ impl Network {
                 if demand.guarantee == 0 {
                     return first;
                 }
-                let node = circuit.add();
-                circuit.define(node, 1, (first..=first + demand.guarantee).collect());
-                node
+                *demanded.entry((demand.monitor, demand.guarantee)).or_insert_with(|| {
+                    let node = circuit.add();
+                    circuit.define(node, 1, (first..=first + demand.guarantee).collect());
+                    node
+                })
             });
             let demands: Vec<NodeIndex> = demands.collect();
             let place = &mut places[id.index()];
@@ -183,8 +187,15 @@ impl Network {
         self.places[monitor.index()].first_guarantee + position
     }
 
-    pub(crate) fn demand_node(&self, monitor: MonitorId, position: u32) -> NodeIndex {
-        self.places[monitor.index()].demands[position as usize]
+    /// The nodes of a monitor's demands, equal ones for equal demands. That of a demand for another monitor's strongest
+    /// guarantee is the guarantee's.
+    pub(crate) fn demand_nodes(&self, monitor: MonitorId) -> &[NodeIndex] {
+        &self.places[monitor.index()].demands
+    }
+
+    /// The monitor of a guarantee; `None` for another node.
+    pub(crate) fn guarantor(&self, node: NodeIndex) -> Option<MonitorId> {
+        self.guarantors.get((node as usize).checked_sub(self.rules.len())?).copied()
     }
 }
 
@@ -226,8 +237,7 @@ fn order(monitors: &[Monitor]) -> Result<Vec<MonitorId>, Invalid> {
             demanding[demand.monitor.index()].push(id);
         }
     }
-    let mut free: std::collections::BTreeSet<MonitorId> =
-        ids(monitors).map(|(id, _)| id).filter(|id| open[id.index()] == 0).collect();
+    let mut free: BTreeSet<MonitorId> = ids(monitors).map(|(id, _)| id).filter(|id| open[id.index()] == 0).collect();
     while let Some(id) = free.pop_first() {
         order.push(id);
         ranked[id.index()] = true;

@@ -64,12 +64,11 @@ impl Deciding {
     #[inline]
     pub(crate) fn set(&mut self, network: &Network, evidence: EvidenceId, truth: Truth) {
         let Deciding { values, touched, is_touched, .. } = self;
-        let first = network.rules.len();
         values.set(&network.circuit, evidence.0, truth, |node, before, after| {
             if before != Truth::True && after != Truth::True {
                 return;
             }
-            let Some(&monitor) = network.guarantors.get((node as usize).wrapping_sub(first)) else { return };
+            let Some(monitor) = network.guarantor(node) else { return };
             if !std::mem::replace(&mut is_touched[monitor.index()], true) {
                 touched.push(network.places[monitor.index()].rank);
             }

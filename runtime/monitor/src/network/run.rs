@@ -158,7 +158,7 @@ impl Run {
 
     /// The value of a demand: whether its guarantee or a stronger one of that monitor holds.
     pub fn demand(&self, monitor: MonitorId, position: u32) -> Truth {
-        self.deciding.get(self.network.demand_node(monitor, position))
+        self.deciding.get(self.network.demand_nodes(monitor)[position as usize])
     }
 
     /// The state of a monitor.

@@ -53,10 +53,20 @@ pub(crate) fn gate(shape: &Shape, evidence: u32, demands: u32) -> Gate {
     }
 }
 
+/// So many pieces of evidence that hold at once and are never stale.
+pub(crate) fn plain(count: usize) -> Vec<Evidence> {
+    vec![evidence(0, None); count]
+}
+
 fn any_evidence() -> impl Strategy<Value = Evidence> {
     let held = prop_oneof![2 => Just(0), 1 => 1..6_i64];
     let stale = prop::option::of((1..7_i64, any::<bool>()));
-    (held, stale).prop_map(|(held, stale)| Evidence {
+    (held, stale).prop_map(|(held, stale)| evidence(held, stale))
+}
+
+/// Evidence that must be held this long, and is false or unknown after this long, in nanoseconds.
+fn evidence(held: i64, stale: Option<(i64, bool)>) -> Evidence {
+    Evidence {
         name: "evidence".into(),
         doc: String::new(),
         inputs: vec![Input {
@@ -71,7 +81,7 @@ fn any_evidence() -> impl Strategy<Value = Evidence> {
             is: if is_false { StaleIs::False } else { StaleIs::Unknown },
         }),
         side: Side::Outbound,
-    })
+    }
 }
 
 /// A monitor without demands.
