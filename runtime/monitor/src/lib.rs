@@ -7,15 +7,21 @@
 //!
 //! - [`network`]: monitors compiled together, and a run of them: observations in, decisions out.
 //! - [`why`]: the evidence that decided.
+//! - [`score`]: hazards foreseen and missed, lead times, false alarms.
+//! - [`compare`]: decisions on two recordings.
+//! - [`tolerance`]: by how much messages may be late before decisions change.
 //! - [`truth`], [`gate`], [`evidence`]: what these are made of.
 //!
 //! Nothing here knows messages or topics: whoever uses it evaluates the conditions of evidence and says what they came
 //! to. Everything is a function of its arguments; no result depends on the machine or on wall time.
 
 mod circuit;
+pub mod compare;
 pub mod evidence;
 pub mod gate;
 pub mod network;
+pub mod score;
+pub mod tolerance;
 pub mod truth;
 pub mod why;
 

@@ -128,16 +128,14 @@ pub fn why(moment: &Moment<'_>, monitor: MonitorId, guarantee: u32, depth: Depth
     let (set, smallest) =
         smallest::smallest(network.circuit(), root, &|node| own.contains(&node), &wanted, truth.holds());
     let ways = ways(network, monitor, root, &wanted);
-    let cause = |&node: &NodeIndex| match own.iter().position(|&demand| demand == node) {
-        Some(at) => {
-            let leaf = Leaf::Demand(u32::try_from(at).expect("a plan has fewer than 2^32 demands"));
-            Cause { monitor, leaf, truth: moment.get(node), through: Vec::new() }
+    let cause = |&node: &NodeIndex| {
+        let truth = moment.get(node);
+        if let Some((at, _)) = (0..).zip(own).find(|&(_, &demand)| demand == node) {
+            return Cause { monitor, leaf: Leaf::Demand(at), truth, through: Vec::new() };
         }
-        None => {
-            let (owner, at) = network.owner(EvidenceId(node));
-            let through = ways[node as usize].clone().unwrap_or_default();
-            Cause { monitor: owner, leaf: Leaf::Evidence(at), truth: moment.get(node), through }
-        }
+        let (owner, at) = network.owner(EvidenceId(node));
+        let through = ways[node as usize].clone().unwrap_or_default();
+        Cause { monitor: owner, leaf: Leaf::Evidence(at), truth, through }
     };
     Why { monitor, guarantee, truth, because: set.iter().map(cause).collect(), smallest }
 }

@@ -178,7 +178,9 @@ impl Search {
         for choice in self.choices.iter_mut().filter(|choice| **choice != Choice::Banned) {
             *choice = Choice::Banned;
         }
-        best.iter().for_each(|&leaf| self.choices[leaf] = Choice::Chosen);
+        for &leaf in &best {
+            self.choices[leaf] = Choice::Chosen;
+        }
         best.retain(|&leaf| {
             self.choices[leaf] = Choice::Banned;
             let needed = self.bound() > 0;

@@ -6,4 +6,6 @@
 mod naive;
 mod random;
 mod run;
+mod score;
+mod tolerance;
 mod why;

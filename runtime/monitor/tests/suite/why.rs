@@ -34,14 +34,13 @@ fn value(
     let monitor = &monitors[id.index()];
     gate(&monitor.guarantees[guarantee as usize].gate, &|leaf| match leaf {
         Gate::Evidence(at) => evidence[network.evidence(id, *at).index()],
-        Gate::Demand(at) => match given {
-            Some(given) => given[*at as usize],
-            None => {
+        Gate::Demand(at) => {
+            let of_guarantee = || {
                 let Demand { monitor, guarantee, .. } = monitor.demands[*at as usize];
-                let of = |at| value(network, monitors, monitor, at, evidence, None);
-                (0..=guarantee).map(of).max().unwrap()
-            }
-        },
+                (0..=guarantee).map(|at| value(network, monitors, monitor, at, evidence, None)).max().unwrap()
+            };
+            given.map_or_else(of_guarantee, |given| given[*at as usize])
+        }
         _ => unreachable!(),
     })
 }
