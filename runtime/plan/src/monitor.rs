@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::formula::Condition;
-use crate::{FieldRef, Input, MonitorId, MonitorPart, MonitorState, Side, TopicId};
+use crate::{CampaignPlan, FieldRef, Input, MonitorId, MonitorPart, MonitorState, Side, TopicId};
 
 /// A runtime monitor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -52,6 +52,19 @@ impl Monitor {
             MonitorPart::Guarantee(at) => self.state_name(MonitorState::Guarantee(at)),
             MonitorPart::Otherwise => self.state_name(MonitorState::Otherwise),
         }
+    }
+}
+
+impl CampaignPlan {
+    /// Whether a monitor publishes its state on a topic, so that nobody else needs to know the topic.
+    pub fn is_state_of_monitor(&self, topic: TopicId) -> bool {
+        self.monitors.iter().any(|monitor| monitor.publishes == Some(topic))
+    }
+
+    /// Whether the runner publishes on a topic: the state of a monitor, or what is to bring the system into a safe state.
+    pub fn is_published_by_monitor(&self, topic: TopicId) -> bool {
+        let mitigations = self.monitors.iter().filter_map(|monitor| monitor.otherwise.mitigation.as_ref());
+        self.is_state_of_monitor(topic) || mitigations.into_iter().any(|mitigation| mitigation.field.topic == topic)
     }
 }
 

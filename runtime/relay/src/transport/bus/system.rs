@@ -342,7 +342,7 @@ impl System {
 
     /// Publishes what is delivered; what was only listened to stays where it is.
     fn deliver(&mut self) -> Result<(), TransportError> {
-        for Delivery { wire, index, value } in self.deliveries.drain(..) {
+        for Delivery { wire, index, value, .. } in self.deliveries.drain(..) {
             let Some(&(line, sink)) = self.sinks.get(&wire) else { continue };
             let call = self.calls.get(&(self.lines[line].wire, index)).copied();
             self.bus.publish(line, sink, &value, call)?;
