@@ -7,6 +7,7 @@
 //!
 //! - [`network`]: monitors compiled together, and a run of them: observations in, decisions out.
 //! - [`why`]: the evidence that decided.
+//! - [`check`]: guarantees that never or always hold, evidence that decides nothing, orders that contradict.
 //! - [`score`]: hazards foreseen and missed, lead times, false alarms.
 //! - [`compare`]: decisions on two recordings.
 //! - [`tolerance`]: by how much messages may be late before decisions change.
@@ -15,6 +16,7 @@
 //! Nothing here knows messages or topics: whoever uses it evaluates the conditions of evidence and says what they came
 //! to. Everything is a function of its arguments; no result depends on the machine or on wall time.
 
+pub mod check;
 mod circuit;
 pub mod compare;
 pub mod evidence;

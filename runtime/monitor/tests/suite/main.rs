@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "in tests, and in what is only for tests")]
 #![expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the numbers of tests are small")]
 
+mod check;
 mod naive;
 mod random;
 mod run;
