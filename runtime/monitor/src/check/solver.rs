@@ -20,9 +20,9 @@ pub(super) enum Answer {
     GivenUp,
 }
 
-/// Whether these literals can hold together. `comparisons` says, per node, which comparison an atom is; `theory` is what
-/// is known of the numbers in them. `laws` always hold; one of which only one part matters says nothing about the goals
-/// and must be such that the rest can always be chosen accordingly.
+/// Whether these literals can hold together. `comparisons` says, per node, which comparison an atom is; `theory` is
+/// what is known of the numbers in them. `laws` always hold; one of which only one part matters says nothing about the
+/// goals and must be such that the rest can always be chosen accordingly.
 pub(super) fn solve(
     logic: &Logic,
     comparisons: &[Option<Comparison>],

@@ -215,8 +215,8 @@ impl<'a> Worlds<'a> {
         [holds[node(stronger)], !may_hold[node(weaker)]]
     }
 
-    /// Values under which that is so, and the moment that they make; `None` if none were found, because numbers that are
-    /// exact in theory are rounded.
+    /// Values under which that is so, and the moment that they make; `None` if none were found, because numbers that
+    /// are exact in theory are rounded.
     pub(super) fn witness(
         &self,
         when: &When,
