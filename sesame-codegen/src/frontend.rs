@@ -147,9 +147,6 @@ fn not_used(space: &Space, sources: &SourceMap) -> Vec<String> {
     if let (Some(budget), Some(why)) = (&space.lifecycle.relay_budget, unmeasured) {
         notes.push(format!("`relay budget` ({}) has no effect: {why}", at(budget.span)));
     }
-    notes.extend(space.eddis.values().map(|Eddi { declaration, .. }| {
-        format!("monitor `{}` ({}) is checked, but not used by runners yet", declaration.name, at(declaration.span))
-    }));
     notes
 }
 
@@ -273,12 +270,8 @@ mod tests {
         assert_eq!(checked.diagnostics, "");
         assert_eq!(
             checked.notes,
-            [
-                "`relay budget` (blocks.sesame:7) has no effect: in lock-step time stands still while messages pass \
-                 through the relay",
-                "monitor `transport` (blocks.sesame:32) is checked, but not used by runners yet",
-                "monitor `conveyor` (blocks.sesame:41) is checked, but not used by runners yet",
-            ]
+            ["`relay budget` (blocks.sesame:7) has no effect: in lock-step time stands still while messages pass \
+                 through the relay",]
         );
     }
 

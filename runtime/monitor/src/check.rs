@@ -1,10 +1,10 @@
-//! Whether certificates say anything: guarantees that can never hold, always hold, or are never the state; evidence that
-//! decides nothing; and orders that contradict what they promise.
+//! Whether certificates say anything: guarantees that can never hold, always hold, or are never the state; evidence
+//! that decides nothing; and orders that contradict what they promise.
 //!
 //! Decided exactly, through demands, with what evidence has to do with each other because it reads the same values:
 //! `p > 5bar` and `p < 3bar` exclude each other. Not by patterns: each question is whether some formula over the
-//! comparisons in all conditions can hold, which is searched to the end. What the search cannot decide within a bound on
-//! its work is listed as undecided, never as a finding.
+//! comparisons in all conditions can hold, which is searched to the end. What the search cannot decide within a bound
+//! on its work is listed as undecided, never as a finding.
 //!
 //! **What is known of conditions.** Comparisons of inputs, sums of an input and constants, multiples of an input, and
 //! differences of two inputs, all in floating point; inputs that are true or false; texts; minima, maxima and absolute
@@ -12,9 +12,9 @@
 //! looked into: equal expressions have equal values, and that is all.
 //!
 //! **No finding is false.** Findings that say *never* or *always* hold whatever the numbers are that are not looked
-//! into, and whatever evidence is stale, not held for long enough or not known yet, as far as they speak of such moments;
-//! more than what can happen is considered. Findings that say that something *may happen* have a witness: values under
-//! which the conditions were computed. Less than what can happen is considered.
+//! into, and whatever evidence is stale, not held for long enough or not known yet, as far as they speak of such
+//! moments; more than what can happen is considered. Findings that say that something *may happen* have a witness:
+//! values under which the conditions were computed. Less than what can happen is considered.
 
 mod arithmetic;
 mod atoms;
@@ -74,8 +74,8 @@ pub enum Finding {
         /// The constant.
         as_if: bool,
     },
-    /// The stronger guarantee may hold while the weaker one does not, although whoever demands the weaker one is content
-    /// with the stronger one.
+    /// The stronger guarantee may hold while the weaker one does not, although whoever demands the weaker one is
+    /// content with the stronger one.
     Order {
         /// The monitor.
         monitor: MonitorId,
@@ -219,7 +219,7 @@ impl Checker<'_> {
                             None
                         }
                         Answer::Yes(found, theory) => {
-                            let witness = self.worlds.witness(moment, &found, theory, self.monitors);
+                            let witness = self.worlds.witness(moment, &found, &theory);
                             let witness = witness.filter(|(_, moment)| {
                                 moment.guarantee(monitor, stronger).holds()
                                     && !moment.guarantee(monitor, weaker).holds()

@@ -7,8 +7,8 @@
 //! none: nothing was lost, and no mitigation is sent. A hazard in it counts as foreseen all the same, because the
 //! monitor had promised nothing.
 //!
-//! [`Scorer`] takes decisions and hazards as they come, so that scores are metrics while a run goes on; [`score`] is the
-//! same over a whole run.
+//! [`Scorer`] takes decisions and hazards as they come, so that scores are metrics while a run goes on; [`score`] is
+//! the same over a whole run.
 
 use std::collections::VecDeque;
 
@@ -25,7 +25,8 @@ pub struct Score {
     /// Alarms that were false: with no hazard in the stay, nor within the horizon after it began. Without a horizon
     /// they are alarms without a hazard, for which mitigation may be the reason.
     pub false_alarms: u32,
-    /// Alarms without a hazard so far, for which one may still come. At the end of a run there are none: they are false.
+    /// Alarms without a hazard so far, for which one may still come. At the end of a run there are none: they are
+    /// false.
     pub open_alarms: u32,
     /// How often a guarantee was lost and none was left: so often mitigation was sent, if there is one.
     pub mitigations: u32,
@@ -95,8 +96,8 @@ pub struct Scorer {
 }
 
 impl Scorer {
-    /// At time zero, in the safe state, of a monitor with so many guarantees. With a horizon, an alarm is also justified
-    /// by a hazard at most so long after it began.
+    /// At time zero, in the safe state, of a monitor with so many guarantees. With a horizon, an alarm is also
+    /// justified by a hazard at most so long after it began.
     pub fn new(guarantees: u32, horizon: Option<SimTime>) -> Self {
         Scorer {
             horizon,

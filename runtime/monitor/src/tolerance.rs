@@ -1,19 +1,21 @@
 //! By how much messages may be late before a monitor decides otherwise ([SESAME 2023, §3.3.4]): the largest delay up to
 //! which every delay keeps the sequence of decisions.
 //!
-//! **The delayed recording.** Some streams are delayed by one delay: each of their messages is heard that much later, by
-//! all evidence that hears it. All others are heard when they were recorded. Messages of one instant are heard in the
-//! order of the recording, and timers before them. What would be heard after the end of the recording is not heard.
+//! **The delayed recording.** Some streams are delayed by one delay: each of their messages is heard that much later,
+//! by all evidence that hears it. All others are heard when they were recorded. Messages of one instant are heard in
+//! the order of the recording, and timers before them. What would be heard after the end of the recording is not
+//! heard.
 //!
 //! **What is kept.** Each monitor makes the same decisions in the same order, each at most as much earlier or later as
 //! the delay. Decisions that may still come after the end (those of the recording within the delay before its end) may
 //! be missing.
 //!
-//! **Why this is exact.** The order of all that happens changes only at delays that are the difference between two times
-//! of the recording: that of something which is delayed (a change of evidence, or where evidence hears both kinds of
-//! streams, a message or a timer that it starts) and that of something which is not. Between two of these *critical*
-//! delays everything is decided alike. So it is enough to look at each of them, and at the nanosecond after it. Evidence
-//! whose streams are all delayed changes as it did, only later, so its condition need not be evaluated again.
+//! **Why this is exact.** The order of all that happens changes only at delays that are the difference between two
+//! times of the recording: that of something which is delayed (a change of evidence, or where evidence hears both
+//! kinds of streams, a message or a timer that it starts) and that of something which is not. Between two of these
+//! *critical* delays everything is decided alike. So it is enough to look at each of them, and at the nanosecond after
+//! it. Evidence whose streams are all delayed changes as it did, only later, so its condition need not be evaluated
+//! again.
 
 mod critical;
 mod timeline;
@@ -25,9 +27,10 @@ use crate::compare::Step;
 use crate::network::{Deciding, EvidenceId, Network, State};
 use crate::truth::Truth;
 use critical::Critical;
-use timeline::{Change, timeline};
+use timeline::{Change, Heard, heard, timeline};
 
-/// How many changes of evidence are taken, over all delays, before the search is given up.
+/// How many changes of evidence and messages of mixed evidence are taken, over all delays, before the search is given
+/// up.
 const PATIENCE: u64 = 20_000_000;
 
 /// What was heard in a run.
@@ -53,9 +56,9 @@ pub struct Message {
 
 /// The conditions of evidence over the messages of a recording.
 pub trait Conditions {
-    /// What the condition of a piece of evidence says when it hears the message at this position of the recording, given
-    /// the position of the latest message of each of its streams, in the order of [`Recording::streams`]. It must be
-    /// the same for the same arguments.
+    /// What the condition of a piece of evidence says when it hears the message at this position of the recording,
+    /// given the position of the latest message of each of its streams, in the order of [`Recording::streams`]. It
+    /// must be the same for the same arguments.
     fn truth(&mut self, evidence: EvidenceId, heard: usize, latest: &[Option<usize>]) -> Truth;
 }
 
@@ -98,8 +101,8 @@ pub struct Broken {
     pub delayed: Option<Step<State>>,
 }
 
-/// The tolerance of the decisions of some monitors to a delay of some streams. Its decisions depend on all evidence that
-/// their demands lead to, and only on that.
+/// The tolerance of the decisions of some monitors to a delay of some streams. Its decisions depend on all evidence
+/// that their demands lead to, and only on that.
 ///
 /// A delay of all streams together only shifts everything, so every such delay keeps the sequence.
 pub fn tolerance(
@@ -109,7 +112,19 @@ pub fn tolerance(
     delayed: &[u32],
     monitors: &[MonitorId],
 ) -> Tolerance {
-    let mut search = Search::new(network, recording, conditions, delayed, monitors);
+    let prepared = Prepared::new(network, recording, conditions);
+    of_streams(network, recording, &prepared, conditions, delayed, monitors)
+}
+
+fn of_streams(
+    network: &Network,
+    recording: &Recording,
+    prepared: &Prepared,
+    conditions: &mut dyn Conditions,
+    delayed: &[u32],
+    monitors: &[MonitorId],
+) -> Tolerance {
+    let mut search = Search::new(network, recording, prepared, conditions, delayed, monitors);
     let recorded = search.decisions(SimTime::ZERO);
     let mut critical = search.critical(&recorded);
     let mut work = 0;
@@ -131,7 +146,7 @@ pub fn tolerance(
         if let Some(broken) = broken.min_by_key(at) {
             return Tolerance { delay: delay - SimTime::from_nanos(1), limit: Limit::Decision(broken) };
         }
-        work += search.changes.len() as u64 + 1;
+        work += search.work();
         next = critical.after(delay);
         if let Some(next) = next.filter(|_| work > PATIENCE) {
             return Tolerance { delay: next - SimTime::from_nanos(1), limit: Limit::GivenUp };
@@ -164,25 +179,37 @@ fn broken(recorded: &[Step<State>], found: &[Step<State>], delay: SimTime, end: 
     })
 }
 
-/// How the evidence of a network hears.
-#[derive(Clone, Copy, PartialEq)]
-enum Hears {
-    /// Nothing that is delayed.
-    InTime,
-    /// Nothing that is not.
-    Late,
-    /// Both.
-    Mixed,
+/// What is the same for all delays.
+struct Prepared {
+    /// Per evidence: what it hears.
+    heard: Vec<Vec<Heard>>,
+    /// Per evidence: its changes in the recording.
+    changes: Vec<Vec<Change>>,
+}
+
+impl Prepared {
+    fn new(network: &Network, recording: &Recording, conditions: &mut dyn Conditions) -> Self {
+        let heard = heard(recording);
+        let ids = (0..).map(EvidenceId).take(network.evidence_count());
+        let changes = ids.zip(&heard).zip(&recording.streams).map(|((id, heard), streams)| {
+            let mut changes = Vec::new();
+            timeline((id, network.rule(id)), (heard, streams.len()), recording.end, conditions, &mut changes);
+            changes
+        });
+        Prepared { changes: changes.collect(), heard }
+    }
 }
 
 struct Search<'a> {
     network: &'a Network,
     recording: &'a Recording,
+    prepared: &'a Prepared,
     conditions: &'a mut dyn Conditions,
     monitors: &'a [MonitorId],
     /// Per stream, up to the last one that is delayed: whether it is.
     is_delayed: Vec<bool>,
-    hears: Vec<Hears>,
+    /// Evidence that hears both kinds of streams.
+    mixed: Vec<EvidenceId>,
     /// Changes of evidence that hears nothing that is delayed.
     in_time: Vec<Change>,
     /// Changes of evidence that hears nothing else, without delay.
@@ -195,6 +222,7 @@ impl<'a> Search<'a> {
     fn new(
         network: &'a Network,
         recording: &'a Recording,
+        prepared: &'a Prepared,
         conditions: &'a mut dyn Conditions,
         delayed: &[u32],
         monitors: &'a [MonitorId],
@@ -203,37 +231,34 @@ impl<'a> Search<'a> {
         for &stream in delayed {
             is_delayed[stream as usize] = true;
         }
-        let hears = recording.streams.iter().map(|streams| {
+        let (mut mixed, mut in_time, mut late) = (Vec::new(), Vec::new(), Vec::new());
+        for ((id, changes), streams) in (0..).map(EvidenceId).zip(&prepared.changes).zip(&recording.streams) {
             match streams.iter().filter(|&&stream| is_in(&is_delayed, stream)).count() {
-                0 => Hears::InTime,
-                late if late == streams.len() => Hears::Late,
-                _ => Hears::Mixed,
-            }
-        });
-        let hears = hears.collect();
-        let (in_time, late, changes) = (Vec::new(), Vec::new(), Vec::new());
-        let mut search = Search { network, recording, conditions, monitors, is_delayed, hears, in_time, late, changes };
-        let mut in_time = Vec::new();
-        let mut late = Vec::new();
-        for evidence in search.all_evidence() {
-            match search.hears[evidence.index()] {
-                Hears::InTime => search.add_timeline(evidence, SimTime::ZERO, &mut in_time),
-                Hears::Late => search.add_timeline(evidence, SimTime::ZERO, &mut late),
-                Hears::Mixed => {}
+                0 => in_time.extend_from_slice(changes),
+                delayed if delayed == streams.len() => late.extend_from_slice(changes),
+                _ => mixed.push(id),
             }
         }
-        (search.in_time, search.late) = (in_time, late);
-        search
+        let changes = Vec::new();
+        Search { network, recording, prepared, conditions, monitors, is_delayed, mixed, in_time, late, changes }
     }
 
-    fn all_evidence(&self) -> impl Iterator<Item = EvidenceId> + use<> {
-        (0..).map(EvidenceId).take(self.hears.len().min(self.network.evidence_count()))
+    /// What it costs to look at a delay.
+    fn work(&self) -> u64 {
+        let heard = self.mixed.iter().map(|evidence| self.prepared.heard[evidence.index()].len());
+        (self.changes.len() + heard.sum::<usize>() + 1) as u64
     }
 
-    fn add_timeline(&mut self, evidence: EvidenceId, delay: SimTime, changes: &mut Vec<Change>) {
-        let is_delayed = &self.is_delayed;
-        let shift = |stream| if is_in(is_delayed, stream) { delay } else { SimTime::ZERO };
-        timeline(self.network.rule(evidence), evidence, self.recording, &shift, self.conditions, changes);
+    /// Adds the changes of evidence that hears both kinds of streams.
+    fn add_mixed(&mut self, evidence: EvidenceId, delay: SimTime, changes: &mut Vec<Change>) {
+        let streams = &self.recording.streams[evidence.index()];
+        let shift = |place: usize| if is_in(&self.is_delayed, streams[place]) { delay } else { SimTime::ZERO };
+        let heard = &self.prepared.heard[evidence.index()];
+        let mut heard: Vec<Heard> =
+            heard.iter().map(|heard| Heard { at: heard.at + shift(heard.place), ..*heard }).collect();
+        heard.sort_unstable_by_key(|heard| (heard.at, heard.message));
+        let of = (evidence, self.network.rule(evidence));
+        timeline(of, (&heard, streams.len()), self.recording.end, self.conditions, changes);
     }
 
     /// The decisions of each monitor if the delayed streams are late by this much.
@@ -242,10 +267,8 @@ impl<'a> Search<'a> {
         changes.clear();
         changes.extend_from_slice(&self.in_time);
         changes.extend(self.late.iter().map(|change| Change { at: change.at + delay, ..*change }));
-        for evidence in self.all_evidence() {
-            if self.hears[evidence.index()] == Hears::Mixed {
-                self.add_timeline(evidence, delay, &mut changes);
-            }
+        for at in 0..self.mixed.len() {
+            self.add_mixed(self.mixed[at], delay, &mut changes);
         }
         let end = self.recording.end;
         changes.retain(|change| change.at <= end);
@@ -274,14 +297,14 @@ impl<'a> Search<'a> {
         let mut in_time: Vec<SimTime> = self.in_time.iter().map(|change| change.at).collect();
         late.extend(recorded.iter().flatten().map(|step| step.at));
         in_time.push(self.recording.end);
-        for evidence in self.all_evidence().filter(|evidence| self.hears[evidence.index()] == Hears::Mixed) {
+        for &evidence in &self.mixed {
             let rule = self.network.rule(evidence);
             let stale = rule.stale.map(|(after, _)| after.saturating_add(1));
             let timers = [Some(0), Some(rule.held), stale];
             let streams = &self.recording.streams[evidence.index()];
-            for message in self.recording.messages.iter().filter(|message| streams.contains(&message.stream)) {
-                let times = timers.into_iter().flatten().map(|after| message.at + SimTime::from_nanos(after));
-                if is_in(&self.is_delayed, message.stream) { late.extend(times) } else { in_time.extend(times) }
+            for heard in &self.prepared.heard[evidence.index()] {
+                let times = timers.into_iter().flatten().map(|after| heard.at + SimTime::from_nanos(after));
+                if is_in(&self.is_delayed, streams[heard.place]) { late.extend(times) } else { in_time.extend(times) }
             }
         }
         Critical::new(late, in_time)

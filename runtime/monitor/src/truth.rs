@@ -1,4 +1,5 @@
-//! Truth with three values: Kleene's strong logic. Unknown means that it is true or false, but nobody knows which.
+//! Truth with three values: Kleene's strong logic [Kleene 1952]. Unknown means that it is true or false, but nobody
+//! knows which.
 
 use std::fmt;
 

@@ -124,27 +124,8 @@ impl Reader<'_> {
     fn below(&mut self, left: &Expression, strictly: bool, right: &Expression) -> Sure {
         let compare = move |left: f64, right: f64| if strictly { left < right } else { left <= right };
         if is_number(left) && is_number(right) {
-            let negate = |of: &Expression| Expression::Negate(Box::new(of.clone()));
-            let parts = match (left, right) {
-                (Expression::Max(parts) | Expression::Min(parts), _) => {
-                    parts.iter().map(|part| self.below(part, strictly, right)).collect::<Vec<Sure>>()
-                }
-                (_, Expression::Max(parts) | Expression::Min(parts)) => {
-                    parts.iter().map(|part| self.below(left, strictly, part)).collect()
-                }
-                (Expression::Absolute(of), _) => {
-                    vec![self.below(of, strictly, right), self.below(&negate(of), strictly, right)]
-                }
-                (_, Expression::Absolute(of)) => {
-                    vec![self.below(left, strictly, of), self.below(left, strictly, &negate(of))]
-                }
-                _ => Vec::new(),
-            };
-            match (left, right) {
-                _ if parts.is_empty() => {}
-                (Expression::Min(_), _) => return self.any(&parts),
-                (Expression::Max(_) | Expression::Absolute(_), _) | (_, Expression::Min(_)) => return self.all(&parts),
-                _ => return self.any(&parts),
+            if let Some(found) = self.below_each(left, strictly, right) {
+                return found;
             }
             match (constant(left), constant(right)) {
                 (Some(left), Some(right)) => {
@@ -164,6 +145,27 @@ impl Reader<'_> {
             }
         }
         self.ordered(left, strictly, right)
+    }
+
+    /// The same for extremes and absolute values: it is so for all, or for any, of what they are made of.
+    fn below_each(&mut self, left: &Expression, strictly: bool, right: &Expression) -> Option<Sure> {
+        let signs = |of: &Expression| [of.clone(), Expression::Negate(Box::new(of.clone()))];
+        let (parts, all): (Vec<Sure>, bool) = match (left, right) {
+            (Expression::Max(parts), _) => (parts.iter().map(|part| self.below(part, strictly, right)).collect(), true),
+            (Expression::Min(parts), _) => {
+                (parts.iter().map(|part| self.below(part, strictly, right)).collect(), false)
+            }
+            (Expression::Absolute(of), _) => {
+                (signs(of).iter().map(|part| self.below(part, strictly, right)).collect(), true)
+            }
+            (_, Expression::Max(parts)) => (parts.iter().map(|part| self.below(left, strictly, part)).collect(), false),
+            (_, Expression::Min(parts)) => (parts.iter().map(|part| self.below(left, strictly, part)).collect(), true),
+            (_, Expression::Absolute(of)) => {
+                (signs(of).iter().map(|part| self.below(left, strictly, part)).collect(), false)
+            }
+            _ => return None,
+        };
+        Some(if all { self.all(&parts) } else { self.any(&parts) })
     }
 
     /// Whether a chain has a property that only the numbers up to some number have, or lack.

@@ -1,11 +1,13 @@
 //! Whether literals can hold together: a search for values of the nodes below them that justify each other, with the
-//! comparisons of numbers decided on the way (DPLL(T), [Nieuwenhuis et al. 2006]).
+//! comparisons of numbers decided on the way (DPLL(T) [Nieuwenhuis et al. 2006]). Each value knows on which decisions
+//! it depends, so that a contradiction undoes those that led to it and not those that happened to come later
+//! [Prosser 1993].
 
 use super::logic::{Literal, Logic, Node};
 use super::theory::{Comparison, Theory};
 
 /// How many nodes are looked at for one question before it is given up.
-const PATIENCE: u64 = 400_000;
+const PATIENCE: u64 = 4_000_000;
 
 /// The answer to a question.
 #[derive(Debug)]
@@ -18,9 +20,9 @@ pub(super) enum Answer {
     GivenUp,
 }
 
-/// Whether these literals can hold together. `comparisons` says, per node, which comparison an atom is; `theory` is what
-/// is known of the numbers in them. `laws` always hold; one of which only one part matters says nothing about the goals
-/// and must be such that the rest can always be chosen accordingly.
+/// Whether these literals can hold together. `comparisons` says, per node, which comparison an atom is; `theory` is
+/// what is known of the numbers in them. `laws` always hold; one of which only one part matters says nothing about the
+/// goals and must be such that the rest can always be chosen accordingly.
 pub(super) fn solve(
     logic: &Logic,
     comparisons: &[Option<Comparison>],
@@ -60,11 +62,39 @@ struct Decision {
     trail: usize,
     /// How much was known of numbers before it.
     theory: usize,
-    /// What was tried; its negation is next.
     literal: Literal,
-    /// Whether the negation is being tried.
-    turned: bool,
 }
+
+/// A set of decisions, by their level. All levels from the last one on share one place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Levels(u128);
+
+impl Levels {
+    const NONE: Levels = Levels(0);
+    const SHARED: usize = 127;
+
+    fn one(level: usize) -> Self {
+        Levels(1 << level.min(Levels::SHARED))
+    }
+
+    fn and(self, other: Levels) -> Self {
+        Levels(self.0 | other.0)
+    }
+
+    /// The latest level, if there are so many decisions; `None` if there is none.
+    fn latest(self, decisions: usize) -> Option<usize> {
+        let latest = 127_usize.checked_sub(self.0.leading_zeros() as usize)?;
+        Some(if latest == Levels::SHARED { decisions - 1 } else { latest })
+    }
+
+    /// Those before a level, which is the latest.
+    fn before(self, level: usize) -> Self {
+        if level > Levels::SHARED { self } else { Levels(self.0 & !(1 << level)) }
+    }
+}
+
+/// The decisions that led to a contradiction.
+type Fits = Result<(), Levels>;
 
 struct Solver<'a> {
     logic: &'a Logic,
@@ -74,7 +104,11 @@ struct Solver<'a> {
     matters: Vec<bool>,
     /// Per term: the nodes of atoms that compare it with a number.
     atoms_of: Vec<Vec<u32>>,
+    /// All nodes of atoms that compare terms, with the group of the terms.
+    compared: Vec<(usize, u32)>,
     values: Vec<Option<bool>>,
+    /// Per node with a value: on what it depends.
+    depends: Vec<Levels>,
     /// Per node: how many of its parts hold, and how many do not.
     holding: Vec<usize>,
     failing: Vec<usize>,
@@ -96,7 +130,9 @@ impl<'a> Solver<'a> {
             theory,
             matters: vec![false; size],
             atoms_of: Vec::new(),
+            compared: Vec::new(),
             values,
+            depends: vec![Levels::NONE; size],
             holding: vec![0; size],
             failing: vec![0; size],
             trail: Vec::new(),
@@ -115,38 +151,39 @@ impl<'a> Solver<'a> {
             if let Node::AtLeast { parts, .. } = &self.logic.nodes()[node] {
                 waiting.extend(parts.iter().map(|part| part.node()));
             }
-            if let Some(Comparison::AtMost(term, _)) = self.comparisons.get(node).copied().flatten() {
+            let Some(comparison) = self.comparisons.get(node).copied().flatten() else { continue };
+            let atom = u32::try_from(node).expect("nodes are counted in 32 bits");
+            let (Comparison::AtMost(term, _) | Comparison::Ordered(term, _)) = comparison;
+            self.compared.push((self.theory.group(term), atom));
+            if let Comparison::AtMost(term, _) = comparison {
                 self.atoms_of.resize(self.atoms_of.len().max(term + 1), Vec::new());
-                self.atoms_of[term].push(u32::try_from(node).expect("nodes are counted in 32 bits"));
+                self.atoms_of[term].push(atom);
             }
         }
     }
 
     /// `None` if it is given up.
     fn run(&mut self, goals: &[Literal]) -> Option<bool> {
-        let mut fits = goals.iter().all(|&goal| self.set(goal)) && self.follow();
+        let mut fits = goals.iter().try_for_each(|&goal| self.set(goal, Levels::NONE)).and_then(|()| self.follow());
         loop {
             if self.work > PATIENCE {
                 return None;
             }
-            if fits {
-                let Some(literal) = self.unjustified() else { return Some(true) };
-                let (trail, theory) = (self.trail.len(), self.theory.mark());
-                self.decisions.push(Decision { trail, theory, literal, turned: false });
-                fits = self.set(literal) && self.follow();
-                continue;
-            }
-            loop {
-                let Some(decision) = self.decisions.last_mut() else { return Some(false) };
-                let (trail, theory, turned) = (decision.trail, decision.theory, decision.turned);
-                let literal = !decision.literal;
-                decision.turned = true;
-                self.go_back(trail, theory);
-                if !turned {
-                    fits = self.set(literal) && self.follow();
-                    break;
+            fits = match fits {
+                Ok(()) => {
+                    let Some(literal) = self.unjustified() else { return Some(true) };
+                    let (level, trail, theory) = (self.decisions.len(), self.trail.len(), self.theory.mark());
+                    self.decisions.push(Decision { trail, theory, literal });
+                    self.set(literal, Levels::one(level)).and_then(|()| self.follow())
                 }
-                self.decisions.pop();
+                Err(levels) => {
+                    let Some(level) = levels.latest(self.decisions.len()) else { return Some(false) };
+                    let Decision { trail, theory, literal } = self.decisions[level];
+                    self.decisions.truncate(level);
+                    self.go_back(trail, theory);
+                    // With the decisions before it, its negation follows.
+                    self.set(!literal, levels.before(level)).and_then(|()| self.follow())
+                }
             }
         }
     }
@@ -155,33 +192,36 @@ impl<'a> Solver<'a> {
         self.values[literal.node()].map(|value| value == literal.is_positive())
     }
 
-    /// Makes a literal hold; false if it does not already.
-    fn set(&mut self, literal: Literal) -> bool {
-        if let Some(value) = self.values[literal.node()] {
-            return value == literal.is_positive();
+    /// Makes a literal hold, because of some decisions.
+    fn set(&mut self, literal: Literal, because: Levels) -> Fits {
+        let node = literal.node();
+        match self.values[node] {
+            Some(value) if value == literal.is_positive() => Ok(()),
+            Some(_) => Err(because.and(self.depends[node])),
+            None => {
+                self.values[node] = Some(literal.is_positive());
+                self.depends[node] = because;
+                self.trail.push(node);
+                Ok(())
+            }
         }
-        self.values[literal.node()] = Some(literal.is_positive());
-        self.trail.push(literal.node());
-        true
     }
 
-    /// Follows up all values that were set; false if they contradict each other.
-    fn follow(&mut self) -> bool {
+    /// Follows up all values that were set.
+    fn follow(&mut self) -> Fits {
         while let Some(&node) = self.trail.get(self.followed) {
             self.followed += 1;
             self.count(node, 1);
+            self.compare(node)?;
+            self.examine(node)?;
             let logic = self.logic;
-            let fits = self.compare(node)
-                && self.examine(node)
-                && logic
-                    .users(node)
-                    .iter()
-                    .all(|&(user, _)| !self.matters[user as usize] || self.examine(user as usize));
-            if !fits {
-                return false;
+            for &(user, _) in logic.users(node) {
+                if self.matters[user as usize] {
+                    self.examine(user as usize)?;
+                }
             }
         }
-        true
+        Ok(())
     }
 
     /// Counts the value of a node among the parts of all that it is part of, or (with -1) no longer.
@@ -195,47 +235,82 @@ impl<'a> Solver<'a> {
     }
 
     /// Tells the theory about an atom, and sets atoms that follow.
-    fn compare(&mut self, node: usize) -> bool {
+    fn compare(&mut self, node: usize) -> Fits {
         let (Some(comparison), Some(holds)) = (self.comparisons.get(node).copied().flatten(), self.values[node]) else {
-            return true;
+            return Ok(());
         };
-        if !self.theory.add(comparison, holds) {
-            return false;
-        }
-        let Comparison::AtMost(term, _) = comparison else { return true };
+        let fits = self.theory.add(comparison, holds);
+        let Comparison::AtMost(term, _) = comparison else {
+            let Comparison::Ordered(term, _) = comparison else { return Ok(()) };
+            return if fits { Ok(()) } else { Err(self.because_of_group(term)) };
+        };
         let (least, most) = self.theory.range(term);
+        // What is known of a term by itself comes from its own atoms, unless it is made of others.
+        let own = self.theory.is_own(term) && (fits || least > most);
+        let because = if own { self.because_of(self.atoms_of[term].iter()) } else { self.because_of_group(term) };
+        if !fits {
+            return Err(because);
+        }
         for at in 0..self.atoms_of[term].len() {
             let other = self.atoms_of[term][at] as usize;
             let Some(Comparison::AtMost(_, bound)) = self.comparisons[other] else { continue };
             if self.values[other].is_none() && (most <= bound || least > bound) {
-                self.values[other] = Some(most <= bound);
-                self.trail.push(other);
+                let literal = Literal::of(other);
+                self.set(if most <= bound { literal } else { !literal }, because)?;
             }
         }
-        true
+        Ok(())
+    }
+
+    fn because_of_group(&self, term: usize) -> Levels {
+        let group = self.theory.group(term);
+        self.because_of(self.compared.iter().filter(|(of, _)| *of == group).map(|(_, atom)| atom))
+    }
+
+    /// The decisions on which values of these nodes depend.
+    fn because_of<'b>(&self, nodes: impl Iterator<Item = &'b u32>) -> Levels {
+        let known = nodes.map(|&node| node as usize).filter(|&node| self.values[node].is_some());
+        known.fold(Levels::NONE, |levels, node| levels.and(self.depends[node]))
+    }
+
+    /// The decisions on which it depends that so many of these parts hold, or do not.
+    fn because_of_parts(&self, parts: &[Literal], hold: bool, count: usize) -> Levels {
+        let so = parts.iter().filter(|&&part| self.value(part) == Some(hold)).take(count);
+        so.fold(Levels::NONE, |levels, part| levels.and(self.depends[part.node()]))
     }
 
     /// What the values of a node and of its parts say about each other.
-    fn examine(&mut self, node: usize) -> bool {
+    fn examine(&mut self, node: usize) -> Fits {
         self.work += 1;
         let logic = self.logic;
-        let Node::AtLeast { need, parts } = &logic.nodes()[node] else { return true };
-        let spare = parts.len() - need;
+        let Node::AtLeast { need, parts } = &logic.nodes()[node] else { return Ok(()) };
+        let (holding, failing, spare) = (self.holding[node], self.failing[node], parts.len() - need);
         let literal = Literal::of(node);
-        if self.holding[node] >= *need {
-            if !self.set(literal) {
-                return false;
+        if holding >= *need {
+            if self.values[node] != Some(true) {
+                self.set(literal, self.because_of_parts(parts, true, *need))?;
             }
-        } else if self.failing[node] > spare && !self.set(!literal) {
-            return false;
+            return Ok(());
+        }
+        if failing > spare {
+            if self.values[node] != Some(false) {
+                self.set(!literal, self.because_of_parts(parts, false, spare + 1))?;
+            }
+            return Ok(());
         }
         let rest = match self.values[node] {
-            Some(true) if self.failing[node] == spare && self.holding[node] < *need => true,
-            Some(false) if self.holding[node] == need - 1 && self.failing[node] <= spare => false,
-            _ => return true,
+            Some(true) if failing == spare => true,
+            Some(false) if holding + 1 == *need => false,
+            _ => return Ok(()),
         };
         self.work += parts.len() as u64;
-        parts.iter().all(|&part| self.value(part).is_some() || self.set(if rest { part } else { !part }))
+        let because = self.because_of_parts(parts, !rest, parts.len()).and(self.depends[node]);
+        for &part in parts {
+            if self.value(part).is_none() {
+                self.set(if rest { part } else { !part }, because)?;
+            }
+        }
+        Ok(())
     }
 
     /// A part to be set for a node whose value does not follow from its parts yet.

@@ -1,11 +1,11 @@
 //! Which comparisons of numbers can be true together.
 //!
-//! A *term* is a number that conditions compare: an input, the difference of two inputs, an input with a constant added,
-//! or anything else, about which nothing more is known than that it is the same each time. All terms are numbers in
-//! floating point, infinities included, so `t < 5` is `t <= 4.999…`: bounds of one term by constants are decided exactly
-//! in floating point. Orders between terms, and what differences of inputs say about the inputs, are decided by bounds
-//! on differences of real numbers, which are weakened where a difference in floating point was rounded. So what
-//! contradicts here contradicts in floating point; the reverse may fail by a rounding.
+//! A *term* is a number that conditions compare: an input, the difference of two inputs, an input with a constant
+//! added, or anything else, about which nothing more is known than that it is the same each time. All terms are
+//! numbers in floating point, infinities included, so `t < 5` is `t <= 4.999…`: bounds of one term by constants are
+//! decided exactly in floating point. Orders between terms, and what differences of inputs say about the inputs, are
+//! decided by bounds on differences of real numbers, which are weakened where a difference in floating point was
+//! rounded. So what contradicts here contradicts in floating point; the reverse may fail by a rounding.
 
 use sesame_base::differences::{Bound, Differences};
 
@@ -126,6 +126,21 @@ impl Theory {
                     && (of_a == of_b || self.bound(of_b, of_a, Bound { most, below: true }))
             }
         }
+    }
+
+    /// The number of the group of terms with which a term has to do; for one that is compared with numbers only, a
+    /// number of its own.
+    pub(super) fn group(&self, term: TermIndex) -> usize {
+        let member = match self.terms[term].shape {
+            Shape::Difference(of, _) => of,
+            Shape::Own | Shape::Sum(..) => term,
+        };
+        self.groups_of[member].map_or(self.groups.len() + member, |(group, _)| group)
+    }
+
+    /// Whether a term is not made of others.
+    pub(super) fn is_own(&self, term: TermIndex) -> bool {
+        self.terms[term].shape == Shape::Own
     }
 
     /// What is known of a term by itself.

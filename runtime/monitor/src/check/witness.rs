@@ -6,7 +6,7 @@ use sesame_base::differences::Bound;
 use sesame_plan::{Condition, Evidence, TextTest};
 
 use super::arithmetic::number;
-use super::atoms::{Atoms, Known};
+use super::atoms::Atoms;
 use super::theory::{Comparison, Theory};
 use crate::truth::{Truth, at_least};
 
@@ -21,20 +21,11 @@ pub enum Value {
     Text(String),
 }
 
-/// Values for all inputs about which the search found something, or anything else where it did not matter.
-pub(super) fn values(atoms: &Atoms, found: &[Option<bool>], mut theory: Theory) -> Option<BTreeMap<usize, Value>> {
-    let mut values = BTreeMap::new();
-    for (&input, &term) in &atoms.input_terms {
-        let number = choose(theory.bounds(term), atoms.terms[term].whole)?;
-        // What the others can be depends on it.
-        let fits = theory.add(Comparison::AtMost(term, number), true)
-            && theory.add(
-                Comparison::AtMost(term, if atoms.terms[term].whole { number - 1.0 } else { number.next_down() }),
-                false,
-            );
-        fits.then_some(())?;
-        values.insert(input, Value::Number(number));
-    }
+/// Values for all inputs about which the search found something, or anything else where it did not matter. `None` if
+/// none were found: numbers that are apart in theory may have no number of floating point between them.
+pub(super) fn values(atoms: &Atoms, found: &[Option<bool>], theory: &Theory) -> Option<BTreeMap<usize, Value>> {
+    // Numbers amid others leave room for those that are chosen after them; numbers at bounds are the last resort.
+    let mut values = [true, false].into_iter().find_map(|amid| numbers(atoms, theory.clone(), amid))?;
     for (&input, flag) in &atoms.flags {
         values.insert(input, Value::Flag(found[flag.node()].unwrap_or(false) == flag.is_positive()));
     }
@@ -49,8 +40,24 @@ pub(super) fn values(atoms: &Atoms, found: &[Option<bool>], mut theory: Theory) 
     Some(values)
 }
 
-/// A number between bounds: 0, else a whole one, else one at a bound, else one between.
-fn choose((least, most): (Bound, Bound), whole: bool) -> Option<f64> {
+/// Numbers for all inputs that are numbers, chosen one after another.
+fn numbers(atoms: &Atoms, mut theory: Theory, amid: bool) -> Option<BTreeMap<usize, Value>> {
+    let mut numbers = BTreeMap::new();
+    for (&input, &term) in &atoms.input_terms {
+        let whole = atoms.terms[term].whole;
+        let number = choose(theory.bounds(term), whole, amid)?;
+        let before = if whole { number - 1.0 } else { number.next_down() };
+        // What the others can be depends on it.
+        let fits =
+            theory.add(Comparison::AtMost(term, number), true) && theory.add(Comparison::AtMost(term, before), false);
+        fits.then_some(())?;
+        numbers.insert(input, Value::Number(number));
+    }
+    Some(numbers)
+}
+
+/// A number between bounds, simple ones first.
+fn choose((least, most): (Bound, Bound), whole: bool, amid: bool) -> Option<f64> {
     let low = -least.most;
     let high = most.most;
     let fits = |number: f64| {
@@ -58,15 +65,15 @@ fn choose((least, most): (Bound, Bound), whole: bool) -> Option<f64> {
         let below = if most.below { number < high } else { number <= high };
         above && below && number.is_finite() && (!whole || number.floor() == number)
     };
-    let (low_next, high_next) = (low.next_up(), high.next_down());
-    let between = f64::midpoint(low, high);
-    let numbers =
-        [0.0, low.ceil(), low.floor() + 1.0, high.floor(), high.ceil() - 1.0, low, high, between, low_next, high_next];
-    numbers.into_iter().find(|&number| fits(number)).map(|number| if number == 0.0 { 0.0 } else { number })
+    let between = [0.0, low.floor() + 1.0, high.ceil() - 1.0, f64::midpoint(low, high)];
+    let at_bounds =
+        [0.0, low.ceil(), high.floor(), low, high, f64::midpoint(low, high), low.next_up(), high.next_down()];
+    let inside = between.into_iter().filter(|&number| amid && low < number && number < high);
+    inside.chain(at_bounds).find(|&number| fits(number)).map(|number| if number == 0.0 { 0.0 } else { number })
 }
 
-/// The truth of the condition of evidence under values of inputs, by what [`Atoms`] calls them; unknown if it needs what
-/// is not known.
+/// The truth of the condition of evidence under values of its inputs, by position; unknown if it needs one that is not
+/// known.
 pub(super) fn truth(of: &Condition, evidence: &Evidence, known: &dyn Fn(u32) -> Option<Value>) -> Truth {
     let of_part = |part: &Condition| truth(part, evidence, known);
     match of {
@@ -99,9 +106,4 @@ pub(super) fn truth(of: &Condition, evidence: &Evidence, known: &dyn Fn(u32) -> 
             Truth::Unknown => Truth::Unknown,
         },
     }
-}
-
-/// The value that conditions may rely on: none for an input whose value proves nothing.
-pub(super) fn reliable(known: &Known, value: Option<&Value>) -> Option<Value> {
-    value.filter(|_| !known.loose).cloned()
 }

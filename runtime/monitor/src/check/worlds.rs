@@ -17,7 +17,7 @@ use crate::truth::Truth;
 use crate::why::Moment;
 
 /// How much work all questions together may take.
-const PATIENCE: u64 = 40_000_000;
+const PATIENCE: u64 = 50_000_000;
 
 /// Of which moments a question is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -72,11 +72,11 @@ impl<'a> Worlds<'a> {
         let laws = atoms.laws();
         let mut fresh = Vec::new();
         let mut possible = Vec::new();
-        for (at, evidence) in evidence.iter().enumerate() {
+        for (id, evidence) in (0..).map(EvidenceId).zip(&evidence) {
+            let at = id.index();
             let steady = (evidence.held > 0.0).then(|| atoms.named(format!("steady {at}")));
             let is_fresh = evidence.stale.map(|_| atoms.named(format!("fresh {at}")));
-            let (known, topics) =
-                known(&mut atoms, evidence, EvidenceId(u32::try_from(at).unwrap_or(u32::MAX)), values);
+            let (known, topics) = known(&mut atoms, evidence, id, values);
             reads[at].1 = topics;
             fresh.push(atoms.logic.all([free[at]].into_iter().chain(steady)));
             possible.push(atoms.logic.all([free[at]].into_iter().chain(steady).chain(is_fresh).chain(known)));
@@ -215,29 +215,26 @@ impl<'a> Worlds<'a> {
         [holds[node(stronger)], !may_hold[node(weaker)]]
     }
 
-    /// Values under which that is so, and the moment that they make; `None` if none were found, because numbers that are
-    /// exact in theory are rounded.
+    /// Values under which that is so, and the moment that they make; `None` if none were found, because numbers that
+    /// are exact in theory are rounded.
     pub(super) fn witness(
         &self,
         when: &When,
         found: &[Option<bool>],
-        theory: Theory,
-        monitors: &[Monitor],
+        theory: &Theory,
     ) -> Option<(Witness, Moment<'a>)> {
         let values = witness::values(&self.atoms, found, theory)?;
-        let known = |evidence: usize, at: u32| {
-            let declared = self.evidence[evidence];
-            let owner = EvidenceId(u32::try_from(evidence).ok()?);
-            let input = self.atoms.find(owner, declared.side, &declared.inputs[at as usize])?;
-            witness::reliable(&self.atoms.inputs[input], values.get(&input))
+        let known = |id: EvidenceId, at: u32| {
+            let declared = self.evidence[id.index()];
+            let input = self.atoms.find(id, declared.side, &declared.inputs[at as usize])?;
+            values.get(&input).filter(|_| !self.atoms.inputs[input].loose).cloned()
         };
-        debug_assert_eq!(self.evidence.len(), monitors.iter().map(|monitor| monitor.evidence.len()).sum::<usize>());
         let truths: Vec<Truth> = self
             .evidence
             .iter()
-            .enumerate()
-            .map(|(at, evidence)| {
-                let raw = witness::truth(&evidence.condition, evidence, &|input| known(at, input));
+            .zip((0..).map(EvidenceId))
+            .map(|(evidence, id)| {
+                let raw = witness::truth(&evidence.condition, evidence, &|input| known(id, input));
                 match falls(evidence, *when) {
                     Some(truth) if raw == Truth::True || *when == When::Silent => truth,
                     _ => raw,

@@ -25,24 +25,46 @@ impl Change {
     }
 }
 
-/// Adds the changes of one piece of evidence, if the messages of each stream are shifted by so much, until the end of
-/// the recording.
+/// A message that evidence hears.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Heard {
+    pub(super) at: SimTime,
+    /// The position of the message in the recording.
+    pub(super) message: usize,
+    /// The position of its stream among those of the evidence.
+    pub(super) place: usize,
+}
+
+/// What each piece of evidence hears, in the order of the recording.
+pub(super) fn heard(recording: &Recording) -> Vec<Vec<Heard>> {
+    let streams = recording.streams.iter().flatten().max().map_or(0, |&last| last as usize + 1);
+    let mut messages = vec![Vec::new(); streams];
+    for (message, it) in recording.messages.iter().enumerate() {
+        if let Some(messages) = messages.get_mut(it.stream as usize) {
+            messages.push((message, it.at));
+        }
+    }
+    let of_evidence = recording.streams.iter().map(|streams| {
+        let of_stream = streams.iter().enumerate().flat_map(|(place, &stream)| {
+            messages[stream as usize].iter().map(move |&(message, at)| Heard { at, message, place })
+        });
+        let mut all: Vec<Heard> = of_stream.collect();
+        all.sort_unstable_by_key(|heard| heard.message);
+        all
+    });
+    of_evidence.collect()
+}
+
+/// Adds the changes of one piece of evidence, until the end of a recording. `heard` is what it hears, in the order of
+/// time, from so many streams.
 pub(super) fn timeline(
-    rule: &Rule,
-    evidence: EvidenceId,
-    recording: &Recording,
-    shift: &dyn Fn(u32) -> SimTime,
+    (evidence, rule): (EvidenceId, &Rule),
+    (heard, streams): (&[Heard], usize),
+    end: SimTime,
     conditions: &mut dyn Conditions,
     changes: &mut Vec<Change>,
 ) {
-    let streams = &recording.streams[evidence.index()];
-    let own = recording.messages.iter().enumerate().filter_map(|(at, message)| {
-        let place = streams.iter().position(|&stream| stream == message.stream)?;
-        Some((message.at + shift(message.stream), at, place))
-    });
-    let mut own: Vec<(SimTime, usize, usize)> = own.filter(|(at, ..)| *at <= recording.end).collect();
-    own.sort_unstable();
-    let mut latest = vec![None; streams.len()];
+    let mut latest = vec![None; streams];
     let mut automaton = Automaton::new();
     let mut last = Truth::Unknown;
     let mut add = |at, message, truth| {
@@ -50,7 +72,7 @@ pub(super) fn timeline(
             changes.push(Change { at, message, evidence, truth });
         }
     };
-    for (at, message, place) in own {
+    for &Heard { at, message, place } in heard.iter().take_while(|heard| heard.at <= end) {
         while automaton.due(rule) <= at.nanos() {
             let due = SimTime::from_nanos(automaton.due(rule));
             automaton.pass(rule, due);
@@ -60,7 +82,7 @@ pub(super) fn timeline(
         automaton.observe(rule, at, conditions.truth(evidence, message, &latest));
         add(at, Some(message), automaton.value());
     }
-    while automaton.due(rule) <= recording.end.nanos() {
+    while automaton.due(rule) <= end.nanos() {
         let due = automaton.due(rule);
         automaton.pass(rule, SimTime::from_nanos(due));
         add(SimTime::from_nanos(due), None, automaton.value());

@@ -584,3 +584,12 @@ fn messages_before_and_after_operations_are_not_the_same() {
     certificate.evidence[0].side = Side::Inbound;
     assert_eq!(findings(certificate), []);
 }
+
+#[test]
+fn a_contradiction_undoes_all_that_led_to_it() {
+    let order = Condition::Compare { left: input(Y), by: Comparison::AtLeast, right: input(X) };
+    let one = compare(difference(), Comparison::Equal, 1.0);
+    let two = sesame_plan::Gate::AtLeast { count: 2, of: vec![E(1), E(1), E(0), E(1)] };
+    let found = findings(monitor(vec![order, one], vec![two]));
+    assert_eq!(found, [Finding::Redundant { monitor: M, evidence: 0, as_if: true }]);
+}
