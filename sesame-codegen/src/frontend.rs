@@ -5,7 +5,6 @@ use std::path::Path;
 use sesame_dsl::Analysis;
 use sesame_dsl::diagnostic::{Diagnostic, MEANINGS, Severity, page, render};
 use sesame_dsl::index::Kind;
-use sesame_dsl::model::eddi::Eddi;
 use sesame_dsl::model::{Space, Transport};
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::span::Span;
