@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::formula::Condition;
-use crate::{CampaignPlan, FieldRef, Input, MonitorId, MonitorPart, MonitorState, Side, TopicId};
+use crate::{CampaignPlan, FieldRef, Input, MonitorId, MonitorPart, MonitorState, Side, TopicId, Type};
 
 /// A runtime monitor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -14,7 +14,7 @@ pub struct Monitor {
     /// Its doc comment.
     pub doc: String,
     /// Where it publishes its state: a topic that carries a `bool` (whether any guarantee holds), an `int` (the
-    /// integrity of the strongest one that holds, 0 if none does) or a `text` (its name). `None` for an external
+    /// integrity of the strongest one that holds, 0 if none does) or a `text` (its name), or a message of one such field. `None` for an external
     /// monitor, which is a part of the system: its evidence is what that part says, and the runner only scores it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub publishes: Option<TopicId>,
@@ -56,6 +56,20 @@ impl Monitor {
 }
 
 impl CampaignPlan {
+    /// What a monitor may publish its state as, on a topic: a message that is a `bool`, an `int` or a `text`, or that has
+    /// one such field and no other, whose name is given; `None` of a topic on which no state can be published.
+    pub fn state_on(&self, topic: TopicId) -> Option<(&Type, Option<&str>)> {
+        let fits = |ty: &Type| matches!(ty, Type::Bool | Type::Int { .. } | Type::Text);
+        let topic = self.topics.get(topic.index()).filter(|topic| topic.paths.len() == 1)?;
+        match &topic.ty {
+            Type::Message { id } => match self.messages.get(id.index())?.fields.as_slice() {
+                [only] if fits(&only.ty) => Some((&only.ty, Some(&only.name))),
+                _ => None,
+            },
+            ty => fits(ty).then_some((ty, None)),
+        }
+    }
+
     /// Whether a monitor publishes its state on a topic, so that nobody else needs to know the topic.
     pub fn is_state_of_monitor(&self, topic: TopicId) -> bool {
         self.monitors.iter().any(|monitor| monitor.publishes == Some(topic))

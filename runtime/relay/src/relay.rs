@@ -492,6 +492,10 @@ impl Exchange for Relay<'_> {
         }
     }
 
+    fn next_index(&self, wire: Wire) -> u64 {
+        self.published[wire.index()]
+    }
+
     fn parameters(&self) -> &[(String, f64)] {
         &self.parameters
     }

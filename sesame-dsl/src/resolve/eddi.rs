@@ -79,8 +79,16 @@ impl<'a> Resolver<'a> {
     fn published(&mut self, name: &'a Name) -> Option<TopicId> {
         let index = self.find(name, Kind::Topic)?;
         let topic = self.system.topics[index].as_ref()?;
-        let fits = matches!(topic.ty, Type::Bool | Type::Int(None) | Type::Text) && topic.paths.len() == 1;
-        if fits {
+        let carries = |ty: &Type| matches!(ty, Type::Bool | Type::Int(None) | Type::Text);
+        let fits = match topic.ty {
+            // As most messages of ROS are that carry one value.
+            Type::Message(id) => match &self.system.messages[id.index()].as_ref()?.fields[..] {
+                [only] => carries(&only.ty),
+                _ => false,
+            },
+            ref ty => carries(ty),
+        };
+        if fits && topic.paths.len() == 1 {
             return Some(TopicId::from_index(index));
         }
         let is =
@@ -88,7 +96,8 @@ impl<'a> Resolver<'a> {
         let title = format!("a monitor cannot publish its state on `{}`", name.text);
         let diagnostic = Diagnostic::new(Code::WRONG_TYPE, name.span, title).label(format!("it is {is}"));
         self.report(diagnostic.note(
-            "the topic must be of type `bool` (whether a guarantee holds), `int` (its integrity) or `text` (its name)",
+            "the topic must be of type `bool` (whether a guarantee holds), `int` (its integrity) or `text` (its name), \
+             or a message of one such field",
         ));
         None
     }

@@ -2,7 +2,7 @@
 
 use crate::{
     CampaignPlan, Demand, Evidence, Gate, Guarantee, MetricSource, Monitor, MonitorId, MonitorPart, MonitorState,
-    RequirementId, SafeState, Score, Type,
+    RequirementId, SafeState, Score,
 };
 
 use super::check::{Checked, at, at_least_one, distinct, each, filled, finite, id, name, positive, require, wrong};
@@ -23,12 +23,9 @@ impl CampaignPlan {
         at("name", name(own))?;
         if let Some(topic) = *publishes {
             at("publishes", self.has_topic(topic))?;
-            let topic = self.topic(topic);
-            let fits = topic.paths.len() == 1 && matches!(topic.ty, Type::Bool | Type::Int { .. } | Type::Text);
-            at(
-                "publishes",
-                require(fits, || format!("`{}` is not one topic of a bool, an int or a text", topic.name)),
-            )?;
+            let fits = self.state_on(topic).is_some();
+            let name = || &self.topic(topic).name;
+            at("publishes", require(fits, || format!("`{}` is not one topic of a bool, an int or a text", name())))?;
         }
         at("demands", few(demands))?;
         each("demands", demands, |demand| self.sound_demand(demand))?;
@@ -182,7 +179,7 @@ fn sound_gate(monitor: &Monitor, gate: &Gate, room: usize) -> Checked {
 mod tests {
     use super::*;
     use crate::testing::{demand, evidence_above, guarantee, minimal, monitor, requirement, score, topic};
-    use crate::{Bound, Mitigation, MitigationValue, TopicId};
+    use crate::{Bound, Mitigation, MitigationValue, TopicId, Type};
 
     /// Two monitors, the first of which relies on the second; scores of the first; a requirement on one of them.
     fn watched() -> CampaignPlan {

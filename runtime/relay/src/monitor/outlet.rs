@@ -1,12 +1,13 @@
 //! What monitors publish: their states, and what is to bring the system into a safe state.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 use sesame_monitor::{Decision, State};
 use sesame_plan::{CampaignPlan, FieldRef, Mitigation, MitigationValue, Monitor, MonitorState, Type};
 
 use crate::metric::sample;
-use crate::value::{Text, Value};
+use crate::value::{Fields, Record, Text, Value};
 use crate::wire::{Wire, WireTable};
 
 /// Where monitors publish.
@@ -18,8 +19,8 @@ pub(super) struct Outlets<'p> {
 }
 
 struct Outlet<'p> {
-    /// The wire of its state, with its type.
-    state: Option<(Wire, &'p Type)>,
+    /// The wire of its state, with the type of it, and with the fields of its message if it has any.
+    state: Option<(Wire, &'p Type, Option<Arc<Fields>>)>,
     mitigation: Option<(&'p Mitigation, Vec<Wire>)>,
 }
 
@@ -30,7 +31,9 @@ impl<'p> Outlets<'p> {
         let monitors = plan.monitors.iter().map(|monitor| {
             // An external monitor only observes.
             let publishes = monitor.publishes?;
-            let state = of_topic(publishes).next().map(|wire| (wire, &plan.topic(publishes).ty));
+            let (ty, field) = plan.state_on(publishes)?;
+            let fields = field.map(|field| Fields::new([field]));
+            let state = of_topic(publishes).next().map(|wire| (wire, ty, fields));
             let mitigation = monitor.otherwise.mitigation.as_ref().map(|mitigation| {
                 let wires: Vec<Wire> = of_topic(mitigation.field.topic).collect();
                 (mitigation, wires)
@@ -59,8 +62,13 @@ impl<'p> Outlets<'p> {
     /// Queues what a decision causes: first the state, then the mitigation.
     pub(super) fn publish(&self, plan: &CampaignPlan, decision: &Decision, outbox: &mut VecDeque<(Wire, Value)>) {
         let Outlet { state, mitigation } = &self.monitors[decision.monitor.index()];
-        if let Some((wire, ty)) = *state {
-            outbox.push_back((wire, said(plan.monitor(decision.monitor), decision.state, ty)));
+        if let Some((wire, ty, fields)) = state {
+            let said = said(plan.monitor(decision.monitor), decision.state, ty);
+            let message = match fields {
+                Some(fields) => Record::new(fields, vec![said]).into(),
+                None => said,
+            };
+            outbox.push_back((*wire, message));
         }
         let Some((mitigation, wires)) = mitigation.as_ref().filter(|_| decision.mitigate) else { return };
         for &wire in wires {

@@ -205,6 +205,16 @@ fn a_mitigation_is_sent_with_the_other_fields_of_the_last_message_or_zeros() {
 }
 
 #[test]
+fn a_state_may_be_the_only_field_of_a_message() {
+    let mut plan = watched(vec![cell(ok())]);
+    plan.messages.push(message("Flag", vec![field("data", Type::Bool)]));
+    plan.topics[2].ty = Type::Message { id: MessageId(1) };
+    let ran = run(&plan, vec![], &[a(10, 1.0)], SECOND);
+    let flag = |is: bool| Value::from(Record::new(&crate::value::Fields::new(["data"]), vec![Value::Bool(is)]));
+    assert_eq!(ran.delivered("state"), [(0, flag(false)), (10, flag(true))]);
+}
+
+#[test]
 fn a_monitor_hears_what_is_delivered_and_inbound_evidence_what_was_published() {
     let lose = operation(0, OperationKind::Blackhole);
     let test = || vec![use_of(0, 0.0, 10.0, vec![], 1)];

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use sesame_plan::{CampaignPlan, FieldRef, Input, MetricSource, Mitigation, OperationKind, Place, Step, TopicId};
+use sesame_plan::{CampaignPlan, FieldRef, Input, MetricSource, OperationKind, Place, Step, TopicId};
 
 /// Which fields of a message are read.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -30,7 +30,7 @@ impl Wanted {
 }
 
 /// The fields of a topic's messages that metrics and monitors of the plan read and that its operations change. All of
-/// them where the user's code sees the message, where traces are recorded, or where a monitor sends messages of its own.
+/// them where the user's code sees the message, where traces are recorded, or where a monitor publishes.
 pub fn wanted(plan: &CampaignPlan, topic: TopicId) -> Wanted {
     let seen_whole = plan.campaign.record.is_some()
         || plan
@@ -41,7 +41,7 @@ pub fn wanted(plan: &CampaignPlan, topic: TopicId) -> Wanted {
             .operations
             .iter()
             .any(|operation| operation.topic == Some(topic) && matches!(operation.kind, OperationKind::Custom { .. }))
-        || mitigations(plan).any(|mitigation| mitigation.field.topic == topic);
+        || plan.is_published_by_monitor(topic);
     if seen_whole {
         return Wanted::All;
     }
@@ -79,11 +79,6 @@ pub fn wanted(plan: &CampaignPlan, topic: TopicId) -> Wanted {
         }
     }
     wanted
-}
-
-/// What monitors of the runner send. Where that is one field of a message, the others are those of the last message.
-fn mitigations(plan: &CampaignPlan) -> impl Iterator<Item = &Mitigation> {
-    plan.monitors.iter().filter_map(|monitor| monitor.otherwise.mitigation.as_ref())
 }
 
 /// The fields up to the first list of a place.
