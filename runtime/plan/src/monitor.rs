@@ -14,8 +14,9 @@ pub struct Monitor {
     /// Its doc comment.
     pub doc: String,
     /// Where it publishes its state: a topic that carries a `bool` (whether any guarantee holds), an `int` (the
-    /// integrity of the strongest one that holds, 0 if none does) or a `text` (its name), or a message of one such field. `None` for an external
-    /// monitor, which is a part of the system: its evidence is what that part says, and the runner only scores it.
+    /// integrity of the strongest one that holds, 0 if none does) or a `text` (its name), or a message of one such
+    /// field. `None` for an external monitor, which is a part of the system: its evidence is what that part says, and
+    /// the runner only scores it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub publishes: Option<TopicId>,
     /// Guarantees of other monitors on which it relies. No monitor relies on itself by any chain of demands.
@@ -56,8 +57,8 @@ impl Monitor {
 }
 
 impl CampaignPlan {
-    /// What a monitor may publish its state as, on a topic: a message that is a `bool`, an `int` or a `text`, or that has
-    /// one such field and no other, whose name is given; `None` of a topic on which no state can be published.
+    /// What a monitor may publish its state as, on a topic: a message that is a `bool`, an `int` or a `text`, or that
+    /// has one such field and no other, whose name is given; `None` of a topic on which no state can be published.
     pub fn state_on(&self, topic: TopicId) -> Option<(&Type, Option<&str>)> {
         let fits = |ty: &Type| matches!(ty, Type::Bool | Type::Int { .. } | Type::Text);
         let topic = self.topics.get(topic.index()).filter(|topic| topic.paths.len() == 1)?;
@@ -75,7 +76,8 @@ impl CampaignPlan {
         self.monitors.iter().any(|monitor| monitor.publishes == Some(topic))
     }
 
-    /// Whether the runner publishes on a topic: the state of a monitor, or what is to bring the system into a safe state.
+    /// Whether the runner publishes on a topic: the state of a monitor, or what is to bring the system into a safe
+    /// state.
     pub fn is_published_by_monitor(&self, topic: TopicId) -> bool {
         let mitigations = self.monitors.iter().filter_map(|monitor| monitor.otherwise.mitigation.as_ref());
         self.is_state_of_monitor(topic) || mitigations.into_iter().any(|mitigation| mitigation.field.topic == topic)

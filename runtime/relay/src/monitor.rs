@@ -123,8 +123,8 @@ impl<'p> Monitors<'p> {
         !self.listeners.delivered[wire.index()].is_empty()
     }
 
-    /// A message, as it was published or as it is delivered. Nothing is decided before [`Monitors::decide`], or the next
-    /// message.
+    /// A message, as it was published or as it is delivered. Nothing is decided before [`Monitors::decide`], or the
+    /// next message.
     pub(crate) fn hear(&mut self, now: SimTime, side: Side, wire: Wire, index: u64, value: &Value) {
         if side == Side::Outbound {
             self.outlets.remember(wire, value);

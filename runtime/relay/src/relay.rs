@@ -19,15 +19,17 @@ mod exchange;
 mod finished;
 mod fuzzing_time;
 mod listener;
+mod marks;
 mod monitors;
 mod pass;
+mod publishing;
 mod release;
 mod stage;
 
 use std::collections::BTreeSet;
 
 use fuzzing_time::Read;
-use monitors::Publishing;
+use publishing::Publishing;
 use release::{Held, ReleaseQueue, Why};
 use stage::Stage;
 
@@ -54,6 +56,9 @@ pub const HELD_LIMIT: usize = 100_000;
 
 /// The most copies that operations may make in one event; beyond it, no more are made, with a warning.
 pub const COPIES_LIMIT: u32 = 10_000;
+
+/// The most messages that monitors may publish in one event; beyond it, no more are sent, with a warning.
+pub const PUBLISHED_LIMIT: usize = 1_000;
 
 /// The relay of one run.
 pub struct Relay<'a> {

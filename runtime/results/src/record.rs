@@ -21,6 +21,7 @@ mod fresh;
 mod lab_runs;
 mod monitors;
 mod quarantine;
+mod read_monitors;
 mod read_tests;
 mod recognise;
 mod recorder;

@@ -5,7 +5,7 @@ use sesame_base::time::SimTime;
 use sesame_plan::Span;
 
 use crate::fuzz::Disturbance;
-use crate::relay::{COPIES_LIMIT, HELD_LIMIT, Phase, Relay, monitors};
+use crate::relay::{COPIES_LIMIT, HELD_LIMIT, PUBLISHED_LIMIT, Phase, Relay};
 
 /// The result of a run.
 pub struct Finished {
@@ -69,8 +69,7 @@ impl Relay<'_> {
         }
         if self.publishing.endless {
             warnings.push(format!(
-                "monitors cause each other's messages without end: more than {} in one event are not sent",
-                monitors::PUBLISHED_LIMIT
+                "monitors cause each other's messages without end: more than {PUBLISHED_LIMIT} in one event are not sent"
             ));
         }
         let unheard = self.acted_on.iter().filter(|wire| !self.heard[wire.index()]);

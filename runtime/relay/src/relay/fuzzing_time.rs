@@ -9,6 +9,7 @@ use sesame_plan::condition::{Condition, Operand};
 use sesame_plan::{Activation, CampaignPlan, MetricId, MetricSource, Score, Span, Test};
 
 use crate::relay::Relay;
+use crate::relay::marks::{beyond, reaching};
 use crate::relay::stage::Stage;
 
 impl Stage {
@@ -62,33 +63,6 @@ impl Relay<'_> {
         // The least number of nanoseconds after which this many operations have added up enough.
         marks.min().map(|mark| self.now + SimTime::from_nanos((mark - total - 1) / pace + 1))
     }
-}
-
-/// The first nanosecond whose seconds are at least this number.
-pub(super) fn reaching(number: f64) -> i64 {
-    first(number, |seconds| seconds >= number)
-}
-
-/// The first nanosecond whose seconds are above this number.
-pub(super) fn beyond(number: f64) -> i64 {
-    first(number, |seconds| seconds > number)
-}
-
-/// The first nanosecond near a number of seconds from which on something holds.
-fn first(number: f64, holds: impl Fn(f64) -> bool) -> i64 {
-    // Even the largest times have smaller gaps than this after rounding to seconds.
-    const NEAR: i64 = 1 << 12;
-    let near = SimTime::from_seconds(number).nanos();
-    let (mut low, mut high) = (near.saturating_sub(NEAR), near.saturating_add(NEAR));
-    while low < high {
-        let middle = low + (high - low) / 2;
-        if holds(SimTime::from_nanos(middle).seconds()) {
-            high = middle;
-        } else {
-            low = middle + 1;
-        }
-    }
-    low
 }
 
 /// What conditions and hazards read.
@@ -152,23 +126,6 @@ impl Read {
             MetricSource::FuzzingTime if !is_fuzzing_time(with) => self.compared.push(with),
             MetricSource::Monitor { score: Score::TimeIn { .. }, .. } => self.stays.push((metric, with)),
             _ => {}
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use proptest::prelude::*;
-
-    use super::*;
-
-    proptest! {
-        #[test]
-        fn the_first_nanosecond_is_the_first(number in prop_oneof![0.0..100.0f64, (0i64..2000).prop_map(|n| n as f64 * 0.05)]) {
-            let seconds = |nanos| SimTime::from_nanos(nanos).seconds();
-            let (reached, passed) = (reaching(number), beyond(number));
-            prop_assert!(seconds(reached) >= number && seconds(reached - 1) < number);
-            prop_assert!(seconds(passed) > number && seconds(passed - 1) <= number);
         }
     }
 }

@@ -28,8 +28,8 @@ use crate::wire::{Wire, WireTable};
 
 const SECOND: i64 = 1_000_000_000;
 
-/// The topics `a` and `b`, which are numbers; `state`, which is whole; `word`, a text; `drive`, a message of `speed` and
-/// `gear`; `gap`, the number that a requirement is about.
+/// The topics `a` and `b`, which are numbers; `state`, which is whole; `word`, a text; `drive`, a message of `speed`
+/// and `gear`; `gap`, the number that a requirement is about.
 fn watched(monitors: Vec<Monitor>) -> CampaignPlan {
     let (real, int) = (|| Type::Real { unit: None }, Type::Int { unit: None });
     let last = MetricSource::Last { input: FieldRef { topic: TopicId(5), path: Vec::new() } };

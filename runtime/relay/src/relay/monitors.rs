@@ -5,33 +5,19 @@
 //! it waits in a queue until that event is over. Conditions see new states of monitors when the queue is empty: an
 //! operation that begins because of a decision does not act on the message that tells of it.
 //!
-//! Monitors begin with the run, but what they publish at time zero waits until the transport advances time: before that,
-//! not all subscribers may be there.
+//! Monitors begin with the run, but what they publish at time zero waits until the transport advances time: before
+//! that, not all subscribers may be there.
 
 use sesame_base::time::SimTime;
 use sesame_plan::condition::Operand;
 use sesame_plan::{NodeId, Side};
 
 use crate::monitor::Monitors;
-use crate::relay::fuzzing_time::{beyond, reaching};
+use crate::relay::marks::{beyond, reaching};
 use crate::relay::release::Held;
-use crate::relay::{Delivery, Listener as _, Phase, Relay};
+use crate::relay::{Delivery, Listener as _, PUBLISHED_LIMIT, Phase, Relay};
 use crate::value::Value;
 use crate::wire::Wire;
-
-/// The most messages that monitors may publish in one event; beyond it, no more are sent, with a warning.
-pub(super) const PUBLISHED_LIMIT: usize = 1_000;
-
-/// How what monitors publish goes on.
-#[derive(Debug, Default)]
-pub(super) struct Publishing {
-    /// Whether subscribers are there, so that messages can be sent.
-    pub(super) open: bool,
-    /// Whether the queue is being emptied.
-    busy: bool,
-    /// Whether there was no end of it.
-    pub(super) endless: bool,
-}
 
 impl Relay<'_> {
     /// Monitors hear a message.

@@ -109,7 +109,8 @@ impl Line {
     pub(super) fn written(&self, delivery: &Delivery) -> Result<Option<(String, Message)>, Mismatch> {
         let Some(name) = &self.injected else { return Ok(None) };
         let of_index = self.originals.iter().find(|(number, _)| *number == delivery.index);
-        // Nothing is delivered that has not come, but for what monitors publish, which is written as the last message is.
+        // Nothing is delivered that has not come, but for what monitors publish, which is written as the last message
+        // is.
         let Some((_, original)) = of_index.or(self.originals.back()) else { return Ok(None) };
         Ok(Some((name.clone(), original.with(&delivery.value)?)))
     }
