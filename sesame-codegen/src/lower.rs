@@ -195,6 +195,40 @@ mod tests {
     }
 
     #[test]
+    fn topics_on_which_monitors_publish_are_cut_and_nobody_needs_to_publish_a_state() {
+        let text = r#"
+            space cell
+            system {
+              simulator sim = ros2
+              message Level = "std_msgs/msg/Float64" { data: real[mm] }
+              message Flag  = "std_msgs/msg/Bool" { data: bool }
+              topic level = "level" : Level
+              topic stop  = "stop"  : Flag
+              topic safe  = "safe"  : Flag
+              node arm { publishes level  subscribes stop, safe  launch "./arm" "{ros-args}" }
+              node plc { publishes stop   launch "./plc" "{ros-args}" }
+            }
+            eddi cell publishes safe {
+              evidence  low = level.data < 1m
+              guarantee moves  integrity 1 = low
+              otherwise stands  mitigate with stop.data = true
+            }
+            metric highest maximise default 0mm = max(level.data)
+            operation lag on node arm = slow [10%, 50%]
+            campaign look { objectives highest  operations lag 1 per test
+                            search random { evaluations 8 }  end after 10s }
+        "#;
+        let plan = lowered_from(text, "look").plan;
+        plan.validate().unwrap();
+        let cut: Vec<bool> = plan.simulator.transport.wiring().iter().map(|wiring| wiring.cut).collect();
+        assert_eq!(cut, [false, true, true], "a level is only heard");
+        let remapped = |node| plan.remappings(plan::NodeId(node)).into_iter().map(|it| it.to).collect::<Vec<_>>();
+        assert_eq!((remapped(0), remapped(1)), (Vec::new(), vec!["/stop/undisturbed".to_owned()]));
+        assert!(plan.unclaimed().is_empty(), "{:?}", plan.unclaimed());
+        assert_eq!(plan.state_on(plan::TopicId(2)), Some((&plan::Type::Bool, Some("data"))));
+    }
+
+    #[test]
     fn an_operation_on_a_node_has_the_node_and_no_topic_and_cuts_none() {
         let text = r#"
             space cell

@@ -204,3 +204,77 @@ impl Wires for RelayedBus<'_> {
         self.board.lines[port.0].inbox.as_mut()?.pop_front()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use sesame_plan::testing::{
+        evidence_above, guarantee, in_process as simulator, metric, minimal, monitor, test_of, topic,
+    };
+    use sesame_plan::{
+        FieldRef, Gate, MetricSource, Mitigation, MitigationValue, Monitor, MonitorState, SafeState, TopicId, Type,
+    };
+
+    use super::*;
+    use crate::evaluate::{Custom, evaluate};
+    use crate::metric::MetricTable;
+    use crate::wire::WireTable;
+
+    /// It comes nearer by one in each step, until it is told to stop. It does not know the topic of the monitor.
+    struct Robot {
+        distance: f64,
+        stopped: bool,
+        ports: [Port; 2],
+    }
+
+    impl Simulator for Robot {
+        fn start(_: &Setup, bus: &mut Bus<'_>) -> Result<Self, SimulatorError> {
+            let ports = ["distance", "stop"].map(|path| bus.open(path));
+            bus.subscribe(ports[1]);
+            Ok(Robot { distance: 10.0, stopped: false, ports })
+        }
+
+        fn step(&mut self, bus: &mut Bus<'_>) -> Result<Progress, SimulatorError> {
+            while let Some(stop) = bus.receive(self.ports[1]) {
+                self.stopped = stop == Value::Bool(true);
+            }
+            self.distance -= if self.stopped { 0.0 } else { 1.0 };
+            bus.publish(self.ports[0], self.distance);
+            Ok(Progress::Running)
+        }
+    }
+
+    #[test]
+    fn a_monitor_stops_a_simulator_that_does_not_know_its_topic() {
+        let (distance, stop) = (TopicId(0), FieldRef { topic: TopicId(1), path: Vec::new() });
+        let mitigation = Some(Mitigation { field: stop, value: MitigationValue::Bool(true) });
+        let far = evidence_above("far", 0, 5.0);
+        let plan = CampaignPlan {
+            simulator: simulator("robot", "robot::Robot", 100_000_000),
+            topics: vec![
+                topic("distance", &["distance"], Type::Real { unit: None }),
+                topic("stop", &["stop"], Type::Bool),
+                topic("state", &["state"], Type::Int { unit: None }),
+            ],
+            metrics: vec![metric(
+                "distance",
+                MetricSource::Last { input: FieldRef { topic: distance, path: Vec::new() } },
+            )],
+            monitors: vec![Monitor {
+                otherwise: SafeState { name: "halted".to_owned(), doc: String::new(), mitigation },
+                ..monitor("cell", 2, vec![far], vec![guarantee("moves", 1, Gate::Evidence(0))])
+            }],
+            ..minimal()
+        };
+        plan.validate().unwrap();
+        let wires = WireTable::new(&plan);
+        let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
+        let mut transport = in_process::<Robot>().transport(&plan);
+        let run = || evaluate(&plan, &wires, &metrics, &mut *transport, &test_of(vec![]), 1, &mut Custom::none());
+        let observed = std::iter::repeat_with(run).take(2).collect::<Result<Vec<_>, _>>().unwrap();
+        let decisions: Vec<_> = observed[0].monitors[0].decisions.iter().map(|it| (it.time, it.state)).collect();
+        let moves = MonitorState::Guarantee(0);
+        assert_eq!(decisions, [(0.0, MonitorState::Otherwise), (0.1, moves), (0.5, MonitorState::Otherwise)]);
+        assert_eq!(observed[0].metrics[0].value, Some(5.0), "it stops in the step after it is told to");
+        assert_eq!((&observed[1].monitors, observed[1].messages), (&observed[0].monitors, observed[0].messages));
+    }
+}

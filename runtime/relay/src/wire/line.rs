@@ -102,3 +102,33 @@ fn line(plan: &CampaignPlan, wires: &WireTable, wire: Wire) -> Line {
     }
     Line { wire, topic, channel, path, cut, sources, sinks }
 }
+
+#[cfg(test)]
+mod tests {
+    use sesame_plan::testing::{evidence_above, guarantee, minimal, monitor, node, topic};
+    use sesame_plan::{Clock, Gate, Node, Ros2, Transport, Type};
+
+    use super::*;
+
+    #[test]
+    fn a_state_that_only_a_monitor_publishes_comes_from_nowhere() {
+        let mut plan = minimal();
+        plan.topics = vec![topic("level", &["level"], Type::Real { unit: None }), topic("safe", &["safe"], Type::Bool)];
+        plan.monitors =
+            vec![monitor("cell", 1, vec![evidence_above("low", 0, 1.0)], vec![guarantee("ok", 1, Gate::Evidence(0))])];
+        plan.nodes = vec![node("arm")];
+        let wiring = [false, true].map(|cut| Wiring { cut, ..Wiring::default() }).to_vec();
+        let (interfaces, clock) = (Vec::new(), Clock::Wall);
+        plan.simulator.transport =
+            Transport::Ros2(Ros2 { domain: 0, clock, step: None, reset: None, interfaces, wiring });
+        let ends = |plan: &CampaignPlan| {
+            let path = |source: &Source| source.path.clone();
+            let of = |line: Line| (line.sources.iter().map(path).collect(), line.sinks.len());
+            lines(plan, &WireTable::new(plan)).into_iter().map(of).collect::<Vec<(Vec<String>, usize)>>()
+        };
+        let level = (vec!["level".to_owned()], 0);
+        assert_eq!(ends(&plan), [level.clone(), (Vec::new(), 1)]);
+        plan.nodes = vec![Node { publishes: vec![TopicId(1)], ..node("arm") }];
+        assert_eq!(ends(&plan), [level, (vec!["safe/undisturbed".to_owned()], 1)]);
+    }
+}
