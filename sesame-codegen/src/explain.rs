@@ -68,6 +68,7 @@ fn grammar(plan: &CampaignPlan, space: &ConditionSpace) -> String {
         let compared = metric.unit.as_ref().map(|unit| format!("is compared with whole numbers of {unit}"));
         let initial = match (&metric.source, metric.initial) {
             (MetricSource::FuzzingTime, _) => None,
+            (MetricSource::Monitor { score, .. }, _) if score.always_has_a_value() => None,
             (_, Some(initial)) => Some(format!("is {} before it is first set", unit.number(initial))),
             (_, None) => Some("is unknown before it is first set".to_owned()),
         };

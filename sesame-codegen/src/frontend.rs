@@ -5,7 +5,6 @@ use std::path::Path;
 use sesame_dsl::Analysis;
 use sesame_dsl::diagnostic::{Diagnostic, MEANINGS, Severity, page, render};
 use sesame_dsl::index::Kind;
-use sesame_dsl::model::eddi::Eddi;
 use sesame_dsl::model::{Space, Transport};
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::span::Span;
@@ -147,9 +146,6 @@ fn not_used(space: &Space, sources: &SourceMap) -> Vec<String> {
     if let (Some(budget), Some(why)) = (&space.lifecycle.relay_budget, unmeasured) {
         notes.push(format!("`relay budget` ({}) has no effect: {why}", at(budget.span)));
     }
-    notes.extend(space.eddis.values().map(|Eddi { declaration, .. }| {
-        format!("monitor `{}` ({}) is checked, but not used by runners yet", declaration.name, at(declaration.span))
-    }));
     notes
 }
 
@@ -190,7 +186,7 @@ fn summary(space: &Space) -> String {
     let counts = [
         (space.campaigns.iter().count(), "campaign"),
         (space.operations.iter().count(), "operation"),
-        (space.metrics.iter().count(), "metric"),
+        (space.metrics.values().filter(|metric| !metric.is_of_part()).count(), "metric"),
         (space.requirements.iter().count(), "requirement"),
     ];
     let counted = counts.map(|(n, what)| if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") });
@@ -273,12 +269,8 @@ mod tests {
         assert_eq!(checked.diagnostics, "");
         assert_eq!(
             checked.notes,
-            [
-                "`relay budget` (blocks.sesame:7) has no effect: in lock-step time stands still while messages pass \
-                 through the relay",
-                "monitor `transport` (blocks.sesame:32) is checked, but not used by runners yet",
-                "monitor `conveyor` (blocks.sesame:41) is checked, but not used by runners yet",
-            ]
+            ["`relay budget` (blocks.sesame:7) has no effect: in lock-step time stands still while messages pass \
+                 through the relay",]
         );
     }
 

@@ -8,12 +8,13 @@
 //!   plan and begin before the campaign's end;
 //! - metrics: its objectives, those it observes, its condition variables, and those of all requirements, of the labs,
 //!   and of the conditions and expectations of these tests;
-//! - all labs of the space.
+//! - all runtime monitors and all labs of the space.
 
 mod condition;
 mod formula;
 mod id;
 mod lab;
+mod monitor;
 mod operation;
 mod robustness;
 mod ros2;
@@ -69,6 +70,7 @@ pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str)
             tests.map(|&id| selection.test(space, &space.tests[id], declared.end_after)).collect()
         },
         campaign: selection.campaign(space, declared),
+        monitors: space.eddis.values().map(|eddi| monitor::monitor(space, eddi)).collect(),
         labs: space.physicals.values().map(|lab| selection.lab(space, lab)).collect(),
         compensation: None,
     };
@@ -87,6 +89,7 @@ fn hooks(space: &Space) -> Vec<HookPlan> {
             inputs: topics.iter().map(|&id| topic_id(id)).collect(),
         }),
         model::MetricSource::FuzzingTime
+        | model::MetricSource::Monitor(..)
         | model::MetricSource::Last(_)
         | model::MetricSource::Robustness(_)
         | model::MetricSource::Formula(_) => None,
@@ -107,6 +110,7 @@ fn trend(metric: &model::Metric) -> Option<plan::Trend> {
             plan::Aggregate::Min { .. } => Some(plan::Trend::Falling),
             plan::Aggregate::Last { .. } | plan::Aggregate::Mean { .. } => None,
         },
+        model::MetricSource::Monitor(_, score) => score.trend(),
         model::MetricSource::Last(_) | model::MetricSource::Robustness(_) => None,
     }
 }
@@ -129,6 +133,9 @@ fn metric(metric: &model::Metric) -> plan::Metric {
             model::MetricSource::Last(input) => plan::MetricSource::Last { input: formula::field(input) },
             model::MetricSource::Robustness(of) => {
                 plan::MetricSource::Robustness { robustness: robustness::robustness(of) }
+            }
+            model::MetricSource::Monitor(of, score) => {
+                plan::MetricSource::Monitor { monitor: monitor::monitor_id(*of), score: *score }
             }
             model::MetricSource::Formula(of) => plan::MetricSource::Formula { formula: formula::formula(of) },
         },

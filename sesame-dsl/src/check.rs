@@ -32,7 +32,12 @@ pub(crate) fn check(space: &Space, root: FileId) -> Vec<Diagnostic> {
 fn objectives_without_default(space: &Space, diagnostics: &mut Vec<Diagnostic>) {
     for (id, metric) in space.metrics.iter() {
         let objective = space.campaigns.values().any(|campaign| campaign.objectives.contains(&id));
-        if objective && metric.default.is_none() && metric.source != MetricSource::FuzzingTime {
+        let always = match &metric.source {
+            MetricSource::FuzzingTime => true,
+            MetricSource::Monitor(_, score) => score.always_has_a_value(),
+            _ => false,
+        };
+        if objective && metric.default.is_none() && !always {
             let name = &metric.declaration.name;
             let title = format!("objective `{name}` has no default");
             let diagnostic = Diagnostic::new(Code::OBJECTIVE_WITHOUT_DEFAULT, metric.declaration.span, title);

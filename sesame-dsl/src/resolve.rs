@@ -3,13 +3,15 @@
 //! 1. [`collect`] collects names, and reports duplicates and missing declarations
 //! 2. [`system`] resolves message types (ordered so that each follows those it contains), topics, nodes, the simulator;
 //!    [`ros2`], [`ros_types`] and [`services`] those of ROS, [`bus`] addresses
-//! 3. [`metrics`] resolves metrics and requirements; [`formula`] resolves formulas, with [`function`], [`geometry`],
-//!    [`region`] and [`members`]
-//! 4. [`fuzz`] resolves operations ([`disturbance`] their targets and parameters, [`custom`] those in the user's code)
+//! 3. [`eddi`] resolves runtime monitors, with their [`evidence`]
+//! 4. [`metrics`] resolves metrics and requirements; [`formula`] resolves formulas, with [`function`], [`geometry`],
+//!    [`region`] and [`members`]; [`score`] what is said of monitors
+//! 5. [`fuzz`] resolves operations ([`disturbance`] their targets and parameters, [`custom`] those in the user's code)
 //!    and tests
-//! 5. [`campaign`] resolves campaigns, whose inherited clauses [`inherit`] has copied before all else; [`condition`]
-//!    resolves the conditions of tests and the building blocks of campaigns' conditions
-//! 6. [`eddi`] resolves runtime monitors, [`physical`] labs, and [`lifecycle`] the rest of a system's clauses
+//! 6. [`campaign`] resolves campaigns, whose inherited clauses [`inherit`] has copied before all else; [`condition`]
+//!    resolves the conditions of tests and the building blocks of campaigns' conditions, by what is [`known`] of
+//!    metrics; [`contained`] what operations require of such conditions
+//! 7. [`physical`] resolves labs, and [`lifecycle`] the rest of a system's clauses
 //!
 //! Each pass reports all it finds. A declaration with a mistake is `None` from then on, and references to it are not
 //! reported again: one mistake is one diagnostic.
@@ -20,17 +22,20 @@ mod campaign;
 mod collect;
 mod condition;
 mod confirmation;
+mod contained;
 mod coverage;
 mod custom;
 mod depth;
 mod disturbance;
 mod eddi;
+mod evidence;
 mod exploration;
 mod formula;
 mod function;
 mod fuzz;
 mod geometry;
 mod inherit;
+mod known;
 mod lengths;
 mod lifecycle;
 mod members;
@@ -47,6 +52,7 @@ mod resource;
 mod robustness;
 mod ros2;
 mod ros_types;
+mod score;
 mod services;
 mod simulator;
 mod stop;
@@ -59,6 +65,7 @@ use crate::diagnostic::{Code, Diagnostic, Severity, Suggestion};
 use crate::import::Merged;
 use crate::index::Kind;
 use crate::interfaces::Interfaces;
+use crate::model::eddi::MonitorPart;
 use crate::model::{self, Arena, Declaration, Id, Space};
 use crate::similar::most_similar;
 use crate::source::SourceMap;
@@ -92,19 +99,23 @@ pub(crate) fn resolve(
         operations: Vec::new(),
         tests: Vec::new(),
         compared: Compared::default(),
+        eddis: Vec::new(),
+        parts: BTreeMap::new(),
     };
     resolver.collect();
     let simulator = resolver.system();
     let lifecycle = resolver.lifecycle();
+    resolver.eddis = resolver.eddis();
     resolver.metrics();
+    resolver.metrics_of_parts();
     let requirements = resolver.requirements();
+    resolver.hazards_of_scores(&requirements);
     resolver.operations();
     resolver.tests();
     let campaigns = resolver.campaigns();
-    let eddis = resolver.eddis();
     let physicals = resolver.physicals();
 
-    let Resolver { system, metrics, operations, tests, diagnostics, .. } = resolver;
+    let Resolver { system, metrics, operations, tests, eddis, diagnostics, .. } = resolver;
     if diagnostics.iter().any(|diagnostic| diagnostic.severity() == Severity::Error) {
         return None;
     }
@@ -182,6 +193,9 @@ struct Resolver<'a> {
     operations: Vec<Option<model::Operation>>,
     tests: Vec<Option<model::Test>>,
     compared: Compared,
+    eddis: Vec<Option<model::eddi::Eddi>>,
+    /// The metrics of the parts of monitors.
+    parts: BTreeMap<(usize, MonitorPart), usize>,
 }
 
 /// The most names that are compared with unknown ones in all.
@@ -215,14 +229,21 @@ impl<'a> Resolver<'a> {
 
     /// The position of a name among the declarations of its kind.
     fn find(&mut self, name: &'a Name, kind: Kind) -> Option<usize> {
+        if kind == Kind::Metric && name.text.contains('.') {
+            return self.metric_of_part(name);
+        }
+        self.find_text(&name.text, name.span, kind)
+    }
+
+    fn find_text(&mut self, name: &'a str, span: Span, kind: Kind) -> Option<usize> {
         let word = kind.word();
-        match self.names.get(name.text.as_str()) {
+        match self.names.get(name) {
             Some(definition) if definition.kind == kind => return Some(definition.index),
-            Some(_) | None if self.silent.contains(name.text.as_str()) => return None,
+            Some(_) | None if self.silent.contains(name) => return None,
             Some(definition) => {
                 let is = definition.kind.with_article();
-                let title = format!("`{}` is {is}, not {}", name.text, kind.with_article());
-                let diagnostic = Diagnostic::new(Code::OTHER_KIND, name.span, title)
+                let title = format!("`{name}` is {is}, not {}", kind.with_article());
+                let diagnostic = Diagnostic::new(Code::OTHER_KIND, span, title)
                     .label(format!("expected {}", kind.with_article()))
                     .secondary(definition.span, format!("declared as {is} here"));
                 self.report(diagnostic);
@@ -230,12 +251,12 @@ impl<'a> Resolver<'a> {
             }
             None => {}
         }
-        self.silent.insert(&name.text);
+        self.silent.insert(name);
         // An import that failed may have declared it.
         if self.file.incomplete {
             return None;
         }
-        let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, format!("no {word} named `{}`", name.text))
+        let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, span, format!("no {word} named `{name}`"))
             .label("not found in this space");
         if !self.compared.more(self.names.len()) {
             self.report(diagnostic);
@@ -243,12 +264,12 @@ impl<'a> Resolver<'a> {
         }
         let known = self.names_of(kind);
         if kind == Kind::Metric
-            && name.text == "fuzzing_time"
-            && let Some(declared) = self.declared_fuzzing_time(name.span)
+            && name == "fuzzing_time"
+            && let Some(declared) = self.declared_fuzzing_time(span)
         {
             diagnostic.suggestions.push(declared);
-        } else if let Some(similar) = most_similar(&name.text, known.iter().copied()) {
-            diagnostic = diagnostic.did_you_mean(name.span, similar);
+        } else if let Some(similar) = most_similar(name, known.iter().copied()) {
+            diagnostic = diagnostic.did_you_mean(span, similar);
         } else if known.is_empty() {
             diagnostic = diagnostic.note(format!("this space declares no {word}s"));
         } else if known.len() <= 8 {

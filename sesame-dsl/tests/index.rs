@@ -129,3 +129,23 @@ fn what_is_known_inside_of_a_monitor_is_meant_there() {
     assert_eq!(uses(&sources, &index, "conveyor"), [at("transport", 34)]);
     assert_eq!(uses(&sources, &index, "known"), [at("again", 73)]);
 }
+
+#[test]
+fn what_is_said_of_a_monitor_elsewhere_mentions_it_and_its_parts() {
+    let text = include_str!("good/monitors.sesame");
+    let (sources, index, has_errors) = index(text);
+    assert!(!has_errors);
+    let who = |name: &str| uses(&sources, &index, name).into_iter().map(|(who, _)| who).collect::<Vec<_>>();
+    let campaign = "missed_hazards_of_the_certificate";
+    assert_eq!(
+        who("transport.brakes_ok"),
+        [&["transport"; 3][..], &["lie"], &["worst_moment"; 2], &[campaign]].concat()
+    );
+    assert_eq!(who("transport.fast"), ["quick", "worst_moment", campaign]);
+    assert_eq!(who("transport.halted"), ["still", "worst_moment", campaign]);
+    assert_eq!(who("conveyor.rolls"), ["worst_moment"]);
+    assert_eq!(who("plc"), ["cell", "controller"], "the topic that says a state");
+    assert_eq!(who("controller"), ["plc_safe"]);
+    assert!(who("R1").contains(&"missed".to_owned()));
+    assert!(index.references.iter().all(|reference| reference.target.is_some()));
+}

@@ -98,6 +98,7 @@ fn check(plan: &CampaignPlan, tests: &[(Test, f64)]) {
             operations: Vec::new(),
             unheard: Vec::new(),
             metrics: vec![metric(*value); plan.metrics.len()],
+            monitors: Vec::new(),
             messages: 0,
             warnings: Vec::new(),
             wall: WallTime::default(),

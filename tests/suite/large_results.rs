@@ -113,6 +113,7 @@ fn record(plan: &CampaignPlan, permitted: &TestSpace, number: u32) -> TestRecord
             operations: test.operations.iter().map(|operation| effect(&operation.activation)).collect(),
             unheard: Vec::new(),
             metrics: values(objectives, number, &mut stream).map(metric).to_vec(),
+            monitors: Vec::new(),
             messages: 10_000,
             warnings: Vec::new(),
             wall: WallTime::default(),

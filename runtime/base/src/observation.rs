@@ -1,10 +1,14 @@
 //! What was observed in one run of a test: what a worker reports and the results repository keeps.
 
+mod monitor;
+
 use std::fmt::Write as _;
 
 use serde::{Deserialize, Serialize};
 
 use sesame_plan::{Span, Trend};
+
+pub use monitor::{CHANGES_KEPT, ChangeCause, EvidenceChange, MonitorDecision, MonitorObservation};
 
 /// How a run ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -125,6 +129,9 @@ pub struct Observation {
     pub unheard: Vec<String>,
     /// Per metric of the plan, in its order; empty after a crash of the worker.
     pub metrics: Vec<MetricObservation>,
+    /// Per monitor of the plan, in its order; empty after a crash of the worker.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub monitors: Vec<MonitorObservation>,
     /// Messages the relay handled.
     pub messages: u64,
     /// What should be brought to the user's attention; in order, and bounded by the relay.
@@ -301,13 +308,14 @@ impl Observation {
             operations: Vec::new(),
             unheard: Vec::new(),
             metrics: Vec::new(),
+            monitors: Vec::new(),
             messages: 0,
             warnings: Vec::new(),
             wall: WallTime::default(),
         }
     }
 
-    /// The same run without the series of its metrics, which are most of it.
+    /// The same run without the series of its metrics and what its monitors did, which are most of it.
     #[must_use]
     pub fn without_series(&self) -> Self {
         let metric = |&MetricObservation { value, set, reach, not_finite, .. }: &MetricObservation| MetricObservation {
@@ -324,6 +332,7 @@ impl Observation {
             operations: self.operations.clone(),
             unheard: self.unheard.clone(),
             metrics: self.metrics.iter().map(metric).collect(),
+            monitors: Vec::new(),
             messages: self.messages,
             warnings: self.warnings.clone(),
             wall: self.wall,

@@ -31,6 +31,10 @@ id!(
     NodeId
 );
 id!(
+    /// A runtime monitor: position in [`crate::CampaignPlan::monitors`].
+    MonitorId
+);
+id!(
     /// A metric: position in [`crate::CampaignPlan::metrics`].
     MetricId
 );

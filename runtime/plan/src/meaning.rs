@@ -1,6 +1,9 @@
 //! What a plan means, without what it says to people only.
 
-use crate::{Campaign, CampaignPlan, Field, KnownTest, MessageType, Metric, Node, Operation, Requirement, Topic};
+use crate::{
+    Campaign, CampaignPlan, Demand, Evidence, Field, Guarantee, KnownTest, MessageType, Metric, Monitor, Node,
+    Operation, Requirement, SafeState, Topic,
+};
 
 impl CampaignPlan {
     /// The plan without what it says to people only: doc comments, the sentences of requirements, where things are
@@ -40,6 +43,7 @@ impl CampaignPlan {
             difference("metric", &before.metrics, &now.metrics, |metric| &metric.name),
             difference("operation", &before.operations, &now.operations, |operation| &operation.name),
             difference("requirement", &before.requirements, &now.requirements, |requirement| &requirement.name),
+            difference("monitor", &before.monitors, &now.monitors, |monitor| &monitor.name),
             (before.simulator != now.simulator).then(|| format!("simulator `{}` has changed", now.simulator.name)),
             (before.campaign != now.campaign).then(|| format!("campaign `{}` has changed", now.campaign.name)),
         ];
@@ -79,6 +83,7 @@ fn forget_what_is_for_people(plan: &mut CampaignPlan) {
         operations,
         tests,
         campaign,
+        monitors,
         labs,
         compensation: _,
     } = plan;
@@ -137,6 +142,7 @@ fn forget_what_is_for_people(plan: &mut CampaignPlan) {
         } = operation;
         doc.clear();
     }
+    monitors.iter_mut().for_each(forget_in_monitor);
     for KnownTest { name: _, doc, test: _, expectations: _, simulator_seed: _ } in tests {
         doc.clear();
     }
@@ -159,6 +165,21 @@ fn forget_what_is_for_people(plan: &mut CampaignPlan) {
         end_when: _,
         record: _,
     } = campaign;
+    doc.clear();
+}
+
+fn forget_in_monitor(monitor: &mut Monitor) {
+    let Monitor { name: _, doc, publishes: _, demands, evidence, guarantees, otherwise, line } = monitor;
+    doc.clear();
+    *line = 0;
+    for Demand { name: _, monitor: _, guarantee: _ } in demands {}
+    for Evidence { name: _, doc, inputs: _, condition: _, held: _, stale: _, side: _ } in evidence {
+        doc.clear();
+    }
+    for Guarantee { name: _, doc, integrity: _, gate: _ } in guarantees {
+        doc.clear();
+    }
+    let SafeState { name: _, doc, mitigation: _ } = otherwise;
     doc.clear();
 }
 
@@ -201,9 +222,11 @@ fn align_what_no_test_depends_on(one: &mut CampaignPlan, other: &mut CampaignPla
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{known_test, lab, metric, node, operation, plan, requirement};
+    use crate::testing::{
+        evidence_above, guarantee, known_test, lab, metric, monitor, node, operation, plan, requirement,
+    };
     use crate::{
-        Bound, CoverageGoal, Dimension, GridAxis, MetricId, MetricSource, OperationKind, Recorded, Task, Test,
+        Bound, CoverageGoal, Dimension, Gate, GridAxis, MetricId, MetricSource, OperationKind, Recorded, Task, Test,
     };
 
     fn whole() -> CampaignPlan {
@@ -214,6 +237,12 @@ mod tests {
                 requirement("R2", 0, Bound::Below { value: 9.0 }),
             ],
             tests: vec![known_test("known", Test::default())],
+            monitors: vec![monitor(
+                "transport",
+                0,
+                vec![evidence_above("ok", 0, 1.0)],
+                vec![guarantee("safe", 1, Gate::Evidence(0))],
+            )],
             ..plan(vec![operation(0, OperationKind::Bias), operation(1, OperationKind::Blackhole)])
         }
     }
@@ -221,7 +250,7 @@ mod tests {
     #[test]
     fn what_is_only_for_people_is_not_part_of_the_meaning() {
         let plan = whole();
-        let changes: [fn(&mut CampaignPlan); 14] = [
+        let changes: [fn(&mut CampaignPlan); 19] = [
             |plan| plan.generator = "sesamec 9.9.9".to_owned(),
             |plan| plan.source = "moved.sesame".to_owned(),
             |plan| plan.doc = "Corrected.".to_owned(),
@@ -236,6 +265,11 @@ mod tests {
             |plan| plan.tests[0].doc = "Corrected.".to_owned(),
             |plan| plan.campaign.doc = "Corrected.".to_owned(),
             |plan| plan.labs.push(lab("lab")),
+            |plan| plan.monitors[0].doc = "Corrected.".to_owned(),
+            |plan| plan.monitors[0].line += 7,
+            |plan| plan.monitors[0].evidence[0].doc = "Corrected.".to_owned(),
+            |plan| plan.monitors[0].guarantees[0].doc = "Corrected.".to_owned(),
+            |plan| plan.monitors[0].otherwise.doc = "Corrected.".to_owned(),
         ];
         for (at, change) in changes.into_iter().enumerate() {
             let mut changed = plan.clone();
@@ -288,6 +322,8 @@ mod tests {
         assert_eq!(difference(|plan| plan.nodes.clear()), "node `arm` was removed");
         assert_eq!(difference(|plan| plan.topics[0].paths.clear()), "topic `command` has changed");
         assert_eq!(difference(|plan| plan.messages[0].fields.clear()), "message `Zone` has changed");
+        assert_eq!(difference(|plan| plan.monitors[0].evidence[0].held = 1.0), "monitor `transport` has changed");
+        assert_eq!(difference(|plan| plan.monitors.clear()), "monitor `transport` was removed");
         assert_eq!(difference(|plan| plan.simulator.name.push('2')), "simulator `sim2` has changed");
         assert_eq!(difference(|plan| plan.campaign.end_after += 1.0), "campaign `campaign` has changed");
         assert_eq!(difference(|plan| plan.space.push('2')), "space `test2` has changed");

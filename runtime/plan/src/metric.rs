@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::stl::Robustness;
-use crate::{FieldRef, Formula, MetricId, TopicId};
+use crate::{FieldRef, Formula, MetricId, MonitorId, Score, TopicId};
 
 /// Which end of a metric is of interest to a tester.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -79,6 +79,13 @@ pub enum MetricSource {
     Formula {
         /// How.
         formula: Formula,
+    },
+    /// What there is to say of a runtime monitor.
+    Monitor {
+        /// Which monitor.
+        monitor: MonitorId,
+        /// What is said of it.
+        score: Score,
     },
 }
 

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Campaign, Compensation, KnownTest, KnownTestId, Lab, MessageId, MessageType, Metric, MetricId, Node, NodeId,
-    Operation, OperationId, Requirement, RequirementId, Simulator, Topic, TopicId,
+    Campaign, Compensation, KnownTest, KnownTestId, Lab, MessageId, MessageType, Metric, MetricId, Monitor, MonitorId,
+    Node, NodeId, Operation, OperationId, Requirement, RequirementId, Simulator, Topic, TopicId,
 };
 
 /// Everything a runner knows of its campaign. Deserializing one [validates](CampaignPlan::validate) it.
@@ -41,6 +41,10 @@ pub struct CampaignPlan {
     pub tests: Vec<KnownTest>,
     /// The campaign.
     pub campaign: Campaign,
+    /// All runtime monitors of the space, in declaration order. A plan without any is written as if there were no such
+    /// list.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub monitors: Vec<Monitor>,
     /// All labs of the space, in declaration order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub labs: Vec<Lab>,
@@ -73,6 +77,10 @@ impl CampaignPlan {
     /// The requirement of an id.
     pub fn requirement(&self, id: RequirementId) -> &Requirement {
         &self.requirements[id.index()]
+    }
+    /// The runtime monitor of an id.
+    pub fn monitor(&self, id: MonitorId) -> &Monitor {
+        &self.monitors[id.index()]
     }
     /// The known test of an id.
     pub fn test(&self, id: KnownTestId) -> &KnownTest {

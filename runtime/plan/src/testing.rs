@@ -5,10 +5,11 @@
 //! plan is filled in here, and in no test.
 
 use crate::{
-    Activation, ActivationMode, Bound, Campaign, CampaignPlan, Channel, Choice, Copies, Count, Distribution, Domain,
-    Drain, Field, FieldRef, KnownTest, Lab, LabCost, Lifecycle, MessageId, MessageType, Metric, MetricId, MetricSource,
-    Node, Operation, OperationId, OperationKind, Parameter, Requirement, SCHEMA, Search, Shape, Simulator, Span, Step,
-    Strategy, Test, TestOperation, Topic, TopicId, Transport, Type, ValueMode,
+    Activation, ActivationMode, Bound, Campaign, CampaignPlan, Channel, Choice, Comparison, Copies, Count, Demand,
+    Distribution, Domain, Drain, Evidence, Expression, Field, FieldRef, Gate, Guarantee, Input, KnownTest, Lab,
+    LabCost, Lifecycle, Members, MessageId, MessageType, Metric, MetricId, MetricSource, Monitor, MonitorId, Node,
+    Operation, OperationId, OperationKind, Parameter, Requirement, SCHEMA, SafeState, Score, Search, Shape, Side,
+    Simulator, Span, Step, Strategy, Test, TestOperation, Topic, TopicId, Transport, Type, ValueMode, formula,
 };
 
 /// The smallest valid plan: a simulator, and [a campaign](campaign) that may not use anything.
@@ -28,6 +29,7 @@ pub fn minimal() -> CampaignPlan {
         operations: Vec::new(),
         tests: Vec::new(),
         campaign: campaign("campaign", 0),
+        monitors: Vec::new(),
         labs: Vec::new(),
         compensation: None,
     }
@@ -134,6 +136,59 @@ pub fn metric(name: &str, source: MetricSource) -> Metric {
         accepts_not_finite: false,
         line: 1,
     }
+}
+
+/// A metric of what there is to say of a monitor, with its unit and its trend.
+pub fn score(name: &str, monitor: u32, score: Score) -> Metric {
+    let source = MetricSource::Monitor { monitor: MonitorId(monitor), score };
+    Metric { unit: score.unit().map(str::to_owned), trend: score.trend(), ..metric(name, source) }
+}
+
+/// A monitor that publishes its state on a topic, relies on no other monitor, and sends nothing: of this evidence and
+/// these guarantees, and with the safe state `unsafe`.
+pub fn monitor(name: &str, publishes: u32, evidence: Vec<Evidence>, guarantees: Vec<Guarantee>) -> Monitor {
+    Monitor {
+        name: name.to_owned(),
+        doc: String::new(),
+        publishes: Some(TopicId(publishes)),
+        demands: Vec::new(),
+        evidence,
+        guarantees,
+        otherwise: SafeState { name: "unsafe".to_owned(), doc: String::new(), mitigation: None },
+        line: 1,
+    }
+}
+
+/// Evidence that a number is above a limit: delivered by a topic of its own, of one member, that carries it alone.
+/// Without a hold, never stale.
+pub fn evidence_above(name: &str, topic: u32, limit: f64) -> Evidence {
+    Evidence {
+        name: name.to_owned(),
+        doc: String::new(),
+        inputs: vec![Input {
+            field: FieldRef { topic: TopicId(topic), path: Vec::new() },
+            members: Members::Min,
+            text: None,
+        }],
+        condition: formula::Condition::Compare {
+            left: Expression::Input(0),
+            by: Comparison::Above,
+            right: Expression::Constant(limit),
+        },
+        held: 0.0,
+        stale: None,
+        side: Side::Outbound,
+    }
+}
+
+/// A guarantee of a monitor.
+pub fn guarantee(name: &str, integrity: u32, gate: Gate) -> Guarantee {
+    Guarantee { name: name.to_owned(), doc: String::new(), integrity, gate }
+}
+
+/// A demand of a monitor for a guarantee of another one, at its position there.
+pub fn demand(name: &str, monitor: u32, guarantee: u32) -> Demand {
+    Demand { name: name.to_owned(), monitor: MonitorId(monitor), guarantee }
 }
 
 /// A requirement on a metric.

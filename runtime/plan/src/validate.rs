@@ -11,6 +11,7 @@ mod campaign;
 mod check;
 mod formula;
 mod lab;
+mod monitor;
 mod system;
 
 use serde::de::Error as _;
@@ -93,6 +94,7 @@ impl CampaignPlan {
         each("operations", &self.operations, |operation| self.sound_operation(operation))?;
         each("tests", &self.tests, |test| self.sound_known_test(test))?;
         at("campaign", self.sound_campaign(&self.campaign))?;
+        at("monitors", self.sound_monitors())?;
         at("labs", distinct(self.labs.iter().map(|lab| &lab.name)))?;
         each("labs", &self.labs, |lab| self.sound_lab(lab))?;
         let compensation = self.compensation.as_ref();
@@ -151,6 +153,7 @@ impl CampaignPlan {
             MetricSource::Last { input } => at("input", self.field(input)),
             MetricSource::Robustness { robustness } => at("robustness", self.sound_robustness(robustness)),
             MetricSource::Formula { formula } => at("formula", self.sound_formula(formula)),
+            MetricSource::Monitor { monitor, score } => self.sound_score(*monitor, *score),
         };
         at("source", sound)
     }

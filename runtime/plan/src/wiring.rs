@@ -120,7 +120,8 @@ impl CampaignPlan {
     pub fn unclaimed(&self) -> Vec<(Channel, Remapping)> {
         let mut unclaimed: Vec<(Channel, Remapping)> = Vec::new();
         for (topic, declared, _) in self.cut() {
-            let claimed = self.nodes.iter().any(|node| is_source(node, topic, declared.channel));
+            let claimed = self.nodes.iter().any(|node| is_source(node, topic, declared.channel))
+                || self.is_state_of_monitor(topic);
             // The server may be known by the other direction of its service.
             let served = declared.channel != Channel::Topic
                 && (0..).map(TopicId).zip(&self.topics).any(|(other, it)| {

@@ -88,6 +88,7 @@ pub fn evaluate_tapped(
         // A run that broke off may have been about to subscribe.
         unheard: if ended { finished.unheard } else { Vec::new() },
         metrics: finished.metrics,
+        monitors: finished.monitors,
         messages: finished.messages,
         warnings: finished.warnings,
         wall: WallTime { run: started.elapsed().as_secs_f64() },

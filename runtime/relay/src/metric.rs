@@ -20,7 +20,10 @@ mod robustness;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use engine::Shown;
 pub use engine::{MetricError, MetricTable, Metrics};
+pub(crate) use expression::{Held, Moment, holds};
+pub(crate) use held::{HeldInputs, hear};
 pub(crate) use probe::sample;
 pub use probe::unimplemented_hooks;
 

@@ -16,31 +16,37 @@
 
 mod compensation;
 mod exchange;
+mod finished;
 mod fuzzing_time;
 mod listener;
+mod monitors;
 mod pass;
 mod release;
 mod stage;
 
 use std::collections::BTreeSet;
 
+use fuzzing_time::Read;
+use monitors::Publishing;
 use release::{Held, ReleaseQueue, Why};
 use stage::Stage;
 
 use sesame_base::activation::{Activity, Edge, TICK};
 use sesame_base::condition::holds;
-use sesame_base::observation::{Counters, OperationEffect};
+use sesame_base::observation::Counters;
 use sesame_base::time::SimTime;
 use sesame_plan::condition::{Condition, Operand};
-use sesame_plan::{CampaignPlan, Copies, Drain, Moment, NodeId, Side, Span, Test};
+use sesame_plan::{CampaignPlan, Copies, Drain, MetricId, MetricSource, Moment, NodeId, Side, Test};
 
 use crate::files::SpaceFiles;
 use crate::fuzz::{ChoiceError, Disturbance, KeyedRng, OperationEntry, Order, RunContext};
 use crate::metric::Metrics;
+use crate::monitor::Monitors;
 use crate::value::Value;
 use crate::wire::{Wire, WireTable};
 
 pub use exchange::{Delivery, Exchange};
+pub use finished::Finished;
 pub use listener::{Listener, MessageRef, OperationEvent};
 
 /// The most messages that operations may hold back at once; beyond it, the oldest is released early, with a warning.
@@ -66,6 +72,9 @@ pub struct Relay<'a> {
     published: Vec<u64>,
     queue: ReleaseQueue,
     metrics: Metrics<'a>,
+    /// `None` for a plan without monitors.
+    monitors: Option<Monitors<'a>>,
+    publishing: Publishing,
     /// Per wire: whether it has a receiver.
     heard: Vec<bool>,
     /// The wires that operations of the plan act on, whether or not this test contains them.
@@ -74,6 +83,8 @@ pub struct Relay<'a> {
     /// The instant at hand.
     now: SimTime,
     phase: Phase,
+    /// Whether the run has come to its end.
+    ended: bool,
     messages: u64,
     overflowed: bool,
     /// Copies made in the event at hand.
@@ -95,10 +106,12 @@ struct Conditions {
     ended: Vec<usize>,
     /// Per wire: whether a condition reads a metric of its messages as they are published.
     read: Vec<bool>,
-    /// Whether a condition reads a metric of messages as they are delivered.
+    /// Whether a condition reads a metric of messages as they are delivered, or a score of a monitor.
     reads_delivered: bool,
-    /// What conditions compare the fuzzing time with.
+    /// What the fuzzing time is compared with.
     compared: Vec<Operand>,
+    /// What times in states of monitors are compared with.
+    stays: Vec<(MetricId, Operand)>,
     /// Whether copies of one operation wait for each other.
     apart: bool,
 }
@@ -157,28 +170,36 @@ impl<'a> Relay<'a> {
             }
         }
         let conditional = (0..operations.len()).filter(|&at| operations[at].activity.is_conditional()).collect();
-        let (variables, compared) = fuzzing_time::read_by(plan, test);
+        let Read { variables, compared, stays } = Read::by(plan, test);
         let reads = |wire, side| variables.iter().any(|&metric| metrics.hears(metric, wire, side));
+        let is_score = |&metric: &MetricId| matches!(plan.metric(metric).source, MetricSource::Monitor { .. });
+        let monitors = Monitors::new(&metrics, wires);
+        let hears =
+            |wire| metrics.delivers(wire) || monitors.as_ref().is_some_and(|monitors| monitors.hears_delivered(wire));
         Ok(Relay {
             wires,
             disturbed_by: pipelines.iter().map(Vec::len).collect(),
             parameters: Vec::new(),
-            heard: wires.iter().map(|wire| metrics.delivers(wire)).chain(wires.links().iter().map(|_| false)).collect(),
+            heard: wires.iter().map(hears).chain(wires.links().iter().map(|_| false)).collect(),
             acted_on: plan.operations.iter().flat_map(|operation| wires.acted_on(operation)).collect(),
             conditions: Conditions {
                 ended: Vec::with_capacity(operations.len()),
                 operations: conditional,
                 read: wires.iter().map(|wire| reads(wire, Side::Inbound)).collect(),
-                reads_delivered: wires.iter().any(|wire| reads(wire, Side::Outbound)),
+                reads_delivered: wires.iter().any(|wire| reads(wire, Side::Outbound)) || variables.iter().any(is_score),
                 compared,
+                stays,
                 apart: plan.campaign.copies != Copies::MayOverlap,
             },
             phase: Phase::New,
+            ended: false,
             operations,
             order,
             pipelines,
             published: vec![0; wires.len()],
             queue: ReleaseQueue::new(test.operations.len(), wires.len_with_links()),
+            monitors,
+            publishing: Publishing::default(),
             metrics,
             now: SimTime::ZERO,
             messages: 0,
@@ -241,6 +262,9 @@ impl<'a> Relay<'a> {
     /// Tells the listeners the time.
     fn tell_time(&mut self, now: SimTime) {
         self.metrics.advanced(now);
+        if let Some(monitors) = &mut self.monitors {
+            monitors.tick(now, &mut self.metrics);
+        }
         for tap in &mut self.taps {
             tap.advanced(now);
         }
@@ -254,53 +278,17 @@ impl<'a> Relay<'a> {
     /// Tells the metrics that the run has ended.
     pub fn end(&mut self, now: SimTime) {
         self.metrics.end(now);
-    }
-
-    /// The result of a run that ended or broke off at `end`: messages still held are lost, open intervals are closed.
-    pub fn finish(mut self, end: SimTime) -> Finished {
-        self.begin_time();
-        self.phase = Phase::Over;
-        self.advance_to(end, &mut Vec::new());
-        // Even if no message came at the end: the reach of metrics is asked for this time.
-        self.tell_time(end);
-        let operations: Vec<OperationEffect> = self
-            .operations
-            .iter()
-            .take(self.order.len())
-            .map(|stage| OperationEffect {
-                intervals: stage.activity.intervals(end),
-                tails: stage.tails(end),
-                counters: stage.counters,
-                first_touch: stage.first_touch.map(SimTime::seconds),
-                last_touch: stage.last_touch.map(SimTime::seconds),
-            })
-            .collect();
-        let timed = self.operations.iter().zip(&operations).filter(|(stage, _)| stage.timed);
-        let busy: Vec<Span> = timed.flat_map(|(_, operation)| operation.busy()).collect();
-        let (metrics, mut warnings) = self.metrics.finish(&busy);
-        for stage in &self.operations {
-            if let Disturbance::Custom(custom) = &stage.disturbance
-                && let Some(mismatch) = &custom.mismatch
-            {
-                warnings.push(format!("operation `{}`: {mismatch}", stage.name));
-            }
-        }
-        if self.overflowed {
-            warnings
-                .push(format!("more than {HELD_LIMIT} messages were held back at once; the oldest were let go early"));
-        }
-        if self.flooded {
-            warnings.push(format!("copies of copies: more than {COPIES_LIMIT} in one event are not made"));
-        }
-        let unheard = self.acted_on.iter().filter(|wire| !self.heard[wire.index()]);
-        let unheard = unheard.map(|&wire| self.wires.path(wire).to_owned()).collect();
-        Finished { operations, unheard, metrics, warnings, messages: self.messages }
+        self.monitors_end(now);
+        self.ended = true;
     }
 
     /// Carries out, in order of time, every activation edge and every release up to `now`; at one instant edges come
     /// first, since an operation is active for `start <= t < end`.
     fn advance_to(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>) {
         self.begin_time();
+        if self.now < now {
+            self.open_publishing(deliveries);
+        }
         loop {
             self.release_due(deliveries);
             if self.now >= now {
@@ -315,6 +303,7 @@ impl<'a> Relay<'a> {
             self.now = moment;
             self.tell_time(moment);
             self.arrive();
+            self.monitors_arrive(deliveries);
         }
     }
 
@@ -323,13 +312,14 @@ impl<'a> Relay<'a> {
     #[inline(always)]
     fn next_moment(&self) -> Option<SimTime> {
         let edges = self.operations.iter().filter_map(|stage| stage.activity.next_edge());
-        edges.chain(self.queue.next_release()).chain(self.next_comparison()).min()
+        edges.chain(self.queue.next_release()).chain(self.next_comparison()).chain(self.monitors_due()).min()
     }
 
     /// Carries out the edges at time zero, once.
     fn begin_time(&mut self) {
         if self.phase == Phase::New {
             self.phase = Phase::Running;
+            self.show_scores();
             self.arrive();
         }
     }
@@ -349,7 +339,8 @@ impl<'a> Relay<'a> {
     /// Ends an instant, when time advances: some values are known only now. They switch operations one nanosecond
     /// later, since the instant to which they belong is over.
     fn leave(&mut self) {
-        if self.metrics.settle() {
+        let waited = self.metrics.settle();
+        if self.monitors_leave() || waited {
             self.now = self.now + TICK;
             self.tell_time(self.now);
         }
@@ -395,9 +386,7 @@ impl<'a> Relay<'a> {
         while self.queue.next_release().is_some_and(|release| release <= self.now) {
             if let Some(held) = self.release() {
                 self.pass(self.now, held, deliveries);
-                if self.conditions.reads_delivered {
-                    self.evaluate_conditions();
-                }
+                self.end_event(deliveries);
             }
         }
     }
@@ -479,6 +468,8 @@ impl Exchange for Relay<'_> {
 
     fn advance(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>) {
         self.copies = 0;
+        self.begin_time();
+        self.open_publishing(deliveries);
         self.advance_to(now, deliveries);
     }
 
@@ -493,23 +484,16 @@ impl Exchange for Relay<'_> {
         if now > self.now || self.phase == Phase::New {
             self.advance_to(now, deliveries);
         }
-        self.messages += 1;
         self.copies = 0;
-        let index = self.published[wire.index()];
-        self.published[wire.index()] += 1;
-        for tap in &mut self.taps {
-            tap.published(self.now, wire, index, &value);
-        }
-        self.metrics.published(self.now, wire, index, &value);
-        if self.conditions.read[wire.index()] {
-            self.evaluate_conditions();
-            self.release_due(deliveries);
-        }
-        self.pass(self.now, Held { wire, publisher, published: index, index, value, next_stage: 0 }, deliveries);
+        self.publish(self.now, wire, publisher, false, value, deliveries);
+        self.end_event(deliveries);
         if self.conditions.reads_delivered {
-            self.evaluate_conditions();
             self.release_due(deliveries);
         }
+    }
+
+    fn next_index(&self, wire: Wire) -> u64 {
+        self.published[wire.index()]
     }
 
     fn parameters(&self) -> &[(String, f64)] {
@@ -530,25 +514,12 @@ impl Exchange for Relay<'_> {
             Phase::Over => None,
             Phase::Running => {
                 // The end of this instant may make values known that conditions read.
-                let settled = !self.conditions.operations.is_empty() && self.metrics.is_waiting();
+                let settled =
+                    !self.conditions.operations.is_empty() && (self.metrics.is_waiting() || self.monitors_wait());
                 self.next_moment().into_iter().chain(settled.then(|| self.now + TICK)).min()
             }
         }
     }
-}
-
-/// The result of a run.
-pub struct Finished {
-    /// Per operation of the test, in its order.
-    pub operations: Vec<OperationEffect>,
-    /// Names on the wire that operations of the plan act on and that had no receiver, in order of declaration.
-    pub unheard: Vec<String>,
-    /// Per metric of the plan.
-    pub metrics: Vec<sesame_base::observation::MetricObservation>,
-    /// Warnings for the user.
-    pub warnings: Vec<String>,
-    /// The number of messages published.
-    pub messages: u64,
 }
 
 #[cfg(test)]
@@ -559,5 +530,7 @@ mod behaviour;
 mod links;
 #[cfg(test)]
 mod matrix;
+#[cfg(test)]
+mod monitored;
 #[cfg(test)]
 mod tests;

@@ -19,6 +19,7 @@ mod files;
 mod folder;
 mod fresh;
 mod lab_runs;
+mod monitors;
 mod quarantine;
 mod read_tests;
 mod recognise;

@@ -34,7 +34,7 @@ impl fmt::Display for Unheard {
             write!(
                 f,
                 "nothing receives what operation `{operation}` disturbs: the simulator does not subscribe to its topic \
-                 `{topic}` ({named}), and no outbound metric reads it"
+                 `{topic}` ({named}), and no outbound metric and no monitor reads it"
             )
         } else {
             write!(

@@ -47,7 +47,7 @@ pub(super) struct ExecutionArgs {
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     reference_timeout: Option<Duration>,
     /// Go on although nothing receives what an operation disturbs: the simulator does not subscribe to its topic, and
-    /// no outbound metric reads it
+    /// no outbound metric and no monitor reads it
     #[arg(long)]
     allow_unheard: bool,
 }

@@ -37,6 +37,7 @@ pub(crate) fn metric(name: &str, default: Option<f64>, initial: Option<f64>, sou
             Aggregate::Last { .. } | Aggregate::Mean { .. } => None,
         },
         MetricSource::Last { .. } | MetricSource::Robustness { .. } => None,
+        MetricSource::Monitor { score, .. } => score.trend(),
     };
     Metric { default, initial, trend, ..testing::metric(name, source) }
 }

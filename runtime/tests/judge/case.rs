@@ -90,7 +90,7 @@ pub(crate) fn variables(activation: &Activation) -> Vec<MetricId> {
 pub(crate) fn topics_of(metric: &Metric) -> Vec<TopicId> {
     match &metric.source {
         MetricSource::Hook { topics } => topics.clone(),
-        MetricSource::FuzzingTime => Vec::new(),
+        MetricSource::FuzzingTime | MetricSource::Monitor { .. } => Vec::new(),
         MetricSource::Last { input } => vec![input.topic],
         MetricSource::Robustness { robustness } => robustness.inputs.iter().map(|it| it.field.topic).collect(),
         MetricSource::Formula { formula } => formula.inputs.iter().map(|it| it.field.topic).collect(),

@@ -29,7 +29,7 @@ pub(crate) fn judged(plan: &CampaignPlan, metric: &Metric, ledger: &Ledger) -> J
         return Judged::Open;
     }
     let value = match &metric.source {
-        MetricSource::FuzzingTime => unreachable!("no message makes it"),
+        MetricSource::FuzzingTime | MetricSource::Monitor { .. } => unreachable!("no message makes it"),
         MetricSource::Last { input } => {
             let on = |message: &&Message| member(plan, input.topic, &message.path).is_some();
             messages.iter().rfind(on).and_then(|message| number(&message.value, &input.path))
@@ -70,7 +70,7 @@ pub(crate) fn heard<'a>(metric: &Metric, ledger: &'a Ledger) -> &'a [Message] {
 /// When a metric first heard what is not finite, in nanoseconds.
 pub(crate) fn first_blank(plan: &CampaignPlan, metric: &Metric, ledger: &Ledger) -> Option<i64> {
     let fields: Vec<FieldRef> = match &metric.source {
-        MetricSource::FuzzingTime => Vec::new(),
+        MetricSource::FuzzingTime | MetricSource::Monitor { .. } => Vec::new(),
         MetricSource::Last { input } => vec![input.clone()],
         MetricSource::Hook { topics } => {
             let blank = |message: &&Message| {

@@ -133,7 +133,7 @@ fn only_worsens(metric: &Metric, bound: Bound) -> bool {
             HookKind::Least => lower,
             HookKind::Latest => false,
         },
-        MetricSource::Last { .. } | MetricSource::Robustness { .. } => false,
+        MetricSource::Last { .. } | MetricSource::Robustness { .. } | MetricSource::Monitor { .. } => false,
     }
 }
 

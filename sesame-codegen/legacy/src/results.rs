@@ -112,6 +112,7 @@ impl Importer<'_> {
                 operations: effects,
                 unheard: Vec::new(),
                 metrics,
+                monitors: Vec::new(),
                 messages: 0,
                 warnings: Vec::new(),
                 wall: WallTime::default(),

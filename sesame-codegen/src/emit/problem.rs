@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use sesame_plan::Transport;
+use sesame_plan::{MetricSource, Transport};
 
 use super::package;
 use crate::names;
@@ -102,7 +102,14 @@ pub(super) fn problems(plans: &[RunnerPlan], dependencies: &BTreeMap<String, tom
                 check("parameter", &parameter.name);
             }
         }
-        for metric in plan.metrics.iter().map(|metric| &metric.name).chain(hooks.iter().map(|hook| &hook.metric)) {
+        for metric in &plan.metrics {
+            match metric.source {
+                // A part of a monitor is named with its monitor before a dot.
+                MetricSource::Monitor { .. } => metric.name.split('.').for_each(|name| check("metric", name)),
+                _ => check("metric", &metric.name),
+            }
+        }
+        for metric in hooks.iter().map(|hook| &hook.metric) {
             check("metric", metric);
         }
     }

@@ -13,6 +13,14 @@ pub(super) fn wirings(space: &Space, stepped: bool) -> Vec<plan::Wiring> {
     space.topics.iter().map(|(topic, _)| wiring(space, topic, stepped)).collect()
 }
 
+/// Whether a monitor of the runner publishes on a topic: its state, or what is to bring the system into a safe state.
+pub(super) fn by_monitor(space: &Space, topic: TopicId) -> bool {
+    space.eddis.values().any(|eddi| {
+        let mitigation = eddi.otherwise.mitigation.as_ref();
+        eddi.publishes == Some(topic) || mitigation.is_some_and(|mitigation| mitigation.field.topic == topic)
+    })
+}
+
 /// The layouts of all topics and what these contain, each after those it contains.
 pub(super) fn interfaces(space: &Space) -> Vec<plan::Interface> {
     let mut used: BTreeSet<&str> = BTreeSet::new();
@@ -43,7 +51,8 @@ fn contained(ty: &WireType) -> Option<&str> {
     }
 }
 
-/// How a topic is cut: by all operations of the space, so that its campaigns need the same remappings.
+/// How a topic is cut: by all operations of the space, so that its campaigns need the same remappings. What monitors
+/// publish takes the same way as what nodes do, so these topics are cut, too.
 ///
 /// In lock-step, what a node answers to, whatever else it hears, and its answers pass through the relay too: only then
 /// does the relay decide in which order a node hears its messages, and that an answer has arrived before the next step.
@@ -58,7 +67,7 @@ fn wiring(space: &Space, topic: TopicId, stepped: bool) -> plan::Wiring {
         answers || !node.answers.is_empty() && node.subscribes.contains(&topic)
     };
     plan::Wiring {
-        cut: on_it().next().is_some() || stepped && space.nodes.values().any(in_step),
+        cut: on_it().next().is_some() || by_monitor(space, topic) || stepped && space.nodes.values().any(in_step),
         publishers: distinguished(|operation| &operation.from),
         subscribers: distinguished(|operation| &operation.to),
     }

@@ -6,7 +6,7 @@ use sesame_dsl::model::{self, NodeId, Space, TopicId};
 use sesame_plan as plan;
 
 use super::id::{node_id, topic_id};
-use super::ros2::{interfaces, wirings};
+use super::ros2::{by_monitor, interfaces, wirings};
 
 /// The way to a simulator of a space: its own, or that of a lab.
 pub(super) fn transport(space: &Space, transport: &model::Transport) -> plan::Transport {
@@ -47,7 +47,9 @@ pub(super) fn transport(space: &Space, transport: &model::Transport) -> plan::Tr
             plan::Transport::Mqtt(plan::Mqtt { broker, brokers, quality, wiring: wiring() })
         }
         model::Transport::Simlog { url, topics_url, step_ns, protocol, names, marker, settle_ns, trust: ca } => {
-            let acted_on: BTreeSet<TopicId> = space.operations.values().filter_map(model::Operation::topic).collect();
+            let mut acted_on: BTreeSet<TopicId> =
+                space.operations.values().filter_map(model::Operation::topic).collect();
+            acted_on.extend(space.topics.iter().map(|(topic, _)| topic).filter(|&topic| by_monitor(space, topic)));
             let cut = acted_on.into_iter().map(topic_id).collect();
             plan::Transport::Simlog(plan::Simlog {
                 url,

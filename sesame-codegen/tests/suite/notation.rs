@@ -18,8 +18,9 @@ use sesame_plan::condition::{
 };
 use sesame_plan::{
     Activation, ActivationMode, Bound, Campaign, CampaignPlan, Choice, Confirmation, Copies, Count, CoverageGoal,
-    Dimension, Domain, Expectation, GridAxis, KnownTest, Lengths, Metric, MetricId, Operation, OperationId,
-    OperationKind, Parameter, Recorded, Search, Shape, Span, Statistic, StopRule, Test, TestOperation,
+    Dimension, Domain, Expectation, GridAxis, KnownTest, Lengths, Metric, MetricId, MetricSource, Operation,
+    OperationId, OperationKind, Parameter, Recorded, Score, Search, Shape, Span, Statistic, StopRule, Test,
+    TestOperation,
 };
 
 /// Units that are made up of several symbols.
@@ -268,9 +269,13 @@ fn choice(domain: &Domain) -> BoxedStrategy<Choice> {
 }
 
 /// Conditions over metrics that come in pairs of one unit: no comparison is constant.
-fn condition(metrics: u32) -> impl Strategy<Value = Condition> {
+fn condition(metrics: &[Metric]) -> impl Strategy<Value = Condition> + use<> {
     let by = prop::sample::select(vec![Comparison::Below, Comparison::Above, Comparison::Equal]);
-    let sides = (0..metrics / 2, number(), 0..4u8).prop_map(|(pair, number, sides)| {
+    let truths: Vec<bool> = metrics.iter().map(is_truth).collect();
+    let pairs = u32::try_from(metrics.len() / 2).expect("there are a few metrics");
+    let sides = (0..pairs, number(), 0..4u8).prop_map(move |(pair, number, sides)| {
+        // What is 0 or 1 is compared with what is between them.
+        let number = if truths[2 * pair as usize] { 0.01 + 0.98 * number.abs().fract() } else { number };
         let [one, other] = [2 * pair, 2 * pair + 1].map(|id| Operand::Variable(MetricId(id)));
         match sides {
             0 => (one, other),
@@ -288,6 +293,11 @@ fn condition(metrics: u32) -> impl Strategy<Value = Condition> {
     })
 }
 
+/// Whether a metric is 0 or 1 by being false or true.
+fn is_truth(metric: &Metric) -> bool {
+    matches!(metric.source, MetricSource::Monitor { score: Score::Holds { .. }, .. })
+}
+
 fn bound() -> impl Strategy<Value = Bound> {
     (number(), ordered(number()), 0..6u8).prop_map(|(value, (low, high), kind)| match kind {
         0 => Bound::AtMost { value },
@@ -300,7 +310,7 @@ fn bound() -> impl Strategy<Value = Bound> {
 }
 
 /// An operation of a test.
-fn used(id: OperationId, of: &Operation, metrics: u32) -> BoxedStrategy<TestOperation> {
+fn used(id: OperationId, of: &Operation, metrics: &[Metric]) -> BoxedStrategy<TestOperation> {
     let Span { start, end } = of.within;
     let at = move |share: f64| (start + (end - start) * share).clamp(start, end);
     let activation = if of.kind.is_offline() {
@@ -336,9 +346,10 @@ fn used(id: OperationId, of: &Operation, metrics: u32) -> BoxedStrategy<TestOper
 }
 
 /// Regression tests of these operations.
-fn tests(operations: &[Operation], metrics: u32) -> impl Strategy<Value = Vec<KnownTest>> + use<> {
+fn tests(operations: &[Operation], metrics: &[Metric]) -> impl Strategy<Value = Vec<KnownTest>> + use<> {
     let used = (0..).map(OperationId).zip(operations).map(|(id, operation)| used(id, operation, metrics));
     let used = Union::new(used);
+    let metrics = u32::try_from(metrics.len()).expect("there are a few metrics");
     let expected = (0..metrics, bound()).prop_map(|(metric, bound)| Expectation { metric: MetricId(metric), bound });
     let seed = prop::option::of(any::<u64>());
     let test = (prop::collection::vec(used, 1..12), prop::collection::vec(expected, 0..4), doc(), seed);
@@ -352,7 +363,7 @@ fn tests(operations: &[Operation], metrics: u32) -> impl Strategy<Value = Vec<Kn
 
 /// How conditions grow: over the first metrics, each with a range or without one.
 fn condition_space(metrics: &[Metric]) -> impl Strategy<Value = ConditionSpace> + use<> {
-    let units: Vec<Option<String>> = metrics.iter().map(|metric| metric.unit.clone()).collect();
+    let metrics: Vec<(Option<String>, bool)> = metrics.iter().map(|it| (it.unit.clone(), is_truth(it))).collect();
     let ranges = prop::collection::vec(prop::option::of((-1e9..-1e3f64, 1e3..1e9f64)), 2..4);
     let end = prop_oneof![
         Just(ConditionEnd::Condition),
@@ -362,12 +373,15 @@ fn condition_space(metrics: &[Metric]) -> impl Strategy<Value = ConditionSpace> 
         move |(ranges, depth, lowest, highest, end, times)| ConditionSpace {
             variables: (0..)
                 .zip(ranges)
-                .zip(units.clone())
-                .map(|((id, range), unit)| Variable {
-                    metric: MetricId(id),
-                    unit,
-                    low: range.map(|range| range.0),
-                    high: range.map(|range| range.1),
+                .zip(metrics.clone())
+                .map(|((id, range), (unit, truth))| {
+                    let range = if truth { Some((0.0, 1.0)) } else { range };
+                    Variable {
+                        metric: MetricId(id),
+                        unit,
+                        low: range.map(|range| range.0),
+                        high: range.map(|range| range.1),
+                    }
                 })
                 .collect(),
             depth,
@@ -431,7 +445,7 @@ fn campaign(like: &Campaign, metrics: &[Metric], end_after: f64) -> impl Strateg
 
 /// A plan like this one with some of its operations, with other numbers, texts, tests and settings.
 pub(crate) fn plans(like: &CampaignPlan) -> impl Strategy<Value = Shown> + use<> {
-    let (like, metrics) = (like.clone(), u32::try_from(like.metrics.len()).expect("there are a few metrics"));
+    let (like, metrics) = (like.clone(), like.metrics.clone());
     let settings = like.clone();
     let campaigns = (1.0..1e4f64).prop_flat_map(move |end| campaign(&settings.campaign, &settings.metrics, end));
     let operations = prop::sample::subsequence(like.operations.clone(), 1..=like.operations.len().min(11));
@@ -451,7 +465,7 @@ pub(crate) fn plans(like: &CampaignPlan) -> impl Strategy<Value = Shown> + use<>
             })
         })
         .prop_flat_map(move |plan| {
-            tests(&plan.operations, metrics).prop_map(move |tests| Shown(CampaignPlan { tests, ..plan.clone() }))
+            tests(&plan.operations, &metrics).prop_map(move |tests| Shown(CampaignPlan { tests, ..plan.clone() }))
         })
 }
 
@@ -523,6 +537,72 @@ fn nodes() -> (String, CampaignPlan) {
     (system.to_owned(), plan(&text))
 }
 
+/// A campaign of which parts of monitors are condition variables, beside scores.
+fn monitors() -> (String, CampaignPlan) {
+    let system = r#"space everything
+        system {
+          simulator sim = in_process "cell_sim::Cell" { step 20ms }
+          topic level = "level" : real[mm]  topic other = "other" : real[mm]  topic state = "state" : int
+          topic plc = "plc" : text  topic stop = "stop" : bool
+        }
+        eddi transport publishes state {
+          demand    safe from eddi plc_monitor
+          evidence  low  = level < 3mm held 100ms stale after 1s is false
+          evidence  flat = other < 3mm inbound
+          guarantee fast integrity 3 = 2 of (low, flat, safe)
+          guarantee slow integrity 1 = low or flat
+          otherwise halted mitigate with stop = true
+        }
+        eddi plc_monitor external on plc { guarantee safe integrity 1  otherwise not_safe }
+        metric m0 maximise = max(level)
+        metric m1 minimise = min(other)
+        metric missed maximise = missed_hazards(transport, R1)
+        metric alarms = false_alarms(transport, R1) within 5s
+        metric lead default 0s = lead_time(transport, R1)
+        metric fast = time_in(transport.fast)
+        requirement R1 "nothing is hit" = m0 <= 3mm
+        "#;
+    let parts = ["low", "flat", "safe", "fast", "slow", "halted"].map(|part| format!("transport.{part}")).join(", ");
+    let text = format!(
+        r"{system} operation biased on level = bias [-1mm, 3mm]
+           operation lied on state = stuck at [0, 3]
+           operation cut on plc = blackhole
+           campaign look {{ objectives m0, m1  operations biased, lied, cut 1 per test
+                           observes {parts}
+                           search random {{ evaluations 1 }}  end after 5s }}"
+    );
+    (system.to_owned(), plan(&text))
+}
+
+#[test]
+fn parts_of_monitors_are_written_in_conditions_and_read_back() {
+    let (system, like) = monitors();
+    let names: Vec<&str> = like.metrics.iter().skip(2).map(|metric| metric.name.as_str()).collect();
+    let parts = ["low", "flat", "safe", "fast", "slow", "halted"].map(|part| format!("transport.{part}"));
+    assert_eq!(names, parts);
+    assert_eq!(like.monitors.len(), 2);
+    let test = r"test worst { biased bias 1mm when not transport.low until transport.low
+                               cut when transport.fast == true and 0 < plc_monitor.safe for 2s
+                               expect transport.halted == 1 }";
+    let operations = "operation biased on level = bias [-1mm, 3mm]  operation cut on plc = blackhole";
+    let campaign = "campaign look { objectives m0  operations biased, cut 1..2 per test
+                    activate by condition over transport.low, plc_monitor.not_safe
+                    observes missed, alarms, lead, fast
+                    search random { evaluations 1 }  end after 5s or when transport.halted }";
+    let before = plan(&format!("{system} {operations} {test} {campaign}"));
+    let again = written(&system, &before);
+    for part in [
+        "when transport.low == 0 until transport.low == 1",
+        "when transport.fast == 1 and 0 < plc_monitor.safe for 2s",
+        "over transport.low in [0, 1], plc_monitor.not_safe in [0, 1]",
+        "or when transport.halted == 1",
+        "expect transport.halted == 1",
+    ] {
+        assert!(again.contains(part), "{part}: {again}");
+    }
+    reads_back(&system, &before).unwrap();
+}
+
 #[test]
 fn what_operations_on_nodes_do_is_written_and_read_back() {
     let (system, like) = nodes();
@@ -549,7 +629,7 @@ fn each_kind_of_operation_reads_back_in_every_unit() {
 
 #[test]
 fn what_is_written_reads_back_as_the_same_plan() {
-    for (system, like) in [everything(), nodes()] {
+    for (system, like) in [everything(), nodes(), monitors()] {
         let cases = ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(48) };
         let outcome = TestRunner::new(cases).run(&plans(&like), |Shown(original)| reads_back(&system, &original));
         if let Err(failure) = outcome {

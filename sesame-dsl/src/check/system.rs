@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{Declaration, MetricSource, NodeId, Space, TopicId};
+use crate::model::{Declaration, MetricSource, Space, TopicId};
 
 /// Operations whose name ends with the name of a topic that they do not disturb.
 pub(super) fn misnamed_operations(space: &Space, diagnostics: &mut Vec<Diagnostic>) {
@@ -46,7 +46,8 @@ pub(super) fn unheard_operations(space: &Space, diagnostics: &mut Vec<Diagnostic
         }
     }
     for eddi in space.eddis.values() {
-        heard.extend(eddi.evidence.iter().flat_map(|evidence| &evidence.inputs).map(|input| input.field.topic));
+        let delivered = eddi.evidence.iter().filter(|evidence| !evidence.inbound);
+        heard.extend(delivered.flat_map(|evidence| &evidence.inputs).map(|input| input.field.topic));
     }
     for operation in space.operations.values() {
         let Some(topic) = operation.topic().filter(|topic| !heard.contains(topic)) else { continue };
@@ -62,19 +63,27 @@ pub(super) fn unheard_operations(space: &Space, diagnostics: &mut Vec<Diagnostic
     }
 }
 
-/// Topics that more than one node publishes.
+/// Topics that more than one node or monitor publishes.
 pub(super) fn two_publishers(space: &Space, diagnostics: &mut Vec<Diagnostic>) {
-    let mut publishers: BTreeMap<TopicId, Vec<NodeId>> = BTreeMap::new();
-    for (id, node) in space.nodes.iter() {
+    let mut publishers: BTreeMap<TopicId, Vec<(&str, &Declaration)>> = BTreeMap::new();
+    for node in space.nodes.values() {
         for &topic in &node.publishes {
-            publishers.entry(topic).or_default().push(id);
+            publishers.entry(topic).or_default().push(("node", &node.declaration));
         }
     }
-    for (topic, nodes) in publishers {
-        let [first, second, ..] = nodes[..] else { continue };
-        let [first, second] = [first, second].map(|id| &space.nodes[id].declaration);
+    for eddi in space.eddis.values() {
+        if let Some(topic) = eddi.publishes {
+            publishers.entry(topic).or_default().push(("monitor", &eddi.declaration));
+        }
+    }
+    for (topic, publishers) in publishers {
+        let [(of_first, first), (of_second, second), ..] = publishers[..] else { continue };
         let topic = &space.topics[topic].declaration;
-        let title = format!("nodes `{}` and `{}` both publish `{}`", first.name, second.name, topic.name);
+        let title = if of_first == of_second {
+            format!("{of_first}s `{}` and `{}` both publish `{}`", first.name, second.name, topic.name)
+        } else {
+            format!("{of_first} `{}` and {of_second} `{}` both publish `{}`", first.name, second.name, topic.name)
+        };
         let diagnostic = Diagnostic::new(Code::TWO_PUBLISHERS, second.span, title)
             .label("also publishes it")
             .secondary(first.span, "publishes it")

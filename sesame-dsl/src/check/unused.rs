@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::eddi::Gate;
+use crate::model::eddi::{Gate, MonitorPart, Score};
 use crate::model::{ActivationMode, MetricId, MetricSource, Operation, OperationId, ReadyWhen, Space, TopicId};
 use crate::span::FileId;
 
@@ -33,7 +33,7 @@ pub(super) fn metrics(space: &Space, root: FileId, diagnostics: &mut Vec<Diagnos
     let used = used_metrics(space);
     for (id, metric) in space.metrics.iter() {
         let declaration = &metric.declaration;
-        if !used.contains(&id) && declaration.span.file == root {
+        if !used.contains(&id) && declaration.span.file == root && !metric.is_of_part() {
             let title = format!("metric `{}` is never measured", declaration.name);
             let diagnostic = Diagnostic::new(Code::UNUSED_METRIC, declaration.span, title)
                 .label("not used in any campaign, requirement, condition or expectation");
@@ -96,7 +96,7 @@ fn used_topics(space: &Space) -> BTreeSet<TopicId> {
     used.extend(space.operations.values().filter_map(Operation::topic));
     for metric in space.metrics.values() {
         match &metric.source {
-            MetricSource::FuzzingTime => {}
+            MetricSource::FuzzingTime | MetricSource::Monitor(..) => {}
             MetricSource::Hook(topics) => used.extend(topics),
             MetricSource::Last(input) => used.extend([input.topic]),
             MetricSource::Robustness(robustness) => {
@@ -109,7 +109,7 @@ fn used_topics(space: &Space) -> BTreeSet<TopicId> {
         used.extend(eddi.evidence.iter().flat_map(|evidence| &evidence.inputs).map(|input| input.field.topic));
         used.extend(eddi.otherwise.mitigation.iter().map(|mitigation| mitigation.field.topic));
     }
-    used.extend(space.eddis.values().map(|eddi| eddi.publishes));
+    used.extend(space.eddis.values().filter_map(|eddi| eddi.publishes));
     let launches = space.nodes.values().filter_map(|node| node.launch.as_ref()).chain(&space.lifecycle.launch);
     used.extend(launches.filter_map(|launch| launch.ready.as_ref()).filter_map(|ready| match ready.when {
         ReadyWhen::Topic(topic) => Some(topic),
@@ -118,11 +118,23 @@ fn used_topics(space: &Space) -> BTreeSet<TopicId> {
     used
 }
 
-/// Evidence and demands that no guarantee of their monitor uses.
+/// Evidence and demands that no guarantee of their monitor uses, and no metric or condition either.
 pub(super) fn evidence(space: &Space, diagnostics: &mut Vec<Diagnostic>) {
-    for eddi in space.eddis.values() {
+    let used = used_metrics(space);
+    for (id, eddi) in space.eddis.iter() {
         let mut gates: Vec<&Gate> = eddi.guarantees.iter().map(|guarantee| &guarantee.gate).collect();
         let mut needed = BTreeSet::new();
+        for (_, metric) in space.metrics.iter().filter(|(id, metric)| !metric.is_of_part() || used.contains(id)) {
+            match metric.source {
+                MetricSource::Monitor(of, Score::Holds { part: MonitorPart::Evidence(at) }) if of == id => {
+                    needed.insert((false, at));
+                }
+                MetricSource::Monitor(of, Score::Holds { part: MonitorPart::Demand(at) }) if of == id => {
+                    needed.insert((true, at));
+                }
+                _ => {}
+            }
+        }
         while let Some(gate) = gates.pop() {
             match gate {
                 Gate::Evidence(at) => {
@@ -131,11 +143,11 @@ pub(super) fn evidence(space: &Space, diagnostics: &mut Vec<Diagnostic>) {
                 Gate::Demand(at) => {
                     needed.insert((true, *at));
                 }
-                Gate::All(parts) | Gate::Any(parts) => gates.extend(parts),
+                Gate::All(_) | Gate::Any(_) | Gate::AtLeast { .. } => gates.extend(gate.parts()),
             }
         }
-        let evidence = eddi.evidence.iter().enumerate().map(|(at, it)| ((false, at), &it.declaration));
-        let demands = eddi.demands.iter().enumerate().map(|(at, it)| ((true, at), &it.declaration));
+        let evidence = (0u32..).zip(&eddi.evidence).map(|(at, it)| ((false, at), &it.declaration));
+        let demands = (0u32..).zip(&eddi.demands).map(|(at, it)| ((true, at), &it.declaration));
         for (key, declaration) in evidence.chain(demands).filter(|(key, _)| !needed.contains(key)) {
             let what = if key.0 { "demand" } else { "evidence" };
             let title = format!("no guarantee of `{}` uses {what} `{}`", eddi.declaration.name, declaration.name);

@@ -101,7 +101,7 @@ codes! {
     NOTHING_TO_GROW = "E0504": "Every condition that a campaign could grow is constant.",
     CANNOT_CONTAIN = "E0505": "An operation requires something that the campaign's conditions cannot contain, or lengths that its activations do not have.",
     NOTHING_TO_EXPLORE = "E0506": "A strategy lacks what it needs: cells, time windows, conditions, requirements or NSGA-II.",
-    BAD_MONITOR = "E0601": "A monitor's guarantees have no order, or are not made of evidence and demands.",
+    BAD_MONITOR = "E0601": "Evidence, guarantees or mitigation of a monitor are not in order.",
     BAD_LAB = "E0602": "The simulator of a lab cannot stand in the place of the system's.",
     OUTLASTS_THE_END = "W0001": "A window extends beyond the campaign's end.",
     UNUSED_OPERATION = "W0002": "No campaign and no test uses the operation.",

@@ -153,7 +153,7 @@ impl<'t> Walk<'t> {
                 before = Some(rule);
             }
         }
-        self.after_names |= pair.as_rule() == Rule::names;
+        self.after_names |= matches!(pair.as_rule(), Rule::names | Rule::metric_names);
     }
 
     fn token(&mut self, start: usize, text: &'t str, kind: Kind, glued: bool) {

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::{Definition, DefinitionId, Index, Kind, Reference};
 use crate::import::Merged;
 use crate::span::{FileId, Span};
-use crate::syntax::ast::eddi::Eddi;
+use crate::syntax::ast::eddi::{Eddi, State};
 use crate::syntax::ast::lifecycle::{Launch, ReadyWhen};
 use crate::syntax::ast::physical::Physical;
 use crate::syntax::ast::{
@@ -60,7 +60,7 @@ pub(crate) fn index(merged: &Merged) -> Index {
         indexer.metric(metric, id);
     }
     for (requirement, id) in requirements {
-        indexer.mention(&requirement.metric, id);
+        indexer.mention_metric(&requirement.metric, id);
     }
     for (operation, id) in operations {
         indexer.operation(operation, id);
@@ -185,7 +185,7 @@ impl<'a> Indexer<'a> {
     }
 
     fn declare_eddi(&mut self, eddi: &'a Eddi) -> DefinitionId {
-        let Eddi { head, publishes: _, demands, evidence, guarantees, otherwise, has_errors: _ } = eddi;
+        let Eddi { head, state: _, demands, evidence, guarantees, otherwise, has_errors: _ } = eddi;
         let id = self.declare(Kind::Monitor, head);
         let demands = demands.iter().map(|demand| (Kind::Demand, &demand.head));
         let evidence = evidence.iter().map(|item| (Kind::Evidence, &item.head));
@@ -229,6 +229,30 @@ impl<'a> Indexer<'a> {
         target
     }
 
+    /// A metric, or a part of a monitor, with the monitor's name before a dot.
+    fn mention_metric(&mut self, name: &'a Name, within: DefinitionId) {
+        let Some((monitor, part)) = name.text.split_once('.') else {
+            self.mention(name, within);
+            return;
+        };
+        let dot = name.span.lo + u32::try_from(monitor.len()).expect("files are small");
+        let target = self.names.get(monitor).copied();
+        self.refer(Span { hi: dot, ..name.span }, target, within);
+        let part = target.and_then(|monitor| self.members.get(&(monitor, part)).copied());
+        self.refer(Span { lo: dot + 1, ..name.span }, part, within);
+    }
+
+    /// A part of a monitor, if a path is one: what is before its dot is a monitor.
+    fn part(&mut self, path: &'a Path, within: DefinitionId) -> bool {
+        let monitor = self.names.get(path.topic.text.as_str()).copied();
+        let is_monitor = |id: &DefinitionId| self.index.definitions[id.0].kind == Kind::Monitor;
+        let (Some(monitor), [part]) = (monitor.filter(is_monitor), path.fields.as_slice()) else { return false };
+        self.mention(&path.topic, within);
+        let part_id = self.members.get(&(monitor, part.text.as_str())).copied();
+        self.refer(part.span, part_id, within);
+        true
+    }
+
     fn mention_all(&mut self, lists: &'a [(Span, Vec<Name>)], within: DefinitionId) {
         for name in lists.iter().flat_map(|(_, names)| names) {
             self.mention(name, within);
@@ -258,6 +282,9 @@ impl<'a> Indexer<'a> {
     }
 
     fn path(&mut self, path: &'a Path, within: DefinitionId) {
+        if self.part(path, within) {
+            return;
+        }
         let mut target = self.mention(&path.topic, within);
         for field in &path.fields {
             let ty = target.and_then(|target| self.types.get(&target));
@@ -304,7 +331,10 @@ impl<'a> Indexer<'a> {
                     self.expression(part, within);
                 }
             }
-            ExpressionKind::All(parts) | ExpressionKind::Any(parts) | ExpressionKind::Call(_, parts) => {
+            ExpressionKind::All(parts)
+            | ExpressionKind::Any(parts)
+            | ExpressionKind::AtLeast(_, parts)
+            | ExpressionKind::Call(_, parts) => {
                 for part in parts {
                     self.expression(part, within);
                 }
@@ -372,7 +402,7 @@ impl<'a> Indexer<'a> {
             MetricSource::Hook { hooks, has_errors: _ } => self.mention_all(hooks, id),
             MetricSource::FuzzingTime => {}
             MetricSource::Formula(formula) => {
-                let Formula { kind, when, every: _, per, outbound: _, whole: _ } = &**formula;
+                let Formula { kind, when, every: _, per, outbound: _, whole: _, within: _ } = &**formula;
                 match kind {
                     FormulaKind::WhenThen(condition, value) => {
                         self.expression(condition, id);
@@ -423,7 +453,7 @@ impl<'a> Indexer<'a> {
         }
         for contained in contains.iter().flat_map(|(_, contained)| contained) {
             if let Contained::Variable(name) = contained {
-                self.mention(name, id);
+                self.mention_metric(name, id);
             }
         }
     }
@@ -447,7 +477,7 @@ impl<'a> Indexer<'a> {
             }
         }
         for expectation in expectations {
-            self.mention(&expectation.metric, id);
+            self.mention_metric(&expectation.metric, id);
         }
     }
 
@@ -477,14 +507,16 @@ impl<'a> Indexer<'a> {
             self.mention(name, id);
         }
         self.mention_all(objectives, id);
-        self.mention_all(observes, id);
+        for name in observes.iter().flat_map(|(_, names)| names) {
+            self.mention_metric(name, id);
+        }
         for name in operations.iter().flat_map(|clause| &clause.names) {
             self.mention(name, id);
         }
         for (_, mode) in activates {
             if let ActivationMode::Condition(condition) = mode {
                 for name in &condition.variables {
-                    self.mention(name, id);
+                    self.mention_metric(name, id);
                 }
             }
         }
@@ -497,8 +529,13 @@ impl<'a> Indexer<'a> {
     }
 
     fn eddi(&mut self, eddi: &'a Eddi, id: DefinitionId) {
-        let Eddi { head: _, publishes, demands, evidence, guarantees, otherwise, has_errors: _ } = eddi;
-        self.mention(publishes, id);
+        let Eddi { head: _, state, demands, evidence, guarantees, otherwise, has_errors: _ } = eddi;
+        match state {
+            State::Published(topic) => {
+                self.mention(topic, id);
+            }
+            State::External(_, path) => path.iter().for_each(|path| self.path(path, id)),
+        }
         for demand in demands {
             // A demand has the name of a guarantee of the other monitor.
             if let Some(other) = self.mention(&demand.eddi, id) {
@@ -507,7 +544,7 @@ impl<'a> Indexer<'a> {
             }
         }
         for expression in
-            evidence.iter().map(|item| &item.condition).chain(guarantees.iter().map(|guarantee| &guarantee.gate))
+            evidence.iter().map(|item| &item.condition).chain(guarantees.iter().filter_map(|it| it.gate.as_ref()))
         {
             self.expression(expression, id);
         }

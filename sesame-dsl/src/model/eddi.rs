@@ -1,8 +1,9 @@
 //! Runtime monitors: conditional safety certificates that watch evidence and publish which guarantee holds.
 
-use super::declaration::Declaration;
 use sesame_plan::Condition;
+pub use sesame_plan::{Gate, MitigationValue, MonitorPart, MonitorState, Score, Stale, StaleIs};
 
+use super::declaration::Declaration;
 use super::formula::Input;
 use super::ids::{EddiId, TopicId};
 use super::system::FieldPath;
@@ -13,16 +14,32 @@ pub struct Eddi {
     /// Its name and doc comment.
     pub declaration: Declaration,
     /// Where it publishes what holds: a topic that carries a `bool` (whether any guarantee holds), an `int` (the
-    /// integrity of the best one) or a `text` (its name).
-    pub publishes: TopicId,
+    /// integrity of the best one) or a `text` (its name). `None` for an external monitor, which is a part of the
+    /// system.
+    pub publishes: Option<TopicId>,
     /// Guarantees of other monitors that it relies on, in written order.
     pub demands: Vec<Demand>,
-    /// What it watches, in written order.
+    /// What it watches, in written order. Of an external monitor whose state a topic says: for each guarantee, in
+    /// written order, whether it says that one.
     pub evidence: Vec<Evidence>,
     /// What it can guarantee, highest integrity first; at least one, no two of one integrity.
     pub guarantees: Vec<Guarantee>,
     /// What holds when no guarantee does.
     pub otherwise: Otherwise,
+}
+
+impl Eddi {
+    /// What can be true, false or unknown of it, each name once: evidence, demands, guarantees, and whether none holds.
+    pub fn parts(&self) -> impl Iterator<Item = (MonitorPart, &Declaration)> {
+        let own = |declaration: &Declaration| self.guarantees.iter().any(|it| it.declaration.name == declaration.name);
+        let evidence = (0..).zip(&self.evidence).map(|(at, it)| (MonitorPart::Evidence(at), &it.declaration));
+        // What a topic says of a guarantee is not named besides it.
+        let evidence = evidence.filter(move |(_, declaration)| !own(declaration));
+        let demands = (0..).zip(&self.demands).map(|(at, it)| (MonitorPart::Demand(at), &it.declaration));
+        let guarantees = (0..).zip(&self.guarantees).map(|(at, it)| (MonitorPart::Guarantee(at), &it.declaration));
+        let otherwise = std::iter::once((MonitorPart::Otherwise, &self.otherwise.declaration));
+        evidence.chain(demands).chain(guarantees).chain(otherwise)
+    }
 }
 
 /// A guarantee of another monitor that one relies on. Its name is that of the guarantee.
@@ -48,24 +65,8 @@ pub struct Evidence {
     pub held: f64,
     /// When it has become too old to be believed; `None` is never.
     pub stale: Option<Stale>,
-}
-
-/// When evidence is too old.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stale {
-    /// Longest time since the last message of any of its topics, in seconds; positive.
-    pub after: f64,
-    /// What it is then.
-    pub is: StaleIs,
-}
-
-/// What stale evidence is taken for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StaleIs {
-    /// It does not hold.
-    False,
-    /// Nobody knows.
-    Unknown,
+    /// Whether it hears messages before operations, and not as they are delivered.
+    pub inbound: bool,
 }
 
 /// Something a monitor can vouch for.
@@ -77,19 +78,6 @@ pub struct Guarantee {
     pub integrity: u32,
     /// What it needs.
     pub gate: Gate,
-}
-
-/// What a guarantee needs, in three-valued logic.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Gate {
-    /// Evidence, by its position in [`Eddi::evidence`].
-    Evidence(usize),
-    /// A demand, by its position in [`Eddi::demands`].
-    Demand(usize),
-    /// All of two or more.
-    All(Vec<Gate>),
-    /// At least one of two or more.
-    Any(Vec<Gate>),
 }
 
 /// What holds when no guarantee does.
@@ -107,16 +95,5 @@ pub struct Mitigation {
     /// What is set.
     pub field: FieldPath,
     /// What it is set to, of the field's type and in its unit.
-    pub value: Literal,
-}
-
-/// A value written in a space.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Literal {
-    /// True or false.
-    Bool(bool),
-    /// A number; whole where the field is.
-    Number(f64),
-    /// A text.
-    Text(String),
+    pub value: MitigationValue,
 }

@@ -1,10 +1,10 @@
 //! What is measured, and what must hold of it.
 
-use sesame_plan::{Bound, Direction, Trend};
+use sesame_plan::{Bound, Direction, Score, Trend};
 
 use super::declaration::Declaration;
 use super::formula::Formula;
-use super::ids::{MetricId, TopicId};
+use super::ids::{EddiId, MetricId, TopicId};
 use super::system::FieldPath;
 use super::temporal::Robustness;
 use crate::units::Unit;
@@ -30,6 +30,13 @@ pub struct Metric {
     pub source: MetricSource,
 }
 
+impl Metric {
+    /// Whether nobody declared it: whether a part of a monitor holds, named by both with a dot between them.
+    pub fn is_of_part(&self) -> bool {
+        self.declaration.name.contains('.')
+    }
+}
+
 /// Where a metric's value comes from.
 #[derive(Debug, Clone, PartialEq)]
 pub enum MetricSource {
@@ -41,6 +48,8 @@ pub enum MetricSource {
     Last(FieldPath),
     /// By how much a temporal formula is kept: its robustness over the whole test.
     Robustness(Robustness),
+    /// What there is to say of a monitor. The requirement of a score is a position in [`super::Space::requirements`].
+    Monitor(EddiId, Score),
     /// Any other formula.
     Formula(Formula),
 }

@@ -47,6 +47,10 @@ impl<'a> Resolver<'a> {
                 let conclusion = self.condition(inputs, conclusion);
                 Some(Condition::Any(vec![Condition::Not(Box::new(premise?)), conclusion?]))
             }
+            ExpressionKind::AtLeast(..) => {
+                self.only_in_a_guarantee(expression.span);
+                None
+            }
             ExpressionKind::Until(_, until, _) => {
                 self.of_one_moment(until.span);
                 None
@@ -91,6 +95,15 @@ impl<'a> Resolver<'a> {
         let diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, word, title)
             .label("temporal operator outside `robustness(…)`")
             .note("for example `robustness(always zones.level > 0mm)`");
+        self.report(diagnostic);
+    }
+
+    /// How many of several conditions hold, is for guarantees to say.
+    pub(super) fn only_in_a_guarantee(&mut self, span: Span) {
+        let title = "`… of (…)` is only allowed in a guarantee of a monitor";
+        let diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, span, title)
+            .label("not allowed here")
+            .note("here, conditions are joined by `and` and `or`");
         self.report(diagnostic);
     }
 
@@ -206,6 +219,7 @@ impl<'a> Resolver<'a> {
             | ExpressionKind::Compare(..)
             | ExpressionKind::All(_)
             | ExpressionKind::Any(_)
+            | ExpressionKind::AtLeast(..)
             | ExpressionKind::Prefixed(..)
             | ExpressionKind::Until(..)
             | ExpressionKind::Implies(..) => true,

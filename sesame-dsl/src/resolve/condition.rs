@@ -1,15 +1,12 @@
-//! Conditions: those of tests, the building blocks of those that a campaign grows, and what operations require of them.
+//! Conditions: those of tests, and the building blocks of those that a campaign grows.
 
 use super::words::list;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::condition::{
-    Comparison, Condition, ConditionSpace, Constraint, Integers, Operand, ValueRange, Variable,
-};
-use crate::model::{Activation, Aggregate, BinaryFunction, End, Expression, Id as _, Metric, MetricId, MetricSource};
-use crate::model::{Range, UnaryFunction};
+use crate::model::condition::{Comparison, Condition, ConditionSpace, Integers, Operand, ValueRange, Variable};
+use crate::model::{Activation, End, Id as _, Metric, MetricId, MetricSource, Range};
 use crate::span::Span;
-use crate::syntax::ast::{self, ByCondition, Contained, ExpressionKind, Relation, Trigger, TriggerEnd};
+use crate::syntax::ast::{self, ByCondition, ExpressionKind, PrefixWord, Relation, Trigger, TriggerEnd};
 use crate::units::{Unit, convert, dimension};
 
 const EXAMPLE: &str = "expected a comparison such as `near_zone1 > 2`";
@@ -64,6 +61,14 @@ impl<'a> Resolver<'a> {
             ExpressionKind::All(parts) => (parts, true),
             ExpressionKind::Any(parts) => (parts, false),
             ExpressionKind::Compare(left, by, right) => return self.comparison(expression, left, *by, right),
+            ExpressionKind::Field(path) if self.is_true_or_false(path) => return self.truth_of(path, true),
+            ExpressionKind::Prefixed(prefixes, of)
+                if prefixes.iter().all(|prefix| prefix.word == PrefixWord::Not)
+                    && let ExpressionKind::Field(path) = &of.kind
+                    && self.is_true_or_false(path) =>
+            {
+                return self.truth_of(path, prefixes.len() % 2 == 0);
+            }
             kind => {
                 let written = self.text(expression.span);
                 let title = match kind {
@@ -79,6 +84,28 @@ impl<'a> Resolver<'a> {
         let parts: Vec<Condition> = parts.into_iter().collect::<Option<_>>()?;
         let join = if all { Condition::And } else { Condition::Or };
         parts.into_iter().reduce(|left, right| join(Box::new(left), Box::new(right)))
+    }
+
+    /// Whether a path means a metric that is true or false: a part of a monitor, or a metric of whether one holds.
+    fn is_true_or_false(&self, path: &ast::Path) -> bool {
+        let metric = match self.names.get(path.topic.text.as_str()) {
+            Some(definition) if path.fields.is_empty() && definition.kind == Kind::Metric => {
+                self.metrics[definition.index].as_ref()
+            }
+            _ => None,
+        };
+        metric.is_some_and(Self::is_truth) || self.is_part(path)
+    }
+
+    /// Whether a metric that is true or false is this. One that is neither yet is not.
+    fn truth_of(&mut self, path: &'a ast::Path, truth: bool) -> Option<Condition> {
+        let index = match path.fields.as_slice() {
+            [] => self.find(&path.topic, Kind::Metric)?,
+            _ => self.metric_of_path(path)?,
+        };
+        let (left, right) = (Operand::Variable(MetricId::from_index(index)), number_of(truth));
+        self.open_outcome(path.span, (left, right), Comparison::Equal)?;
+        Some(Condition::Compare { left, by: Comparison::Equal, right })
     }
 
     fn comparison(
@@ -126,6 +153,14 @@ impl<'a> Resolver<'a> {
             (Side::Number(number), Side::Metric(metric)) => {
                 (Operand::Number(self.in_unit_of(metric, right.span, number)?), Operand::Variable(metric))
             }
+            (Side::Metric(metric), Side::Truth(truth)) if self.equals_truth(metric, by) => {
+                (Operand::Variable(metric), number_of(truth))
+            }
+            (Side::Truth(truth), Side::Metric(metric)) if self.equals_truth(metric, by) => {
+                (number_of(truth), Operand::Variable(metric))
+            }
+            (Side::Truth(_), _) => return self.no_metric(left),
+            (_, Side::Truth(_)) => return self.no_metric(right),
         };
         self.open_outcome(whole.span, compared, by)?;
         let (left, right) = compared;
@@ -161,6 +196,10 @@ impl<'a> Resolver<'a> {
     fn side(&mut self, side: &'a ast::Expression) -> Option<Side<'a>> {
         match &side.kind {
             ExpressionKind::Number(quantity) => Some(Side::Number(quantity)),
+            ExpressionKind::Truth(truth) => Some(Side::Truth(*truth)),
+            ExpressionKind::Field(path) if self.is_part(path) => {
+                self.metric_of_path(path).map(|index| Side::Metric(MetricId::from_index(index)))
+            }
             ExpressionKind::Field(path) if path.fields.is_empty() => {
                 let before = self.diagnostics.len();
                 let found = self.find(&path.topic, Kind::Metric);
@@ -176,34 +215,42 @@ impl<'a> Resolver<'a> {
                 self.known_during_a_test(id, side.span)?;
                 Some(Side::Metric(id))
             }
-            kind => {
-                let written = self.text(side.span);
-                let title = match kind {
-                    ExpressionKind::Field(_) | ExpressionKind::Members(..) => {
-                        format!("`{written}` is not a metric")
-                    }
-                    ExpressionKind::Truth(_)
-                    | ExpressionKind::Compare(..)
-                    | ExpressionKind::All(_)
-                    | ExpressionKind::Any(_) => {
-                        format!("`{written}` is a condition, not a metric")
-                    }
-                    ExpressionKind::Text(_) => format!("`{written}` is a text, but metrics are numbers"),
-                    _ => format!("`{written}` is an expression, not a metric"),
-                };
-                let note = match kind {
+            _ => self.no_metric(side),
+        }
+    }
+
+    /// Whether a metric is true or false, and compared for being equal to one of these.
+    fn equals_truth(&self, metric: MetricId, by: Comparison) -> bool {
+        by == Comparison::Equal && Self::is_truth(self.metric_of(metric))
+    }
+
+    /// Reports a side of a comparison that is neither a metric nor a number.
+    fn no_metric<T>(&mut self, side: &ast::Expression) -> Option<T> {
+        let kind = &side.kind;
+        let written = self.text(side.span);
+        let title = match kind {
+            ExpressionKind::Field(_) | ExpressionKind::Members(..) => {
+                format!("`{written}` is not a metric")
+            }
+            ExpressionKind::Truth(_)
+            | ExpressionKind::Compare(..)
+            | ExpressionKind::All(_)
+            | ExpressionKind::Any(_) => {
+                format!("`{written}` is a condition, not a metric")
+            }
+            ExpressionKind::Text(_) => format!("`{written}` is a text, but metrics are numbers"),
+            _ => format!("`{written}` is an expression, not a metric"),
+        };
+        let note = match kind {
                     ExpressionKind::Text(_) => format!(
                         "a condition compares metrics; `when tower == {written} then time` is a metric, and so is `when tower != {written} then time`: the greater of the two is the state that holds"
                     ),
                     _ => "a condition compares metrics; declare one for what you want to compare, for example `metric near = last(near1.level)`".to_owned(),
                 };
-                let diagnostic = Diagnostic::new(Code::NOT_A_CONDITION, side.span, title)
-                    .label("expected a metric or a number")
-                    .note(note);
-                self.report(diagnostic);
-                None
-            }
-        }
+        let diagnostic =
+            Diagnostic::new(Code::NOT_A_CONDITION, side.span, title).label("expected a metric or a number").note(note);
+        self.report(diagnostic);
+        None
     }
 
     /// A robustness is known when the test has ended, so no condition can read it.
@@ -253,7 +300,7 @@ impl<'a> Resolver<'a> {
     fn open_outcome(&mut self, span: Span, (left, right): (Operand, Operand), by: Comparison) -> Option<()> {
         let known = [left, right].map(|side| match side {
             Operand::Number(number) => ValueRange::exactly(number),
-            Operand::Variable(metric) => known_of(self.metric_of(metric)),
+            Operand::Variable(metric) => self.known_of(self.metric_of(metric)),
         });
         let Some(outcome) = known[0].outcome(by, known[1]) else { return Some(()) };
         let mut diagnostic =
@@ -278,11 +325,10 @@ impl<'a> Resolver<'a> {
         let found = self.find_all(&by.variables, Kind::Metric);
         let mut variables = Some(Vec::new());
         for (name, range) in by.variables.iter().zip(&by.ranges) {
-            let index = self
-                .names
-                .get(name.text.as_str())
-                .filter(|definition| definition.kind == Kind::Metric)
-                .map(|definition| definition.index);
+            // Mistakes in names are reported already.
+            let reported = self.diagnostics.len();
+            let index = self.find(name, Kind::Metric);
+            self.diagnostics.truncate(reported);
             let variable = index.and_then(|index| self.variable(name, MetricId::from_index(index), range.as_ref()));
             match (&mut variables, variable) {
                 (Some(variables), Some(variable)) => variables.push(variable),
@@ -327,7 +373,7 @@ impl<'a> Resolver<'a> {
 
     /// Whether a comparison of this variable may go both ways: with a whole number, or with another variable of its
     /// unit.
-    fn is_comparable(&self, space: &ConditionSpace, variable: &Variable) -> bool {
+    pub(super) fn is_comparable(&self, space: &ConditionSpace, variable: &Variable) -> bool {
         let unit = |variable: &Variable| self.metric_of(variable.metric).unit.as_ref();
         variable.known.meets(space.integers)
             || space.variables.iter().any(|other| {
@@ -339,7 +385,7 @@ impl<'a> Resolver<'a> {
 
     fn variable(&mut self, name: &'a ast::Name, id: MetricId, range: Option<&'a ast::Range>) -> Option<Variable> {
         let metric = self.metrics[id.index()].as_ref()?;
-        let own = known_of(metric);
+        let own = self.known_of(metric);
         self.known_during_a_test(id, name.span)?;
         let metric = self.metric_of(id);
         let (unit, initial, declared) = (metric.unit.clone(), metric.initial, metric.declaration.span);
@@ -381,7 +427,7 @@ impl<'a> Resolver<'a> {
         None
     }
 
-    fn integers(&mut self, range: &ast::Range, what: &str) -> Option<Integers> {
+    pub(super) fn integers(&mut self, range: &ast::Range, what: &str) -> Option<Integers> {
         let found = self.range(range, None, what)?;
         let low = self.whole(found.low, range.low.span, what);
         if !self.whole(found.high, range.high.span, what) || !low {
@@ -400,100 +446,6 @@ impl<'a> Resolver<'a> {
         self.report(Diagnostic::new(Code::OUT_OF_RANGE, range.low.span, title).label("expected more than 0s"));
         None
     }
-
-    // ----- what operations require
-
-    pub(super) fn constraints(&mut self, clauses: &'a [(Span, Vec<Contained>)]) -> Option<Vec<Constraint>> {
-        let mut found: Vec<(Constraint, Span)> = Vec::new();
-        let mut complete = true;
-        for contained in clauses.iter().flat_map(|(_, contained)| contained) {
-            let (constraint, span) = match contained {
-                Contained::Variable(name) => {
-                    let metric = self.find(name, Kind::Metric);
-                    (metric.map(|index| Constraint::Variable(MetricId::from_index(index))), name.span)
-                }
-                Contained::Integer(span, range) => {
-                    (self.integers(range, "an integer of a condition").map(Constraint::Integer), *span)
-                }
-            };
-            let Some(constraint) = constraint else {
-                complete = false;
-                continue;
-            };
-            if let Some((_, before)) = found.iter().find(|(known, _)| *known == constraint) {
-                let title = format!("`{}` is required twice", self.text(span));
-                let diagnostic = Diagnostic::new(Code::LISTED_TWICE, span, title)
-                    .label("required again here")
-                    .secondary(*before, "first required here");
-                self.report(diagnostic);
-                complete = false;
-                continue;
-            }
-            found.push((constraint, span));
-        }
-        complete.then(|| found.into_iter().map(|(constraint, _)| constraint).collect())
-    }
-
-    /// Checks that conditions of a campaign can contain what one of its operations requires.
-    pub(super) fn constraints_and_space(
-        &mut self,
-        name: &ast::Name,
-        index: usize,
-        space: &ConditionSpace,
-        campaign: &'a ast::Campaign,
-    ) {
-        let Some(operation) = &self.operations[index] else { return };
-        let constraints = operation.constraints.clone();
-        let body = &self.file.operations[index].body;
-        let written = body.contains.iter().flat_map(|(_, contained)| contained);
-        let mut failed = false;
-        for (constraint, written) in constraints.iter().zip(written) {
-            let (span, wrong) = match (constraint, written) {
-                (Constraint::Variable(metric), Contained::Variable(variable)) => {
-                    let offered = space.variables.iter().find(|offered| offered.metric == *metric);
-                    let wrong = match offered {
-                        None => {
-                            format!("`{}` is not a variable of campaign `{}`", variable.text, campaign.head.name.text)
-                        }
-                        Some(offered) if !self.is_comparable(space, offered) => {
-                            format!("every comparison with `{}` is constant", variable.text)
-                        }
-                        Some(_) => continue,
-                    };
-                    (variable.span, wrong)
-                }
-                (Constraint::Integer(bounds), Contained::Integer(span, _)) => {
-                    let wrong = match bounds.shared(space.integers) {
-                        None => format!(
-                            "the integers of campaign `{}` range from {} to {}",
-                            campaign.head.name.text, space.integers.lowest, space.integers.highest
-                        ),
-                        Some(shared) if !space.variables.iter().any(|variable| variable.known.meets(shared)) => {
-                            "no variable can be both below and above such a number".to_owned()
-                        }
-                        Some(_) => continue,
-                    };
-                    (*span, wrong)
-                }
-                _ => continue,
-            };
-            failed = true;
-            let title = format!("no start condition can contain what `{}` requires", name.text);
-            let diagnostic = Diagnostic::new(Code::CANNOT_CONTAIN, name.span, title).label(wrong);
-            self.report(diagnostic.secondary(span, "required here"));
-        }
-        let (needed, most) = (comparisons_needed(&constraints), 1_usize << (space.depth - 1));
-        if !failed && needed > most {
-            let title =
-                format!("a condition of depth {} cannot contain everything that `{}` requires", space.depth, name.text);
-            let label = format!("this needs {needed} comparisons, but there is room for only {most}");
-            let mut diagnostic = Diagnostic::new(Code::CANNOT_CONTAIN, name.span, title).label(label);
-            if let Some((clause, _)) = body.contains.first() {
-                diagnostic = diagnostic.secondary(*clause, "required here");
-            }
-            self.report(diagnostic);
-        }
-    }
 }
 
 /// One side of a comparison, as written.
@@ -501,66 +453,12 @@ impl<'a> Resolver<'a> {
 enum Side<'a> {
     Number(&'a ast::Quantity),
     Metric(MetricId),
+    Truth(bool),
 }
 
-/// What is known of a metric's values before any test, its initial value included.
-fn known_of(metric: &Metric) -> ValueRange {
-    let from_zero = match &metric.source {
-        // It needs no message, so it has a value from the beginning.
-        MetricSource::FuzzingTime => return ValueRange { low: 0.0, high: f64::INFINITY },
-        MetricSource::Formula(formula) => match &formula.aggregate {
-            Aggregate::Count { .. } | Aggregate::Duration { .. } => true,
-            // Over groups and keys these are the least, the greatest or the sum of values that are not negative.
-            Aggregate::Last { of } | Aggregate::Min { of } | Aggregate::Max { of } | Aggregate::Mean { of } => {
-                never_negative(of)
-            }
-        },
-        MetricSource::Hook(_) | MetricSource::Last(_) | MetricSource::Robustness(_) => false,
-    };
-    if !from_zero {
-        return ValueRange::NOTHING;
-    }
-    ValueRange { low: metric.initial.map_or(0.0, |initial| initial.min(0.0)), high: f64::INFINITY }
-}
-
-fn never_negative(expression: &Expression) -> bool {
-    match expression {
-        Expression::Constant(value) => *value >= 0.0,
-        Expression::Absolute(_)
-        | Expression::Distance(_)
-        | Expression::Time
-        | Expression::Unary { function: UnaryFunction::Sqrt | UnaryFunction::Exp | UnaryFunction::Acos, .. }
-        | Expression::Binary { function: BinaryFunction::Hypot, .. } => true,
-        Expression::Sum(of) | Expression::Product(of) | Expression::Min(of) => of.iter().all(never_negative),
-        Expression::Max(of) => of.iter().any(never_negative),
-        Expression::Divide { value, by } => never_negative(value) && never_negative(by),
-        Expression::Input(_)
-        | Expression::Negate(_)
-        | Expression::SignedDistance(_)
-        | Expression::Unary { .. }
-        | Expression::Binary { .. } => false,
-    }
-}
-
-/// The fewest comparisons that contain these: a comparison has at most two variables, or a variable and a number.
-fn comparisons_needed(constraints: &[Constraint]) -> usize {
-    let variables = constraints.iter().filter(|constraint| matches!(constraint, Constraint::Variable(_))).count();
-    let mut bounds: Vec<Integers> = constraints
-        .iter()
-        .filter_map(|constraint| match constraint {
-            Constraint::Integer(bounds) => Some(*bounds),
-            Constraint::Variable(_) => None,
-        })
-        .collect();
-    // One number may be enough for several bounds: the greatest of those that end first, then of those it is not in.
-    bounds.sort_by_key(|bounds| bounds.highest);
-    let mut numbers: Vec<i64> = Vec::new();
-    for bounds in bounds {
-        if numbers.last().is_none_or(|&number| number < bounds.lowest) {
-            numbers.push(bounds.highest);
-        }
-    }
-    numbers.len() + variables.saturating_sub(numbers.len()).div_ceil(2)
+/// A truth as the value of a metric.
+fn number_of(truth: bool) -> Operand {
+    Operand::Number(f64::from(u8::from(truth)))
 }
 
 /// Whether two metrics are in one unit, however it is written.

@@ -4,21 +4,21 @@ use std::collections::BTreeMap;
 
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::eddi::{Demand, Eddi, Evidence, Gate, Guarantee, Literal, Mitigation, Otherwise, Stale, StaleIs};
+use crate::model::eddi::{Demand, Eddi, Mitigation, MitigationValue, Otherwise};
 use crate::model::{EddiId, Id as _, TopicId, Type};
 use crate::similar::most_similar;
 use crate::span::Span;
-use crate::syntax::ast::eddi as written;
-use crate::syntax::ast::{self, ExpressionKind, Name};
-use crate::units::Unit;
+use crate::syntax::ast::eddi::{self as written, State};
+use crate::syntax::ast::{self, Name};
+use sesame_plan::Monitor;
 
 /// The names inside a monitor, and what each stands for.
-type Members<'a> = BTreeMap<&'a str, (Member, Span)>;
+pub(super) type Members<'a> = BTreeMap<&'a str, (Member, Span)>;
 
 #[derive(Clone, Copy)]
-enum Member {
-    Evidence(usize),
-    Demand(usize),
+pub(super) enum Member {
+    Evidence(u32),
+    Demand(u32),
     /// A guarantee, or the state when none holds.
     State,
 }
@@ -27,20 +27,38 @@ impl<'a> Resolver<'a> {
     pub(super) fn eddis(&mut self) -> Vec<Option<Eddi>> {
         let file = self.file;
         self.cycles_of_demands();
+        self.not_too_many(&file.eddis, "monitors", |eddi| eddi.head.name.span);
         file.eddis.iter().map(|eddi| self.eddi(eddi)).collect()
     }
 
     fn eddi(&mut self, eddi: &'a written::Eddi) -> Option<Eddi> {
         let name = &eddi.head.name;
-        let publishes = self.published(&eddi.publishes);
         let members = self.members_of_eddi(eddi);
+        let publishes = match &eddi.state {
+            State::Published(name) => self.published(name).map(Some),
+            State::External(..) => Some(None),
+        };
+        let said_by = match &eddi.state {
+            State::External(_, Some(path)) => Some(path),
+            _ => None,
+        };
+        self.not_too_many(&eddi.demands, "demands", |demand| demand.head.name.span);
+        self.not_too_many(&eddi.evidence, "pieces of evidence", |evidence| evidence.head.name.span);
+        self.not_too_many(&eddi.guarantees, "guarantees", |guarantee| guarantee.head.name.span);
         let demands: Vec<_> = eddi.demands.iter().map(|demand| self.demand(demand)).collect();
-        let evidence: Vec<_> = eddi.evidence.iter().map(|evidence| self.evidence(evidence)).collect();
-        let mut guarantees = self.guarantees(eddi, &members);
+        let evidence = if let Some(path) = said_by {
+            self.evidence_of_states(eddi, path)
+        } else {
+            // All are resolved, so that a mistake in one does not hide one in another.
+            let evidence: Vec<_> = eddi.evidence.iter().map(|evidence| self.evidence(evidence)).collect();
+            evidence.into_iter().collect()
+        };
+        let mut guarantees = self.guarantees(eddi, &members, said_by);
         if eddi.otherwise.is_empty() && !eddi.has_errors {
             self.missing(name, "its state when no guarantee holds", "otherwise not_safe");
         }
         let otherwise = self.single(&eddi.otherwise, "otherwise").and_then(|otherwise| self.otherwise(otherwise));
+        self.nothing_is_sent(eddi);
         if eddi.guarantees.is_empty() && !eddi.has_errors {
             self.missing(name, "a guarantee", "guarantee safe  integrity 1 = brakes_ok");
             return None;
@@ -52,7 +70,7 @@ impl<'a> Resolver<'a> {
             declaration: self.declaration(&eddi.head),
             publishes: publishes?,
             demands: demands.into_iter().collect::<Option<_>>()?,
-            evidence: evidence.into_iter().collect::<Option<_>>()?,
+            evidence: evidence?,
             guarantees: guarantees?,
             otherwise: otherwise?,
         })
@@ -61,8 +79,16 @@ impl<'a> Resolver<'a> {
     fn published(&mut self, name: &'a Name) -> Option<TopicId> {
         let index = self.find(name, Kind::Topic)?;
         let topic = self.system.topics[index].as_ref()?;
-        let fits = matches!(topic.ty, Type::Bool | Type::Int(None) | Type::Text) && topic.paths.len() == 1;
-        if fits {
+        let carries = |ty: &Type| matches!(ty, Type::Bool | Type::Int(None) | Type::Text);
+        let fits = match topic.ty {
+            // As most messages of ROS are that carry one value.
+            Type::Message(id) => match &self.system.messages[id.index()].as_ref()?.fields[..] {
+                [only] => carries(&only.ty),
+                _ => false,
+            },
+            ref ty => carries(ty),
+        };
+        if fits && topic.paths.len() == 1 {
             return Some(TopicId::from_index(index));
         }
         let is =
@@ -70,15 +96,37 @@ impl<'a> Resolver<'a> {
         let title = format!("a monitor cannot publish its state on `{}`", name.text);
         let diagnostic = Diagnostic::new(Code::WRONG_TYPE, name.span, title).label(format!("it is {is}"));
         self.report(diagnostic.note(
-            "the topic must be of type `bool` (whether a guarantee holds), `int` (its integrity) or `text` (its name)",
+            "the topic must be of type `bool` (whether a guarantee holds), `int` (its integrity) or `text` (its name), \
+             or a message of one such field",
         ));
         None
     }
 
+    /// An external monitor does what it does; the runner sends nothing in its place.
+    fn nothing_is_sent(&mut self, eddi: &'a written::Eddi) {
+        let State::External(external, _) = &eddi.state else { return };
+        for (path, _) in eddi.otherwise.iter().filter_map(|(_, otherwise)| otherwise.mitigation.as_ref()) {
+            let title = format!("external monitor `{}` cannot have a mitigation", eddi.head.name.text);
+            let diagnostic = Diagnostic::new(Code::BAD_MONITOR, path.span, title)
+                .label("remove `mitigate with`")
+                .secondary(*external, "the system decides and acts by itself, the runner only scores it");
+            self.report(diagnostic);
+        }
+    }
+
+    /// Reports more parts than a plan may have.
+    fn not_too_many<T>(&mut self, parts: &'a [T], what: &str, span: impl Fn(&T) -> Span) {
+        let most = Monitor::MOST_PARTS;
+        if let Some(beyond) = parts.get(most) {
+            let title = format!("there are {} {what}, but the limit is {most}", parts.len());
+            self.report(Diagnostic::new(Code::TOO_LARGE, span(beyond), title).label("too many"));
+        }
+    }
+
     fn members_of_eddi(&mut self, eddi: &'a written::Eddi) -> Members<'a> {
         let mut members: Members<'a> = BTreeMap::new();
-        let demands = eddi.demands.iter().enumerate().map(|(at, it)| (&it.head.name, Member::Demand(at)));
-        let evidence = eddi.evidence.iter().enumerate().map(|(at, it)| (&it.head.name, Member::Evidence(at)));
+        let demands = (0..).zip(&eddi.demands).map(|(at, it)| (&it.head.name, Member::Demand(at)));
+        let evidence = (0..).zip(&eddi.evidence).map(|(at, it)| (&it.head.name, Member::Evidence(at)));
         let states = eddi.guarantees.iter().map(|guarantee| &guarantee.head.name);
         let states = states.chain(eddi.otherwise.iter().map(|(_, it)| &it.head.name));
         let mut all: Vec<_> = demands.chain(evidence).chain(states.map(|name| (name, Member::State))).collect();
@@ -175,143 +223,6 @@ impl<'a> Resolver<'a> {
         }
     }
 
-    fn evidence(&mut self, evidence: &'a written::Evidence) -> Option<Evidence> {
-        let mut inputs = Vec::new();
-        let before = self.diagnostics.len();
-        let condition = self.condition(&mut inputs, &evidence.condition);
-        if condition.is_some() && inputs.is_empty() {
-            // That its comparisons are constant is the same mistake as the one below.
-            self.diagnostics.truncate(before);
-        }
-        let seconds = Unit::seconds();
-        let held = match self.single(&evidence.held, "held") {
-            Some(held) => self.positive(held, &seconds, "the time that evidence must hold"),
-            None => Some(0.0),
-        };
-        let stale = match self.single(&evidence.stale, "stale after") {
-            Some((after, unknown)) => self
-                .positive(after, &seconds, "the age of evidence")
-                .map(|after| Some(Stale { after, is: if *unknown { StaleIs::Unknown } else { StaleIs::False } })),
-            None => Some(None),
-        };
-        let condition = condition?;
-        if inputs.is_empty() {
-            let title = "this evidence reads no topic";
-            let diagnostic = Diagnostic::new(Code::NOT_A_FORMULA, evidence.condition.span, title);
-            self.report(
-                diagnostic
-                    .label("this condition is constant")
-                    .note("evidence is a condition on messages, so it must name a topic"),
-            );
-            return None;
-        }
-        self.members_fit(&inputs, evidence.condition.span)?;
-        Some(Evidence { declaration: self.declaration(&evidence.head), inputs, condition, held: held?, stale: stale? })
-    }
-
-    /// A quantity greater than zero.
-    pub(super) fn positive(&mut self, quantity: &ast::Quantity, unit: &Unit, what: &str) -> Option<f64> {
-        let value = self.value(quantity, Some(unit), what)?;
-        if value > 0.0 {
-            return Some(value);
-        }
-        let title = format!("`{}` is out of range for {what}", self.text(quantity.span));
-        let label = format!("expected more than 0{}", unit.text());
-        self.report(Diagnostic::new(Code::OUT_OF_RANGE, quantity.span, title).label(label));
-        None
-    }
-
-    fn guarantees(&mut self, eddi: &'a written::Eddi, members: &Members<'a>) -> Option<Vec<Guarantee>> {
-        let mut first: BTreeMap<u32, Span> = BTreeMap::new();
-        let mut guarantees = Vec::new();
-        let mut complete = true;
-        for guarantee in &eddi.guarantees {
-            let gate = self.gate(eddi, members, &guarantee.gate);
-            let integrity = self.count(guarantee.integrity, 1, "the integrity of a guarantee");
-            if let Some(integrity) = integrity {
-                if let Some(&before) = first.get(&integrity) {
-                    let title = format!("two guarantees have integrity {integrity}");
-                    let diagnostic = Diagnostic::new(Code::BAD_MONITOR, guarantee.integrity.span, title)
-                        .label("used again here")
-                        .secondary(before, "first used here")
-                        .note("the state of a monitor is the strongest guarantee that holds, so no two can be equally strong");
-                    self.report(diagnostic);
-                    complete = false;
-                }
-                first.entry(integrity).or_insert(guarantee.integrity.span);
-            }
-            match (gate, integrity) {
-                (Some(gate), Some(integrity)) => {
-                    let declaration = self.declaration(&guarantee.head);
-                    guarantees.push(Guarantee { declaration, integrity, gate });
-                }
-                _ => complete = false,
-            }
-        }
-        complete.then_some(guarantees)
-    }
-
-    fn gate(
-        &mut self,
-        eddi: &'a written::Eddi,
-        members: &Members<'a>,
-        expression: &'a ast::Expression,
-    ) -> Option<Gate> {
-        let (parts, all) = match &expression.kind {
-            ExpressionKind::All(parts) => (parts, true),
-            ExpressionKind::Any(parts) => (parts, false),
-            ExpressionKind::Field(path) if path.fields.is_empty() => {
-                return self.gate_member(eddi, members, &path.topic);
-            }
-            _ => {
-                let title = "a guarantee can only combine evidence and demands with `and` and `or`";
-                let diagnostic = Diagnostic::new(Code::BAD_MONITOR, expression.span, title);
-                self.report(
-                    diagnostic
-                        .label("expected evidence or a demand")
-                        .note("declare a condition on messages as `evidence`, which gives it a name"),
-                );
-                return None;
-            }
-        };
-        let parts: Vec<Option<Gate>> = parts.iter().map(|part| self.gate(eddi, members, part)).collect();
-        let parts = parts.into_iter().collect::<Option<Vec<Gate>>>()?;
-        Some(if all { Gate::All(parts) } else { Gate::Any(parts) })
-    }
-
-    fn gate_member(&mut self, eddi: &'a written::Eddi, members: &Members<'a>, name: &Name) -> Option<Gate> {
-        match members.get(name.text.as_str()) {
-            Some((Member::Evidence(at), _)) => return Some(Gate::Evidence(*at)),
-            Some((Member::Demand(at), _)) => return Some(Gate::Demand(*at)),
-            Some((Member::State, declared)) => {
-                let title = format!("`{}` is a state of the monitor, not evidence or a demand", name.text);
-                let diagnostic = Diagnostic::new(Code::OTHER_KIND, name.span, title)
-                    .label("expected evidence or a demand")
-                    .secondary(*declared, "declared here");
-                self.report(diagnostic);
-                return None;
-            }
-            None => {}
-        }
-        let known: Vec<&str> = members
-            .iter()
-            .filter(|(_, (member, _))| !matches!(member, Member::State))
-            .map(|(known, _)| *known)
-            .collect();
-        if eddi.has_errors {
-            return None;
-        }
-        let title = format!("monitor `{}` has no evidence or demand named `{}`", eddi.head.name.text, name.text);
-        let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title).label("not found in this monitor");
-        diagnostic = match most_similar(&name.text, known.iter().copied()) {
-            Some(similar) => diagnostic.did_you_mean(name.span, similar),
-            None if known.is_empty() => diagnostic.note("it has no evidence and no demands"),
-            None => diagnostic.note(format!("its evidence and demands are {}", super::words::list(&known))),
-        };
-        self.report(diagnostic);
-        None
-    }
-
     fn otherwise(&mut self, otherwise: &'a written::Otherwise) -> Option<Otherwise> {
         let mitigation = match &otherwise.mitigation {
             Some((path, value)) => Some(self.mitigation(path, value)?),
@@ -324,17 +235,18 @@ impl<'a> Resolver<'a> {
         let (field, ty) = self.field(path)?;
         let what = format!("`{}`", self.text(path.span));
         let value = match (value, ty) {
-            (written::Mitigation::Truth(truth, _), Type::Bool) => Literal::Bool(*truth),
-            (written::Mitigation::Text(text), Type::Text) => Literal::Text(text.text.clone()),
+            (written::Mitigation::Truth(truth, _), Type::Bool) => MitigationValue::Bool(*truth),
+            (written::Mitigation::Text(text), Type::Text) => MitigationValue::Text(text.text.clone()),
             (written::Mitigation::Number(number), Type::Real(unit)) => {
-                Literal::Number(self.value(number, unit.as_ref(), &what)?)
+                MitigationValue::Real(self.value(number, unit.as_ref(), &what)?)
             }
             (written::Mitigation::Number(number), Type::Int(unit)) => {
                 let value = self.value(number, unit.as_ref(), &what)?;
                 if !self.whole(value, number.span, &what) {
                     return None;
                 }
-                Literal::Number(value)
+                #[expect(clippy::cast_possible_truncation, reason = "it is whole and at most 2^53")]
+                MitigationValue::Int(value as i64)
             }
             (value, ty) => {
                 let span = match value {

@@ -4,6 +4,7 @@ use super::Resolver;
 use super::depth;
 use super::function::is_function;
 use super::parts::first_part;
+use super::score::scores;
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::model::{Aggregate, Condition, Expression, FieldPath, Formula, Id as _, Input, Members};
 use crate::model::{MetricSource, TextTest, Type};
@@ -22,6 +23,10 @@ pub(super) type Number = (Expression, Option<Unit>);
 impl<'a> Resolver<'a> {
     /// A formula, with the unit of its value.
     pub(super) fn formula(&mut self, formula: &'a ast::Formula) -> Option<(MetricSource, Option<Unit>)> {
+        if let Some(score) = self.score(formula) {
+            return score;
+        }
+        self.no_horizon(formula);
         if let FormulaKind::Plain(whole) = &formula.kind
             && let ExpressionKind::Call(name, arguments) = &whole.kind
             && name.text == "robustness"
@@ -131,7 +136,8 @@ impl<'a> Resolver<'a> {
         let (name, arguments) = match &expression.kind {
             ExpressionKind::Call(name, arguments) if AGGREGATES.contains(&name.text.as_str()) => (name, arguments),
             ExpressionKind::Call(name, _) if !is_function(&name.text) => {
-                self.unknown_function(name, &AGGREGATES);
+                let known: Vec<&str> = AGGREGATES.into_iter().chain(scores()).collect();
+                self.unknown_function(name, &known);
                 return None;
             }
             _ => {
@@ -276,6 +282,7 @@ impl<'a> Resolver<'a> {
             | ExpressionKind::Compare(..)
             | ExpressionKind::All(_)
             | ExpressionKind::Any(_)
+            | ExpressionKind::AtLeast(..)
             | ExpressionKind::Prefixed(..)
             | ExpressionKind::Until(..)
             | ExpressionKind::Implies(..) => self.not_a_number(expression.span, "a condition"),
@@ -292,7 +299,7 @@ impl<'a> Resolver<'a> {
     }
 
     /// Whether a path is the simulation time, and not something that the space declares.
-    fn is_time(&self, path: &Path) -> bool {
+    pub(super) fn is_time(&self, path: &Path) -> bool {
         path.topic.text == "time" && path.fields.is_empty() && !self.names.contains_key("time")
     }
 

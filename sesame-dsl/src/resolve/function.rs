@@ -2,6 +2,7 @@
 
 use super::Resolver;
 use super::formula::{AGGREGATES, Number, scaled};
+use super::score::scores;
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::model::{BinaryFunction, Expression, Input, UnaryFunction};
 use crate::similar::most_similar;
@@ -120,7 +121,7 @@ impl<'a> Resolver<'a> {
             (Some(Computes::Binary(..)), _) => "two values",
             (Some(Computes::SignedDistance), _) => "two arguments",
             (Some(Computes::Least | Computes::Greatest), _) => "two values or more",
-            (None, _) if AGGREGATES.contains(&name.text.as_str()) => {
+            (None, _) if AGGREGATES.contains(&name.text.as_str()) || scores().any(|score| score == name.text) => {
                 self.over_time(call.span, name, None);
                 return None;
             }

@@ -146,6 +146,7 @@ impl<'a> Resolver<'a> {
             | ExpressionKind::Sum(_)
             | ExpressionKind::Product(_)
             | ExpressionKind::Compare(..)
+            | ExpressionKind::AtLeast(..)
             | ExpressionKind::Prefixed(..)
             | ExpressionKind::Until(..)
             | ExpressionKind::All(_)

@@ -37,11 +37,7 @@ impl<'a> Resolver<'a> {
             }
             ast::MetricSource::FuzzingTime => {
                 self.no_type(metric.ty.as_ref(), "`fuzzing_time()` is in seconds");
-                if let Some((word, initial)) = metric.initials.first() {
-                    let title = "`initial` has no effect, because `fuzzing_time()` starts at 0s";
-                    let span = word.to(initial.span);
-                    self.report(Diagnostic::new(Code::IDLE_CLAUSE, span, title).label("remove this"));
-                }
+                self.no_initial(metric, &MetricSource::FuzzingTime);
                 (Some(MetricSource::FuzzingTime), Some(Type::Real(Some(Unit::seconds()))))
             }
             ast::MetricSource::Formula(formula) => {
@@ -50,7 +46,10 @@ impl<'a> Resolver<'a> {
                     "its unit follows from the units of the topics and numbers in the formula",
                 );
                 match self.formula(formula) {
-                    Some((source, unit)) => (Some(source), Some(Type::Real(unit))),
+                    Some((source, unit)) => {
+                        self.no_initial(metric, &source);
+                        (Some(source), Some(Type::Real(unit)))
+                    }
                     None => (None, None),
                 }
             }
@@ -72,6 +71,21 @@ impl<'a> Resolver<'a> {
             accepts_not_finite: !metric.accepts.is_empty(),
             source: source?,
         })
+    }
+
+    /// Reports an initial value of what has a value from the beginning.
+    fn no_initial(&mut self, metric: &ast::Metric, source: &MetricSource) {
+        let Some((word, initial)) = metric.initials.first() else { return };
+        let starts = match source {
+            MetricSource::FuzzingTime => "`fuzzing_time()` starts at 0s".to_owned(),
+            MetricSource::Monitor(_, score) if score.always_has_a_value() => {
+                format!("`{}(…)` starts at 0{}", score.name(), score.unit().unwrap_or_default())
+            }
+            _ => return,
+        };
+        let title = format!("`initial` has no effect, because {starts}");
+        let span = word.to(initial.span);
+        self.report(Diagnostic::new(Code::IDLE_CLAUSE, span, title).label("remove this"));
     }
 
     /// Reports clauses that only a hook needs; for a formula they follow from the formula.

@@ -23,6 +23,9 @@ fn parts(expression: &Expression) -> Box<dyn Iterator<Item = &Expression> + '_> 
         ExpressionKind::Compare(left, _, right)
         | ExpressionKind::Until(left, _, right)
         | ExpressionKind::Implies(left, right) => Box::new([&**left, &**right].into_iter()),
-        ExpressionKind::All(all) | ExpressionKind::Any(all) | ExpressionKind::Call(_, all) => Box::new(all.iter()),
+        ExpressionKind::All(all)
+        | ExpressionKind::Any(all)
+        | ExpressionKind::AtLeast(_, all)
+        | ExpressionKind::Call(_, all) => Box::new(all.iter()),
     }
 }

@@ -35,6 +35,8 @@ pub(super) fn phrases_of(rule: Rule) -> Vec<String> {
         | Rule::target
         | Rule::targets
         | Rule::identifier
+        | Rule::metric_name
+        | Rule::metric_names
         | Rule::condition_variable => &["a name"],
         Rule::field_name => &["a field such as `level: real[mm]`"],
         Rule::text | Rule::texts => &["a text in double quotes"],
@@ -81,6 +83,9 @@ pub(super) fn phrases_of(rule: Rule) -> Vec<String> {
         Rule::inclusion => &["`inclusion`"],
         Rule::untimed => &["`untimed`"],
         Rule::to_nodes => &["`to`"],
+        Rule::state_topic => &["`publishes`"],
+        Rule::external => &["`external`"],
+        Rule::inbound => &["`inbound`"],
         Rule::held => &["`held`"],
         Rule::stale => &["`stale after`"],
         Rule::mitigation => &["`mitigate with`"],
@@ -159,6 +164,7 @@ pub(super) fn phrases_of(rule: Rule) -> Vec<String> {
         | Rule::region
         | Rule::function
         | Rule::members
+        | Rule::some_of
         | Rule::truth => &["a value such as `link0 - 2.5rad`"],
         Rule::plus => &["`+`"],
         Rule::times | Rule::each_element => &["`*`"],
@@ -170,7 +176,14 @@ pub(super) fn phrases_of(rule: Rule) -> Vec<String> {
         Rule::formula_whole => &["`whole windows`"],
         Rule::fuzzing_time => &["`fuzzing_time()`"],
         Rule::minus => &["`-`"],
-        Rule::k_not | Rule::k_always | Rule::k_eventually | Rule::k_pair | Rule::element => &[],
+        // What is for few places would be in the way at all others.
+        Rule::k_not
+        | Rule::k_always
+        | Rule::k_eventually
+        | Rule::k_pair
+        | Rule::element
+        | Rule::of_these
+        | Rule::formula_within => &[],
         _ => {
             let members: Vec<String> = blocks::members(rule).map(blocks::Member::phrase).collect();
             if !members.is_empty() {

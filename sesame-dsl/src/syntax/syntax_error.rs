@@ -142,7 +142,17 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
     let found = token_at(text, failure.at);
     let span = span_of(found);
     let wants_name = failure.expected.iter().any(|&rule| {
-        matches!(rule, Rule::name | Rule::names | Rule::path | Rule::target | Rule::targets | Rule::condition_variable)
+        matches!(
+            rule,
+            Rule::name
+                | Rule::names
+                | Rule::metric_name
+                | Rule::metric_names
+                | Rule::path
+                | Rule::target
+                | Rule::targets
+                | Rule::condition_variable
+        )
     });
     let at_start = found.lo == first.lo;
     let fitting = fitting(&failure.expected, block, at_start);

@@ -52,6 +52,7 @@ fn record(permitted: &TestSpace, metrics: usize, number: u32) -> TestRecord {
             operations,
             unheard: Vec::new(),
             metrics,
+            monitors: Vec::new(),
             messages: 10_000,
             warnings: Vec::new(),
             wall: WallTime::default(),

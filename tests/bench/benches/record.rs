@@ -24,6 +24,7 @@ fn test(number: u32, points: u32) -> TestRecord {
             operations: Vec::new(),
             unheard: Vec::new(),
             metrics: vec![metric.clone(), metric],
+            monitors: Vec::new(),
             messages: 10_000,
             warnings: Vec::new(),
             wall: WallTime::default(),

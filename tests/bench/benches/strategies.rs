@@ -88,6 +88,7 @@ fn observe(plan: &CampaignPlan, number: u32, operations: &[sesame_plan::TestOper
             MetricObservation::whole(Some(touched), true, Vec::new()),
             MetricObservation::whole(Some(-level), true, series),
         ],
+        monitors: Vec::new(),
         messages: 10_000,
         warnings: Vec::new(),
         wall: WallTime::default(),

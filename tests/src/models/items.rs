@@ -567,22 +567,32 @@ impl Space {
             return None;
         }
         let name = self.name("eddi");
-        let topic = self.topics[*self.draw.one(&topics)].name.clone();
+        let topic = *self.draw.one(&topics);
+        let (topic, truth) = (self.topics[topic].name.clone(), matches!(self.topics[topic].ty, Type::Bool));
         let names = own_names(&mut self.draw, 4);
         let Field { written, unit, .. } = self.field();
         let bound = self.draw.number();
-        Some(format!(
-            "{}eddi {name} publishes {topic} {{\n  evidence {} = {written} >= {bound}{unit} held 100ms  stale after 1s is false\n  \
-             guarantee {} integrity 2 = {}\n  guarantee {} integrity 1 = {} or {}\n  otherwise {}\n}}\n",
-            docs(&mut self.draw),
-            names[0],
-            names[1],
-            names[0],
-            names[2],
-            names[0],
-            names[0],
-            names[3]
-        ))
+        let [evidence, strong, weak, otherwise] = &names[..] else { unreachable!("there are four names") };
+        let docs = docs(&mut self.draw);
+        let watched = format!("  evidence {evidence} = {written} >= {bound}{unit} held 100ms  stale after 1s is false");
+        // Which form it has follows from its names, so that spaces are those that they were with one form.
+        Some(match evidence.len() % 4 {
+            0 => format!(
+                "{docs}eddi {name} external {{\n{watched} inbound\n  guarantee {strong} integrity 2 = \
+                 2 of ({evidence}, {evidence}, {evidence})\n  otherwise {otherwise}\n}}\n"
+            ),
+            1 if truth => format!(
+                "{docs}eddi {name} external on {topic} {{\n  guarantee {strong} integrity 2\n  otherwise {otherwise}\n}}\n"
+            ),
+            1 => format!(
+                "{docs}eddi {name} external on {topic} {{\n  guarantee {weak} integrity 3\n  \
+                 guarantee {strong} integrity 7\n  otherwise {otherwise}\n}}\n"
+            ),
+            _ => format!(
+                "{docs}eddi {name} publishes {topic} {{\n{watched}\n  guarantee {strong} integrity 2 = {evidence}\n  \
+                 guarantee {weak} integrity 1 = {evidence} or {evidence}\n  otherwise {otherwise}\n}}\n"
+            ),
+        })
     }
 
     pub(super) fn lab(&mut self) -> Option<String> {

@@ -1,11 +1,13 @@
 //! Conditions that are always true or always false, for all values of their variables: a run with one is wasted.
 //!
-//! Comparisons and known ranges bound differences between two variables, or between one and a number. A set of such
-//! bounds contradicts itself exactly when the bounds around some cycle add up to less than nothing, so a search through
-//! the alternatives of `or` decides the question exactly.
+//! Comparisons and known ranges bound differences between two variables, or between one and a number, and whether a set
+//! of such bounds contradicts itself is decided exactly. So a search through the alternatives of `or` decides the
+//! question exactly.
 
 use sesame_plan::MetricId;
 use sesame_plan::condition::{Comparison, Condition, Operand, Variable};
+
+use crate::differences::{Bound, Differences};
 
 /// Parts of a condition looked at before a question is given up. Conditions of five levels and more can be made that
 /// need more; those a search grows need a few dozen.
@@ -76,13 +78,12 @@ fn satisfiable(goals: Option<&Goals<'_>>, bounds: &Bounds, patience: &mut u32) -
     }
 }
 
-/// The tightest bounds on all differences that follow from what is known.
+/// What is known of the variables of a condition.
 #[derive(Clone)]
 struct Bounds {
-    /// Place 0 of a row or column is the number zero, place `n + 1` the variable here at `n`.
+    /// The variables: that at `n` has place `n + 1` among the differences.
     metrics: Vec<MetricId>,
-    /// At `row * size + column`: the value of the row less that of the column is at most this; below it, where said.
-    most: Vec<(f64, bool)>,
+    differences: Differences,
 }
 
 impl Bounds {
@@ -90,10 +91,8 @@ impl Bounds {
     fn new(condition: &Condition, variables: &[Variable]) -> Option<Self> {
         let mut metrics = Vec::new();
         collect(condition, &mut metrics);
-        let size = metrics.len() + 1;
-        let most =
-            (0..size * size).map(|at| (if at / size == at % size { 0.0 } else { f64::INFINITY }, false)).collect();
-        let mut bounds = Bounds { metrics, most };
+        let differences = Differences::new(metrics.len());
+        let mut bounds = Bounds { metrics, differences };
         for variable in
             variables.iter().filter(|variable| bounds.metrics.contains(&variable.metric)).collect::<Vec<_>>()
         {
@@ -111,7 +110,6 @@ impl Bounds {
     /// These bounds with one more: that one operand is at most another, or below it; `None` where that contradicts
     /// them.
     fn with(&self, left: Operand, right: Operand, below: bool) -> Option<Self> {
-        let size = self.metrics.len() + 1;
         let place = |operand| match operand {
             Operand::Variable(metric) => {
                 let at = self.metrics.iter().position(|&known| known == metric);
@@ -120,23 +118,8 @@ impl Bounds {
             Operand::Number(number) => (0, number),
         };
         let ((row, plus), (column, minus)) = (place(left), place(right));
-        let new = (minus - plus, below);
-        let add = |a: (f64, bool), b: (f64, bool)| (a.0 + b.0, a.1 || b.1);
-        let cycle = add(new, self.most[column * size + row]);
-        if cycle.0 < 0.0 || (cycle.0 == 0.0 && cycle.1) {
-            return None;
-        }
-        let mut tighter = self.clone();
-        for from in 0..size {
-            for to in 0..size {
-                let way = add(add(self.most[from * size + row], new), self.most[column * size + to]);
-                let most = &mut tighter.most[from * size + to];
-                if way.0 < most.0 || (way.0 == most.0 && way.1 && !most.1) {
-                    *most = way;
-                }
-            }
-        }
-        Some(tighter)
+        let differences = self.differences.with(row, column, Bound { most: minus - plus, below })?;
+        Some(Bounds { metrics: self.metrics.clone(), differences })
     }
 }
 

@@ -39,6 +39,17 @@ impl CampaignPlan {
         at("formula", temporal(&robustness.formula, robustness.signals.len()))
     }
 
+    /// A condition, and the inputs that it refers to. It is one condition, so it is of no single members.
+    pub(super) fn sound_condition(&self, inputs: &[Input], condition: &crate::formula::Condition) -> Checked {
+        at("inputs", filled(inputs))?;
+        each("inputs", inputs, |input| {
+            at("field", self.field(&input.field))?;
+            let one = matches!(input.members, Members::Min | Members::Max | Members::Sum);
+            at("members", require(one, || "are not taken together".to_owned()))
+        })?;
+        at("condition", proposition(condition, inputs.len()))
+    }
+
     /// Inputs that are of a pair are of pairs of one group, and no others are of each member.
     fn one_pair(&self, inputs: &[Input]) -> Checked {
         let of_pair = |input: &&Input| matches!(input.members, Members::First | Members::Second);

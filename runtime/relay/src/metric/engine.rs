@@ -1,9 +1,12 @@
 //! All metrics of one run: which messages they read, and their results.
 
+use std::sync::Arc;
+
 use sesame_base::activation::TICK;
 use sesame_base::observation::{MetricObservation, Reach};
 use sesame_base::time::SimTime;
 use sesame_base::verdict::ends;
+use sesame_monitor::{Invalid, Network};
 use sesame_plan::stl::Robustness;
 use sesame_plan::{CampaignPlan, Formula, Members, MetricId, MetricSource, Side, Span, TopicId};
 
@@ -26,6 +29,8 @@ pub struct MetricTable<'p> {
     delivered: Vec<Vec<usize>>,
     /// Per wire: its path, its topic, and the position among the topic's paths.
     wires: Vec<(Text, TopicId, usize)>,
+    /// The monitors, whose scores are metrics; `None` for a plan without monitors.
+    network: Option<Arc<Network>>,
 }
 
 /// Why a runner cannot compute the metrics of its plan.
@@ -48,6 +53,9 @@ pub enum MetricError {
         /// The problem.
         error: FormulaError,
     },
+    /// Monitors that are not valid.
+    #[error("{0}; the plan was not written by sesamec: run `sesamec generate` again")]
+    Monitors(Invalid),
 }
 
 impl<'p> MetricTable<'p> {
@@ -59,7 +67,7 @@ impl<'p> MetricTable<'p> {
         for (at, metric) in plan.metrics.iter().enumerate() {
             let topics: Vec<TopicId> = match &metric.source {
                 MetricSource::Hook { topics } => topics.clone(),
-                MetricSource::FuzzingTime => Vec::new(),
+                MetricSource::FuzzingTime | MetricSource::Monitor { .. } => Vec::new(),
                 MetricSource::Last { input } => vec![input.topic],
                 MetricSource::Robustness { robustness: Robustness { inputs, .. } }
                 | MetricSource::Formula { formula: Formula { inputs, .. } } => {
@@ -105,7 +113,9 @@ impl<'p> MetricTable<'p> {
             members[topic.index()] += 1;
             (Text::from(wires.path(wire)), topic, member)
         });
-        Ok(MetricTable { plan, hooks: found, taps, delivered, wires: wires.collect() })
+        let network = (!plan.monitors.is_empty()).then(|| Network::new(&plan.monitors));
+        let network = network.transpose().map_err(MetricError::Monitors)?.map(Arc::new);
+        Ok(MetricTable { plan, hooks: found, taps, delivered, wires: wires.collect(), network })
     }
 
     /// Fresh metrics for one run.
@@ -130,6 +140,7 @@ impl<'p> MetricTable<'p> {
                 context: Context { trend: metric.trend, ..Context::default() },
                 waits: false,
                 ended: false,
+                unknown: false,
             })
             .collect();
         let timed = states.iter().enumerate().filter(|(_, state)| state.is_timed()).map(|(at, _)| at).collect();
@@ -160,12 +171,39 @@ struct State<'p> {
     waits: bool,
     /// Whether it knows the end of the run.
     ended: bool,
+    /// Whether it has no value for conditions although it had one.
+    unknown: bool,
+}
+
+/// What a score of a monitor is at a moment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Shown {
+    /// This value, from this moment on.
+    Value(f64),
+    /// This value at this moment, and another one later: it grows with time, and its series has only the ends of that.
+    Growing(f64),
+    /// Nobody knows. The metric keeps its value, but conditions have none.
+    Unknown,
+    /// There is nothing of which it could be the score.
+    Nothing,
 }
 
 impl State<'_> {
     fn is_timed(&self) -> bool {
         self.formula.as_ref().is_some_and(FormulaState::is_timed)
             || self.robustness.as_ref().is_some_and(RobustnessState::is_timed)
+    }
+}
+
+impl<'p> Metrics<'p> {
+    /// The plan whose metrics these are.
+    pub(crate) fn plan(&self) -> &'p CampaignPlan {
+        self.table.plan
+    }
+
+    /// The monitors of the plan, if it has any.
+    pub(crate) fn network(&self) -> Option<&'p Arc<Network>> {
+        self.table.network.as_ref()
     }
 }
 
@@ -292,9 +330,31 @@ impl Metrics<'_> {
     /// knows the fuzzing time so far, in seconds.
     pub fn value(&self, metric: MetricId, fuzzing_time: f64) -> Option<f64> {
         let declared = self.table.plan.metric(metric);
-        match declared.source {
-            MetricSource::FuzzingTime => Some(fuzzing_time),
-            _ => self.states[metric.index()].context.value.or(declared.initial),
+        if matches!(declared.source, MetricSource::FuzzingTime) {
+            return Some(fuzzing_time);
+        }
+        let State { context, unknown, .. } = &self.states[metric.index()];
+        if *unknown && context.value.is_some() { None } else { context.value.or(declared.initial) }
+    }
+
+    /// The value that a metric was set to last.
+    pub(crate) fn set_value(&self, metric: MetricId) -> Option<f64> {
+        self.states[metric.index()].context.value
+    }
+
+    /// Says what a score of a monitor is now.
+    pub(crate) fn score(&mut self, metric: MetricId, now: SimTime, shown: Shown) {
+        let State { context, unknown, .. } = &mut self.states[metric.index()];
+        *unknown = shown == Shown::Unknown;
+        match shown {
+            Shown::Value(value) => {
+                // Since then it may have grown.
+                context.value = context.series.last().map(|point| point.1);
+                context.now = now;
+                context.set(value);
+            }
+            Shown::Growing(value) => context.value = Some(value),
+            Shown::Unknown | Shown::Nothing => {}
         }
     }
 

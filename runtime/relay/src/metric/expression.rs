@@ -8,10 +8,10 @@ use sesame_plan::{BinaryFunction, Condition, Distance, Expression, Point, UnaryF
 use crate::metric::region::signed_distance;
 
 /// The values of a formula's inputs: a point, or a number (true is 1, false 0) followed by zeros.
-pub(super) type Held = [f64; 3];
+pub(crate) type Held = [f64; 3];
 
 /// What a formula is computed from at one moment.
-pub(super) struct Moment<'a> {
+pub(crate) struct Moment<'a> {
     inputs: &'a [Held],
     /// The simulation time, in seconds.
     time: f64,
@@ -20,12 +20,12 @@ pub(super) struct Moment<'a> {
 
 impl<'a> Moment<'a> {
     /// The values of a formula's inputs at a time, in seconds.
-    pub(super) fn new(inputs: &'a [Held], time: f64) -> Self {
+    pub(crate) fn new(inputs: &'a [Held], time: f64) -> Self {
         Moment { inputs, time, undefined: Cell::new(None) }
     }
 
     /// The first function that had no value, of all that was computed.
-    pub(super) fn undefined(&self) -> Option<Undefined> {
+    pub(crate) fn undefined(&self) -> Option<Undefined> {
         self.undefined.get()
     }
 
@@ -48,7 +48,7 @@ impl<'a> Moment<'a> {
 
 /// A function without a finite value, such as the square root of a negative number.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Undefined {
+pub(crate) struct Undefined {
     function: &'static str,
     arguments: (f64, Option<f64>),
 }
@@ -122,7 +122,7 @@ fn binary(function: BinaryFunction, left: f64, right: f64) -> f64 {
 }
 
 /// Whether a condition holds.
-pub(super) fn holds(of: &Condition, at: &Moment<'_>) -> bool {
+pub(crate) fn holds(of: &Condition, at: &Moment<'_>) -> bool {
     match of {
         Condition::Constant(value) => *value,
         Condition::Input(input) => at.inputs[*input as usize][0] != 0.0,

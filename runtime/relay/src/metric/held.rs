@@ -10,7 +10,7 @@ const NOT_FINITE: Held = [f64::NAN; 3];
 
 /// Reads the values of the inputs that a message on a topic has, with their positions, and returns whether all of them
 /// are finite. The error is a missing field.
-pub(super) fn hear(
+pub(crate) fn hear(
     inputs: &[Input],
     topic: TopicId,
     value: &Value,
@@ -43,7 +43,7 @@ fn truth(holds: bool) -> Held {
 
 /// The last values of the inputs of a formula.
 #[derive(Debug, Clone)]
-pub(super) struct HeldInputs {
+pub(crate) struct HeldInputs {
     /// Per input: the last value of each member.
     members: Vec<Vec<Option<Held>>>,
     /// Per input: the value computed from them.
@@ -54,7 +54,7 @@ pub(super) struct HeldInputs {
 
 impl HeldInputs {
     /// Before the first message.
-    pub(super) fn new(inputs: &[Input], plan: &CampaignPlan) -> Self {
+    pub(crate) fn new(inputs: &[Input], plan: &CampaignPlan) -> Self {
         HeldInputs {
             members: inputs.iter().map(|input| vec![None; plan.topic(input.field.topic).paths.len()]).collect(),
             inputs: vec![[0.0; 3]; inputs.len()],
@@ -74,7 +74,7 @@ impl HeldInputs {
     }
 
     /// Takes the values that [`hear`] found in a message on the `member`th path of its topic.
-    pub(super) fn hold(&mut self, inputs: &[Input], heard: &[(usize, Held)], member: usize) {
+    pub(crate) fn hold(&mut self, inputs: &[Input], heard: &[(usize, Held)], member: usize) {
         for &(at, value) in heard {
             self.known[at] = true;
             let members = &mut self.members[at];
@@ -124,7 +124,7 @@ impl HeldInputs {
     }
 
     /// The held values of all inputs, once all had a message and while the last ones are finite.
-    pub(super) fn values(&self) -> Option<&[Held]> {
+    pub(crate) fn values(&self) -> Option<&[Held]> {
         let usable = !self.known.contains(&false) && self.inputs.iter().all(|held| !held[0].is_nan());
         usable.then_some(&self.inputs)
     }

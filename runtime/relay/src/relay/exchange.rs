@@ -14,6 +14,9 @@ pub struct Delivery {
     pub wire: Wire,
     /// It comes from the message with this number among those published on the wire, from 0.
     pub index: u64,
+    /// Whether it comes from a message that a monitor of the runner published, so that no node sent it: a transport
+    /// that only listens to the wire has to publish it.
+    pub by_monitor: bool,
     /// What.
     pub value: Value,
 }
@@ -29,7 +32,7 @@ pub trait Exchange {
     /// Simulation time is `now` from here on; it never goes back.
     fn advance(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>);
     /// A message was published at `now`, by this node if the transport can tell. It gets the next number of its wire,
-    /// from 0.
+    /// from 0; messages of monitors have numbers in between.
     fn message_from(
         &mut self,
         now: SimTime,
@@ -42,6 +45,8 @@ pub trait Exchange {
     fn message(&mut self, now: SimTime, wire: Wire, value: Value, deliveries: &mut Vec<Delivery>) {
         self.message_from(now, wire, None, value, deliveries);
     }
+    /// The number that the next message published on this wire gets.
+    fn next_index(&self, wire: Wire) -> u64;
     /// Parameters of the simulator that have other values in this run than the simulator gives them, by name. They are
     /// set before the run begins; one that the simulator does not have is an error.
     fn parameters(&self) -> &[(String, f64)];

@@ -4,8 +4,9 @@
 //! events, so the relay computes the moment, to the nanosecond, instead of checking at every event.
 
 use sesame_base::time::SimTime;
+use sesame_base::verdict::ends;
 use sesame_plan::condition::{Condition, Operand};
-use sesame_plan::{Activation, CampaignPlan, MetricId, MetricSource, Span, Test};
+use sesame_plan::{Activation, CampaignPlan, MetricId, MetricSource, Score, Span, Test};
 
 use crate::relay::Relay;
 use crate::relay::stage::Stage;
@@ -64,12 +65,12 @@ impl Relay<'_> {
 }
 
 /// The first nanosecond whose seconds are at least this number.
-fn reaching(number: f64) -> i64 {
+pub(super) fn reaching(number: f64) -> i64 {
     first(number, |seconds| seconds >= number)
 }
 
 /// The first nanosecond whose seconds are above this number.
-fn beyond(number: f64) -> i64 {
+pub(super) fn beyond(number: f64) -> i64 {
     first(number, |seconds| seconds > number)
 }
 
@@ -90,41 +91,67 @@ fn first(number: f64, holds: impl Fn(f64) -> bool) -> i64 {
     low
 }
 
-/// The metrics that the conditions of a test read, and the operands with which they compare the fuzzing time.
-pub(super) fn read_by(plan: &CampaignPlan, test: &Test) -> (Vec<MetricId>, Vec<Operand>) {
-    let (mut variables, mut compared) = (Vec::new(), Vec::new());
-    for operation in &test.operations {
-        match &operation.activation {
-            Activation::Condition { start, end, .. } => {
-                collect(plan, start, &mut variables, &mut compared);
-                collect(plan, end, &mut variables, &mut compared);
-            }
-            Activation::ConditionFor { start, .. } => collect(plan, start, &mut variables, &mut compared),
-            Activation::Time { .. } | Activation::Offline => {}
-        }
-    }
-    (variables, compared)
+/// What conditions and hazards read.
+#[derive(Default)]
+pub(super) struct Read {
+    /// The metrics that the conditions of the test read.
+    pub(super) variables: Vec<MetricId>,
+    /// With what the fuzzing time is compared.
+    pub(super) compared: Vec<Operand>,
+    /// The metrics that are times in states of monitors, each with what it is compared with.
+    pub(super) stays: Vec<(MetricId, Operand)>,
 }
 
-fn collect(plan: &CampaignPlan, condition: &Condition, variables: &mut Vec<MetricId>, compared: &mut Vec<Operand>) {
-    match condition {
-        Condition::Compare { left, right, .. } => {
-            let is_fuzzing_time = |operand: Operand| match operand {
-                Operand::Variable(metric) => matches!(plan.metric(metric).source, MetricSource::FuzzingTime),
-                Operand::Number(_) => false,
-            };
-            for (one, other) in [(*left, *right), (*right, *left)] {
-                if let Operand::Variable(metric) = one {
-                    variables.push(metric);
+impl Read {
+    /// What a test reads, and the requirements whose hazards are scored.
+    pub(super) fn by(plan: &CampaignPlan, test: &Test) -> Self {
+        let mut read = Read::default();
+        for operation in &test.operations {
+            match &operation.activation {
+                Activation::Condition { start, end, .. } => {
+                    read.add(plan, start);
+                    read.add(plan, end);
                 }
-                if is_fuzzing_time(one) && !is_fuzzing_time(other) {
-                    compared.push(other);
-                }
+                Activation::ConditionFor { start, .. } => read.add(plan, start),
+                Activation::Time { .. } | Activation::Offline => {}
             }
         }
-        Condition::And(a, b) | Condition::Or(a, b) => {
-            collect(plan, a, variables, compared);
-            collect(plan, b, variables, compared);
+        for metric in &plan.metrics {
+            let MetricSource::Monitor { score, .. } = metric.source else { continue };
+            let Some(requirement) = score.requirement() else { continue };
+            let requirement = plan.requirement(requirement);
+            let (low, _, high, _) = ends(requirement.bound);
+            for end in [low, high].into_iter().flatten() {
+                read.compare(plan, requirement.metric, Operand::Number(end));
+            }
+        }
+        read
+    }
+
+    fn add(&mut self, plan: &CampaignPlan, condition: &Condition) {
+        match condition {
+            Condition::Compare { left, right, .. } => {
+                for (one, other) in [(*left, *right), (*right, *left)] {
+                    if let Operand::Variable(metric) = one {
+                        self.variables.push(metric);
+                        self.compare(plan, metric, other);
+                    }
+                }
+            }
+            Condition::And(a, b) | Condition::Or(a, b) => {
+                self.add(plan, a);
+                self.add(plan, b);
+            }
+        }
+    }
+
+    fn compare(&mut self, plan: &CampaignPlan, metric: MetricId, with: Operand) {
+        let source = |metric| &plan.metric(metric).source;
+        let is_fuzzing_time = |operand| matches!(operand, Operand::Variable(metric) if matches!(source(metric), MetricSource::FuzzingTime));
+        match source(metric) {
+            MetricSource::FuzzingTime if !is_fuzzing_time(with) => self.compared.push(with),
+            MetricSource::Monitor { score: Score::TimeIn { .. }, .. } => self.stays.push((metric, with)),
+            _ => {}
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The way of a message through its pipeline: each operation in turn acts on it, and what it adds follows it.
 
 use sesame_base::time::SimTime;
+use sesame_plan::Side;
 
 use crate::fuzz::{Action, Disturbance, KeyedRng, MessageContext};
 use crate::relay::release::{Held, Why};
@@ -79,7 +80,8 @@ impl Relay<'_> {
                 return;
             }
         }
-        deliveries.push(Delivery { wire: message.wire, index: message.published, value: message.value });
+        let Held { wire, published: index, by_monitor, value, .. } = message;
+        deliveries.push(Delivery { wire, index, by_monitor, value });
     }
 
     /// A message has passed all operations of the test on its wire.
@@ -92,6 +94,7 @@ impl Relay<'_> {
             for tap in &mut self.taps {
                 tap.delivered(now, message.wire, message.published, &message.value);
             }
+            self.monitors_hear(Side::Outbound, message.wire, message.published, &message.value);
         }
         self.fan_out(now, message, deliveries);
     }

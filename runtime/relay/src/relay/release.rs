@@ -18,6 +18,8 @@ pub(super) struct Held {
     pub(super) wire: Wire,
     /// Who published it, if the transport can tell.
     pub(super) publisher: Option<NodeId>,
+    /// Whether a monitor of the runner published it.
+    pub(super) by_monitor: bool,
     /// Its index among the messages published on its wire; for an injected message, the index of the original one.
     pub(super) published: u64,
     /// The key of its random numbers: its index, or for an injected message a number of its own.

@@ -14,11 +14,12 @@ use serde_json::value::RawValue;
 use sesame_base::observation::{MetricObservation, OperationEffect};
 use sesame_base::time::SimTime;
 use sesame_base::visible::visible;
-use sesame_plan::{CampaignPlan, MetricSource, OperationId, Span, Type};
+use sesame_plan::{CampaignPlan, MetricSource, OperationId, Side, Span, Type};
 
 use crate::json::{Shapes, decode};
 use crate::message::Mismatch;
 use crate::metric::{MetricTable, Metrics};
+use crate::monitor::Monitors;
 use crate::trace::records::records;
 use crate::trace::{ROLE, ROLE_DELIVERED, ROLE_PUBLISHED, RUN, SUBJECT, TOPIC};
 use crate::value::Value;
@@ -182,6 +183,7 @@ pub fn feed(
         delivered_apart: vec![false; wires.len()],
         heard: BTreeSet::new(),
         shapes: Shapes::default(),
+        monitors: None,
         metrics: table.start(),
         start: None,
         now: SimTime::ZERO,
@@ -189,6 +191,8 @@ pub fn feed(
         subject: None,
         ending: None,
     };
+    feeder.monitors = Monitors::new(&feeder.metrics, wires);
+    feeder.show_monitors();
     feeder.metrics.begin();
     read(file, path, &mut |record| feeder.record(record))?;
     feeder.finish()
@@ -260,6 +264,8 @@ struct Feeder<'a> {
     heard: BTreeSet<Wire>,
     shapes: Shapes,
     metrics: Metrics<'a>,
+    /// `None` for a plan without monitors. What they publish is in the recording.
+    monitors: Option<Monitors<'a>>,
     /// Log time of the start of the run, in nanoseconds: zero in a trace, that of the first message elsewhere.
     start: Option<u64>,
     now: SimTime,
@@ -323,6 +329,7 @@ impl Feeder<'_> {
                 path: self.path.to_owned(),
             });
         };
+        self.pass_to(time);
         self.now = time;
         let ty = &self.plan.topic(self.wires.topic(wire)).ty;
         let value = payload(self.plan, &mut self.shapes, ty, data).map_err(|reason| RecordingError::WrongType {
@@ -331,16 +338,50 @@ impl Feeder<'_> {
             reason: visible(&reason),
             path: self.path.to_owned(),
         })?;
+        let index = u64::from(header.sequence);
         if delivered {
             self.metrics.delivery(time, wire, &value);
+            self.monitors_hear(Side::Outbound, wire, index, &value);
             return Ok(());
         }
         self.messages += 1;
         self.metrics.message(time, wire, &value);
+        self.monitors_hear(Side::Inbound, wire, index, &value);
         if !self.delivered_apart[wire.index()] {
             self.metrics.delivery(time, wire, &value);
+            self.monitors_hear(Side::Outbound, wire, index, &value);
         }
         Ok(())
+    }
+
+    fn monitors_hear(&mut self, side: Side, wire: Wire, index: u64, value: &Value) {
+        if let Some(monitors) = &mut self.monitors {
+            monitors.hear(self.now, side, wire, index, value);
+        }
+    }
+
+    /// Time passes up to an instant: monitors learn that the last one is over, and what is due until then happens.
+    fn pass_to(&mut self, time: SimTime) {
+        let Some(monitors) = &mut self.monitors else { return };
+        let mut now = self.now;
+        while now < time {
+            monitors.decide(now);
+            monitors.show(now, &mut self.metrics);
+            self.metrics.settle();
+            monitors.end_instant(now, &mut self.metrics, SimTime::ZERO);
+            now = monitors.next_due().map_or(time, |due| due.min(time));
+            self.metrics.advance_to(now);
+            monitors.tick(now, &mut self.metrics);
+            monitors.advance(now);
+        }
+        self.show_monitors();
+    }
+
+    fn show_monitors(&mut self) {
+        if let Some(monitors) = &mut self.monitors {
+            monitors.give_up();
+            monitors.show(self.now, &mut self.metrics);
+        }
     }
 
     fn finish(mut self) -> Result<Fed, RecordingError> {
@@ -354,7 +395,7 @@ impl Feeder<'_> {
             |problem: &str| RecordingError::Damaged { problem: problem.to_owned(), path: self.path.to_owned() };
         let mut busy: Option<Vec<Span>> = None;
         let mut end = Some(self.now);
-        let mut run = None;
+        let (mut run, mut broken_off) = (None, None);
         if let (Some(subject), Some(ending)) = (&self.subject, &self.ending) {
             let text = |entries: &BTreeMap<String, String>, key: &str| entries.get(key).cloned().unwrap_or_default();
             let metrics = match ending.get("metrics") {
@@ -376,8 +417,8 @@ impl Feeder<'_> {
                 // Hooks are not told of the end of a run that failed.
                 _ => None,
             };
-            if let (None, Some(broken_off)) = (end, ending.get("end_s").and_then(|end| end.parse().ok())) {
-                self.metrics.advance_to(SimTime::from_seconds(broken_off));
+            if end.is_none() {
+                broken_off = ending.get("end_s").and_then(|end| end.parse().ok()).map(SimTime::from_seconds);
             }
             run = Some(RecordedRun {
                 space: text(subject, "space"),
@@ -389,10 +430,26 @@ impl Feeder<'_> {
         } else if self.subject.is_some() {
             return Err(damaged("it does not say how its run ended"));
         }
+        if let Some(at) = broken_off {
+            self.pass_to(at);
+            self.metrics.advance_to(at);
+            self.now = self.now.max(at);
+        }
         if let Some(end) = end {
+            self.pass_to(end);
+            self.now = end;
             self.metrics.end(end);
+            if let Some(monitors) = &mut self.monitors {
+                monitors.end(end, &mut self.metrics, SimTime::ZERO);
+            }
+        } else if let Some(monitors) = &mut self.monitors {
+            monitors.decide(self.now);
+            monitors.break_off(self.now, &mut self.metrics);
         }
         let (mut metrics, mut warnings) = self.metrics.finish(busy.as_deref().unwrap_or_default());
+        if let Some(monitors) = self.monitors {
+            warnings.extend(monitors.finish(self.now, &mut metrics, end.is_some()).1);
+        }
         for (observed, metric) in metrics.iter_mut().zip(&self.plan.metrics) {
             if matches!(metric.source, MetricSource::FuzzingTime) && busy.is_none() {
                 *observed = MetricObservation::default();

@@ -39,7 +39,7 @@ pub struct Line {
     pub path: String,
     /// Whether its messages pass through the relay, or are only listened to.
     pub cut: bool,
-    /// Where its messages come from.
+    /// Where its messages come from; nowhere if only the runner publishes them.
     pub sources: Vec<Source>,
     /// Where they go; none if it is not cut.
     pub sinks: Vec<Sink>,
@@ -88,10 +88,12 @@ fn line(plan: &CampaignPlan, wires: &WireTable, wire: Wire) -> Line {
     }
     let from = |&node: &NodeId| source(format!("{path}/from/{}", plan.node(node).name), Some(node));
     let mut sources: Vec<Source> = publishers.iter().map(from).collect();
+    // Nobody but the runner publishes the state of a monitor.
+    let of_runner = plan.is_state_of_monitor(topic) && !plan.nodes.iter().any(|node| node.publishes.contains(&topic));
     let distinguished = |node: NodeId| publishers.contains(&node) || !plan.node(node).publishes.contains(&topic);
     let mut nodes = (0u32..).map(NodeId).take(plan.nodes.len());
     // Whoever is not named, if only because no node is declared to publish it.
-    if publishers.is_empty() || !nodes.all(distinguished) {
+    if !of_runner && (publishers.is_empty() || !nodes.all(distinguished)) {
         sources.push(source(format!("{path}/undisturbed"), None));
     }
     let mut sinks = vec![Sink { wire, path: path.clone(), subscriber: None }];

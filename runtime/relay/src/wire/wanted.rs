@@ -29,8 +29,8 @@ impl Wanted {
     }
 }
 
-/// The fields of a topic's messages that metrics of the plan read and that its operations change. All of them where the
-/// user's code sees the message, or where traces are recorded.
+/// The fields of a topic's messages that metrics and monitors of the plan read and that its operations change. All of
+/// them where the user's code sees the message, where traces are recorded, or where a monitor publishes.
 pub fn wanted(plan: &CampaignPlan, topic: TopicId) -> Wanted {
     let seen_whole = plan.campaign.record.is_some()
         || plan
@@ -40,7 +40,8 @@ pub fn wanted(plan: &CampaignPlan, topic: TopicId) -> Wanted {
         || plan
             .operations
             .iter()
-            .any(|operation| operation.topic == Some(topic) && matches!(operation.kind, OperationKind::Custom { .. }));
+            .any(|operation| operation.topic == Some(topic) && matches!(operation.kind, OperationKind::Custom { .. }))
+        || plan.is_published_by_monitor(topic);
     if seen_whole {
         return Wanted::All;
     }
@@ -61,9 +62,14 @@ pub fn wanted(plan: &CampaignPlan, topic: TopicId) -> Wanted {
                 &formula.inputs
             }
             MetricSource::Robustness { robustness } => &robustness.inputs,
-            MetricSource::Hook { .. } | MetricSource::FuzzingTime => &[],
+            MetricSource::Hook { .. } | MetricSource::FuzzingTime | MetricSource::Monitor { .. } => &[],
         };
         for input in inputs {
+            read(&input.field);
+        }
+    }
+    for evidence in plan.monitors.iter().flat_map(|monitor| &monitor.evidence) {
+        for input in &evidence.inputs {
             read(&input.field);
         }
     }

@@ -114,6 +114,7 @@ impl Repository {
                     robustness: Vec::new(),
                 })
                 .collect();
+            let mut monitors = Vec::new();
             if series {
                 let ran = row.duplicate_of.unwrap_or(number);
                 let lacking = || RecordError::damaged(&self.path, format!("{this} has a series without a metric"));
@@ -123,6 +124,7 @@ impl Repository {
                 for (metric, points) in self.robustness(ran)? {
                     metrics.get_mut(metric).ok_or_else(lacking)?.robustness = points;
                 }
+                monitors = self.monitors(ran)?;
             }
             records.push(TestRecord {
                 number,
@@ -138,6 +140,7 @@ impl Repository {
                     outcome: row.outcome,
                     end: row.end,
                     metrics,
+                    monitors,
                     messages,
                     warnings: warnings.remove(&number).unwrap_or_default(),
                     wall: WallTime { run },

@@ -14,7 +14,7 @@ use rusqlite::Connection;
 use sesame_plan::CampaignPlan;
 
 use crate::record::schema::{DDL, PIECES_SINCE, ROBUSTNESS, STANDARD_WORDS_SINCE, has_robustness, wide_views};
-use crate::record::{RecordError, lab_runs, relay_latencies, series_views, split_operations};
+use crate::record::{RecordError, lab_runs, monitors, relay_latencies, series_views, split_operations};
 
 /// The objects of a schema by name: the kind of each, and the words of the statement that creates it.
 type Objects = BTreeMap<String, (String, String)>;
@@ -76,7 +76,8 @@ pub(super) fn tables(connection: &Connection, path: &Path, schema: i64) -> Resul
         (lab_runs::TABLE, lab_runs::DDL),
         (relay_latencies::TABLE, relay_latencies::DDL),
     ];
-    for (name, ddl) in at_will {
+    let of_monitors = monitors::OBJECTS.map(|name| (name, monitors::DDL));
+    for (name, ddl) in at_will.into_iter().chain(of_monitors) {
         if schema >= STANDARD_WORDS_SINCE && found.contains_key(name) {
             let mut ours = sound(made_by(&["CREATE TABLE tests (number INTEGER PRIMARY KEY)", ddl]));
             ours.retain(|ours, _| ours == name);

@@ -12,6 +12,7 @@ use sesame_search::indicators::GenerationIndicators;
 use crate::record::columns::index;
 use crate::record::files::{BEGUN, DATABASE};
 use crate::record::folder::Lock;
+use crate::record::monitors;
 use crate::record::write_tests::{unrecordable, write_event, write_test};
 use crate::record::{
     Claim, Event, EventKind, GenerationCoverage, RecordError, Repository, ResultSet, SplitOperation, TestRecord,
@@ -132,6 +133,8 @@ impl Recorder {
             install().map_err(|e| RecordError::database("open the results", &repository.path, e))?;
             repository.has_robustness = true;
         }
+        monitors::install(&repository.connection, repository.plan())
+            .map_err(|e| RecordError::database("open the results", &repository.path, e))?;
         Recorder::begin_session(repository, lock, workers)
     }
 

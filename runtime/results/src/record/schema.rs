@@ -11,7 +11,7 @@ use sesame_base::verdict::ends;
 use sesame_plan::{CampaignPlan, Direction, Task};
 
 use crate::record::columns::index;
-use crate::record::{RecordError, series_views};
+use crate::record::{RecordError, monitors, series_views};
 
 /// The schema's version, in the file's `user_version`.
 pub const SCHEMA: i64 = 7;
@@ -63,6 +63,7 @@ pub(crate) fn install(
     transaction.execute_batch(DDL)?;
     transaction.execute_batch(&series_views::views())?;
     install_robustness(&transaction)?;
+    monitors::install(&transaction, plan)?;
     transaction.execute_batch(&wide_views(plan))?;
     transaction.execute(
         "INSERT INTO campaign (id, space, name, source, generator, runtime, seed, evaluations, end_after_s, plan, task) \

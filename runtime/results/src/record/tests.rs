@@ -21,6 +21,7 @@ mod damage;
 mod digests;
 mod earlier;
 mod environment;
+mod monitors;
 mod robustness;
 mod runs;
 

@@ -10,11 +10,11 @@ use sesame_plan::{Activation, CampaignPlan, Choice};
 
 use crate::record::columns::index;
 use crate::record::series::{self, Pieces};
-use crate::record::{Event, Origin, TestRecord};
+use crate::record::{Event, Origin, TestRecord, monitors};
 
 /// What SQLite could not return as it was written: numbers that are not finite, counts beyond 63 bits.
 pub(super) fn unrecordable(record: &TestRecord) -> Option<String> {
-    let Observation { outcome, end, operations, metrics, messages, wall, unheard: _, warnings: _ } =
+    let Observation { outcome, end, operations, metrics, monitors, messages, wall, unheard: _, warnings: _ } =
         &record.observation;
     let mut numbers = vec![("the end of the run", *end), ("the wall time", wall.run)];
     if let Outcome::Timeout { limit } = outcome {
@@ -60,6 +60,11 @@ pub(super) fn unrecordable(record: &TestRecord) -> Option<String> {
                 .chain(&metric.robustness)
                 .flat_map(|point| [("the time of a change", point.0), ("a value in a series", point.1)]),
         );
+    }
+    for monitor in monitors {
+        let decisions = monitor.decisions.iter().map(|decision| ("the time of a decision", decision.time));
+        numbers
+            .extend(decisions.chain(monitor.evidence.iter().map(|it| ("the time of a change of evidence", it.time))));
     }
     if let Some((what, number)) = numbers.into_iter().find(|(_, number)| !number.is_finite()) {
         return Some(format!("{what} is {number}"));
@@ -173,6 +178,9 @@ pub(super) fn write_test(
         }
         series::write(transaction, Pieces::Series, *number, metric, &shown.series)?;
         series::write(transaction, Pieces::Robustness, *number, metric, &shown.robustness)?;
+    }
+    if duplicate_of.is_none() {
+        monitors::write(transaction, plan, *number, &observation.monitors)?;
     }
     for (position, text) in observation.warnings.iter().enumerate() {
         transaction

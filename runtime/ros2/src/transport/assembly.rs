@@ -44,7 +44,8 @@ impl Session {
                     found = true;
                 }
             }
-            if readers.iter().any(Option::is_some) {
+            // What only the runner publishes has no quality of service to take.
+            if readers.is_empty() || readers.iter().any(Option::is_some) {
                 for (sink, writer) in line.sinks.iter().zip(writers.iter_mut()).filter(|(_, writer)| writer.is_none()) {
                     *writer = Some(self.dds.publish(&names::topic(&sink.path), type_name, qos)?);
                     found = true;

@@ -230,7 +230,7 @@ impl Session {
         Ok(())
     }
 
-    fn deliver_one(&mut self, Delivery { wire, index, value }: &Delivery) -> Result<(), DdsError> {
+    fn deliver_one(&mut self, Delivery { wire, index, value, .. }: &Delivery) -> Result<(), DdsError> {
         for connected in &self.lines {
             let Some(at) = connected.line.sinks.iter().position(|sink| sink.wire == *wire) else { continue };
             let Some(writer) = connected.writers[at] else { return Ok(()) };

@@ -23,8 +23,6 @@ pub(super) struct Line {
     shape: Shape,
     /// Under which name messages are published in place of those that come; `None` for a topic that is only heard.
     injected: Option<String>,
-    /// How many messages have come.
-    count: u64,
     /// The latest messages as they came, with their numbers.
     originals: VecDeque<(u64, Message)>,
 }
@@ -60,7 +58,7 @@ impl Lines {
                 None
             };
             let shape = Shape::of_type(plan, &plan.topic(topic).ty);
-            lines.push(Line { wire, topic, shape, injected, count: 0, originals: VecDeque::new() });
+            lines.push(Line { wire, topic, shape, injected, originals: VecDeque::new() });
         }
         let by_wire = lines.iter().enumerate().map(|(at, line)| (line.wire, at)).collect();
         Ok(Lines { lines, by_wire })
@@ -94,16 +92,15 @@ impl Lines {
 }
 
 impl Line {
-    /// Takes the next message: gives its value, and remembers it as it came.
-    pub(super) fn take(&mut self, message: Message) -> Result<Value, Mismatch> {
+    /// Takes the message with this number: gives its value, and remembers it as it came.
+    pub(super) fn take(&mut self, message: Message, index: u64) -> Result<Value, Mismatch> {
         let value = message.read(&self.shape)?;
         if self.injected.is_some() {
             if self.originals.len() == REMEMBERED {
                 self.originals.pop_front();
             }
-            self.originals.push_back((self.count, message));
+            self.originals.push_back((index, message));
         }
-        self.count += 1;
         Ok(value)
     }
 
@@ -112,7 +109,7 @@ impl Line {
     pub(super) fn written(&self, delivery: &Delivery) -> Result<Option<(String, Message)>, Mismatch> {
         let Some(name) = &self.injected else { return Ok(None) };
         let of_index = self.originals.iter().find(|(number, _)| *number == delivery.index);
-        // Nothing is delivered that has not come.
+        // Nothing is delivered that has not come, but for what monitors publish, which is written as the last message is.
         let Some((_, original)) = of_index.or(self.originals.back()) else { return Ok(None) };
         Ok(Some((name.clone(), original.with(&delivery.value)?)))
     }

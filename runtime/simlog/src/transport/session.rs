@@ -46,7 +46,7 @@ impl Session {
         for Heard { stream, message } in heard {
             let Some(line) = self.lines.of_stream_mut(stream) else { continue };
             let (wire, topic) = (line.wire, line.topic);
-            let value = line.take(message).map_err(|mismatch| TransportError::WrongType {
+            let value = line.take(message, relay.next_index(wire)).map_err(|mismatch| TransportError::WrongType {
                 path: relay.wires().path(wire).to_owned(),
                 reason: format!("{mismatch}; topic `{}` declares it", plan.topic(topic).name),
             })?;

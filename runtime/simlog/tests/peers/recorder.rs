@@ -69,10 +69,14 @@ impl Exchange for Recorder {
         let path = self.wires.path(wire).to_owned();
         let count = self.counts.entry(wire).or_default();
         if let Some(value) = (self.change)(&path, value.clone()) {
-            deliveries.push(Delivery { wire, index: *count, value });
+            deliveries.push(Delivery { wire, index: *count, by_monitor: false, value });
         }
         *count += 1;
         self.published.entry(path).or_default().push((now, value));
+    }
+
+    fn next_index(&self, wire: Wire) -> u64 {
+        self.counts.get(&wire).copied().unwrap_or_default()
     }
 
     fn parameters(&self) -> &[(String, f64)] {

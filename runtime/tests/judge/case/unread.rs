@@ -90,7 +90,7 @@ impl Case {
 fn move_topics(source: &mut MetricSource, to: &impl Fn(TopicId) -> TopicId) {
     let one = |field: &mut FieldRef| field.topic = to(field.topic);
     match source {
-        MetricSource::FuzzingTime => {}
+        MetricSource::FuzzingTime | MetricSource::Monitor { .. } => {}
         MetricSource::Hook { topics } => topics.iter_mut().for_each(|topic| *topic = to(*topic)),
         MetricSource::Last { input } => one(input),
         MetricSource::Robustness { robustness } => robustness.inputs.iter_mut().for_each(|it| one(&mut it.field)),

@@ -8,12 +8,21 @@ use crate::span::Span;
 #[derive(Debug)]
 pub(crate) struct Eddi {
     pub(crate) head: Head,
-    pub(crate) publishes: Name,
+    pub(crate) state: State,
     pub(crate) demands: Vec<Demand>,
     pub(crate) evidence: Vec<Evidence>,
     pub(crate) guarantees: Vec<Guarantee>,
     pub(crate) otherwise: Vec<(Span, Otherwise)>,
     pub(crate) has_errors: bool,
+}
+
+/// Where its state is.
+#[derive(Debug)]
+pub(crate) enum State {
+    /// The runner decides it, and publishes it on this topic.
+    Published(Name),
+    /// The system decides it. The span is that of `external`; a topic may say it.
+    External(Span, Option<Path>),
 }
 
 #[derive(Debug)]
@@ -29,13 +38,16 @@ pub(crate) struct Evidence {
     pub(crate) held: Vec<(Span, Quantity)>,
     /// When it is stale, and whether it is unknown then; false otherwise.
     pub(crate) stale: Vec<(Span, (Quantity, bool))>,
+    /// Whether it hears messages before operations.
+    pub(crate) inbound: Vec<Span>,
 }
 
 #[derive(Debug)]
 pub(crate) struct Guarantee {
     pub(crate) head: Head,
     pub(crate) integrity: Count,
-    pub(crate) gate: Expression,
+    /// None of a monitor whose state a topic says.
+    pub(crate) gate: Option<Expression>,
 }
 
 #[derive(Debug)]

@@ -1,6 +1,6 @@
 //! Formulas of metrics, and the conditions that switch operations.
 
-use super::words::{Comparison, Name, Path, Point, Quantity, Range, Text};
+use super::words::{Comparison, Count, Name, Path, Point, Quantity, Range, Text};
 use crate::span::Span;
 
 /// What a declarative metric is computed from, with its clauses as written.
@@ -13,6 +13,8 @@ pub(crate) struct Formula {
     pub(crate) outbound: Vec<Span>,
     /// `whole windows`.
     pub(crate) whole: Vec<Span>,
+    /// How long after the beginning of an alarm a hazard counts.
+    pub(crate) within: Vec<(Span, Quantity)>,
 }
 
 #[derive(Debug)]
@@ -54,6 +56,8 @@ pub(crate) enum ExpressionKind {
     Until(Box<Expression>, Until, Box<Expression>),
     All(Vec<Expression>),
     Any(Vec<Expression>),
+    /// `2 of (…)`.
+    AtLeast(Count, Vec<Expression>),
     Implies(Box<Expression>, Box<Expression>),
     Call(Name, Vec<Expression>),
 }

@@ -37,7 +37,7 @@ impl Reader<'_> {
             let span = reader.keyword_span(&member);
             match member.as_rule() {
                 Rule::objectives => campaign.objectives.push((span, reader.names(&member))),
-                Rule::observes => campaign.observes.push((span, reader.names(&member))),
+                Rule::observes => campaign.observes.push((span, reader.metric_names(&member))),
                 Rule::operations => {
                     let count = expect_child(&member, Rule::count);
                     let counts: Vec<Count> =
@@ -150,7 +150,7 @@ impl Reader<'_> {
             times: vec![],
         };
         for variable in children(pair, Rule::condition_variable) {
-            found.variables.push(self.name(&expect_child(&variable, Rule::name)));
+            found.variables.push(self.metric_name(&expect_child(&variable, Rule::metric_name)));
             found.ranges.push(child(&variable, Rule::range).map(|range| self.range(&range)));
         }
         if let Some(settings) = child(pair, Rule::condition_settings) {

@@ -3,14 +3,20 @@
 use sesame_grammar::Rule;
 
 use super::reader::{Pair, Reader, child, children, expect_child};
-use crate::syntax::ast::eddi::{Demand, Eddi, Evidence, Guarantee, Mitigation, Otherwise};
+use crate::syntax::ast::eddi::{Demand, Eddi, Evidence, Guarantee, Mitigation, Otherwise, State};
 
 impl Reader<'_> {
     pub(super) fn eddi(&mut self, pair: &Pair<'_>) -> Eddi {
-        let publishes = children(pair, Rule::name).nth(1).expect("a monitor names what it publishes");
+        let state = if let Some(published) = child(pair, Rule::state_topic) {
+            State::Published(self.name(&expect_child(&published, Rule::name)))
+        } else {
+            let external = expect_child(pair, Rule::external);
+            let on = child(&external, Rule::path).map(|path| self.path(&path));
+            State::External(self.keyword_span(&external), on)
+        };
         let mut eddi = Eddi {
             head: self.head(pair),
-            publishes: self.name(&publishes),
+            state,
             demands: vec![],
             evidence: vec![],
             guarantees: vec![],
@@ -29,7 +35,7 @@ impl Reader<'_> {
             Rule::guarantee => eddi.guarantees.push(Guarantee {
                 head: reader.head(&member),
                 integrity: reader.count(&expect_child(&member, Rule::number)),
-                gate: reader.expression(&expect_child(&member, Rule::expression)),
+                gate: child(&member, Rule::expression).map(|gate| reader.expression(&gate)),
             }),
             _ => {
                 let otherwise = reader.otherwise(&member);
@@ -49,7 +55,8 @@ impl Reader<'_> {
         });
         let stale = stale.collect();
         let condition = self.expression(&expect_child(pair, Rule::expression));
-        Evidence { head: self.head(pair), condition, held, stale }
+        let inbound = children(pair, Rule::inbound).map(|inbound| self.span(&inbound)).collect();
+        Evidence { head: self.head(pair), condition, held, stale, inbound }
     }
 
     fn otherwise(&mut self, pair: &Pair<'_>) -> Otherwise {

@@ -30,7 +30,10 @@ impl Reader<'_> {
             .collect();
         let outbound = children(pair, Rule::formula_outbound).map(|outbound| self.span(&outbound)).collect();
         let whole = children(pair, Rule::formula_whole).map(|whole| self.span(&whole)).collect();
-        Formula { kind, when, every, per, outbound, whole }
+        let within = children(pair, Rule::formula_within)
+            .map(|within| (self.keyword_span(&within), self.signed(&expect_child(&within, Rule::signed))))
+            .collect();
+        Formula { kind, when, every, per, outbound, whole, within }
     }
 
     pub(super) fn expression(&mut self, pair: &Pair<'_>) -> Expression {
@@ -153,6 +156,11 @@ impl Reader<'_> {
             .expect("a factor has an operand");
         let kind = match operand.as_rule() {
             Rule::quantity => ExpressionKind::Number(self.quantity(&operand)),
+            Rule::some_of => {
+                let count = self.count(&expect_child(&operand, Rule::number));
+                let parts = children(&operand, Rule::expression).map(|part| self.expression(&part)).collect();
+                ExpressionKind::AtLeast(count, parts)
+            }
             Rule::truth => ExpressionKind::Truth(child(&operand, Rule::k_true).is_some()),
             Rule::text => ExpressionKind::Text(self.any_text(&operand)),
             Rule::point => ExpressionKind::Point(Box::new(self.point(&operand))),

@@ -46,11 +46,10 @@ impl Reader<'_> {
     }
 
     pub(super) fn requirement(&mut self, pair: &Pair<'_>) -> Requirement {
-        let metric = children(pair, Rule::name).nth(1).expect("a requirement names its metric");
         Requirement {
             head: self.head(pair),
             text: self.text_of(&expect_child(pair, Rule::text)),
-            metric: self.name(&metric),
+            metric: self.metric_name(&expect_child(pair, Rule::metric_name)),
             bound: self.bound(&expect_child(pair, Rule::bound)),
         }
     }

@@ -245,7 +245,7 @@ impl Reader<'_> {
         let mut found = Vec::new();
         for item in pair.clone().into_inner() {
             match item.as_rule() {
-                Rule::name => found.push(Contained::Variable(self.name(&item))),
+                Rule::metric_name => found.push(Contained::Variable(self.metric_name(&item))),
                 Rule::contained_integer => {
                     let range = self.range(&expect_child(&item, Rule::range));
                     found.push(Contained::Integer(self.span(&item), range));

@@ -14,7 +14,7 @@ impl Reader<'_> {
             Test { head, operations: vec![], expectations: vec![], simulator_seeds: vec![], has_errors: false };
         test.has_errors = self.members(pair, |reader, member| match member.as_rule() {
             Rule::expectation => test.expectations.push(Expectation {
-                metric: reader.name(&expect_child(&member, Rule::name)),
+                metric: reader.metric_name(&expect_child(&member, Rule::metric_name)),
                 bound: reader.bound(&expect_child(&member, Rule::bound)),
             }),
             Rule::simulator_seed => {

@@ -31,6 +31,16 @@ impl Reader<'_> {
         children(&names, Rule::name).map(|name| self.name(&name)).collect()
     }
 
+    pub(super) fn metric_names(&mut self, pair: &Pair<'_>) -> Vec<Name> {
+        let names = expect_child(pair, Rule::metric_names);
+        children(&names, Rule::metric_name).map(|name| self.metric_name(&name)).collect()
+    }
+
+    /// The name of a metric, or that of a part of a monitor, with the monitor's before a dot.
+    pub(super) fn metric_name(&mut self, pair: &Pair<'_>) -> Name {
+        self.name(pair)
+    }
+
     pub(super) fn name(&mut self, pair: &Pair<'_>) -> Name {
         let name = Name { text: pair.as_str().to_owned(), span: self.span(pair) };
         let starts = name.text.starts_with(|first: char| first.is_ascii_alphabetic());

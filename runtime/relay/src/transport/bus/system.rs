@@ -44,8 +44,7 @@ pub(super) struct System {
     /// What the clock showed last, in this run or before it.
     shown: Option<i64>,
     deliveries: Vec<Delivery>,
-    /// How many messages each wire was given in this run, and to which calls some of them belong.
-    counts: BTreeMap<Wire, u64>,
+    /// To which calls messages of this run belong, by their wires and numbers.
     calls: BTreeMap<(Wire, u64), u64>,
     incidents: Incidents,
     added: Added,
@@ -99,7 +98,6 @@ impl System {
             ticked: Instant::now(),
             shown: None,
             deliveries: Vec::new(),
-            counts: BTreeMap::new(),
             calls: BTreeMap::new(),
             incidents: Incidents::default(),
             added: Added::default(),
@@ -130,7 +128,6 @@ impl System {
             self.assemble()?;
         }
         self.bus.reset(SILENCE)?;
-        self.counts.clear();
         self.calls.clear();
         self.said.clear();
         for (at, line) in self.lines.iter().enumerate() {
@@ -329,20 +326,18 @@ impl System {
         relay: &mut dyn Exchange,
     ) {
         let (wire, publisher) = (self.lines[line].wire, self.lines[line].sources[source].publisher);
-        let index = self.counts.entry(wire).or_insert(0);
         if let Some(call) = call {
-            self.calls.insert((wire, *index), call);
+            self.calls.insert((wire, relay.next_index(wire)), call);
             if self.calls.len() > CALLS {
                 self.calls.pop_first();
             }
         }
-        *index += 1;
         relay.message_from(self.now, wire, publisher, value, &mut self.deliveries);
     }
 
     /// Publishes what is delivered; what was only listened to stays where it is.
     fn deliver(&mut self) -> Result<(), TransportError> {
-        for Delivery { wire, index, value } in self.deliveries.drain(..) {
+        for Delivery { wire, index, value, .. } in self.deliveries.drain(..) {
             let Some(&(line, sink)) = self.sinks.get(&wire) else { continue };
             let call = self.calls.get(&(self.lines[line].wire, index)).copied();
             self.bus.publish(line, sink, &value, call)?;

@@ -218,7 +218,7 @@ impl Connection {
             ready.takes(relay.parameters())?;
             self.resets = ready.resets;
             self.clock = if ready.clock { Clock::Simulator } else { Clock::Wall(Instant::now()) };
-            self.topics.open(&ready, relay)?;
+            self.topics.open(plan, &ready, relay)?;
             self.topics.publish(plan, SimTime::ZERO, &ready.messages, relay, &self.line)?;
             break;
         }

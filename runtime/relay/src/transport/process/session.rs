@@ -146,7 +146,7 @@ impl<R: BufRead, W: Write> Session<R, W> {
         ready.takes(relay.parameters())?;
         self.resets = ready.resets;
         self.ready = true;
-        self.topics.open(&ready, relay)?;
+        self.topics.open(plan, &ready, relay)?;
         self.topics.publish(plan, SimTime::ZERO, &ready.messages, relay, self.lines.line())?;
         Ok(())
     }
@@ -203,9 +203,14 @@ impl Topics {
         *self = Topics { shapes: mem::take(&mut self.shapes), passed, ..Topics::default() };
     }
 
-    /// Takes the simulator's topics; all topics of the space must be among them. Tells the relay which have
-    /// subscribers.
-    pub(super) fn open(&mut self, ready: &Ready<'_>, relay: &mut dyn Exchange) -> Result<(), TransportError> {
+    /// Takes the simulator's topics; all topics of the space must be among them, but for states of monitors. Tells the
+    /// relay which have subscribers.
+    pub(super) fn open(
+        &mut self,
+        plan: &CampaignPlan,
+        ready: &Ready<'_>,
+        relay: &mut dyn Exchange,
+    ) -> Result<(), TransportError> {
         let wires = relay.wires();
         for path in ready.publishes.iter().chain(&ready.subscribes) {
             let topic = Topic { wire: wires.find(path), publishes: false, subscribes: false };
@@ -221,7 +226,9 @@ impl Topics {
                 self.subscribed[wire.index()] = true;
             }
         }
-        if let Some(missing) = wires.iter().find(|&wire| !self.by_path.contains_key(wires.path(wire))) {
+        let is_needed = |&wire: &Wire| !plan.is_state_of_monitor(wires.topic(wire));
+        let mut needed = wires.iter().filter(is_needed);
+        if let Some(missing) = needed.find(|&wire| !self.by_path.contains_key(wires.path(wire))) {
             return Err(unknown_topic(wires.path(missing), self.by_path.keys()));
         }
         for wire in wires.iter().filter(|wire| self.subscribed[wire.index()]) {
@@ -268,16 +275,17 @@ impl Topics {
     /// Puts the relay's deliveries to subscribers into the outbox. A message that no operation intercepts is passed on
     /// byte for byte.
     pub(super) fn deliver(&mut self, relay: &dyn Exchange, published: Option<(Wire, &RawValue)>) {
-        for Delivery { wire, value, .. } in self.deliveries.drain(..) {
+        for Delivery { wire, by_monitor, value, .. } in self.deliveries.drain(..) {
             if !self.subscribed.get(wire.index()).copied().unwrap_or(false) {
                 continue;
             }
             if let (Some(passed), Some((from, _))) = (&mut self.passed, published)
                 && from == wire
+                && !by_monitor
             {
                 passed.push(wire);
             }
-            let untouched = published.filter(|&(from, _)| from == wire && !relay.intercepts(wire));
+            let untouched = published.filter(|&(from, _)| from == wire && !by_monitor && !relay.intercepts(wire));
             request::message(&mut self.outbox, relay.wires().path(wire), |out| match untouched {
                 Some((_, raw)) => out.extend_from_slice(raw.get().as_bytes()),
                 None => json::encode(&value, out),

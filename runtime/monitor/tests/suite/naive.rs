@@ -1,0 +1,118 @@
+//! What monitors decide, computed anew from the whole history after each event, without any state.
+
+use sesame_monitor::{State, Truth};
+use sesame_plan::{Gate, Monitor, MonitorId, StaleIs};
+
+use crate::random::Message;
+
+/// A decision: when, and for what.
+pub(crate) type Step = (i64, State);
+
+/// Truth as a number: 0, 1/2 and 1.
+fn number(truth: Truth) -> f64 {
+    match truth {
+        Truth::False => 0.0,
+        Truth::Unknown => 0.5,
+        Truth::True => 1.0,
+    }
+}
+
+fn nanos(seconds: f64) -> i64 {
+    (seconds * 1e9).round() as i64
+}
+
+/// A moment: what was heard until then, and the time.
+pub(crate) struct Moment<'a> {
+    pub(crate) monitors: &'a [Monitor],
+    pub(crate) heard: &'a [Message],
+    pub(crate) now: i64,
+}
+
+impl Moment<'_> {
+    pub(crate) fn evidence(&self, monitor: MonitorId, at: u32) -> Truth {
+        let evidence = &self.monitors[monitor.index()].evidence[at as usize];
+        let messages: Vec<(i64, Truth)> = self
+            .heard
+            .iter()
+            .flat_map(|message| message.heard.iter().map(|heard| (message.at, heard)))
+            .filter(|(_, heard)| (heard.0, heard.1) == (monitor, at))
+            .map(|(when, heard)| (when, heard.2))
+            .collect();
+        let Some(&(last, raw)) = messages.last() else { return Truth::Unknown };
+        let longest = evidence.stale.map_or(i64::MAX, |stale| nanos(stale.after));
+        if self.now - last > longest {
+            return if evidence.stale.unwrap().is == StaleIs::False { Truth::False } else { Truth::Unknown };
+        }
+        if raw != Truth::True {
+            return raw;
+        }
+        let mut since = last;
+        for &(at, raw) in messages.iter().rev() {
+            if raw != Truth::True || since - at > longest {
+                break;
+            }
+            since = at;
+        }
+        Truth::from(self.now - since >= nanos(evidence.held))
+    }
+
+    /// As a number.
+    fn gate(&self, monitor: MonitorId, gate: &Gate) -> f64 {
+        let all = |of: &[Gate]| of.iter().map(|part| self.gate(monitor, part)).collect::<Vec<f64>>();
+        match gate {
+            Gate::Evidence(at) => number(self.evidence(monitor, *at)),
+            Gate::Demand(at) => {
+                let demand = &self.monitors[monitor.index()].demands[*at as usize];
+                let enough = match self.state(demand.monitor) {
+                    State::Guarantee(at) => at <= demand.guarantee,
+                    State::Safe => false,
+                };
+                let own =
+                    |at: usize| self.gate(demand.monitor, &self.monitors[demand.monitor.index()].guarantees[at].gate);
+                if enough { 1.0 } else { (0..=demand.guarantee as usize).map(own).fold(0.0, f64::max) }
+            }
+            Gate::All(of) => all(of).into_iter().fold(1.0, f64::min),
+            Gate::Any(of) => all(of).into_iter().fold(0.0, f64::max),
+            Gate::AtLeast { count, of } => {
+                let mut values = all(of);
+                values.sort_by(f64::total_cmp);
+                values[values.len() - *count as usize]
+            }
+        }
+    }
+
+    pub(crate) fn guarantee(&self, monitor: MonitorId, at: u32) -> Truth {
+        let value = self.gate(monitor, &self.monitors[monitor.index()].guarantees[at as usize].gate);
+        [Truth::False, Truth::Unknown, Truth::True][(value * 2.0) as usize]
+    }
+
+    pub(crate) fn state(&self, monitor: MonitorId) -> State {
+        let guarantees = self.monitors[monitor.index()].guarantees.len() as u32;
+        (0..guarantees).find(|&at| self.guarantee(monitor, at).holds()).map_or(State::Safe, State::Guarantee)
+    }
+}
+
+/// The moments after each event until the end: each instant before its messages, and after each of them.
+pub(crate) fn moments<'a>(monitors: &'a [Monitor], messages: &'a [Message], end: i64) -> Vec<Moment<'a>> {
+    let mut moments = Vec::new();
+    for now in 0..=end {
+        let before = messages.iter().filter(|message| message.at < now).count();
+        let after = messages.iter().filter(|message| message.at <= now).count();
+        moments.extend((before..=after).map(|count| Moment { monitors, heard: &messages[..count], now }));
+    }
+    moments
+}
+
+/// The decisions of each monitor.
+pub(crate) fn decisions(monitors: &[Monitor], messages: &[Message], end: i64) -> Vec<Vec<Step>> {
+    let mut decisions = vec![vec![(0, State::Safe)]; monitors.len()];
+    for moment in moments(monitors, messages, end) {
+        for (id, steps) in (0..).zip(&mut decisions) {
+            let state = moment.state(MonitorId(id));
+            if steps.last().unwrap().1 != state {
+                steps.push((moment.now, state));
+            }
+        }
+    }
+    decisions
+}

@@ -1,0 +1,136 @@
+//! Tolerances compared with all delays.
+
+use std::sync::Arc;
+
+use proptest::prelude::*;
+use sesame_base::time::SimTime;
+use sesame_monitor::compare::{Step, steps};
+use sesame_monitor::tolerance::{Limit, Message, Recording, tolerance, tolerances};
+use sesame_monitor::{Changes, EvidenceId, Network, Run, State, Truth};
+use sesame_plan::{Gate, Monitor, MonitorId};
+
+use crate::random::{self, END};
+
+const T: fn(i64) -> SimTime = SimTime::from_nanos;
+
+/// A condition made from numbers: of what is the latest in each stream, and which of them was heard.
+fn truth(values: &[u8], evidence: EvidenceId, heard: usize, latest: &[Option<usize>]) -> Truth {
+    if latest.contains(&None) {
+        return Truth::Unknown;
+    }
+    let sum: usize = latest.iter().flatten().map(|&at| values[at] as usize).sum();
+    match (sum + evidence.index() + values[heard] as usize / 4) % 5 {
+        0 | 1 => Truth::False,
+        2 => Truth::Unknown,
+        _ => Truth::True,
+    }
+}
+
+/// The decisions of one monitor in the delayed recording, by a run of it.
+fn delayed(
+    network: &Arc<Network>,
+    recording: &Recording,
+    values: &[u8],
+    streams: &[u32],
+    delay: i64,
+) -> Vec<Vec<Step<State>>> {
+    let mut messages: Vec<(i64, usize)> = recording
+        .messages
+        .iter()
+        .enumerate()
+        .map(|(at, message)| {
+            let by = if streams.contains(&message.stream) { delay } else { 0 };
+            (message.at.nanos() + by, at)
+        })
+        .collect();
+    messages.sort_unstable();
+    let mut latest: Vec<Option<usize>> = vec![None; 8];
+    let mut changes = Changes::default();
+    let mut run = Run::start(Arc::clone(network), &mut changes);
+    for (at, message) in messages.into_iter().filter(|(at, _)| *at <= recording.end.nanos()) {
+        let stream = recording.messages[message].stream;
+        latest[stream as usize] = Some(message);
+        let heard = (0..).map(EvidenceId).zip(&recording.streams).filter(|(_, streams)| streams.contains(&stream));
+        let heard: Vec<_> = heard
+            .map(|(evidence, streams)| {
+                let latest: Vec<_> = streams.iter().map(|&stream| latest[stream as usize]).collect();
+                (evidence, truth(values, evidence, message, &latest))
+            })
+            .collect();
+        run.observe(T(at), &heard, &mut changes);
+    }
+    run.advance(recording.end, &mut changes);
+    network.order().iter().map(|&monitor| steps(&changes.decisions, monitor)).collect()
+}
+
+fn is_kept(recorded: &[Step<State>], found: &[Step<State>], delay: i64, end: i64) -> bool {
+    let missing = recorded.iter().skip(found.len()).all(|step| step.at.nanos() + delay > end);
+    let same =
+        recorded.iter().zip(found).all(|(a, b)| a.state == b.state && (a.at.nanos() - b.at.nanos()).abs() <= delay);
+    missing && same && found.len() <= recorded.len()
+}
+
+prop_compose! {
+    /// Monitors, and a recording with a number for each message.
+    fn any_recording()(monitors in random::any_monitors())(
+        streams in prop::collection::vec(
+            prop::sample::subsequence(vec![0_u32, 1, 2, 3], 1..=2),
+            monitors.iter().map(|monitor| monitor.evidence.len()).sum::<usize>(),
+        ),
+        mut messages in prop::collection::vec((0..=END, 0..4_u32, 0..16_u8), 0..16),
+        monitors in Just(monitors),
+    ) -> (Vec<Monitor>, Recording, Vec<u8>) {
+        messages.sort_by_key(|message| message.0);
+        let values = messages.iter().map(|message| message.2).collect();
+        let messages = messages.into_iter().map(|(at, stream, _)| Message { at: T(at), stream }).collect();
+        (monitors, Recording { messages, streams, end: T(END) }, values)
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(1500))]
+
+    #[test]
+    fn a_tolerance_is_the_largest_delay_below_which_all_keep_the_decisions(
+        (monitors, recording, values) in any_recording(),
+        streams in prop::sample::subsequence(vec![0_u32, 1, 2, 3], 1..=3),
+    ) {
+        let network = Arc::new(Network::new(&monitors).unwrap());
+        let mut conditions = |evidence, heard, latest: &[Option<usize>]| truth(&values, evidence, heard, latest);
+        let found = tolerance(&network, &recording, &mut conditions, &streams, network.order());
+        let recorded = delayed(&network, &recording, &values, &streams, 0);
+        let first_broken = (1..=END + 8).find(|&delay| {
+            let found = delayed(&network, &recording, &values, &streams, delay);
+            !recorded.iter().zip(&found).all(|(recorded, found)| is_kept(recorded, found, delay, END))
+        });
+        let Some(broken) = first_broken else {
+            prop_assert_eq!((found.delay, found.limit), (SimTime::MAX, Limit::None));
+            return Ok(());
+        };
+        prop_assert_eq!(found.delay, T(broken - 1));
+        let Limit::Decision(limit) = found.limit else { panic!("{found:?}") };
+        let rank = network.order().iter().position(|&monitor| monitor == limit.monitor).unwrap();
+        let changed = &delayed(&network, &recording, &values, &streams, broken)[rank];
+        prop_assert!(!is_kept(&recorded[rank], changed, broken, END));
+        prop_assert_eq!(limit.recorded, recorded[rank].get(limit.position).copied());
+        prop_assert_eq!(limit.delayed, changed.get(limit.position).copied());
+    }
+}
+
+#[test]
+fn a_pulse_that_comes_too_late_is_found() {
+    let mut monitor = random::monitor(random::plain(2), vec![Gate::All(vec![Gate::Evidence(0), Gate::Evidence(1)])]);
+    monitor.name = "both".into();
+    let network = Network::new(&[monitor]).unwrap();
+    let at = [(0, 1), (100, 0), (150, 0), (200, 1)];
+    let messages = at.iter().map(|&(at, stream)| Message { at: T(at), stream }).collect();
+    let recording = Recording { messages, streams: vec![vec![0], vec![1]], end: T(1000) };
+    // The first is true from 100 to 150, the second from 0 to 200.
+    let mut conditions = |_, heard: usize, _: &[Option<usize>]| Truth::from(heard < 2);
+    let (each, least) = tolerances(&network, &recording, &mut conditions, &[MonitorId(0)]);
+    assert_eq!(each[0].delay, T(100), "the first begins as the second ends, and was recorded before it");
+    assert_eq!(each[1].delay, T(150), "the second begins as the first ends");
+    assert_eq!(least.unwrap(), each[0]);
+    let Limit::Decision(broken) = each[0].limit else { panic!("{each:?}") };
+    assert_eq!((broken.position, broken.recorded.unwrap().at), (1, T(100)));
+}

@@ -1,0 +1,276 @@
+//! Runtime monitors in a run: they hear messages, decide, and say what is to be published.
+//!
+//! A monitor is a subscriber. Its evidence is evaluated at each message of one of its topics: as delivered, or as
+//! published where the space says `inbound`. A message that is delivered at once is one event for both.
+//!
+//! Nothing is published here: whoever runs the monitors takes what is to be published and passes it on, as messages of
+//! the same instant. A recording that is fed to metrics takes nothing, because what was published is in it.
+
+mod evidence;
+mod outlet;
+mod record;
+mod scores;
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use sesame_base::observation::{ChangeCause, MetricObservation, MonitorObservation};
+use sesame_base::time::SimTime;
+use sesame_monitor::{Changes, EvidenceId, Network, Run, Truth};
+use sesame_plan::{CampaignPlan, MetricId, Side, TopicId};
+
+use crate::metric::Metrics;
+use crate::value::Value;
+use crate::wire::{Wire, WireTable};
+
+use evidence::EvidenceState;
+use outlet::Outlets;
+use record::Record;
+use scores::Scores;
+
+/// The monitors of one run.
+pub(crate) struct Monitors<'p> {
+    plan: &'p CampaignPlan,
+    wires: &'p WireTable,
+    /// Per wire: its topic, and its position among the topic's paths.
+    members: Vec<(TopicId, usize)>,
+    run: Run,
+    listeners: Listeners,
+    evidence: Vec<EvidenceState<'p>>,
+    /// What evidence heard in the event at hand, each at most once, and of which message.
+    heard: Vec<(EvidenceId, Truth)>,
+    message: Option<(Wire, u64)>,
+    /// Kept to be used again.
+    changes: Changes,
+    /// When evidence changes next if nothing is heard until then.
+    due: Option<SimTime>,
+    outlets: Outlets<'p>,
+    /// What is to be published.
+    outbox: VecDeque<(Wire, Value)>,
+    record: Record,
+    scores: Scores<'p>,
+    /// The first problem with a message.
+    problem: Option<String>,
+}
+
+/// Per wire: the evidence that hears its messages.
+struct Listeners {
+    published: Vec<Vec<EvidenceId>>,
+    delivered: Vec<Vec<EvidenceId>>,
+}
+
+impl Listeners {
+    fn new(plan: &CampaignPlan, wires: &WireTable, network: &Network) -> Self {
+        let mut listeners =
+            Listeners { published: vec![Vec::new(); wires.len()], delivered: vec![Vec::new(); wires.len()] };
+        for position in (0..).take(network.evidence_count()) {
+            let id = EvidenceId(position);
+            let (monitor, at) = network.owner(id);
+            let evidence = &plan.monitor(monitor).evidence[at as usize];
+            let of = match evidence.side {
+                Side::Inbound => &mut listeners.published,
+                Side::Outbound => &mut listeners.delivered,
+            };
+            let reads = |topic| evidence.inputs.iter().any(|input| input.field.topic == topic);
+            for wire in wires.iter().filter(|&wire| reads(wires.topic(wire))) {
+                of[wire.index()].push(id);
+            }
+        }
+        listeners
+    }
+}
+
+impl<'p> Monitors<'p> {
+    /// Those of the plan of these metrics, at time zero; `None` for a plan without monitors.
+    pub(crate) fn new(metrics: &Metrics<'p>, wires: &'p WireTable) -> Option<Self> {
+        let (plan, network) = (metrics.plan(), metrics.network()?);
+        let mut counts = vec![0; plan.topics.len()];
+        let members = wires.iter().map(|wire| {
+            let topic = wires.topic(wire);
+            counts[topic.index()] += 1;
+            (topic, counts[topic.index()] - 1)
+        });
+        let members = members.collect();
+        let all = (0..).take(network.evidence_count()).map(|at| network.owner(EvidenceId(at)));
+        let evidence = all.map(|(monitor, at)| &plan.monitor(monitor).evidence[at as usize]);
+        let evidence = evidence.map(|evidence| EvidenceState::new(evidence, plan)).collect();
+        let listeners = Listeners::new(plan, wires, network);
+        let mut changes = Changes::default();
+        let run = Run::start(Arc::clone(network), &mut changes);
+        let mut monitors = Monitors {
+            plan,
+            wires,
+            members,
+            run,
+            listeners,
+            evidence,
+            heard: Vec::new(),
+            message: None,
+            changes,
+            due: None,
+            outlets: Outlets::new(plan, wires),
+            outbox: VecDeque::new(),
+            record: Record::new(plan),
+            scores: Scores::new(plan),
+            problem: None,
+        };
+        monitors.take_changes(None);
+        Some(monitors)
+    }
+
+    /// Whether evidence hears this wire's messages as they are delivered.
+    pub(crate) fn hears_delivered(&self, wire: Wire) -> bool {
+        !self.listeners.delivered[wire.index()].is_empty()
+    }
+
+    /// A message, as it was published or as it is delivered. Nothing is decided before [`Monitors::decide`], or the next
+    /// message.
+    pub(crate) fn hear(&mut self, now: SimTime, side: Side, wire: Wire, index: u64, value: &Value) {
+        if side == Side::Outbound {
+            self.outlets.remember(wire, value);
+        }
+        let listeners = match side {
+            Side::Inbound => &self.listeners.published[wire.index()],
+            Side::Outbound => &self.listeners.delivered[wire.index()],
+        };
+        if listeners.is_empty() {
+            return;
+        }
+        let listeners = listeners.clone();
+        let again = |id: &EvidenceId| self.heard.iter().any(|(heard, _)| heard == id);
+        if self.message.is_some_and(|message| message != (wire, index)) || listeners.iter().any(again) {
+            self.decide(now);
+        }
+        self.message = Some((wire, index));
+        let (topic, member) = self.members[wire.index()];
+        for id in listeners {
+            match self.evidence[id.index()].message(topic, member, now, value) {
+                Ok(truth) => self.heard.push((id, truth)),
+                Err(lacking) => self.note(id, wire, &lacking),
+            }
+        }
+    }
+
+    fn note(&mut self, id: EvidenceId, wire: Wire, lacking: &str) {
+        let (monitor, at) = self.run.network().owner(id);
+        let monitor = self.plan.monitor(monitor);
+        let evidence = &monitor.evidence[at as usize].name;
+        let path = self.wires.path(wire);
+        self.problem.get_or_insert_with(|| {
+            format!("monitor `{}`: a message on `{path}` has no value `{lacking}` for `{evidence}`", monitor.name)
+        });
+    }
+
+    /// Ends an event: monitors decide on what was heard in it.
+    pub(crate) fn decide(&mut self, now: SimTime) {
+        let Some((wire, index)) = self.message.take() else { return };
+        self.run.observe(now, &self.heard, &mut self.changes);
+        self.heard.clear();
+        self.take_changes(Some((wire, index)));
+    }
+
+    /// Time passes: what is due until this instant, and at it, happens.
+    pub(crate) fn advance(&mut self, now: SimTime) {
+        if self.due.is_none_or(|due| due > now) {
+            return;
+        }
+        self.run.advance(now, &mut self.changes);
+        self.take_changes(None);
+    }
+
+    /// When something happens next even without a message.
+    pub(crate) fn next_due(&self) -> Option<SimTime> {
+        self.due.into_iter().chain(self.scores.next_due()).min()
+    }
+
+    /// Records what has changed, and queues what is to be published.
+    fn take_changes(&mut self, message: Option<(Wire, u64)>) {
+        let mut changes = std::mem::take(&mut self.changes);
+        for change in &changes.evidence {
+            let cause = match message {
+                Some((wire, index)) => ChangeCause::Message { topic: self.wires.path(wire).to_owned(), index },
+                None if change.truth == Truth::True => ChangeCause::Held,
+                None => ChangeCause::Stale,
+            };
+            self.record.change(self.run.network(), change, cause);
+        }
+        for decision in &changes.decisions {
+            self.record.decision(decision);
+            self.scores.decided(decision);
+            self.outlets.publish(self.plan, decision, &mut self.outbox);
+        }
+        if !changes.evidence.is_empty() || !changes.decisions.is_empty() {
+            self.scores.changed();
+        }
+        changes.clear();
+        self.changes = changes;
+        self.due = self.run.due();
+    }
+
+    /// The next message that is to be published.
+    pub(crate) fn publication(&mut self) -> Option<(Wire, Value)> {
+        self.outbox.pop_front()
+    }
+
+    /// Whether there is something to publish.
+    pub(crate) fn has_publication(&self) -> bool {
+        !self.outbox.is_empty()
+    }
+
+    /// Nothing more is to be published: returns how many messages are given up.
+    pub(crate) fn give_up(&mut self) -> usize {
+        std::mem::take(&mut self.outbox).len()
+    }
+
+    /// Sets the metrics that are scores to what they are now, if something has changed.
+    pub(crate) fn show(&mut self, now: SimTime, metrics: &mut Metrics<'_>) {
+        self.scores.show(now, &self.run, metrics);
+    }
+
+    /// Sets what grows while time passes.
+    pub(crate) fn tick(&mut self, now: SimTime, metrics: &mut Metrics<'_>) {
+        self.scores.tick(now, metrics);
+    }
+
+    /// Whether a score of time in a state grows now.
+    pub(crate) fn grows(&self, metric: MetricId) -> bool {
+        self.scores.grows(metric)
+    }
+
+    /// Whether a requirement is violated at this moment and was not before. That is a hazard if it is so at the end of
+    /// the instant.
+    pub(crate) fn sees_hazard(&self, metrics: &Metrics<'_>, fuzzing_time: SimTime) -> bool {
+        self.scores.sees_hazard(metrics, fuzzing_time)
+    }
+
+    /// The instant is over. Returns whether there was a hazard in it.
+    pub(crate) fn end_instant(&mut self, now: SimTime, metrics: &mut Metrics<'_>, fuzzing_time: SimTime) -> bool {
+        self.scores.end_instant(now, &self.run, metrics, fuzzing_time)
+    }
+
+    /// The run has come to its end, and metrics have their last values.
+    pub(crate) fn end(&mut self, now: SimTime, metrics: &mut Metrics<'_>, fuzzing_time: SimTime) {
+        self.decide(now);
+        self.advance(now);
+        self.scores.end(now, &self.run, metrics, fuzzing_time);
+    }
+
+    /// The run broke off: scores are what they are now, unless it had come to its end.
+    pub(crate) fn break_off(&mut self, now: SimTime, metrics: &mut Metrics<'_>) {
+        self.scores.break_off(now, &self.run, metrics);
+    }
+
+    /// What the monitors did, and warnings for the user. Scores of requirements whose violation is known only when all
+    /// is over are put in their place among the metrics.
+    pub(crate) fn finish(
+        self,
+        end: SimTime,
+        metrics: &mut [MetricObservation],
+        whole: bool,
+    ) -> (Vec<MonitorObservation>, Vec<String>) {
+        self.scores.finish(end, metrics, whole);
+        let mut warnings: Vec<String> = self.problem.into_iter().collect();
+        let monitors = self.record.finish(&mut warnings);
+        (monitors, warnings)
+    }
+}

@@ -1,0 +1,310 @@
+//! Scores of monitors as metrics, while a run goes on.
+//!
+//! A hazard is a fact of an instant: the metric of a requirement is outside of its bound when the instant is over, for
+//! the first time. So a value that a metric has only between two messages of one instant is no hazard. The robustness of
+//! a temporal formula is known when the run is over, and its signal says when the formula was violated: scores of such
+//! requirements are computed then.
+
+use sesame_base::observation::{MetricObservation, MetricValue, Outcome, Reach};
+use sesame_base::robustness::{Quantifier, lost, quantifier};
+use sesame_base::time::SimTime;
+use sesame_base::verdict::{Verdict, ends, verdict};
+use sesame_monitor::compare::Step;
+use sesame_monitor::score::{Score as Scored, Scorer, score};
+use sesame_monitor::{Decision, Run, State, Truth};
+use sesame_plan::{
+    Bound, CampaignPlan, MetricId, MetricSource, MonitorId, MonitorPart, MonitorState, RequirementId, Score,
+};
+
+use super::outlet::{integrity, planned};
+use crate::metric::{Metrics, Shown};
+
+/// The scores of a plan.
+pub(super) struct Scores<'p> {
+    plan: &'p CampaignPlan,
+    metrics: Vec<MetricScore>,
+    /// The requirements whose hazards are scored, but for those that are known when the run is over.
+    watched: Vec<Watched>,
+    /// The instants at which alarms become false because no hazard has come.
+    deadlines: Vec<SimTime>,
+    /// Whether anything has changed that is not shown yet.
+    changed: bool,
+    /// Whether the run has come to its end, so that the scores are final.
+    ended: bool,
+}
+
+/// A metric that is a score.
+struct MetricScore {
+    metric: MetricId,
+    monitor: MonitorId,
+    score: Score,
+    /// The state of its monitor.
+    state: State,
+    scorer: Scorer,
+    /// The decisions, if the score is computed when the run is over.
+    late: Option<Vec<Step<State>>>,
+}
+
+struct Watched {
+    requirement: RequirementId,
+    metric: MetricId,
+    bound: Bound,
+    /// Whether its metric is the fuzzing time.
+    fuzzing_time: bool,
+    found: bool,
+}
+
+impl Watched {
+    fn is_violated(&self, metrics: &Metrics<'_>, fuzzing_time: SimTime) -> bool {
+        let value = if self.fuzzing_time { Some(fuzzing_time.seconds()) } else { metrics.set_value(self.metric) };
+        !self.found && value.is_some_and(|value| !self.bound.holds(value))
+    }
+}
+
+impl<'p> Scores<'p> {
+    pub(super) fn new(plan: &'p CampaignPlan) -> Self {
+        let is_late = |requirement: RequirementId| {
+            let metric = plan.requirement(requirement).metric;
+            matches!(plan.metric(metric).source, MetricSource::Robustness { .. })
+        };
+        let mut scored = Vec::new();
+        for (metric, declared) in (0..).map(MetricId).zip(&plan.metrics) {
+            let MetricSource::Monitor { monitor, score } = declared.source else { continue };
+            let horizon = match score {
+                Score::FalseAlarms { within, .. } => within.map(SimTime::from_seconds),
+                _ => None,
+            };
+            let guarantees = plan.monitor(monitor).guarantees.len();
+            scored.push(MetricScore {
+                metric,
+                monitor,
+                score,
+                state: State::Safe,
+                scorer: Scorer::new(u32::try_from(guarantees).unwrap_or(u32::MAX), horizon),
+                late: score.requirement().is_some_and(is_late).then(Vec::new),
+            });
+        }
+        let mut requirements: Vec<RequirementId> = scored.iter().filter_map(|it| it.score.requirement()).collect();
+        requirements.sort_unstable();
+        requirements.dedup();
+        let watched = requirements.into_iter().filter(|&requirement| !is_late(requirement)).map(|requirement| {
+            let declared = plan.requirement(requirement);
+            let fuzzing_time = matches!(plan.metric(declared.metric).source, MetricSource::FuzzingTime);
+            Watched { requirement, metric: declared.metric, bound: declared.bound, fuzzing_time, found: false }
+        });
+        Scores { plan, watched: watched.collect(), metrics: scored, deadlines: Vec::new(), changed: true, ended: false }
+    }
+
+    /// A monitor decided.
+    pub(super) fn decided(&mut self, decision: &Decision) {
+        for it in self.metrics.iter_mut().filter(|it| it.monitor == decision.monitor) {
+            it.scorer.decide(decision.at, decision.state);
+            it.state = decision.state;
+            if let Some(late) = &mut it.late {
+                late.push(Step { at: decision.at, state: decision.state });
+            }
+            if let Score::FalseAlarms { within: Some(within), .. } = it.score
+                && decision.mitigate
+            {
+                self.deadlines.push(decision.at + SimTime::from_seconds(within) + SimTime::from_nanos(1));
+            }
+        }
+        self.changed = true;
+    }
+
+    /// Evidence has changed.
+    pub(super) fn changed(&mut self) {
+        self.changed = true;
+    }
+
+    /// When a score changes next without an event.
+    pub(super) fn next_due(&self) -> Option<SimTime> {
+        self.deadlines.iter().copied().min()
+    }
+
+    /// Sets the metrics to what the scores are now, if something has changed.
+    pub(super) fn show(&mut self, now: SimTime, run: &Run, metrics: &mut Metrics<'_>) {
+        if std::mem::take(&mut self.changed) && !self.ended {
+            self.set(now, run, metrics, Scorer::so_far);
+        }
+    }
+
+    fn set(&mut self, now: SimTime, run: &Run, metrics: &mut Metrics<'_>, at: impl Fn(&Scorer, SimTime) -> Scored) {
+        for it in &self.metrics {
+            let shown = match it.score {
+                Score::Holds { part } => holds(part, it.monitor, run),
+                Score::Integrity => Shown::Value(f64::from(integrity(self.plan.monitor(it.monitor), it.state))),
+                _ => value(it.score, &at(&it.scorer, now)).map_or(Shown::Nothing, Shown::Value),
+            };
+            metrics.score(it.metric, now, shown);
+        }
+    }
+
+    /// Time has passed: sets what grows with it, and shows what has become due.
+    pub(super) fn tick(&mut self, now: SimTime, metrics: &mut Metrics<'_>) {
+        for it in self.metrics.iter().filter(|it| it.grows() && !self.ended) {
+            if let Some(value) = value(it.score, &it.scorer.so_far(now)) {
+                metrics.score(it.metric, now, Shown::Growing(value));
+            }
+        }
+        if self.deadlines.iter().any(|&due| due <= now) {
+            self.deadlines.retain(|&due| due > now);
+            self.changed = true;
+        }
+    }
+
+    /// Whether a metric is the time in a state in which its monitor is now.
+    pub(super) fn grows(&self, metric: MetricId) -> bool {
+        self.metrics.iter().any(|it| it.metric == metric && it.grows())
+    }
+
+    /// Whether a requirement is violated at this moment and was not before.
+    pub(super) fn sees_hazard(&self, metrics: &Metrics<'_>, fuzzing_time: SimTime) -> bool {
+        self.watched.iter().any(|watched| watched.is_violated(metrics, fuzzing_time))
+    }
+
+    /// The instant is over, and with it all that metrics are in it. Returns whether there was a hazard.
+    pub(super) fn end_instant(
+        &mut self,
+        now: SimTime,
+        run: &Run,
+        metrics: &mut Metrics<'_>,
+        fuzzing_time: SimTime,
+    ) -> bool {
+        if !self.sees_hazard(metrics, fuzzing_time) {
+            return false;
+        }
+        self.find(now, |watched| watched.is_violated(metrics, fuzzing_time));
+        self.show(now, run, metrics);
+        true
+    }
+
+    /// Counts the hazards of those requirements.
+    fn find(&mut self, now: SimTime, is_violated: impl Fn(&Watched) -> bool) {
+        for watched in &mut self.watched {
+            if is_violated(watched) {
+                watched.found = true;
+                let RequirementId(number) = watched.requirement;
+                for it in self.metrics.iter_mut().filter(|it| it.score.requirement() == Some(watched.requirement)) {
+                    it.scorer.hazard(now, number);
+                }
+                self.changed = true;
+            }
+        }
+    }
+
+    /// The run has come to its end. A metric that was never set has its default, which may be a hazard, too.
+    pub(super) fn end(&mut self, now: SimTime, run: &Run, metrics: &mut Metrics<'_>, fuzzing_time: SimTime) {
+        let plan = self.plan;
+        self.find(now, |watched| {
+            let default = plan.metric(watched.metric).default.filter(|_| metrics.set_value(watched.metric).is_none());
+            let by_default = default.is_some_and(|value| !watched.bound.holds(value));
+            watched.is_violated(metrics, fuzzing_time) || (!watched.found && !watched.fuzzing_time && by_default)
+        });
+        self.set(now, run, metrics, Scorer::end);
+        self.ended = true;
+    }
+
+    /// The run broke off, unless it had come to its end.
+    pub(super) fn break_off(&mut self, now: SimTime, run: &Run, metrics: &mut Metrics<'_>) {
+        self.changed = true;
+        self.show(now, run, metrics);
+    }
+
+    /// All is over: computes the scores of temporal formulas.
+    pub(super) fn finish(self, end: SimTime, metrics: &mut [MetricObservation], whole: bool) {
+        for MetricScore { metric, monitor, score: of, late, .. } in self.metrics {
+            let (Some(steps), Some(requirement)) = (late, of.requirement()) else { continue };
+            let hazard = hazard_of_formula(self.plan, requirement, &metrics[..]);
+            let RequirementId(number) = requirement;
+            let hazards: Vec<(u32, SimTime)> = hazard.map(|at| (number, at.min(end))).into_iter().collect();
+            let horizon = match of {
+                Score::FalseAlarms { within, .. } => within.map(SimTime::from_seconds),
+                _ => None,
+            };
+            let guarantees = u32::try_from(self.plan.monitor(monitor).guarantees.len()).unwrap_or(u32::MAX);
+            let mut scored = score(guarantees, horizon, &steps, &hazards, end);
+            if !whole {
+                // Which alarms were false is not known of a run that broke off.
+                scored.false_alarms = 0;
+            }
+            let declared = self.plan.metric(metric);
+            let observed = &mut metrics[metric.index()];
+            let value = value(of, &scored);
+            observed.set = value.is_some();
+            observed.value = value.or(declared.default);
+            observed.reach =
+                if whole { Reach::of_whole_run(observed.value) } else { Reach::onwards(declared.trend, value) };
+            let at = hazard.filter(|_| !matches!(of, Score::FalseAlarms { .. })).unwrap_or(end);
+            let changes = value.filter(|&value| observed.series.last().is_none_or(|last| last.1 != value));
+            observed.series.extend(changes.map(|value| (at.seconds(), value)));
+        }
+    }
+}
+
+impl MetricScore {
+    fn grows(&self) -> bool {
+        matches!(self.score, Score::TimeIn { state } if state == planned(self.state))
+    }
+}
+
+/// When a requirement on the robustness of a formula was violated; `None` if it was not.
+fn hazard_of_formula(
+    plan: &CampaignPlan,
+    requirement: RequirementId,
+    metrics: &[MetricObservation],
+) -> Option<SimTime> {
+    let declared = plan.requirement(requirement);
+    let MetricSource::Robustness { robustness } = &plan.metric(declared.metric).source else { return None };
+    let observed = &metrics[declared.metric.index()];
+    let shown = MetricValue::from(observed);
+    if verdict(declared.bound, &Outcome::Completed, shown) != Verdict::Violated {
+        return None;
+    }
+    let value = shown.value?;
+    let quantifier = quantifier(&robustness.formula);
+    let (low, _, high, _) = ends(declared.bound);
+    let by_single_times = match quantifier {
+        Some(Quantifier::Always) => low.is_some_and(|low| value <= low),
+        Some(Quantifier::Eventually) => high.is_some_and(|high| value >= high),
+        None => false,
+    };
+    let spans = lost(&observed.robustness, quantifier, declared.bound, value);
+    let first = spans.first().filter(|_| by_single_times).map(|span| span.start);
+    // Otherwise it took the whole run.
+    let decided = first.or(observed.series.last().map(|point| point.0))?;
+    Some(SimTime::from_seconds(decided))
+}
+
+/// What a score is, of all that a monitor was worth.
+fn value(score: Score, of: &Scored) -> Option<f64> {
+    #[expect(clippy::cast_precision_loss, reason = "a run has fewer than 2^52 of anything")]
+    let count = |count: usize| Some(count as f64);
+    match score {
+        Score::MissedHazards { .. } => count(of.missed()),
+        Score::ForeseenHazards { .. } => count(of.foreseen()),
+        Score::FalseAlarms { .. } => Some(f64::from(of.false_alarms)),
+        Score::LeadTime { .. } => of.least_lead().map(SimTime::seconds),
+        Score::TimeIn { state: MonitorState::Guarantee(at) } => of.time_in.get(at as usize).map(|time| time.seconds()),
+        Score::TimeIn { state: MonitorState::Otherwise } => of.time_in.last().map(|time| time.seconds()),
+        Score::Changes => Some(f64::from(of.changes)),
+        Score::ShortestStay => of.shortest_stay.map(SimTime::seconds),
+        Score::Mitigations => Some(f64::from(of.mitigations)),
+        Score::Integrity | Score::Holds { .. } => None,
+    }
+}
+
+/// Whether a part of a monitor holds.
+fn holds(part: MonitorPart, monitor: MonitorId, run: &Run) -> Shown {
+    let truth = match part {
+        MonitorPart::Evidence(at) => run.evidence(run.network().evidence(monitor, at)),
+        MonitorPart::Demand(at) => run.demand(monitor, at),
+        MonitorPart::Guarantee(at) => run.guarantee(monitor, at),
+        MonitorPart::Otherwise => Truth::from(run.state(monitor) == State::Safe),
+    };
+    match truth {
+        Truth::False => Shown::Value(0.0),
+        Truth::Unknown => Shown::Unknown,
+        Truth::True => Shown::Value(1.0),
+    }
+}

@@ -1,0 +1,179 @@
+//! Monitors in the relay: when they hear, decide and publish.
+//!
+//! What a monitor publishes takes the same way as a message of the simulator: through inbound metrics, conditions,
+//! operations and outbound metrics to its subscribers, at the same instant. It belongs to the event that caused it, so
+//! it waits in a queue until that event is over. Conditions see new states of monitors when the queue is empty: an
+//! operation that begins because of a decision does not act on the message that tells of it.
+//!
+//! Monitors begin with the run, but what they publish at time zero waits until the transport advances time: before that,
+//! not all subscribers may be there.
+
+use sesame_base::time::SimTime;
+use sesame_plan::condition::Operand;
+use sesame_plan::{NodeId, Side};
+
+use crate::monitor::Monitors;
+use crate::relay::fuzzing_time::{beyond, reaching};
+use crate::relay::release::Held;
+use crate::relay::{Delivery, Listener as _, Phase, Relay};
+use crate::value::Value;
+use crate::wire::Wire;
+
+/// The most messages that monitors may publish in one event; beyond it, no more are sent, with a warning.
+pub(super) const PUBLISHED_LIMIT: usize = 1_000;
+
+/// How what monitors publish goes on.
+#[derive(Debug, Default)]
+pub(super) struct Publishing {
+    /// Whether subscribers are there, so that messages can be sent.
+    pub(super) open: bool,
+    /// Whether the queue is being emptied.
+    busy: bool,
+    /// Whether there was no end of it.
+    pub(super) endless: bool,
+}
+
+impl Relay<'_> {
+    /// Monitors hear a message.
+    pub(super) fn monitors_hear(&mut self, side: Side, wire: Wire, index: u64, value: &Value) {
+        if let Some(monitors) = &mut self.monitors {
+            monitors.hear(self.now, side, wire, index, value);
+        }
+    }
+
+    /// Ends an event, after its messages were delivered: monitors decide, and what they publish is passed on. Evaluates
+    /// conditions that read what may have changed.
+    pub(super) fn end_event(&mut self, deliveries: &mut Vec<Delivery>) {
+        self.decide(deliveries);
+        if self.conditions.reads_delivered {
+            self.evaluate_conditions();
+        }
+    }
+
+    fn decide(&mut self, deliveries: &mut Vec<Delivery>) {
+        let Some(monitors) = &mut self.monitors else { return };
+        monitors.decide(self.now);
+        // What is published may release messages that were held back; whoever empties the queue goes on with it.
+        if self.publishing.busy {
+            return;
+        }
+        self.publishing.busy = true;
+        let mut published = 0;
+        while self.publishing.open
+            && let Some((wire, value)) = self.monitors.as_mut().and_then(Monitors::publication)
+        {
+            published += 1;
+            self.publish(self.now, wire, None, true, value, deliveries);
+            if let Some(monitors) = &mut self.monitors {
+                monitors.decide(self.now);
+                if published == PUBLISHED_LIMIT {
+                    self.publishing.endless |= monitors.give_up() > 0;
+                }
+            }
+        }
+        self.publishing.busy = false;
+        self.show_scores();
+    }
+
+    /// Conditions see what monitors are now.
+    pub(super) fn show_scores(&mut self) {
+        if let Some(monitors) = &mut self.monitors {
+            monitors.show(self.now, &mut self.metrics);
+        }
+    }
+
+    /// A message was published: by a node, or by a monitor.
+    pub(super) fn publish(
+        &mut self,
+        now: SimTime,
+        wire: Wire,
+        publisher: Option<NodeId>,
+        by_monitor: bool,
+        value: Value,
+        deliveries: &mut Vec<Delivery>,
+    ) {
+        self.messages += 1;
+        let index = self.published[wire.index()];
+        self.published[wire.index()] += 1;
+        for tap in &mut self.taps {
+            tap.published(now, wire, index, &value);
+        }
+        self.metrics.published(now, wire, index, &value);
+        self.monitors_hear(Side::Inbound, wire, index, &value);
+        if self.conditions.read[wire.index()] {
+            self.evaluate_conditions();
+            self.release_due(deliveries);
+        }
+        let message = Held { wire, publisher, by_monitor, published: index, index, value, next_stage: 0 };
+        self.pass(now, message, deliveries);
+    }
+
+    /// Sends what monitors publish at time zero, once.
+    pub(super) fn open_publishing(&mut self, deliveries: &mut Vec<Delivery>) {
+        if self.monitors.is_some() && !self.publishing.open && self.phase == Phase::Running {
+            self.publishing.open = true;
+            self.end_event(deliveries);
+        }
+    }
+
+    /// What monitors have to do at this instant without a message: evidence has been held for long enough, or is stale.
+    pub(super) fn monitors_arrive(&mut self, deliveries: &mut Vec<Delivery>) {
+        let Some(monitors) = &mut self.monitors else { return };
+        monitors.advance(self.now);
+        if self.phase == Phase::Over {
+            monitors.give_up();
+        }
+        self.end_event(deliveries);
+    }
+
+    /// Monitors learn that an instant is over. Returns whether that made values known.
+    pub(super) fn monitors_leave(&mut self) -> bool {
+        if self.monitors.is_none() {
+            return false;
+        }
+        let fuzzing_time = self.fuzzing_time();
+        let Some(monitors) = &mut self.monitors else { return false };
+        monitors.end_instant(self.now, &mut self.metrics, fuzzing_time)
+    }
+
+    /// Whether the end of this instant makes values known that are scores of monitors.
+    pub(super) fn monitors_wait(&self) -> bool {
+        self.monitors.as_ref().is_some_and(|monitors| monitors.sees_hazard(&self.metrics, self.fuzzing_time()))
+    }
+
+    /// When monitors have something to do next without a message, or a time in a state reaches a number with which a
+    /// condition compares it.
+    pub(super) fn monitors_due(&self) -> Option<SimTime> {
+        let monitors = self.monitors.as_ref()?;
+        if self.phase == Phase::Running && !self.publishing.open && monitors.has_publication() {
+            return Some(self.now);
+        }
+        let stays = self.conditions.stays.iter().filter(|(metric, _)| monitors.grows(*metric));
+        let reached = stays.filter_map(|&(metric, operand)| {
+            let spent = SimTime::from_seconds(self.metrics.value(metric, 0.0)?).nanos();
+            let number = match operand {
+                Operand::Number(number) => number,
+                Operand::Variable(other) => self.metrics.value(other, self.fuzzing_time().seconds())?,
+            };
+            let marks = [reaching(number), beyond(number)].into_iter().filter(|&mark| mark > spent);
+            marks.min().map(|mark| self.now + SimTime::from_nanos(mark - spent))
+        });
+        monitors.next_due().into_iter().chain(reached).min()
+    }
+
+    /// The run has come to its end.
+    pub(super) fn monitors_end(&mut self, now: SimTime) {
+        let fuzzing_time = self.fuzzing_time();
+        if let Some(monitors) = &mut self.monitors {
+            monitors.end(now, &mut self.metrics, fuzzing_time);
+        }
+    }
+
+    /// The run broke off.
+    pub(super) fn monitors_break_off(&mut self) {
+        self.monitors_leave();
+        if let Some(monitors) = &mut self.monitors {
+            monitors.break_off(self.now, &mut self.metrics);
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! What monitors did, in results: read back, outside the digest, and missing in results that have none.
+
+use rusqlite::Connection;
+
+use sesame_base::observation::{ChangeCause, EvidenceChange, MonitorDecision, MonitorObservation};
+use sesame_plan::testing::{evidence_above, guarantee, monitor, topic};
+use sesame_plan::{CampaignPlan, Gate, MonitorState, Type};
+
+use super::folder;
+use crate::record::{DATABASE, Origin, Recorder, Repository, sample};
+
+fn plan() -> CampaignPlan {
+    let mut plan = sample::plan();
+    let state = u32::try_from(plan.topics.len()).unwrap();
+    plan.topics.push(topic("state", &["state"], Type::Bool));
+    let evidence = vec![evidence_above("ok", 0, 4.0)];
+    plan.monitors = vec![monitor("cell", state, evidence, vec![guarantee("safe", 3, Gate::Evidence(0))])];
+    plan
+}
+
+fn shown() -> MonitorObservation {
+    let decision = |time, state| MonitorDecision { time, state };
+    let message = ChangeCause::Message { topic: "a".to_owned(), index: 7 };
+    let change = |time, holds, cause| EvidenceChange { time, evidence: 0, holds, cause };
+    MonitorObservation {
+        decisions: vec![
+            decision(0.0, MonitorState::Otherwise),
+            decision(1.5, MonitorState::Guarantee(0)),
+            decision(2.500_000_001, MonitorState::Otherwise),
+        ],
+        evidence: vec![change(1.5, Some(true), message), change(2.500_000_001, None, ChangeCause::Stale)],
+        omitted: 4,
+    }
+}
+
+fn recorded(folder: &std::path::Path, shown: Vec<MonitorObservation>) -> Repository {
+    let plan = plan();
+    let mut recorder = Recorder::create(folder, &plan, 1, 1).unwrap();
+    let mut record = sample::record(&plan, 3, Origin::Search, plan.tests[0].test.clone());
+    record.observation.monitors = shown;
+    recorder.commit(&record).unwrap();
+    recorder.finish("done").unwrap()
+}
+
+#[test]
+fn what_a_monitor_did_comes_back_with_its_test_and_sql_reads_it_with_names() {
+    let folder = folder();
+    let repository = recorded(folder.path(), vec![shown()]);
+    assert_eq!(repository.test(3).unwrap().observation.monitors, [shown()]);
+    assert!(repository.records(3..=3, false).unwrap()[0].observation.monitors.is_empty());
+    let open = Connection::open(folder.path().join(DATABASE)).unwrap();
+    let rows = |sql: &str| -> Vec<String> {
+        let mut statement = open.prepare(sql).unwrap();
+        statement.query_map([], |row| row.get(0)).unwrap().collect::<Result<_, _>>().unwrap()
+    };
+    let decisions =
+        rows("SELECT monitor || ' ' || time_s || ' ' || state || ' ' || integrity FROM decisions WHERE test = 3");
+    assert_eq!(decisions, ["cell 0.0 unsafe 0", "cell 1.5 safe 3", "cell 2.500000001 unsafe 0"]);
+    let evidence = rows(
+        "SELECT evidence || ' ' || coalesce(holds, '?') || ' ' || cause || coalesce(' ' || path || message, '') FROM evidence",
+    );
+    assert_eq!(evidence, ["ok 1 message a7", "ok ? stale"]);
+}
+
+#[test]
+fn the_digest_is_of_scores_and_not_of_decisions() {
+    let (with, without) = (folder(), folder());
+    let digest = |repository: Repository| repository.digest().unwrap();
+    assert_eq!(digest(recorded(with.path(), vec![shown()])), digest(recorded(without.path(), Vec::new())));
+}
+
+#[test]
+fn results_without_monitors_have_no_tables_of_them_and_others_in_their_place_are_refused() {
+    let folder = folder();
+    drop(sample::campaign(folder.path(), &sample::plan(), 12));
+    let open = Connection::open(folder.path().join(DATABASE)).unwrap();
+    assert!(!crate::record::monitors::are_in(&open).unwrap());
+    open.execute_batch("CREATE TABLE monitor_decisions (test INTEGER)").unwrap();
+    drop(open);
+    let said = Repository::open(folder.path()).err().unwrap().to_string();
+    assert!(said.contains("the table `monitor_decisions` is not the one that a run makes"), "{said}");
+}
