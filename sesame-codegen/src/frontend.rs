@@ -80,6 +80,8 @@ pub struct Checked {
     pub errors: usize,
     /// How many of them are warnings.
     pub warnings: usize,
+    /// What could not be decided about monitors, one sentence each.
+    pub undecided: Vec<String>,
     /// What the space holds, for example `4 campaigns, 9 operations`.
     pub summary: String,
     /// A plan for each campaign; empty when there are errors.
@@ -107,6 +109,7 @@ fn check(file: &str, text: &str, look: Look) -> Checked {
     let warnings = analysis.diagnostics.iter().filter(|found| found.severity() == Severity::Warning).count();
     // A plan names the file without its folder: the same space gives the same plan wherever it lies.
     let source = file.rsplit(['/', std::path::MAIN_SEPARATOR]).next().unwrap_or(file);
+    let undecided = undecided(&analysis.undecided, &sources);
     let (summary, plans, notes) = match &analysis.model {
         Some(space) => {
             let plans = space.campaigns.iter().map(|(campaign, _)| lower(space, campaign, source, GENERATOR)).collect();
@@ -114,7 +117,13 @@ fn check(file: &str, text: &str, look: Look) -> Checked {
         }
         None => (String::new(), Vec::new(), Vec::new()),
     };
-    Checked { diagnostics, errors, warnings, summary, plans, notes }
+    Checked { diagnostics, errors, warnings, undecided, summary, plans, notes }
+}
+
+/// What could not be decided about monitors, with its places.
+fn undecided(undecided: &[(Span, String)], sources: &SourceMap) -> Vec<String> {
+    let at = |span: Span| format!("{}:{}", sources.file(span.file).name(), sources.position(span).line);
+    undecided.iter().map(|(span, text)| format!("{text} ({})", at(*span))).collect()
 }
 
 /// An imported file, or why there is none.
@@ -280,6 +289,19 @@ mod tests {
         let checked = check("blocks.sesame", text, PLAIN);
         let shapes = serde_json::to_string_pretty(&checked.plans[0].plan.labs[0].shapes).unwrap();
         insta::assert_snapshot!(shapes);
+    }
+
+    #[test]
+    fn monitors_that_are_too_large_to_be_checked_are_named() {
+        let evidence: String = (0..700).map(|at| format!("evidence e{at} = a > {at}\n")).collect();
+        let guarantees: String = (0..300).map(|at| format!("guarantee g{at} integrity {} = e{at}\n", at + 1)).collect();
+        let text = format!(
+            "space a system {{ simulator s = in_process \"a::A\" {{ step 1s }} topic a = \"a\" : int topic b = \"b\" : int }}
+             eddi large publishes b {{ {evidence} {guarantees} otherwise none }}"
+        );
+        let checked = check("a.sesame", &text, PLAIN);
+        let said = "the guarantees of `large` are not checked: they and what they need are too many (a.sesame:2)";
+        assert_eq!((checked.errors, checked.undecided), (0, vec![said.to_owned()]));
     }
 
     #[test]

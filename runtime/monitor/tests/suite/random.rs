@@ -96,7 +96,7 @@ pub(crate) fn monitor(evidence: Vec<Evidence>, gates: Vec<Gate>) -> Monitor {
     Monitor {
         name: "monitor".into(),
         doc: String::new(),
-        publishes: TopicId(0),
+        publishes: Some(TopicId(0)),
         demands: Vec::new(),
         evidence,
         guarantees: guarantees.collect(),
