@@ -9,6 +9,7 @@ use sesame_dsl::model::{Space, Transport};
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::span::Span;
 
+use crate::certificate;
 use crate::input::{self, Unreadable};
 use crate::interfaces::Files;
 use crate::lower::lower;
@@ -168,13 +169,15 @@ fn find(file: &str, text: &str, name: &str) -> Result<Found, String> {
     let mut sources = SourceMap::new();
     let root = sources.add(file, text);
     sesame_dsl::load_imports(&mut sources, root, read);
-    let Analysis { index, diagnostics, .. } = sesame_dsl::analyse(&sources, root);
+    let Analysis { index, model, diagnostics, .. } = sesame_dsl::analyse_with(&sources, root, &Files::default());
     let id = uses::find(&sources, &index, file, name)?;
+    let declared = index.definition(id).span;
+    let certificate = model.and_then(|space| certificate::certificate(&space, &sources, &index, declared));
     Ok(Found {
         campaign: index.definition(id).kind == Kind::Campaign,
-        text: uses::text(&sources, &index, id),
+        text: uses::text(&sources, &index, id, certificate.as_ref()),
         uses: uses::uses(&sources, &index, id),
-        json: uses::json(&sources, &index, id),
+        json: uses::json(&sources, &index, id, certificate.as_ref()),
         errors: diagnostics.iter().filter(|found| found.severity() == Severity::Error).count(),
     })
 }
@@ -293,8 +296,9 @@ mod tests {
 
     #[test]
     fn monitors_that_are_too_large_to_be_checked_are_named() {
-        let evidence: String = (0..700).map(|at| format!("evidence e{at} = a > {at}\n")).collect();
-        let guarantees: String = (0..300).map(|at| format!("guarantee g{at} integrity {} = e{at}\n", at + 1)).collect();
+        let evidence = (0..700).map(|at| format!("evidence e{at} = a > {at}\n")).collect::<Vec<_>>().concat();
+        let guarantees = (0..300).map(|at| format!("guarantee g{at} integrity {} = e{at}\n", at + 1));
+        let guarantees = guarantees.collect::<Vec<_>>().concat();
         let text = format!(
             "space a system {{ simulator s = in_process \"a::A\" {{ step 1s }} topic a = \"a\" : int topic b = \"b\" : int }}
              eddi large publishes b {{ {evidence} {guarantees} otherwise none }}"
