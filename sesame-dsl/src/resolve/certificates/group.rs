@@ -152,8 +152,8 @@ impl<'a> Group<'a> {
         found
     }
 
-    /// Whether what is known of guarantees decides this one, whatever its evidence: those in `known` all have this
-    /// value, and `all` of as many as a demand is content with are needed for the demand to have it.
+    /// Whether a guarantee has this value whatever its evidence is, only because all guarantees in `known` have it. A
+    /// demand is true if one of the guarantees with which it is content is, and false if all of them are.
     pub(super) fn follows(
         &self,
         (monitor, guarantee): (MonitorId, u32),

@@ -89,7 +89,7 @@ impl<'a> Reporter<'a> {
             Finding::Redundant { monitor, evidence, as_if } => {
                 let guarantees = (0..).zip(&self.group.monitors[monitor.index()].guarantees);
                 let mut reading = guarantees.filter(|(_, it)| leaves(&it.gate).contains(&Leaf::Evidence(evidence)));
-                // Of evidence that no guarantee needs, that is said as well.
+                // If nothing was found of a guarantee that needs it; that none does is W0015.
                 let own = reading.any(|(at, _)| !self.found.contains(&(monitor, at)));
                 own.then(|| self.redundant(monitor, evidence, as_if))
             }
