@@ -136,11 +136,23 @@ pub struct Report {
     pub unproven: Vec<Question>,
 }
 
+/// How much work a check may take, if nothing else is said: some seconds.
+const PATIENCE: u64 = 50_000_000;
+
 /// Checks monitors, given what is known of the values of inputs (without tests of their texts).
 pub fn check(monitors: &[Monitor], values: &dyn Fn(&Input) -> Values) -> Result<Report, Invalid> {
+    check_within(monitors, values, &mut { PATIENCE })
+}
+
+/// [`check`] with so much work at most, of which the rest is left.
+pub fn check_within(
+    monitors: &[Monitor],
+    values: &dyn Fn(&Input) -> Values,
+    work: &mut u64,
+) -> Result<Report, Invalid> {
     let network = Network::new(monitors)?;
     let mut checker = Checker {
-        worlds: Worlds::new(&network, monitors, values),
+        worlds: Worlds::new(&network, monitors, values, *work),
         network: &network,
         monitors,
         report: Report::default(),
@@ -151,11 +163,13 @@ pub fn check(monitors: &[Monitor], values: &dyn Fn(&Input) -> Values) -> Result<
         checker.orders(monitor, &never);
         checker.evidence(monitor);
     }
+    *work = work.saturating_sub(checker.worlds.work());
     Ok(checker.report)
 }
 
-/// Whether all of these pieces of evidence can be true at one moment; `None` if that was not decided.
-pub fn together(evidence: &[&Evidence], values: &dyn Fn(&Input) -> Values) -> Option<bool> {
+/// Whether all of these pieces of evidence can be true at one moment; `None` if that was not decided with so much work,
+/// of which the rest is left.
+pub fn together(evidence: &[&Evidence], values: &dyn Fn(&Input) -> Values, work: &mut u64) -> Option<bool> {
     if evidence.is_empty() {
         return Some(true);
     }
@@ -173,9 +187,11 @@ pub fn together(evidence: &[&Evidence], values: &dyn Fn(&Input) -> Values) -> Op
     };
     let monitors = [monitor];
     let network = Network::new(&monitors).ok()?;
-    let mut worlds = Worlds::new(&network, &monitors, values);
+    let mut worlds = Worlds::new(&network, &monitors, values, *work);
     let all = worlds.guarantees(MonitorId(0), Sight::Settled);
-    match worlds.ask(&all) {
+    let answer = worlds.ask(&all);
+    *work = work.saturating_sub(worlds.work());
+    match answer {
         Answer::Yes(..) => Some(true),
         Answer::No => Some(false),
         Answer::GivenUp => None,

@@ -12,10 +12,15 @@ use super::Resolver;
 use crate::diagnostic::Code;
 use crate::span::Span;
 
+/// How much work all checks of a space may take: far more than those of certificates that people write, and about a
+/// second at most.
+const MOST_WORK: u64 = 1_000_000;
+
 impl Resolver<'_> {
     /// Reports what is wrong with certificates. Returns what could not be decided, in sentences.
     pub(super) fn certificates(&mut self) -> Vec<(Span, String)> {
         let mut notes = Vec::new();
+        let mut work = MOST_WORK;
         let constant = self.diagnostics.iter().filter(|found| found.code == Code::ONE_OUTCOME);
         let constant: Vec<Span> = constant.map(|found| found.span).collect();
         let is_constant =
@@ -26,7 +31,7 @@ impl Resolver<'_> {
                 continue;
             }
             let Some(group) = group::Group::of(&self.eddis, members, &self.system) else { continue };
-            let (diagnostics, undecided) = report::of(&group, self.file);
+            let (diagnostics, undecided) = report::of(&group, self.file, &mut work);
             self.diagnostics.extend(diagnostics);
             notes.extend(undecided);
         }

@@ -497,8 +497,9 @@ fn conditions_that_exclude_each_other_are_not_true_together() {
     );
     let monitors = narrowed(&[one]);
     let all: Vec<&Evidence> = monitors[0].evidence.iter().collect();
-    let together =
-        |which: &[usize]| check::together(&which.iter().map(|&at| all[at]).collect::<Vec<_>>(), &|_| Values::ANY);
+    let together = |which: &[usize]| {
+        check::together(&which.iter().map(|&at| all[at]).collect::<Vec<_>>(), &|_| Values::ANY, &mut 100_000)
+    };
     assert_eq!(together(&[0, 1]), Some(false));
     assert_eq!(together(&[0, 2]), Some(true));
     assert_eq!(together(&[1, 2]), Some(true));

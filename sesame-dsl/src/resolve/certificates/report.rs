@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use sesame_monitor::check::{Finding, Question, Witness, check, together};
+use sesame_monitor::check::{Finding, Question, Witness, check_within, together};
 use sesame_monitor::gate::Leaf;
 use sesame_monitor::truth::Truth;
 use sesame_plan::MonitorId;
@@ -22,16 +22,18 @@ const LARGEST: usize = 200_000;
 const MOST_EVIDENCE: usize = 40;
 
 /// What is wrong with the monitors of a group, and what was not decided.
-pub(super) fn of(group: &Group<'_>, file: &ast::File) -> (Vec<Diagnostic>, Vec<(Span, String)>) {
+pub(super) fn of(group: &Group<'_>, file: &ast::File, work: &mut u64) -> (Vec<Diagnostic>, Vec<(Span, String)>) {
     if group.size() > LARGEST {
         let first = &group.eddis[0].declaration;
         let text = format!("the guarantees of `{}` are not checked: they and what they need are too many", first.name);
         return (Vec::new(), vec![(first.span, text)]);
     }
     // A plan that is not in order has been reported.
-    let Ok(found) = check(&group.monitors, &|input| group.values(input)) else { return (Vec::new(), Vec::new()) };
+    let Ok(found) = check_within(&group.monitors, &|input| group.values(input), work) else {
+        return (Vec::new(), Vec::new());
+    };
     let reporter = Reporter::new(group, file, &found.findings);
-    let diagnostics = found.findings.iter().filter_map(|finding| reporter.diagnostic(finding)).collect();
+    let diagnostics = found.findings.iter().filter_map(|finding| reporter.diagnostic(finding, work)).collect();
     (diagnostics, found.undecided.iter().map(|question| reporter.undecided(question)).collect())
 }
 
@@ -72,11 +74,11 @@ impl<'a> Reporter<'a> {
     }
 
     /// The diagnostic of a finding, unless it follows from another one.
-    fn diagnostic(&self, finding: &Finding) -> Option<Diagnostic> {
+    fn diagnostic(&self, finding: &Finding, work: &mut u64) -> Option<Diagnostic> {
         match *finding {
             Finding::Never { monitor, guarantee } => {
                 let follows = self.group.follows((monitor, guarantee), &self.never, Truth::False);
-                (!follows).then(|| self.never(monitor, guarantee))
+                (!follows).then(|| self.never(monitor, guarantee, work))
             }
             Finding::Always { monitor, guarantee } => {
                 let follows = self.group.follows((monitor, guarantee), &self.always, Truth::True);
@@ -102,12 +104,12 @@ impl<'a> Reporter<'a> {
         }
     }
 
-    fn never(&self, monitor: MonitorId, at: u32) -> Diagnostic {
+    fn never(&self, monitor: MonitorId, at: u32, work: &mut u64) -> Diagnostic {
         let declaration = &self.guarantee(monitor, at).declaration;
         let title = format!("guarantee `{}` of monitor `{}` can never hold", declaration.name, self.name(monitor));
         let mut diagnostic =
             Diagnostic::new(Code::NEVER_HOLDS, declaration.span, title).label("whatever the messages say");
-        let excluding = self.excluding(monitor, at);
+        let excluding = self.excluding(monitor, at, work);
         for &(of, at) in &excluding {
             let span = self.evidence(of, at).declaration.span;
             if span == declaration.span {
@@ -131,16 +133,17 @@ impl<'a> Reporter<'a> {
         &self.evidence(monitor, at).declaration.name
     }
 
-    /// Evidence that is never true at once, so that a guarantee can never hold: none of it can be left out.
-    fn excluding(&self, monitor: MonitorId, guarantee: u32) -> Vec<(MonitorId, u32)> {
+    /// Evidence that is never true at once, so that a guarantee can never hold: none of it can be left out, unless the
+    /// work was too much.
+    fn excluding(&self, monitor: MonitorId, guarantee: u32, work: &mut u64) -> Vec<(MonitorId, u32)> {
         let mut set: Vec<_> = self.group.evidence_of(monitor, guarantee).into_iter().collect();
         if set.len() > MOST_EVIDENCE {
             return Vec::new();
         }
-        let excludes = |set: &[(MonitorId, u32)]| {
+        let mut excludes = |set: &[(MonitorId, u32)]| {
             let evidence: Vec<_> =
                 set.iter().map(|&(of, at)| &self.group.monitors[of.index()].evidence[at as usize]).collect();
-            together(&evidence, &|input| self.group.values(input)) == Some(false)
+            together(&evidence, &|input| self.group.values(input), work) == Some(false)
         };
         if !excludes(&set) {
             return Vec::new();
