@@ -9,6 +9,7 @@ use sesame_dsl::model::{Space, Transport};
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::span::Span;
 
+use crate::certificate;
 use crate::input::{self, Unreadable};
 use crate::interfaces::Files;
 use crate::lower::lower;
@@ -80,6 +81,8 @@ pub struct Checked {
     pub errors: usize,
     /// How many of them are warnings.
     pub warnings: usize,
+    /// What could not be decided about monitors, one sentence each.
+    pub undecided: Vec<String>,
     /// What the space holds, for example `4 campaigns, 9 operations`.
     pub summary: String,
     /// A plan for each campaign; empty when there are errors.
@@ -107,6 +110,7 @@ fn check(file: &str, text: &str, look: Look) -> Checked {
     let warnings = analysis.diagnostics.iter().filter(|found| found.severity() == Severity::Warning).count();
     // A plan names the file without its folder: the same space gives the same plan wherever it lies.
     let source = file.rsplit(['/', std::path::MAIN_SEPARATOR]).next().unwrap_or(file);
+    let undecided = undecided(&analysis.undecided, &sources);
     let (summary, plans, notes) = match &analysis.model {
         Some(space) => {
             let plans = space.campaigns.iter().map(|(campaign, _)| lower(space, campaign, source, GENERATOR)).collect();
@@ -114,7 +118,13 @@ fn check(file: &str, text: &str, look: Look) -> Checked {
         }
         None => (String::new(), Vec::new(), Vec::new()),
     };
-    Checked { diagnostics, errors, warnings, summary, plans, notes }
+    Checked { diagnostics, errors, warnings, undecided, summary, plans, notes }
+}
+
+/// What could not be decided about monitors, with its places.
+fn undecided(undecided: &[(Span, String)], sources: &SourceMap) -> Vec<String> {
+    let at = |span: Span| format!("{}:{}", sources.file(span.file).name(), sources.position(span).line);
+    undecided.iter().map(|(span, text)| format!("{text} ({})", at(*span))).collect()
 }
 
 /// An imported file, or why there is none.
@@ -159,13 +169,15 @@ fn find(file: &str, text: &str, name: &str) -> Result<Found, String> {
     let mut sources = SourceMap::new();
     let root = sources.add(file, text);
     sesame_dsl::load_imports(&mut sources, root, read);
-    let Analysis { index, diagnostics, .. } = sesame_dsl::analyse(&sources, root);
+    let Analysis { index, model, diagnostics, .. } = sesame_dsl::analyse_with(&sources, root, &Files::default());
     let id = uses::find(&sources, &index, file, name)?;
+    let declared = index.definition(id).span;
+    let certificate = model.and_then(|space| certificate::certificate(&space, &sources, &index, declared));
     Ok(Found {
         campaign: index.definition(id).kind == Kind::Campaign,
-        text: uses::text(&sources, &index, id),
+        text: uses::text(&sources, &index, id, certificate.as_ref()),
         uses: uses::uses(&sources, &index, id),
-        json: uses::json(&sources, &index, id),
+        json: uses::json(&sources, &index, id, certificate.as_ref()),
         errors: diagnostics.iter().filter(|found| found.severity() == Severity::Error).count(),
     })
 }
@@ -280,6 +292,20 @@ mod tests {
         let checked = check("blocks.sesame", text, PLAIN);
         let shapes = serde_json::to_string_pretty(&checked.plans[0].plan.labs[0].shapes).unwrap();
         insta::assert_snapshot!(shapes);
+    }
+
+    #[test]
+    fn monitors_that_are_too_large_to_be_checked_are_named() {
+        let evidence = (0..700).map(|at| format!("evidence e{at} = a > {at}\n")).collect::<Vec<_>>().concat();
+        let guarantees = (0..300).map(|at| format!("guarantee g{at} integrity {} = e{at}\n", at + 1));
+        let guarantees = guarantees.collect::<Vec<_>>().concat();
+        let text = format!(
+            "space a system {{ simulator s = in_process \"a::A\" {{ step 1s }} topic a = \"a\" : int topic b = \"b\" : int }}
+             eddi large publishes b {{ {evidence} {guarantees} otherwise none }}"
+        );
+        let checked = check("a.sesame", &text, PLAIN);
+        let said = "the guarantees of `large` are not checked: they and what they need are too many (a.sesame:2)";
+        assert_eq!((checked.errors, checked.undecided), (0, vec![said.to_owned()]));
     }
 
     #[test]

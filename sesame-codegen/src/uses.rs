@@ -9,6 +9,8 @@ use sesame_dsl::place::Place;
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::span::Span;
 
+use crate::certificate::{self, CertificatePart};
+
 /// Finds what a name of the file `file` stands for. What is wrong with the name comes back as a sentence or several.
 pub fn find(sources: &SourceMap, index: &Index, file: &str, name: &str) -> Result<DefinitionId, String> {
     let found = index.find(name);
@@ -67,7 +69,7 @@ fn place(sources: &SourceMap, span: Span) -> String {
 }
 
 /// A definition with its doc comment, and each use with its line.
-pub fn text(sources: &SourceMap, index: &Index, id: DefinitionId) -> String {
+pub fn text(sources: &SourceMap, index: &Index, id: DefinitionId, certificate: Option<&CertificatePart>) -> String {
     let definition = index.definition(id);
     let mut out = String::new();
     let kind = definition.kind.word();
@@ -79,6 +81,9 @@ pub fn text(sources: &SourceMap, index: &Index, id: DefinitionId) -> String {
         writeln!(out, "{}", format!("  {line}").trim_end()).expect(STRING);
     }
     out.push('\n');
+    if let Some(certificate) = certificate {
+        writeln!(out, "{}", certificate::text(certificate)).expect(STRING);
+    }
     let uses = uses(sources, index, id);
     out.push_str(if uses.is_empty() { "no uses\n" } else { &uses });
     out
@@ -138,6 +143,9 @@ struct Explained<'a> {
     doc: &'a str,
     /// The declaration as written.
     text: &'a str,
+    /// Of a monitor of a space without errors: its certificate as a tree.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    certificate: Option<&'a CertificatePart>,
     /// Every place that mentions it.
     uses: Vec<Use<'a>>,
 }
@@ -161,7 +169,7 @@ struct Within {
 }
 
 /// A definition and its uses as one JSON object, in ASCII and on one line.
-pub fn json(sources: &SourceMap, index: &Index, id: DefinitionId) -> String {
+pub fn json(sources: &SourceMap, index: &Index, id: DefinitionId, certificate: Option<&CertificatePart>) -> String {
     let at = |span| Place::with_utf16(sources, span);
     let definition = index.definition(id);
     let explained = Explained {
@@ -170,6 +178,7 @@ pub fn json(sources: &SourceMap, index: &Index, id: DefinitionId) -> String {
         at: at(definition.span),
         doc: &definition.doc,
         text: sources.snippet(definition.full_span),
+        certificate,
         uses: index
             .uses(id)
             .map(|used| {
@@ -226,7 +235,7 @@ operation cat on zoness = blackhole
         let root = sources.add("a.sesame", text);
         let index = analyse(&sources, root).index;
         let id = find(&sources, &index, "a.sesame", name)?;
-        Ok((super::text(&sources, &index, id), json(&sources, &index, id)))
+        Ok((super::text(&sources, &index, id, None), json(&sources, &index, id, None)))
     }
 
     #[test]

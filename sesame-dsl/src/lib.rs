@@ -24,7 +24,7 @@ use index::Index;
 use interfaces::{Interfaces, NoInterfaces};
 use model::Space;
 use source::SourceMap;
-use span::FileId;
+use span::{FileId, Span};
 
 pub use import::load_imports;
 pub use syntax::MAX_BYTES;
@@ -38,6 +38,8 @@ pub struct Analysis {
     pub model: Option<Space>,
     /// Errors and warnings, sorted by position.
     pub diagnostics: Vec<Diagnostic>,
+    /// What could not be decided about monitors within a bound on the work, in sentences.
+    pub undecided: Vec<(Span, String)>,
 }
 
 impl Analysis {
@@ -57,16 +59,16 @@ pub fn analyse(sources: &SourceMap, root: FileId) -> Analysis {
 
 /// [`analyse`] with layouts of ROS interfaces from elsewhere.
 pub fn analyse_with(sources: &SourceMap, root: FileId, interfaces: &dyn Interfaces) -> Analysis {
-    let mut diagnostics = Vec::new();
+    let (mut diagnostics, mut undecided) = (Vec::new(), Vec::new());
     let merged = import::merge(sources, root, &mut diagnostics);
     let index = index::build::index(&merged);
-    let model = resolve::resolve(sources, root, merged, interfaces, &mut diagnostics);
+    let model = resolve::resolve(sources, root, merged, interfaces, &mut diagnostics, &mut undecided);
     if let Some(space) = &model {
         diagnostics.extend(check::check(space, root));
     }
     diagnostics.sort_by_key(|diagnostic| (diagnostic.span, diagnostic.code));
     diagnostics.dedup();
-    Analysis { index, model, diagnostics }
+    Analysis { index, model, diagnostics, undecided }
 }
 
 /// Whether a word is reserved, so that nothing but a message field can be named by it.

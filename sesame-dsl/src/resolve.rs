@@ -12,6 +12,7 @@
 //!    resolves the conditions of tests and the building blocks of campaigns' conditions, by what is [`known`] of
 //!    metrics; [`contained`] what operations require of such conditions
 //! 7. [`physical`] resolves labs, and [`lifecycle`] the rest of a system's clauses
+//! 8. [`certificates`] checks what monitors say
 //!
 //! Each pass reports all it finds. A declaration with a mistake is `None` from then on, and references to it are not
 //! reported again: one mistake is one diagnostic.
@@ -19,6 +20,7 @@
 mod boolean;
 mod bus;
 mod campaign;
+mod certificates;
 mod collect;
 mod condition;
 mod confirmation;
@@ -75,13 +77,15 @@ use crate::syntax::ast::{self, Name};
 use ros_types::RosTypes;
 use words::list;
 
-/// Resolves the files of a space. `None` exactly when there is an error, be it in `diagnostics` before or after.
+/// Resolves the files of a space. `None` exactly when there is an error, be it in `diagnostics` before or after. Adds to
+/// `undecided` what could not be decided about monitors.
 pub(crate) fn resolve(
     sources: &SourceMap,
     root: FileId,
     merged: Merged,
     interfaces: &dyn Interfaces,
     diagnostics: &mut Vec<Diagnostic>,
+    undecided: &mut Vec<(Span, String)>,
 ) -> Option<Space> {
     let Merged { mut file, names, ranks } = merged;
     inherit::inherit(&mut file, diagnostics);
@@ -114,6 +118,7 @@ pub(crate) fn resolve(
     resolver.tests();
     let campaigns = resolver.campaigns();
     let physicals = resolver.physicals();
+    undecided.extend(resolver.certificates());
 
     let Resolver { system, metrics, operations, tests, eddis, diagnostics, .. } = resolver;
     if diagnostics.iter().any(|diagnostic| diagnostic.severity() == Severity::Error) {

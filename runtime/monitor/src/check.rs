@@ -28,7 +28,7 @@ mod worlds;
 use std::collections::BTreeSet;
 
 use sesame_base::time::SimTime;
-use sesame_plan::{Input, Monitor, MonitorId, Side};
+use sesame_plan::{Evidence, Gate, Guarantee, Input, Monitor, MonitorId, SafeState, Side};
 
 use crate::network::{EvidenceId, Invalid, Network};
 use crate::truth::Truth;
@@ -130,15 +130,29 @@ pub enum Question {
 pub struct Report {
     /// What is wrong, by monitor: guarantees from the strongest on, then evidence.
     pub findings: Vec<Finding>,
-    /// What was not decided.
+    /// What was not decided within the bound on the work.
     pub undecided: Vec<Question>,
+    /// What would be a finding if values had been found under which it happens: it may be one, or not.
+    pub unproven: Vec<Question>,
 }
+
+/// How much work a check may take, if nothing else is said: some seconds.
+const PATIENCE: u64 = 50_000_000;
 
 /// Checks monitors, given what is known of the values of inputs (without tests of their texts).
 pub fn check(monitors: &[Monitor], values: &dyn Fn(&Input) -> Values) -> Result<Report, Invalid> {
+    check_within(monitors, values, &mut { PATIENCE })
+}
+
+/// [`check`] with so much work at most, of which the rest is left.
+pub fn check_within(
+    monitors: &[Monitor],
+    values: &dyn Fn(&Input) -> Values,
+    work: &mut u64,
+) -> Result<Report, Invalid> {
     let network = Network::new(monitors)?;
     let mut checker = Checker {
-        worlds: Worlds::new(&network, monitors, values),
+        worlds: Worlds::new(&network, monitors, values, *work),
         network: &network,
         monitors,
         report: Report::default(),
@@ -149,7 +163,39 @@ pub fn check(monitors: &[Monitor], values: &dyn Fn(&Input) -> Values) -> Result<
         checker.orders(monitor, &never);
         checker.evidence(monitor);
     }
+    *work = work.saturating_sub(checker.worlds.work());
     Ok(checker.report)
+}
+
+/// Whether all of these pieces of evidence can be true at one moment; `None` if that was not decided with so much work,
+/// of which the rest is left.
+pub fn together(evidence: &[&Evidence], values: &dyn Fn(&Input) -> Values, work: &mut u64) -> Option<bool> {
+    if evidence.is_empty() {
+        return Some(true);
+    }
+    let gates: Vec<Gate> = (0..).map(Gate::Evidence).take(evidence.len()).collect();
+    let all = Guarantee { name: String::new(), doc: String::new(), integrity: 1, gate: Gate::All(gates) };
+    let monitor = Monitor {
+        name: String::new(),
+        doc: String::new(),
+        publishes: None,
+        demands: Vec::new(),
+        evidence: evidence.iter().copied().cloned().collect(),
+        guarantees: vec![all],
+        otherwise: SafeState { name: String::new(), doc: String::new(), mitigation: None },
+        line: 0,
+    };
+    let monitors = [monitor];
+    let network = Network::new(&monitors).ok()?;
+    let mut worlds = Worlds::new(&network, &monitors, values, *work);
+    let all = worlds.guarantees(MonitorId(0), Sight::Settled);
+    let answer = worlds.ask(&all);
+    *work = work.saturating_sub(worlds.work());
+    match answer {
+        Answer::Yes(..) => Some(true),
+        Answer::No => Some(false),
+        Answer::GivenUp => None,
+    }
 }
 
 struct Checker<'a> {
@@ -204,7 +250,7 @@ impl Checker<'_> {
     fn orders(&mut self, monitor: MonitorId, never: &BTreeSet<u32>) {
         let moments = self.worlds.moments();
         for weaker in 1..self.network.guarantees(monitor) {
-            let mut undecided = false;
+            let (mut undecided, mut unproven) = (false, false);
             let found = (0..weaker).rev().filter(|stronger| !never.contains(stronger)).find_map(|stronger| {
                 let mut asked = BTreeSet::new();
                 moments.iter().find_map(|moment| {
@@ -224,7 +270,7 @@ impl Checker<'_> {
                                 moment.guarantee(monitor, stronger).holds()
                                     && !moment.guarantee(monitor, weaker).holds()
                             });
-                            undecided |= witness.is_none();
+                            unproven |= witness.is_none();
                             witness.map(|(witness, _)| Finding::Order { monitor, stronger, weaker, witness })
                         }
                     }
@@ -233,6 +279,7 @@ impl Checker<'_> {
             match found {
                 Some(finding) => self.report.findings.push(finding),
                 None if undecided => self.report.undecided.push(Question::Order(monitor, weaker)),
+                None if unproven => self.report.unproven.push(Question::Order(monitor, weaker)),
                 None => {}
             }
         }

@@ -76,6 +76,9 @@ pub(super) fn check_only(
 pub(super) fn check(shell: Shell, language: &Language, file: &Path, format: Format) -> anyhow::Result<Checked> {
     let text = input::text(file).with_context(|| format!("cannot read {}", file.display()))?;
     let checked = check_text(shell, language, file, &text, format)?;
+    for undecided in &checked.undecided {
+        shell.note(undecided);
+    }
     shell.did("Checked", format!("{}: {}", file.display(), checked.summary));
     Ok(checked)
 }

@@ -103,6 +103,7 @@ codes! {
     NOTHING_TO_EXPLORE = "E0506": "A strategy lacks what it needs: cells, time windows, conditions, requirements or NSGA-II.",
     BAD_MONITOR = "E0601": "Evidence, guarantees or mitigation of a monitor are not in order.",
     BAD_LAB = "E0602": "The simulator of a lab cannot stand in the place of the system's.",
+    NEVER_HOLDS = "E0603": "A guarantee of a monitor can never hold.",
     OUTLASTS_THE_END = "W0001": "A window extends beyond the campaign's end.",
     UNUSED_OPERATION = "W0002": "No campaign and no test uses the operation.",
     OBJECTIVE_WITHOUT_DEFAULT = "W0003": "An objective has no default value.",
@@ -115,9 +116,13 @@ codes! {
     UNUSED_TOPIC = "W0014": "A topic is never used.",
     UNUSED_EVIDENCE = "W0015": "No guarantee of a monitor uses the evidence or demand.",
     ONE_OUTCOME = "W0016": "A comparison in a formula is constant.",
+    ALWAYS_HOLDS = "W0017": "A guarantee of a monitor always holds.",
+    NEVER_THE_STATE = "W0018": "A guarantee is never the state of its monitor: a stronger one holds whenever it does.",
+    IDLE_EVIDENCE = "W0019": "Evidence of a monitor decides nothing.",
     COPIES_OVERLAP = "W0020": "Copies of one operation are active at the same time in a test.",
     EQUAL_SEEDS = "W0021": "Copies of one operation in a test have equal seeds.",
     NOBODY_HEARS = "W0022": "No node subscribes to what an operation disturbs.",
+    WEAKER_FAILS = "W0023": "A guarantee of a monitor may hold while a weaker one does not.",
 }
 
 /// The page of a code, found by its text in any case, for example `e0203`.

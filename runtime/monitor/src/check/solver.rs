@@ -6,9 +6,6 @@
 use super::logic::{Literal, Logic, Node};
 use super::theory::{Comparison, Theory};
 
-/// How many nodes are looked at for one question before it is given up.
-const PATIENCE: u64 = 4_000_000;
-
 /// The answer to a question.
 #[derive(Debug)]
 pub(super) enum Answer {
@@ -22,16 +19,18 @@ pub(super) enum Answer {
 
 /// Whether these literals can hold together. `comparisons` says, per node, which comparison an atom is; `theory` is
 /// what is known of the numbers in them. `laws` always hold; one of which only one part matters says nothing about the
-/// goals and must be such that the rest can always be chosen accordingly.
+/// goals and must be such that the rest can always be chosen accordingly. After a look at `patience` nodes it gives up.
 pub(super) fn solve(
     logic: &Logic,
     comparisons: &[Option<Comparison>],
     theory: Theory,
     goals: &[Literal],
     laws: &[Literal],
+    patience: u64,
     work: &mut u64,
 ) -> Answer {
     let mut solver = Solver::new(logic, comparisons, theory);
+    solver.patience = patience;
     let mut goals = goals.to_vec();
     solver.add_to_what_matters(&goals);
     let mut laws: Vec<Literal> = laws.to_vec();
@@ -117,6 +116,7 @@ struct Solver<'a> {
     followed: usize,
     decisions: Vec<Decision>,
     work: u64,
+    patience: u64,
 }
 
 impl<'a> Solver<'a> {
@@ -139,6 +139,7 @@ impl<'a> Solver<'a> {
             followed: 0,
             decisions: Vec::new(),
             work: size as u64 / 8,
+            patience: 0,
         }
     }
 
@@ -166,7 +167,7 @@ impl<'a> Solver<'a> {
     fn run(&mut self, goals: &[Literal]) -> Option<bool> {
         let mut fits = goals.iter().try_for_each(|&goal| self.set(goal, Levels::NONE)).and_then(|()| self.follow());
         loop {
-            if self.work > PATIENCE {
+            if self.work > self.patience {
                 return None;
             }
             fits = match fits {

@@ -16,8 +16,8 @@ use crate::network::{EvidenceId, Network};
 use crate::truth::Truth;
 use crate::why::Moment;
 
-/// How much work all questions together may take.
-const PATIENCE: u64 = 50_000_000;
+/// The share of all work that one question may take.
+const ONE_QUESTION: u64 = 10;
 
 /// Of which moments a question is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -48,10 +48,17 @@ pub(super) struct Worlds<'a> {
     /// What each piece of evidence reads: inputs, and topics by side.
     reads: Vec<(BTreeSet<usize>, BTreeSet<String>)>,
     work: u64,
+    /// How much work all questions together may take.
+    limit: u64,
 }
 
 impl<'a> Worlds<'a> {
-    pub(super) fn new(network: &'a Network, monitors: &'a [Monitor], values: &'a dyn Fn(&Input) -> Values) -> Self {
+    pub(super) fn new(
+        network: &'a Network,
+        monitors: &'a [Monitor],
+        values: &'a dyn Fn(&Input) -> Values,
+        limit: u64,
+    ) -> Self {
         let mut atoms = Atoms::new();
         let evidence: Vec<&Evidence> = monitors.iter().flat_map(|monitor| &monitor.evidence).collect();
         // All inputs first: whether values of one prove anything depends on which others there are.
@@ -95,6 +102,7 @@ impl<'a> Worlds<'a> {
             nodes: BTreeMap::new(),
             reads,
             work: 0,
+            limit,
         };
         // What always holds is held for long enough at some time, and from then on.
         for at in 0..worlds.evidence.len() {
@@ -141,16 +149,22 @@ impl<'a> Worlds<'a> {
         }
     }
 
+    /// The work that all questions took.
+    pub(super) fn work(&self) -> u64 {
+        self.work
+    }
+
     /// Whether these can hold together.
     pub(super) fn ask(&mut self, goals: &[Literal]) -> Answer {
         if goals.contains(&Literal::FALSE) {
             return Answer::No;
         }
-        if self.work > PATIENCE {
+        let patience = (self.limit / ONE_QUESTION).min(self.limit.saturating_sub(self.work));
+        if patience == 0 {
             return Answer::GivenUp;
         }
         let theory = self.theory.clone();
-        solve(&self.atoms.logic, &self.atoms.comparisons, theory, goals, &self.laws, &mut self.work)
+        solve(&self.atoms.logic, &self.atoms.comparisons, theory, goals, &self.laws, patience, &mut self.work)
     }
 
     /// That a piece of evidence is true at any moment.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 use sesame_base::time::SimTime;
-use sesame_monitor::check::{Finding, Question, Report, Value, Values, When, check};
+use sesame_monitor::check::{self, Finding, Question, Report, Value, Values, When, check};
 use sesame_monitor::why::Moment;
 use sesame_monitor::{Changes, EvidenceId, Network, Run, State, Truth};
 use sesame_plan::{
@@ -485,6 +485,26 @@ fn monitor(conditions: Vec<Condition>, gates: Vec<sesame_plan::Gate>) -> Monitor
         (evidence.inputs, evidence.condition) = (inputs(), condition);
     }
     random::monitor(evidence, gates)
+}
+
+#[test]
+fn conditions_that_exclude_each_other_are_not_true_together() {
+    let x = || Expression::Input(X);
+    let of = |by, bound| compare(x(), by, bound);
+    let one = monitor(
+        vec![of(Comparison::Above, 5.0), of(Comparison::Below, 3.0), of(Comparison::Above, 1.0)],
+        vec![All(vec![E(0), E(1), E(2)])],
+    );
+    let monitors = narrowed(&[one]);
+    let all: Vec<&Evidence> = monitors[0].evidence.iter().collect();
+    let together = |which: &[usize]| {
+        check::together(&which.iter().map(|&at| all[at]).collect::<Vec<_>>(), &|_| Values::ANY, &mut 100_000)
+    };
+    assert_eq!(together(&[0, 1]), Some(false));
+    assert_eq!(together(&[0, 2]), Some(true));
+    assert_eq!(together(&[1, 2]), Some(true));
+    assert_eq!(together(&[1]), Some(true));
+    assert_eq!(together(&[]), Some(true));
 }
 
 fn findings(monitor: Monitor) -> Vec<Finding> {
