@@ -146,7 +146,8 @@ enum Command {
     /// Explain the code of a diagnostic, for example E0203; or something that a space declares, with all its uses.
     ///
     /// A campaign is shown with every default written out, and with the space of its tests; a monitor with its
-    /// certificate as a tree. Without a code or a name, all codes are listed. `explain wiring FILE` shows how the nodes of a ROS 2 system are remapped.
+    /// certificate as a tree. Without a code or a name, all codes are listed. `explain wiring FILE` shows how the nodes
+    /// of a ROS 2 system are remapped.
     Explain {
         /// The code, or the name: for a field or parameter with what it belongs to, as in `SafetyZone.level`.
         #[arg(value_name = "CODE or NAME")]

@@ -77,8 +77,8 @@ use crate::syntax::ast::{self, Name};
 use ros_types::RosTypes;
 use words::list;
 
-/// Resolves the files of a space. `None` exactly when there is an error, be it in `diagnostics` before or after. Adds to
-/// `undecided` what could not be decided about monitors.
+/// Resolves the files of a space. `None` exactly when there is an error, be it in `diagnostics` before or after. Adds
+/// to `undecided` what could not be decided about monitors.
 pub(crate) fn resolve(
     sources: &SourceMap,
     root: FileId,
