@@ -57,18 +57,15 @@ impl<'a> Resolver<'a> {
     }
 
     fn condition_over_metrics(&mut self, expression: &'a ast::Expression) -> Option<Condition> {
+        if let Some((path, sought)) = truth_sought(expression)
+            && self.is_true_or_false(path)
+        {
+            return self.truth_of(path, sought);
+        }
         let (parts, all) = match &expression.kind {
             ExpressionKind::All(parts) => (parts, true),
             ExpressionKind::Any(parts) => (parts, false),
             ExpressionKind::Compare(left, by, right) => return self.comparison(expression, left, *by, right),
-            ExpressionKind::Field(path) if self.is_true_or_false(path) => return self.truth_of(path, true),
-            ExpressionKind::Prefixed(prefixes, of)
-                if prefixes.iter().all(|prefix| prefix.word == PrefixWord::Not)
-                    && let ExpressionKind::Field(path) = &of.kind
-                    && self.is_true_or_false(path) =>
-            {
-                return self.truth_of(path, prefixes.len() % 2 == 0);
-            }
             kind => {
                 let written = self.text(expression.span);
                 let title = match kind {
@@ -454,6 +451,18 @@ enum Side<'a> {
     Number(&'a ast::Quantity),
     Metric(MetricId),
     Truth(bool),
+}
+
+/// The path that a condition names alone, and whether it is sought true: each `not` before it turns that around.
+fn truth_sought(expression: &ast::Expression) -> Option<(&ast::Path, bool)> {
+    match &expression.kind {
+        ExpressionKind::Field(path) => Some((path, true)),
+        ExpressionKind::Prefixed(prefixes, of) if prefixes.iter().all(|prefix| prefix.word == PrefixWord::Not) => {
+            let ExpressionKind::Field(path) = &of.kind else { return None };
+            Some((path, prefixes.len() % 2 == 0))
+        }
+        _ => None,
+    }
 }
 
 /// A truth as the value of a metric.
