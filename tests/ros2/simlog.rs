@@ -196,7 +196,7 @@ fn forty_tests_over_simlog_are_quick_and_come_to_the_same_as_over_ros2() {
     change(&cells[0], &OF_32_BITS);
     let [ros2, grpc] = cells.each_ref().map(|cell| {
         let mut run = command(optimised_sesamec());
-        run.arg("run").arg(&cell.space).args(["--", "--workers", "2"]);
+        run.arg("run").arg(&cell.space).args(["--", "--workers", "3"]);
         let began = Instant::now();
         done(run.current_dir(cell.folder())).expect(0);
         (began.elapsed().as_secs_f64(), cell.tests("both"))

@@ -5,7 +5,7 @@
 //! go from one to the other. `time` and `duration` are the interfaces `builtin_interfaces/msg/Time` and `Duration`
 //! ([`builtin`]).
 
-use sesame_plan::{Primitive, WireType};
+use sesame_plan::{Interface, Primitive, WireType};
 
 use crate::msg::{array, primitive};
 use crate::{Constant, Definition, DefinitionError, Field, is_name};
@@ -13,6 +13,12 @@ use crate::{Constant, Definition, DefinitionError, Field, is_name};
 /// The types of `time` and `duration`.
 const TIMES: [(&str, &str); 2] =
     [("time", "builtin_interfaces/msg/Time"), ("duration", "builtin_interfaces/msg/Duration")];
+
+/// What has a number in ROS 1 that it does not have in ROS 2.
+const HEADER: &str = "std_msgs/msg/Header";
+
+/// What stands in ROS 2 for a message without fields.
+pub const NOTHING: &str = "structure_needs_at_least_one_member";
 
 /// The most characters of a file.
 const LONGEST: usize = 1 << 20;
@@ -64,6 +70,32 @@ pub fn interface(type_name: &str) -> String {
     match type_name.split_once('/') {
         Some((package, name)) if !name.contains('/') => format!("{package}/msg/{name}"),
         _ => type_name.to_owned(),
+    }
+}
+
+/// The text of a `.msg` file of ROS 1 that declares these fields, as far as a layout knows: without constants and
+/// comments, and with `int8` and `uint8` where the file may say `byte` and `char`.
+pub fn text(interface: &Interface) -> String {
+    let fields = interface.fields.iter().filter(|field| field.name != NOTHING);
+    let mut lines: Vec<String> = fields.map(|field| format!("{} {}\n", written(&field.ty), field.name)).collect();
+    let is_header = interface.name == HEADER && interface.fields.iter().all(|field| field.name != "seq");
+    if is_header {
+        lines.insert(0, "uint32 seq\n".to_owned());
+    }
+    lines.concat()
+}
+
+/// A type as `.msg` files of ROS 1 write it.
+fn written(ty: &WireType) -> String {
+    match ty {
+        WireType::Primitive { primitive } => format!("{primitive:?}").to_lowercase(),
+        WireType::String | WireType::WString => "string".to_owned(),
+        WireType::Interface { name } => {
+            let time = TIMES.iter().find(|(_, interface)| interface == name);
+            time.map_or_else(|| type_name(name), |(word, _)| (*word).to_owned())
+        }
+        WireType::Array { of, length } => format!("{}[{length}]", written(of)),
+        WireType::Sequence { of, .. } => format!("{}[]", written(of)),
     }
 }
 

@@ -121,7 +121,7 @@ impl CampaignPlan {
         let mut unclaimed: Vec<(Channel, Remapping)> = Vec::new();
         for (topic, declared, _) in self.cut() {
             let claimed = self.nodes.iter().any(|node| is_source(node, topic, declared.channel))
-                || self.is_state_of_monitor(topic);
+                || self.is_published_by_monitor(topic);
             // The server may be known by the other direction of its service.
             let served = declared.channel != Channel::Topic
                 && (0..).map(TopicId).zip(&self.topics).any(|(other, it)| {

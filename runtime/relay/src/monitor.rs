@@ -39,6 +39,9 @@ pub(crate) struct Monitors<'p> {
     evidence: Vec<EvidenceState<'p>>,
     /// What evidence heard in the event at hand, each at most once, and of which message.
     heard: Vec<(EvidenceId, Truth)>,
+    /// The event at hand, and per evidence the last one in which it heard something.
+    event: u64,
+    last_heard: Vec<u64>,
     message: Option<(Wire, u64)>,
     /// Kept to be used again.
     changes: Changes,
@@ -78,6 +81,13 @@ impl Listeners {
         }
         listeners
     }
+
+    fn of(&self, side: Side, wire: Wire) -> &[EvidenceId] {
+        match side {
+            Side::Inbound => &self.published[wire.index()],
+            Side::Outbound => &self.delivered[wire.index()],
+        }
+    }
 }
 
 impl<'p> Monitors<'p> {
@@ -93,7 +103,7 @@ impl<'p> Monitors<'p> {
         let members = members.collect();
         let all = (0..).take(network.evidence_count()).map(|at| network.owner(EvidenceId(at)));
         let evidence = all.map(|(monitor, at)| &plan.monitor(monitor).evidence[at as usize]);
-        let evidence = evidence.map(|evidence| EvidenceState::new(evidence, plan)).collect();
+        let evidence: Vec<_> = evidence.map(|evidence| EvidenceState::new(evidence, plan)).collect();
         let listeners = Listeners::new(plan, wires, network);
         let mut changes = Changes::default();
         let run = Run::start(Arc::clone(network), &mut changes);
@@ -103,6 +113,8 @@ impl<'p> Monitors<'p> {
             members,
             run,
             listeners,
+            event: 1,
+            last_heard: vec![0; evidence.len()],
             evidence,
             heard: Vec::new(),
             message: None,
@@ -120,7 +132,7 @@ impl<'p> Monitors<'p> {
 
     /// Whether evidence hears this wire's messages as they are delivered.
     pub(crate) fn hears_delivered(&self, wire: Wire) -> bool {
-        !self.listeners.delivered[wire.index()].is_empty()
+        !self.listeners.of(Side::Outbound, wire).is_empty()
     }
 
     /// A message, as it was published or as it is delivered. Nothing is decided before [`Monitors::decide`], or the
@@ -129,23 +141,24 @@ impl<'p> Monitors<'p> {
         if side == Side::Outbound {
             self.outlets.remember(wire, value);
         }
-        let listeners = match side {
-            Side::Inbound => &self.listeners.published[wire.index()],
-            Side::Outbound => &self.listeners.delivered[wire.index()],
-        };
-        if listeners.is_empty() {
+        let count = self.listeners.of(side, wire).len();
+        if count == 0 {
             return;
         }
-        let listeners = listeners.clone();
-        let again = |id: &EvidenceId| self.heard.iter().any(|(heard, _)| heard == id);
-        if self.message.is_some_and(|message| message != (wire, index)) || listeners.iter().any(again) {
+        let again = |id: &EvidenceId| self.last_heard[id.index()] == self.event;
+        let other = self.message.is_some_and(|message| message != (wire, index));
+        if other || self.listeners.of(side, wire).iter().any(again) {
             self.decide(now);
         }
         self.message = Some((wire, index));
         let (topic, member) = self.members[wire.index()];
-        for id in listeners {
+        for at in 0..count {
+            let id = self.listeners.of(side, wire)[at];
             match self.evidence[id.index()].message(topic, member, now, value) {
-                Ok(truth) => self.heard.push((id, truth)),
+                Ok(truth) => {
+                    self.last_heard[id.index()] = self.event;
+                    self.heard.push((id, truth));
+                }
                 Err(lacking) => self.note(id, wire, &lacking),
             }
         }
@@ -166,6 +179,7 @@ impl<'p> Monitors<'p> {
         let Some((wire, index)) = self.message.take() else { return };
         self.run.observe(now, &self.heard, &mut self.changes);
         self.heard.clear();
+        self.event += 1;
         self.take_changes(Some((wire, index)));
     }
 

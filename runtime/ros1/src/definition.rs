@@ -78,6 +78,11 @@ impl Texts {
         Ok(texts)
     }
 
+    /// The texts of layouts. A layout has no constants, so that the MD5 of a type that declares some is another one.
+    pub fn of_layout(interfaces: &[Interface]) -> Self {
+        Texts(interfaces.iter().map(|interface| (ros1::type_name(&interface.name), ros1::text(interface))).collect())
+    }
+
     /// The definition of a type: its text, and the text of each type that it contains.
     pub fn definition(&self, name: &str) -> Result<String, TypeError> {
         let mut all = Vec::new();

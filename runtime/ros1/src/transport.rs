@@ -174,7 +174,7 @@ impl Bus for Ros1Bus {
             let mut wired = wire(&self.plan, &self.ros1, line)?;
             if line.channel == Channel::Topic {
                 let (roles, position) = (&mut self.roles, self.lines.len());
-                wired.subscribe(&node, |source| roles.push(Role::Source { line: position, source })).map_err(lost)?;
+                wired.subscribe(&node, &self.ros1, |source| roles.push(Role::Source { line: position, source }))?;
             } else {
                 wired.serve(&node, &self.lines, &mut self.services, self.lines.len());
             }

@@ -8,7 +8,7 @@ use sesame_relay::message::Mismatch;
 use sesame_relay::value::Value;
 
 use crate::json;
-use crate::proto::v3::SimlogMessage;
+use crate::proto::v3::{SimlogHeader, SimlogMessage, ValueType};
 use crate::shape::Shape;
 use crate::tree::Tree;
 
@@ -30,6 +30,20 @@ pub(crate) fn write(value: &Value, like: &SimlogMessage) -> Result<SimlogMessage
     let mut all = like.value.as_ref().map_or(Tree::Nothing, tree);
     all.write(value);
     Ok(SimlogMessage { value: Some(dynamic(&all)?), ..like.clone() })
+}
+
+/// A message for a value of which no other message says how it is written.
+pub(crate) fn message(value: &Value, now: u64) -> Result<SimlogMessage, Mismatch> {
+    let seconds = i64::try_from(now / 1_000_000_000).unwrap_or(i64::MAX);
+    let nanos = (now % 1_000_000_000) as i32;
+    let header = SimlogHeader { timestamp: Some(Timestamp { seconds, nanos }), ..SimlogHeader::default() };
+    let kind = match value {
+        Value::Bool(_) => ValueType::Bool,
+        Value::Int(_) | Value::Real(_) => ValueType::Number,
+        Value::Text(_) | Value::Undeclared(_) => ValueType::String,
+        Value::Point(_) | Value::List(_) | Value::Record(_) => ValueType::Undefined,
+    };
+    Ok(SimlogMessage { header: Some(header), r#type: kind.into(), value: Some(dynamic(&Tree::of(value))?) })
 }
 
 /// When a message was published, by its own stamp, in nanoseconds.

@@ -1,6 +1,7 @@
 //! A message of either version.
 
 use prost::Message as _;
+use sesame_plan::SimlogVersion;
 use sesame_relay::message::Mismatch;
 use sesame_relay::value::Value;
 
@@ -42,6 +43,15 @@ impl Message {
             Message::V2(message) => ros::write(value, message).map(|it| Message::V2(Box::new(it))),
             Message::V3(message) => dynamic::write(value, message).map(|it| Message::V3(Box::new(it))),
         }
+    }
+
+    /// A message for a value of which no other message says how it is written, published at this time of the simulator
+    /// in nanoseconds. The type is what the space calls it; in version 2 it may name a content of the protocol.
+    pub fn of(version: SimlogVersion, value: &Value, ty: &str, now: u64) -> Result<Message, Mismatch> {
+        Ok(match version {
+            SimlogVersion::V2 => Message::V2(Box::new(ros::message(value, ty, now)?)),
+            SimlogVersion::V3 => Message::V3(Box::new(dynamic::message(value, now)?)),
+        })
     }
 
     /// When it was published, by its own stamp, in nanoseconds; `None` if it has none.

@@ -85,25 +85,36 @@ pub(crate) fn stamp(message: &RosMessage) -> Option<u64> {
 }
 
 /// A header of this time, in nanoseconds.
-#[cfg(feature = "server")]
 fn header(now: u64) -> Header {
     Header { seq: 0, stamp: Some(Time { sec: now / SECOND, nsec: now % SECOND }), frame_id: String::new() }
 }
 
-/// A message for a value that nobody has declared: a stamped point, a safety zone, or text with a time stamp.
-#[cfg(feature = "server")]
+/// A message for a value of which no other message says how it is written: the content of the protocol whose name the
+/// type has, a stamped point, a safety zone, or text with a time stamp.
 pub(crate) fn message(value: &Value, kind: &str, now: u64) -> Result<RosMessage, Mismatch> {
     const ZONE: [&str; 4] = ["zone", "level", "object1", "object2"];
-    let content = match value {
+    let named = matches!(value, Value::Record(_)).then(|| empty(kind)).flatten();
+    let content = named.unwrap_or_else(|| match value {
         Value::Point(_) => Content::PointStamped(PointStamped { header: Some(header(now)), point: None }),
         Value::Record(record) if record.fields().names().iter().map(|name| &**name).eq(ZONE) => {
             Content::SafetyZone(SafetyZone { header: Some(header(now)), ..SafetyZone::default() })
         }
         _ => Content::TimeStamp(header(now)),
-    };
+    });
     let text = matches!(content, Content::TimeStamp(_)).then(|| written(value, "")).unwrap_or_default();
     let like = RosMessage { r#type: kind.to_owned(), value: text, content: Some(content) };
     if like.value.is_empty() && !matches!(value, Value::Text(_)) { write(value, &like) } else { Ok(like) }
+}
+
+/// Content of the protocol, by the name of its type.
+fn empty(kind: &str) -> Option<Content> {
+    Some(match kind {
+        "JointTrajectory" => Content::JointTrajectory(JointTrajectory::default()),
+        "JointTrajectoryPoint" => Content::JointTrajectoryPoint(JointTrajectoryPoint::default()),
+        "Quaternion" => Content::Quaternion(Quaternion::default()),
+        "SafetyZoneCmd" => Content::SafetyZoneCmd(SafetyZoneCmd::default()),
+        _ => return None,
+    })
 }
 
 /// The content that is the payload.

@@ -182,7 +182,7 @@ impl System {
         relay.advance(self.now, &mut self.deliveries);
         let before = session.start.or(self.start).map(|start| start.middle_of(self.now, step));
         let mut round = Round::new(&self.plan, relay.wires(), session.marker, before);
-        session.deliver(&self.plan, &mut self.deliveries, relay, &mut round)?;
+        session.deliver(&self.plan, &mut self.deliveries, relay, self.now, &mut round)?;
         let answer = session.client.begin_step();
         let settle = Duration::from_nanos(self.settings.settle_ns);
         let mut began = now();

@@ -7,6 +7,7 @@ It says `port N` when it listens. Every step it publishes, all stamped with the 
     point/in, stamped/in, turn/in, trajectory/in, trajectory_point/in, clock/in, safetyzones/Z1, command/in
     state/in              text: JSON
     seldom/in             text: the number of the step, every tenth step
+    ordered/in            text: what came last in place of messages on order/in, which nobody publishes
 """
 
 import argparse
@@ -37,6 +38,7 @@ class Simulator(services.SimlogAPIServicer):
     def begin(self):
         self.steps = 0
         self.heard = "none"
+        self.ordered = "-1"
         self.next = None
 
     def setStepSize(self, request, context):
@@ -65,6 +67,7 @@ class Simulator(services.SimlogAPIServicer):
             t = self.steps * self.step_ms / 1000
             header = self.header()
             self.text("cart/in", self.heard)
+            self.text("ordered/in", self.ordered)
             target = repr(math.sin(t))
             if "joint/in" not in self.cuts:
                 self.heard = target
@@ -126,6 +129,8 @@ class Simulator(services.SimlogAPIServicer):
             with self.lock:
                 if request.topic.path == self.cuts.get("joint/in"):
                     self.heard = request.data.value
+                if request.topic.path == self.cuts.get("order/in"):
+                    self.ordered = request.data.value
         return empty_pb2.Empty()
 
 

@@ -88,8 +88,9 @@ fn line(plan: &CampaignPlan, wires: &WireTable, wire: Wire) -> Line {
     }
     let from = |&node: &NodeId| source(format!("{path}/from/{}", plan.node(node).name), Some(node));
     let mut sources: Vec<Source> = publishers.iter().map(from).collect();
-    // Nobody but the runner publishes the state of a monitor.
-    let of_runner = plan.is_state_of_monitor(topic) && !plan.nodes.iter().any(|node| node.publishes.contains(&topic));
+    // Nobody but the runner publishes what monitors say, unless the space names who does.
+    let of_runner =
+        plan.is_published_by_monitor(topic) && !plan.nodes.iter().any(|node| node.publishes.contains(&topic));
     let distinguished = |node: NodeId| publishers.contains(&node) || !plan.node(node).publishes.contains(&topic);
     let mut nodes = (0u32..).map(NodeId).take(plan.nodes.len());
     // Whoever is not named, if only because no node is declared to publish it.
@@ -106,12 +107,12 @@ fn line(plan: &CampaignPlan, wires: &WireTable, wire: Wire) -> Line {
 #[cfg(test)]
 mod tests {
     use sesame_plan::testing::{evidence_above, guarantee, minimal, monitor, node, topic};
-    use sesame_plan::{Clock, Gate, Node, Ros2, Transport, Type};
+    use sesame_plan::{Clock, FieldRef, Gate, Mitigation, MitigationValue, Node, Ros2, Transport, Type};
 
     use super::*;
 
     #[test]
-    fn a_state_that_only_a_monitor_publishes_comes_from_nowhere() {
+    fn what_only_a_monitor_publishes_comes_from_nowhere() {
         let mut plan = minimal();
         plan.topics = vec![topic("level", &["level"], Type::Real { unit: None }), topic("safe", &["safe"], Type::Bool)];
         plan.monitors =
@@ -129,6 +130,14 @@ mod tests {
         let level = (vec!["level".to_owned()], 0);
         assert_eq!(ends(&plan), [level.clone(), (Vec::new(), 1)]);
         plan.nodes = vec![Node { publishes: vec![TopicId(1)], ..node("arm") }];
-        assert_eq!(ends(&plan), [level, (vec!["safe/undisturbed".to_owned()], 1)]);
+        assert_eq!(ends(&plan), [level.clone(), (vec!["safe/undisturbed".to_owned()], 1)]);
+        // The same holds for what is to bring the system into a safe state.
+        let field = FieldRef { topic: TopicId(1), path: Vec::new() };
+        let mitigation = Mitigation { field, value: MitigationValue::Bool(true) };
+        plan.monitors[0].publishes = None;
+        plan.monitors[0].otherwise.mitigation = Some(mitigation);
+        assert_eq!(ends(&plan), [level.clone(), (vec!["safe/undisturbed".to_owned()], 1)]);
+        plan.nodes = vec![node("arm")];
+        assert_eq!(ends(&plan), [level, (Vec::new(), 1)]);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use sesame_interfaces::ros1::type_name;
+use sesame_interfaces::ros1::{NOTHING, type_name};
 use sesame_plan::{Interface, Primitive, WireType};
 use sesame_relay::value::Fields;
 use sesame_relay::wire::Wanted;
@@ -11,9 +11,6 @@ use super::error::{LARGEST, LayoutError};
 
 /// The number of a message, which headers have in ROS 1 only.
 const SEQ: Primitive = Primitive::Uint32;
-
-/// What stands in ROS 2 for a message without fields.
-const NOTHING: &str = "structure_needs_at_least_one_member";
 
 /// The shapes of a message and of all that it contains. The last one is the message.
 #[derive(Debug)]

@@ -6,8 +6,11 @@ use std::collections::{BTreeSet, VecDeque};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex};
 
+use sesame_plan::Interface;
+
 use super::{Shared, lock};
 use crate::connection::{Connection, LOOK};
+use crate::definition::{Texts, TypeError};
 use crate::master::AskError;
 use crate::protocol::header::Header;
 
@@ -40,6 +43,9 @@ pub(crate) struct Publication {
     pub(crate) topic: String,
     /// Its type, as soon as it is known.
     pub(super) offer: Option<Offer>,
+    /// Whether its type is what the space says, because nobody else publishes on it. The space knows no constants, so
+    /// the MD5 of a subscriber that has a type of the same name is as good.
+    by_space: bool,
     /// Those of its publishers that are latching: as many messages are kept for subscribers that come later.
     latching: BTreeSet<String>,
     latest: VecDeque<Arc<[u8]>>,
@@ -79,7 +85,15 @@ impl Waiting {
 impl Publication {
     pub(crate) fn new(topic: &str) -> Self {
         let (latest, links) = (VecDeque::new(), Vec::new());
-        Publication { topic: topic.to_owned(), offer: None, latching: BTreeSet::new(), latest, links }
+        Publication { topic: topic.to_owned(), offer: None, by_space: false, latching: BTreeSet::new(), latest, links }
+    }
+
+    /// A topic on which nobody else publishes, with the layouts of the space.
+    pub(crate) fn of_space(topic: &str, interfaces: &[Interface], ty: &str) -> Result<Self, TypeError> {
+        let texts = Texts::of_layout(interfaces);
+        let (md5, definition) = (texts.md5(ty)?, texts.definition(ty)?);
+        let offer = Offer { ty: ty.to_owned(), md5, definition, latching: false };
+        Ok(Publication { offer: Some(offer), by_space: true, ..Publication::new(topic) })
     }
 
     /// The nodes that listen.
@@ -90,10 +104,17 @@ impl Publication {
 
 impl Shared {
     /// Adds a publication; it is offered when its type is known.
-    pub(crate) fn add_publication(&self, publication: Publication) -> usize {
-        let mut publications = lock(&self.publications);
-        publications.push(publication);
-        publications.len() - 1
+    pub(crate) fn add_publication(&self, publication: Publication) -> Result<usize, AskError> {
+        let known = publication.offer.as_ref().map(|offer| (publication.topic.clone(), offer.ty.clone()));
+        let at = {
+            let mut publications = lock(&self.publications);
+            publications.push(publication);
+            publications.len() - 1
+        };
+        if let Some((topic, ty)) = known {
+            self.master.publish(&topic, &ty)?;
+        }
+        Ok(at)
     }
 
     /// Offers a publication with what one of its publishers says of it; an error if another one said something else.
@@ -174,7 +195,10 @@ impl Shared {
         let mut publications = lock(&self.publications);
         let found = publications.iter_mut().find(|it| it.topic == topic);
         let known = found.and_then(|publication| Some((publication.offer.clone()?, publication)));
-        let Some((offer, publication)) = known else { return Err(format!("`{topic}` is not published here")) };
+        let Some((mut offer, publication)) = known else { return Err(format!("`{topic}` is not published here")) };
+        if publication.by_space && header.get("type") == offer.ty && md5 != "*" {
+            md5.clone_into(&mut offer.md5);
+        }
         if md5 != "*" && offer.md5 != "*" && md5 != offer.md5 {
             let (node, theirs, ours) = (&link.node, header.get("type"), &offer.ty);
             self.note(format!(

@@ -5,8 +5,9 @@ use std::sync::Arc;
 use sesame_interfaces::ros1::type_name;
 use sesame_plan::{CampaignPlan, Channel, Ros1};
 use sesame_relay::transport::TransportError;
-use sesame_relay::wire::{Line, wanted};
+use sesame_relay::wire::{Line, Sink, wanted};
 
+use super::lost;
 use crate::codec::Codec;
 use crate::master::AskError;
 use crate::node::{Node, Publication, Service, Subscription};
@@ -59,14 +60,33 @@ pub(super) fn wire(plan: &CampaignPlan, ros1: &Ros1, line: &Line) -> Result<Wire
 }
 
 impl Wired {
+    /// What is published at a sink of a topic. Where nobody else publishes, its type is that of the space.
+    fn publication(&self, sink: &Sink, ros1: &Ros1) -> Result<Publication, TransportError> {
+        if !self.line.sources.is_empty() {
+            return Ok(Publication::new(&sink.path));
+        }
+        let publication = Publication::of_space(&sink.path, &ros1.interfaces, &self.interface);
+        publication
+            .map_err(|error| TransportError::Wiring(format!("nothing can be published on `{}`: {error}", sink.path)))
+    }
+
     /// Subscribes to the sources of a topic; `each` is called for each before anything comes from it.
-    pub(super) fn subscribe(&mut self, node: &Node, mut each: impl FnMut(usize)) -> Result<(), AskError> {
-        self.sinks = self.line.sinks.iter().map(|sink| node.add_publication(Publication::new(&sink.path))).collect();
+    pub(super) fn subscribe(
+        &mut self,
+        node: &Node,
+        ros1: &Ros1,
+        mut each: impl FnMut(usize),
+    ) -> Result<(), TransportError> {
+        let lost = |error: AskError| lost(&node.master.at, &error.to_string());
+        for sink in &self.line.sinks {
+            let publication = self.publication(sink, ros1)?;
+            self.sinks.push(node.add_publication(publication).map_err(lost)?);
+        }
         for (at, source) in self.line.sources.iter().enumerate() {
             each(at);
             let codec = Some(Arc::clone(&self.codec));
             let subscription = Subscription::new(&source.path, &self.interface, codec, self.sinks.clone());
-            self.sources.push(node.subscribe(subscription)?);
+            self.sources.push(node.subscribe(subscription).map_err(lost)?);
         }
         Ok(())
     }

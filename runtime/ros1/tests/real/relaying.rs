@@ -3,11 +3,13 @@
 use std::time::{Duration, Instant};
 
 use nix::sys::signal::Signal;
-use sesame_plan::testing::{at, operation, test_of, use_of};
-use sesame_plan::{Choice, Clock, Node, NodeId, Operation, OperationKind, Test};
+use sesame_plan::testing::{at, evidence_above, field, guarantee, message, monitor, node, operation, test_of, use_of};
+use sesame_plan::{
+    Channel, Choice, Clock, Gate, MessageId, Node, NodeId, Operation, OperationKind, Test, TextTest, TopicId, Type,
+};
 
 use crate::core::{Core, Program};
-use crate::system::{System, peers, remapped, ros1};
+use crate::system::{System, peers, plan, remapped, ros1};
 
 const STRING: &str = "std_msgs/msg/String";
 const JOINTS: &str = "sensor_msgs/msg/JointState";
@@ -330,4 +332,41 @@ fn nodes_that_operations_tell_apart_have_ways_of_their_own() {
     assert_eq!(finished.unwrap().messages, 500);
     let received = said.map(|said| said.unwrap()["received"].as_u64().unwrap());
     assert_eq!(received, [200, 500]);
+}
+
+#[test]
+fn a_state_reaches_its_subscribers_although_no_publisher_says_of_which_type_it_is() {
+    let Some(core) = Core::start() else { return };
+    let topics = [("count", "/count", STRING, Channel::Topic), ("state", "/state", STRING, Channel::Topic)];
+    let mut plan = plan(&core.uri(), &topics);
+    ros1(&mut plan).wiring[0].cut = false;
+    plan.messages = vec![message("Text", vec![field("data", Type::Text)])];
+    for topic in &mut plan.topics {
+        topic.ty = Type::Message { id: MessageId(0) };
+    }
+    plan.nodes = vec![
+        Node { publishes: vec![TopicId(0)], ..node("publisher") },
+        Node { subscribes: vec![TopicId(1)], ..node("subscriber") },
+    ];
+    let mut third = evidence_above("third", 0, 0.5);
+    third.inputs[0].field.path = vec!["data".to_owned()];
+    third.inputs[0].text = Some(TextTest::Is("3".to_owned()));
+    plan.monitors = vec![monitor("arm", 1, vec![third], vec![guarantee("moves", 1, Gate::Evidence(0))])];
+    plan.validate().expect("the plan is sound");
+    let mut publisher = core.ready_peer("publisher.py", &["/count", "std_msgs/String", "4", "20"]);
+    let mut subscriber = core.ready_peer("subscriber.py", &["/state", "std_msgs/String", "2", "20"]);
+    let (mut system, mut said) = (System::new(plan), None);
+    let finished = system.run(
+        &nothing(),
+        || publisher.go(),
+        || {
+            said = said.take().or_else(|| subscriber.said_already());
+            said.is_some()
+        },
+    );
+    let (said, finished) = (said.unwrap(), finished.unwrap());
+    assert_eq!(said["received"], 2, "`unsafe` at time zero, and `moves`: {said}");
+    assert_eq!(said["md5sum"], "992ce8a1687cec8c8bd883ec73ca41d1", "that of the real definition");
+    assert_eq!(finished.messages, 6, "four numbers and two states");
+    assert_eq!(system.incidents().notes, [""; 0]);
 }

@@ -2,7 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
-use sesame_plan::{CampaignPlan, Simlog, TopicId, Type};
+use sesame_base::time::SimTime;
+use sesame_plan::{CampaignPlan, Simlog, SimlogVersion, TopicId, Type};
 use sesame_relay::message::Mismatch;
 use sesame_relay::relay::{Delivery, Exchange};
 use sesame_relay::value::Value;
@@ -20,6 +21,9 @@ const REMEMBERED: usize = 128;
 pub(super) struct Line {
     pub(super) wire: Wire,
     pub(super) topic: TopicId,
+    /// The name of its type, and the version of the protocol in which it is written.
+    kind: String,
+    version: SimlogVersion,
     shape: Shape,
     /// Under which name messages are published in place of those that come; `None` for a topic that is only heard.
     injected: Option<String>,
@@ -49,8 +53,8 @@ impl Lines {
             let kind = kind(plan, topic);
             let injected = if cut.contains(&wire) {
                 let injected = match settings.protocol {
-                    sesame_plan::SimlogVersion::V2 => settings.names.injected(path),
-                    sesame_plan::SimlogVersion::V3 => settings.names.injected.clone(),
+                    SimlogVersion::V2 => settings.names.injected(path),
+                    SimlogVersion::V3 => settings.names.injected.clone(),
                 };
                 Some(client.inject(&settings.names.cut(path), &injected, &kind)?.1)
             } else {
@@ -58,7 +62,8 @@ impl Lines {
                 None
             };
             let shape = Shape::of_type(plan, &plan.topic(topic).ty);
-            lines.push(Line { wire, topic, shape, injected, originals: VecDeque::new() });
+            let (version, originals) = (settings.protocol, VecDeque::new());
+            lines.push(Line { wire, topic, kind, version, shape, injected, originals });
         }
         let by_wire = lines.iter().enumerate().map(|(at, line)| (line.wire, at)).collect();
         Ok(Lines { lines, by_wire })
@@ -106,13 +111,18 @@ impl Line {
 
     /// What a delivery is on the wire, and under which name; `None` where messages are only heard, and are where they
     /// belong already.
-    pub(super) fn written(&self, delivery: &Delivery) -> Result<Option<(String, Message)>, Mismatch> {
+    pub(super) fn written(&self, delivery: &Delivery, now: SimTime) -> Result<Option<(String, Message)>, Mismatch> {
         let Some(name) = &self.injected else { return Ok(None) };
         let of_index = self.originals.iter().find(|(number, _)| *number == delivery.index);
         // Nothing is delivered that has not come, but for what monitors publish, which is written as the last message
-        // is.
-        let Some((_, original)) = of_index.or(self.originals.back()) else { return Ok(None) };
-        Ok(Some((name.clone(), original.with(&delivery.value)?)))
+        // is, if there is one.
+        let message = if let Some((_, original)) = of_index.or(self.originals.back()) {
+            original.with(&delivery.value)?
+        } else {
+            let now = u64::try_from(now.nanos()).unwrap_or_default();
+            Message::of(self.version, &delivery.value, &self.kind, now)?
+        };
+        Ok(Some((name.clone(), message)))
     }
 }
 

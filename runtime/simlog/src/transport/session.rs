@@ -61,12 +61,13 @@ impl Session {
         plan: &CampaignPlan,
         deliveries: &mut Vec<Delivery>,
         relay: &dyn Exchange,
+        now: SimTime,
         round: &mut Round,
     ) -> Result<(), TransportError> {
         let mut published = Vec::new();
         for delivery in deliveries.drain(..) {
             let Some(line) = self.lines.of_wire(delivery.wire) else { continue };
-            match line.written(&delivery) {
+            match line.written(&delivery, now) {
                 Ok(None) => {}
                 Ok(Some(written)) => {
                     round.owe(plan, relay.wires(), delivery.wire);

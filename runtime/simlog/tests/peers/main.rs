@@ -9,6 +9,7 @@ mod peer;
 mod recorder;
 
 mod client;
+mod monitors;
 mod scanning;
 mod served;
 #[cfg(feature = "tls")]
