@@ -213,7 +213,7 @@ mod tests {
     /// Each word of a text is a field with a message of that type; `---` is between requests and replies.
     fn words(name: &str, definition: &Definition) -> Result<Vec<Interface>, String> {
         if definition.text.contains('!') {
-            return Err("its line 1 is no field".to_owned());
+            return Err("its line 1 is not a field".to_owned());
         }
         let field = |(at, name): (usize, &str)| InterfaceField {
             name: format!("f{at}"),
@@ -263,7 +263,7 @@ mod tests {
         );
         assert_eq!(found(&files, "a/msg/Other").unwrap(), None);
         assert_eq!(found(&files, "a/../b/msg/Leaf").unwrap(), None);
-        assert_eq!(found(&files, "c/msg/Broken").unwrap_err(), "/first/c/msg/Broken.msg: its line 1 is no field");
+        assert_eq!(found(&files, "c/msg/Broken").unwrap_err(), "/first/c/msg/Broken.msg: its line 1 is not a field");
     }
 
     #[test]

@@ -315,7 +315,7 @@ fn survey(
     let shown = |path: &str| if tree.folder.is_empty() { path.to_owned() } else { format!("{}/{path}", tree.folder) };
     let manifest_path = root.join(manifest::PATH);
     let manifest_shown = shown(manifest::PATH);
-    // What is not UTF-8 was not generated, and is no JSON either.
+    // What is not UTF-8 was not generated, and is not JSON either.
     let at_manifest = Place { root: out, below: &manifest_shown };
     let old_text = at_manifest.read()?.map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
     let old = old_text

@@ -143,7 +143,7 @@ fn scalar(name: &str) -> Option<WireType> {
     Some(WireType::Primitive { primitive })
 }
 
-/// The names of types that are no interfaces, for suggestions.
+/// The names of types that are not interfaces, for suggestions.
 pub(crate) const SCALARS: [&str; 15] = [
     "bool", "int8", "uint8", "byte", "char", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32",
     "float64", "string", "wstring",

@@ -45,7 +45,7 @@ impl Interfaces for Memory {
         let mut found = header();
         match name {
             "cell_msgs/msg/Header" => {}
-            "cell_msgs/msg/Broken" => return Err("its line 3 is no field".to_owned()),
+            "cell_msgs/msg/Broken" => return Err("its line 3 is not a field".to_owned()),
             "cell_msgs/msg/Joint" => {
                 let axes = ["x", "y", "z"].map(|axis| (axis, of(Primitive::Float32)));
                 found.push(interface("other_msgs/msg/Place", &axes));

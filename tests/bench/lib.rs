@@ -46,8 +46,13 @@ campaign all {
 
 /// The plan of the space above.
 pub fn plan() -> CampaignPlan {
+    plan_of(SPACE)
+}
+
+/// The plan of the campaign `all` of a space.
+pub fn plan_of(space: &str) -> CampaignPlan {
     let mut sources = SourceMap::new();
-    let root = sources.add("bench.sesame", SPACE);
+    let root = sources.add("bench.sesame", space);
     let analysis = sesame_dsl::analyse(&sources, root);
     let space = analysis.model.unwrap_or_else(|| panic!("the space is sound: {:?}", analysis.diagnostics));
     let campaign = space.campaign("all").expect("the space has the campaign");

@@ -53,7 +53,7 @@ fn the_published_choices_are_found_and_proved_in_both_modes() {
             let found: f64 = after.split(',').next().unwrap().parse().unwrap();
             assert!((found - value).abs() < 5e-10, "{compat} {lambda}: {found}");
             assert!(after.contains("proved to be the best"), "{}", said.err);
-            assert!(said.err.contains("T202 is no candidate: equal to T103"), "{}", said.err);
+            assert!(said.err.contains("T202 is not a candidate: equal to T103"), "{}", said.err);
         }
     }
 }
@@ -67,6 +67,6 @@ fn a_choice_that_cannot_be_made_says_what_is_missing() {
     assert!(refused(&["--budget", "5", "--lambda", "2"]).contains("λ is 2, which is not in 0 to 1"));
     assert!(refused(&["--budget", "5", "--rank", "collisions:descending"]).contains("there is no metric `collisions`"));
     assert!(refused(&["--budget", "5", "--rank", "collisionOccurance:up"]).contains("`up` is neither `ascending`"));
-    assert!(refused(&["--budget", "5", "--run", "T1"]).contains("T1 is no candidate, so it cannot count as run"));
+    assert!(refused(&["--budget", "5", "--run", "T1"]).contains("T1 is not a candidate, so it cannot count as run"));
     assert!(refused(&["--budget", "5", "--lab", "hall"]).contains("there is no lab `hall`: the space had none"));
 }

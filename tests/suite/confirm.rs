@@ -34,7 +34,7 @@ fn a_front_is_of_confirmed_tests_and_says_how_often_each_finding_came_again() {
     let said = runner.run(&["--results", "results", "--workers", "1", "--junit", junit.to_str().unwrap()]).expect(0);
     let repository = results(&runner, "results");
     let rows = repository.tests().unwrap();
-    assert_eq!(rows.len(), 62, "repetitions are no tests");
+    assert_eq!(rows.len(), 62, "repetitions are not tests");
     let repetitions = repository.repetitions().unwrap();
     let mut seeds: BTreeSet<u64> = BTreeSet::from([repository.test(1).unwrap().simulator_seed]);
     for (test, runs) in &repetitions {

@@ -24,7 +24,7 @@ pub enum Between {
     Linear,
 }
 
-/// Why numbers are no series.
+/// Why numbers are not series.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NotASeries {
     /// There are no samples.

@@ -95,7 +95,7 @@ impl Parser {
     /// A name that declares something.
     fn name(&mut self) -> Result<String, DefinitionError> {
         let name = self.word()?;
-        if is_name(&name) { Ok(name) } else { self.wrong(format!("`{name}` is no name")) }
+        if is_name(&name) { Ok(name) } else { self.wrong(format!("`{name}` is not a name")) }
     }
 
     fn members(&mut self, found: &mut Vec<Definition>, constants: &mut Constants) -> Result<(), DefinitionError> {
@@ -291,7 +291,7 @@ impl Parser {
                     return Ok(ty.clone());
                 }
                 if !full.split('/').all(is_name) {
-                    return self.wrong(format!("`{name}` is no type"));
+                    return self.wrong(format!("`{name}` is not a type"));
                 }
                 Ok(WireType::Interface { name: full })
             }

@@ -55,7 +55,7 @@ pub struct DefinitionError {
     pub problem: String,
 }
 
-/// The most values that a fixed array may hold: a layout is no place for images.
+/// The most values that a fixed array may hold: a layout is not a place for images.
 const LONGEST_ARRAY: u32 = 1 << 24;
 
 /// An interface of these fields.

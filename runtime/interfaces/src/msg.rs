@@ -106,7 +106,7 @@ fn element(package: &str, written: &str) -> Result<WireType, String> {
     if let Some(bound) = bound
         && (!matches!(name, "string" | "wstring") || bound.parse::<u32>().is_err())
     {
-        return Err(format!("`{written}` is no bounded text"));
+        return Err(format!("`{written}` is not a bounded text"));
     }
     if let Some(primitive) = primitive(name) {
         return Ok(WireType::Primitive { primitive });
@@ -126,7 +126,7 @@ fn element(package: &str, written: &str) -> Result<WireType, String> {
     };
     let is_interface = name.rsplit('/').next().is_some_and(|last| last.starts_with(|c: char| c.is_ascii_uppercase()));
     if name.split('/').count() != 3 || !name.split('/').all(is_name) || !is_interface {
-        return Err(format!("`{written}` is no type"));
+        return Err(format!("`{written}` is not a type"));
     }
     Ok(WireType::Interface { name })
 }

@@ -174,7 +174,7 @@ struct Topic {
     arrivals: Arrivals,
     retained: bool,
     quality: u8,
-    /// How many payloads were no JSON.
+    /// How many payloads were not JSON.
     unreadable: u64,
 }
 
@@ -207,7 +207,7 @@ impl Heard {
 impl Topic {
     fn found(self, path: String) -> FoundTopic {
         let messages = self.arrivals.messages();
-        let problem = format!("{} of {messages} payloads are no JSON", self.unreadable);
+        let problem = format!("{} of {messages} payloads are not JSON", self.unreadable);
         FoundTopic {
             path,
             retained: Some(self.retained),
@@ -238,7 +238,7 @@ mod tests {
         let found = |path: &str| heard.topics[path].found(path.to_owned());
         let a = found("a");
         assert_eq!((a.messages, a.rate, a.retained, a.quality), (2, Some(0.5), Some(true), Some(1)));
-        assert_eq!(found("b").problem.as_deref(), Some("1 of 1 payloads are no JSON"));
+        assert_eq!(found("b").problem.as_deref(), Some("1 of 1 payloads are not JSON"));
         for number in 0..MOST_TOPICS + 5 {
             heard.take(&publish(&format!("t{number}"), "1", QoS::AtMostOnce), Duration::ZERO);
         }

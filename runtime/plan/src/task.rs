@@ -77,7 +77,7 @@ pub struct LabTask {
     /// The tests, no two equal; at least one.
     pub tests: Vec<LabTest>,
     /// How often each is run; at least once. All tests are run once before any is run again, so that what changes in
-    /// the lab with time is no difference of tests.
+    /// the lab with time is not a difference of tests.
     pub repeats: u32,
 }
 

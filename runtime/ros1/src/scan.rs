@@ -48,7 +48,7 @@ pub struct Found {
 /// Why nothing can be seen.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ScanError {
-    /// This is no address.
+    /// This is not an address.
     #[error("`{0}` is not the address of a master, such as `http://127.0.0.1:11311`")]
     Address(String),
     /// The master does not answer.

@@ -109,7 +109,7 @@ impl Ros1Bus {
                     self.send(line, sink, bytes, call);
                 }
                 let (path, interface) = (&wired.line.path, &wired.interface);
-                Event::Note(format!("a message on `{path}` is no `{interface}`, and goes on unchanged: {error}"))
+                Event::Note(format!("a message on `{path}` is not a `{interface}`, and goes on unchanged: {error}"))
             }
         }
     }
@@ -133,7 +133,7 @@ impl Ros1Bus {
             Incoming::Note(note) => Some(Event::Note(note)),
             Incoming::Message { subscription, bytes, arrived } => match self.roles.get(subscription)? {
                 Role::Clock => Some(wired::clock(&bytes).map_or_else(
-                    || Event::Note(format!("a message of the clock is no `{CLOCK}`, and is left out")),
+                    || Event::Note(format!("a message of the clock is not a `{CLOCK}`, and is left out")),
                     Event::Clock,
                 )),
                 Role::Source { line, source } => Some(self.event(*line, *source, None, &bytes, arrived)),

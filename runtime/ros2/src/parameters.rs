@@ -165,11 +165,11 @@ impl ParameterValue {
             Some(kind) if kind == DOUBLE as f64 => ("double_value", Value::Real(number)),
             #[expect(clippy::cast_possible_truncation, reason = "casts of reals saturate")]
             Some(kind) if kind == INTEGER as f64 => ("integer_value", Value::Int(number.round() as i64)),
-            _ => return Err("it is no number".to_owned()),
+            _ => return Err("it is not a number".to_owned()),
         };
         match value.at_mut(&[field]) {
             Some(place) => *place = number,
-            None => return Err("it is no number".to_owned()),
+            None => return Err("it is not a number".to_owned()),
         }
         Ok(ParameterValue(value))
     }

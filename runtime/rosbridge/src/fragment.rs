@@ -46,7 +46,7 @@ struct Waiting {
     at: u64,
 }
 
-/// Why a piece is no use.
+/// Why a piece is useless.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PieceError {
     /// Its number is not one of so many.

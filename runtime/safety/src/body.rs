@@ -116,7 +116,7 @@ pub enum BodyError {
         "a box or a capsule moves with a recording without orientations: record them, or use a sphere around the shape"
     )]
     NoOrientations,
-    /// A pose is no pose.
+    /// A pose is not valid.
     #[error(
         "the pose of a fixed body needs finite coordinates of at most {FARTHEST} m and a quaternion of length 1, but is {0:?}"
     )]

@@ -135,7 +135,7 @@ pub fn by_messages(depends: bool) -> Coupling {
 ///
 /// They are compared from the start of `together` up to `until`: the first contact in that run, after which bodies move
 /// differently in any case, or its end. A difference within the tolerance is none. Two recordings that agree, but do
-/// not cover all of that, are no proof.
+/// not cover all of that, are not proof.
 pub fn by_motion(alone: &Trace, together: &Trace, until: f64, tolerance: Tolerance) -> Coupling {
     let needed = Interval { from: together.start(), to: until.max(together.start()) };
     let common = Interval { from: alone.start().max(needed.from), to: alone.end().min(together.end()).min(needed.to) };

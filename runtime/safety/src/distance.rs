@@ -30,7 +30,7 @@ const PARALLEL: f64 = 1e-9;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Separation {
     /// The signed distance, in metres: negative where the shapes overlap. It is exact up to rounding; for two disjoint
-    /// shapes of which one is a box and the other is no sphere, it may be too large by a part in 10⁷.
+    /// shapes of which one is a box and the other is not a sphere, it may be too large by a part in 10⁷.
     pub distance: f64,
     /// A unit vector from the first shape to the second one, along which the gap is greatest.
     pub normal: Vector,

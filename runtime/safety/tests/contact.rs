@@ -263,7 +263,7 @@ proptest! {
             let clearance = clearance(&one, &other, time);
             least = least.min(clearance);
             let touching = found.intervals.iter().any(|interval| (interval.from..=interval.to).contains(&time));
-            prop_assert!(touching || clearance > 0.0, "{clearance} at {time} is no contact in {found:?}");
+            prop_assert!(touching || clearance > 0.0, "{clearance} at {time} is not contact in {found:?}");
             prop_assert!(!touching || clearance <= tolerance * 1.01, "{clearance} at {time} is a contact in {found:?}");
         }
         prop_assert!(found.nearest.clearance <= least + tolerance * 1.01, "{found:?} {least}");

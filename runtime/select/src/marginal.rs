@@ -17,7 +17,7 @@ pub struct Marginal {
 
 /// The choice with `step` more budget. Without a step, the budget is the least one with which another test can be added
 /// to the selection; a smaller one may already allow to exchange tests for better and more expensive ones. `None` if
-/// all tests are chosen, or if the step is no positive number.
+/// all tests are chosen, or if the step is not a positive number.
 pub fn marginal(
     problem: &Problem,
     selection: &Selection,

@@ -39,7 +39,7 @@ pub struct Problem {
     pairs: Pairs,
 }
 
-/// Why something is no problem to be solved. Tests are named by their positions.
+/// Why something is not a problem to be solved. Tests are named by their positions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Invalid {
     /// λ is not in 0..=1.

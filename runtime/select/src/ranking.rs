@@ -17,7 +17,7 @@ pub enum Better {
 /// A metric that tests are ranked by: a value for each of them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Key<'a> {
-    /// The values, in the order of the tests; infinite ones are compared, NaN is no value.
+    /// The values, in the order of the tests; infinite ones are compared, NaN is not a value.
     pub values: &'a [f64],
     /// Which of them are better.
     pub better: Better,

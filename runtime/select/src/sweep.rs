@@ -58,7 +58,7 @@ pub fn sweep(problem: &Problem, stop: &mut dyn FnMut() -> bool) -> Sweep {
     let mut stretches: Vec<Stretch> = Vec::new();
     for (at, (from, chosen)) in bends.iter().enumerate() {
         let to = bends.get(at + 1).map_or(1.0, |(next, _)| *next);
-        // A choice that is the best at one λ only is no stretch.
+        // A choice that is the best at one λ only is not a stretch.
         if to <= *from {
             continue;
         }

@@ -139,7 +139,7 @@ def main():
     parser.add_argument("--port", default="0")
     parser.add_argument("--eager", action="store_true", help="acknowledge streams at once, not with their first message")
     parser.add_argument("--goes-on", action="store_true", help="time goes on from one client to the next")
-    parser.add_argument("--malformed", action="store_true", help="publish on point/in what is no point")
+    parser.add_argument("--malformed", action="store_true", help="publish on point/in what is not a point")
     parser.add_argument("--end-at", type=int, help="the step with which the simulation ends")
     parser.add_argument("--die-at", type=int, help="the step in which the process ends")
     parser.add_argument("--tls", nargs=2, metavar=("KEY", "CERTIFICATE"))

@@ -28,7 +28,7 @@ pub struct Options {
     /// Folder in which the results get a folder of their own; by default beside the run that recorded the test
     #[arg(long, value_name = "DIR")]
     into: Option<PathBuf>,
-    /// The seed of the simulator's seeds; by default one of this test's own, so that the run that found it is no part
+    /// The seed of the simulator's seeds; by default one of this test's own, so that the run that found it is not part
     /// of it
     #[arg(long, value_name = "N")]
     seed: Option<u64>,

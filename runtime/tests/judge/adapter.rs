@@ -142,7 +142,7 @@ pub(crate) fn reach(shown: &MetricObservation) -> (f64, f64) {
     (shown.reach.low.unwrap_or(f64::NEG_INFINITY), shown.reach.high.unwrap_or(f64::INFINITY))
 }
 
-/// Whether the runtime noticed that a metric heard what is no number.
+/// Whether the runtime noticed that a metric heard what is not a number.
 pub(crate) fn heard_no_number(shown: &MetricObservation) -> bool {
     shown.not_finite.is_some()
 }

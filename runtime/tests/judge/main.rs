@@ -1,6 +1,6 @@
 //! What a run says, beside a judge who knows everything.
 //!
-//! Random spaces, tests and simulators, the simulators of which crash, hang, publish what is no number, and do not
+//! Random spaces, tests and simulators, the simulators of which crash, hang, publish what is not a number, and do not
 //! subscribe to some of their topics. The **judge** sees the same run of the same simulator without its faults, and
 //! every delivery; it computes each metric from the complete lists of messages by the words of the documentation, in
 //! two passes and without any of the runtime's code. What the runtime says of a requirement never contradicts it.

@@ -161,7 +161,10 @@ pub(crate) fn contradictions(case: &Case) -> Vec<String> {
                 requirement.name, metric.name, observed.value
             )),
             Err(_) if said == Verdict::Satisfied => {
-                wrong.push(format!("{} of {}: kept, though it heard what is no number", requirement.name, metric.name));
+                wrong.push(format!(
+                    "{} of {}: kept, though it heard what is not a number",
+                    requirement.name, metric.name
+                ));
             }
             _ => {}
         }
@@ -175,7 +178,7 @@ pub(crate) fn contradictions(case: &Case) -> Vec<String> {
             wrong.push(format!("metric {}: {seen:?}, while the judge has {value:?}", words::metric(metric)));
         }
         if adapter::heard_no_number(&truth.metrics[at]) != value.is_err() {
-            wrong.push(format!("metric {}: whether it heard what is no number is wrong", metric.name));
+            wrong.push(format!("metric {}: whether it heard what is not a number is wrong", metric.name));
         }
     }
     if sound.iter().any(|(_, value)| value.is_err()) {
@@ -243,7 +246,7 @@ fn faulty(
     for (at, metric) in case.plan.metrics.iter().enumerate() {
         let blank = first_blank(&case.plan, metric, &ledger);
         if adapter::heard_no_number(&observed.metrics[at]) != blank.is_some() {
-            wrong.push(format!("metric {}: whether it heard what is no number is wrong", metric.name));
+            wrong.push(format!("metric {}: whether it heard what is not a number is wrong", metric.name));
         }
         let (low, high) = adapter::reach(&observed.metrics[at]);
         if let Ok(Some(value)) = value_of(case, metric, told, busy(case, truth, told))
@@ -257,7 +260,10 @@ fn faulty(
         let said = said(requirement, &observed);
         if first_blank(&case.plan, metric, &ledger).is_some() {
             if said == Verdict::Satisfied {
-                wrong.push(format!("{} of {}: kept, though it heard what is no number", requirement.name, metric.name));
+                wrong.push(format!(
+                    "{} of {}: kept, though it heard what is not a number",
+                    requirement.name, metric.name
+                ));
             }
         } else if broke_off && only_worsens(metric, requirement.bound) && said != Verdict::Violated {
             // What was known at the last message before the crash, the instant of which may not be over.

@@ -344,7 +344,7 @@ fn cells(writer: &mut Writer<'_>, coverage: &Coverage, shown: &str) -> Option<Co
         };
         if low >= high || *count == 0 || axes.iter().any(|axis| axis.dimension == dimension) {
             let name = dimension.name();
-            writer.notes.say(Kind::LeftOut, format!("campaign `{shown}`: the cells of {name} are no cells"));
+            writer.notes.say(Kind::LeftOut, format!("campaign `{shown}`: the cells of {name} are not cells"));
             continue;
         }
         axes.push(GridAxis { dimension, low, high, cells: *count });

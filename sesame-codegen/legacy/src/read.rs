@@ -21,7 +21,7 @@ pub(crate) fn read(path: &Path, file: File) -> Result<Original, Broken> {
         Step::Open(root) => {
             let tag = printable(&root.tag);
             return Err(source.broken(format!(
-                "this is no testing space of the original platform: it begins with `{tag}`, not with `TestingSpace`"
+                "this is not a testing space of the original platform: it begins with `{tag}`, not with `TestingSpace`"
             )));
         }
         Step::Close | Step::End => {
@@ -411,7 +411,7 @@ fn loose_number(element: &Element, name: &str, default: f64) -> Result<f64, Stri
         "-Infinity" => Ok(f64::NEG_INFINITY),
         text => text
             .parse()
-            .map_err(|_| format!("`{name}` of this `{}` is `{}`, which is no number", element.tag, printable(text))),
+            .map_err(|_| format!("`{name}` of this `{}` is `{}`, which is not a number", element.tag, printable(text))),
     }
 }
 
@@ -434,5 +434,5 @@ fn integer(element: &Element, name: &str) -> Result<i64, String> {
 
 fn count(element: &Element, name: &str) -> Result<u32, String> {
     let value = integer(element, name)?;
-    u32::try_from(value).map_err(|_| format!("`{name}` of this `{}` is {value}, which is no count", element.tag))
+    u32::try_from(value).map_err(|_| format!("`{name}` of this `{}` is {value}, which is not a count", element.tag))
 }

@@ -298,7 +298,7 @@ impl Importer<'_> {
             for &member in &set.members {
                 match self.original.test(member) {
                     Some((at, index)) if at == campaign => members.push(number_of(index)),
-                    _ => notes.say(Kind::LeftOut, "members of result sets that are no tests of the same campaign"),
+                    _ => notes.say(Kind::LeftOut, "members of result sets that are not tests of the same campaign"),
                 }
             }
             let generation = evaluations(&set.name).and_then(|it| generations.binary_search(&it).ok());

@@ -175,7 +175,7 @@ impl Writer<'_> {
         for metric in &self.original.metrics {
             let shown = printable(&metric.name);
             if metric.source == MetricSource::Timing {
-                self.notes.say(Kind::LeftOut, format!("metric `{shown}`: it is no number, it only kept time"));
+                self.notes.say(Kind::LeftOut, format!("metric `{shown}`: it is not a number, it only kept time"));
                 self.mapped.metrics.push(None);
                 continue;
             }

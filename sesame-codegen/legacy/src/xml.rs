@@ -276,7 +276,7 @@ impl Source {
 fn element(begun: &BytesStart<'_>) -> Result<Element, String> {
     let tag = begun.local_name().into_inner().to_owned();
     if !is_name(&tag) {
-        return Err(format!("`{}` is no name of an element", printable(&tag)));
+        return Err(format!("`{}` is not a name of an element", printable(&tag)));
     }
     let mut element = Element { tag, ..Element::default() };
     for attribute in begun.attributes() {

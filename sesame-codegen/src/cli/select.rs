@@ -166,7 +166,7 @@ pub(super) fn selected(shell: Shell, asked: &Selected) -> anyhow::Result<ExitCod
         shell.note(said);
     }
     for (number, reason) in &found.left_out {
-        shell.note(format!("T{number} is no candidate: {}", reason.words(plan)));
+        shell.note(format!("T{number} is not a candidate: {}", reason.words(plan)));
     }
     if let Some(more) = choosing.next_budget(&choice, &mut stop) {
         let names: Vec<String> = more.tests.iter().map(|number| format!("T{number}")).collect();

@@ -16,7 +16,7 @@ pub struct Templates {
 impl Templates {
     /// The templates of this project, some of them replaced: by name, such as `runner/hook.rs.tera`.
     ///
-    /// Refuses names that no template has, and texts that are no templates.
+    /// Refuses names that no template has, and texts that are not templates.
     pub fn replacing(replaced: BTreeMap<String, String>) -> Result<Self, Vec<Problem>> {
         let problems: Vec<Problem> = replaced
             .iter()

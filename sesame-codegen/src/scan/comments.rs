@@ -4,9 +4,9 @@ use sesame_dsl::diagnostic::visible;
 
 /// What cannot be said in the language, one comment each.
 #[derive(Default)]
-pub(super) struct Unsaid(Vec<String>);
+pub(super) struct LeftOut(Vec<String>);
 
-impl Unsaid {
+impl LeftOut {
     /// A question to a person.
     pub(super) fn decide(&mut self, what: &str) {
         self.0.push(format!("// decide: {}\n", on_one_line(what)));

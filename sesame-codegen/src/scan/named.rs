@@ -6,7 +6,7 @@ use sesame_legacy::Names;
 use sesame_notation::quoted;
 use sesame_scan::{Facts, FoundNode, FoundService, FoundTopic};
 
-use super::comments::Unsaid;
+use super::comments::LeftOut;
 use super::groups::{Line, fold};
 use super::sayable::is_ros_name;
 
@@ -27,7 +27,7 @@ pub(super) fn name_all<'a>(
     needed: &[&'a str],
     topics: &[&'a FoundTopic],
     services: &[&'a FoundService],
-    unsaid: &mut Unsaid,
+    left_out: &mut LeftOut,
 ) -> Named<'a> {
     let mut names = Names::default();
     let last = |path: &str| path.rsplit('/').next().unwrap_or_default().to_owned();
@@ -38,7 +38,7 @@ pub(super) fn name_all<'a>(
         if is_ros_name(&node.name) {
             nodes.push((names.take(&node.name, "node"), node));
         } else {
-            unsaid.decide(&format!("node {} has no name of ROS", quoted(&node.name)));
+            left_out.decide(&format!("node {} has no name of ROS", quoted(&node.name)));
         }
     }
     let simulator = names.take("robots", "simulator");

@@ -92,7 +92,7 @@ pub fn types_by_payloads(types: &mut Types, facts: &Facts, payloads: &Payloads) 
                 let axis = |name: &str| InterfaceField { name: name.to_owned(), ty: real() };
                 types.add_payload(&name, ["x", "y", "z"].map(axis).into(), Vec::new());
             }
-            Ok(_) => types.refuse(&name, "its messages are no objects".to_owned()),
+            Ok(_) => types.refuse(&name, "its messages are not objects".to_owned()),
             Err(why) => types.refuse(&name, format!("of its messages: {why}")),
         }
     }

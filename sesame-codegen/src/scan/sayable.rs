@@ -6,7 +6,7 @@ use sesame_dsl::diagnostic::visible;
 use sesame_notation::quoted;
 use sesame_scan::{CLOCK, Facts, FoundService, FoundTopic, System, TypeSource};
 
-use super::comments::Unsaid;
+use super::comments::LeftOut;
 use super::origin::Origin;
 use super::types::Types;
 
@@ -16,7 +16,7 @@ pub(super) fn topics<'a>(
     types: &Types,
     origin: Origin<'_>,
     clock: Option<&str>,
-    unsaid: &mut Unsaid,
+    left_out: &mut LeftOut,
 ) -> Vec<&'a FoundTopic> {
     let (mut paths, mut sayable) = (BTreeSet::new(), Vec::new());
     for topic in &facts.topics {
@@ -27,19 +27,19 @@ pub(super) fn topics<'a>(
             continue;
         }
         if !is_path(&facts.system, &topic.path) {
-            unsaid.decide(&if facts.system.is_ros() {
+            left_out.decide(&if facts.system.is_ros() {
                 format!("topic {what} has no name of ROS")
             } else {
                 format!("topic {what} has a name that a space cannot say")
             });
         } else if let Some(problem) = topic.problem.as_deref().or(ty.and_then(|ty| types.problem(ty))) {
-            unsaid.decide(&format!("topic {what} cannot be used: {problem}"));
+            left_out.decide(&format!("topic {what} cannot be used: {problem}"));
         } else if let Some(ty) = ty {
             if types.is_plain(ty) || types.source(ty) != TypeSource::Unknown {
                 if paths.insert(topic.path.as_str()) {
                     sayable.push(topic);
                 } else {
-                    unsaid.decide(&format!("topic {what} is used with another type as well"));
+                    left_out.decide(&format!("topic {what} is used with another type as well"));
                 }
             } else {
                 let nobody = match facts.system {
@@ -49,31 +49,31 @@ pub(super) fn topics<'a>(
                 };
                 let add =
                     if origin.folders.is_empty() { "name one with `types`" } else { "name another one with `types`" };
-                unsaid.decide(&format!("no folder has the type of topic {what}, and {nobody}; {add}"));
+                left_out.decide(&format!("no folder has the type of topic {what}, and {nobody}; {add}"));
             }
         } else {
-            unsaid.decide(&format!("nobody said the type of topic {what}"));
+            left_out.decide(&format!("nobody said the type of topic {what}"));
         }
     }
     sayable
 }
 
 /// Services that the space can have.
-pub(super) fn services<'a>(facts: &'a Facts, origin: Origin<'_>, unsaid: &mut Unsaid) -> Vec<&'a FoundService> {
+pub(super) fn services<'a>(facts: &'a Facts, origin: Origin<'_>, left_out: &mut LeftOut) -> Vec<&'a FoundService> {
     let (mut paths, mut sayable) = (BTreeSet::new(), Vec::new());
     for service in &facts.services {
         let path = quoted(&service.path);
         let Some(ty) = &service.ty else {
-            unsaid.decide(&format!("nobody said the type of service {path}"));
+            left_out.decide(&format!("nobody said the type of service {path}"));
             continue;
         };
         let what = format!("{path} of type {}", quoted(ty));
         if !is_ros_name(&service.path) {
-            unsaid.decide(&format!("service {what} has no name of ROS"));
+            left_out.decide(&format!("service {what} has no name of ROS"));
         } else if !origin.services.contains(ty) {
-            unsaid.decide(&format!("no folder has the type of service {what}"));
+            left_out.decide(&format!("no folder has the type of service {what}"));
         } else if !paths.insert(service.path.as_str()) {
-            unsaid.decide(&format!("service {what} is used with another type as well"));
+            left_out.decide(&format!("service {what} is used with another type as well"));
         } else {
             sayable.push(service);
         }
@@ -87,7 +87,7 @@ fn is_path(system: &System, path: &str) -> bool {
     if system.is_ros() {
         return is_ros_name(path);
     }
-    // A brace begins a group, and what is not visible is no text of a space.
+    // A brace begins a group, and what is not visible is not text of a space.
     let unsayable = |c: char| c.is_whitespace() || c.is_control() || matches!(c, '{' | '}');
     !path.is_empty() && path.len() <= LONGEST && !path.contains(unsayable) && visible(path) == path
 }

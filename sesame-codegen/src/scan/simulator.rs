@@ -6,7 +6,7 @@ use sesame_notation::quoted;
 use sesame_plan::Dialect;
 use sesame_scan::{CLOCK, Facts, FoundService, System};
 
-use super::comments::{Unsaid, on_one_line};
+use super::comments::{LeftOut, on_one_line};
 use super::origin::Origin;
 use super::sayable::is_ros_name;
 
@@ -47,17 +47,17 @@ pub(super) fn knows_nodes(system: &System) -> bool {
 }
 
 /// What a scan of this middleware cannot see.
-pub(super) fn unseen(facts: &Facts, unsaid: &mut Unsaid) {
+pub(super) fn unseen(facts: &Facts, left_out: &mut LeftOut) {
     let nodes = "such as `node control { publishes order  subscribes state }`";
     match &facts.system {
         System::Ros2 { .. } | System::Ros1 { .. } | System::Rosbridge { rosapi: true, .. } => {}
-        System::Rosbridge { rosapi: false, .. } => unsaid.decide(
+        System::Rosbridge { rosapi: false, .. } => left_out.decide(
             "other topics, services and nodes: without rosapi only topics that were named with `--topic` were looked at",
         ),
-        System::Mqtt { .. } => unsaid.decide(&format!(
+        System::Mqtt { .. } => left_out.decide(&format!(
             "the nodes, {nodes}: a broker does not tell who publishes and who subscribes"
         )),
-        System::Simlog { .. } => unsaid.decide(&format!(
+        System::Simlog { .. } => left_out.decide(&format!(
             "other topics, which the protocol does not list: only those that were named were looked at; and the \
              nodes, {nodes}"
         )),

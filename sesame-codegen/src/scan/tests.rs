@@ -271,7 +271,7 @@ fn a_broker_has_topics_of_fleets_as_groups_and_messages_as_their_payloads() {
     for topic in &mut topics {
         (topic.retained, topic.quality) = (Some(topic.path.ends_with("order")), Some(1));
     }
-    topics[0].problem = Some("1 of 2 payloads are no JSON".to_owned());
+    topics[0].problem = Some("1 of 2 payloads are not JSON".to_owned());
     let system = System::Mqtt { url: "mqtt://127.0.0.1:1883".to_owned() };
     let mut facts = Facts { seconds: 5.0, topics, ..Facts::of(system) };
     let types = by_payloads(&mut facts, &payloads, Conventions::Json);

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use sesame_notation::quoted;
 use sesame_scan::Facts;
 
-use super::comments::Unsaid;
+use super::comments::LeftOut;
 use super::named::name_all;
 use super::nodes::nodes;
 use super::origin::Origin;
@@ -15,17 +15,21 @@ use super::{blocks, sayable, simulator};
 
 /// A space with its system, in need of formatting.
 pub(super) fn space(facts: &Facts, types: &Types, origin: Origin<'_>) -> String {
-    let mut unsaid = Unsaid::default();
+    let mut left_out = LeftOut::default();
     let system = &facts.system;
     let clock = simulator::clock(facts);
-    let topics = sayable::topics(facts, types, origin, clock, &mut unsaid);
-    let services = sayable::services(facts, origin, &mut unsaid);
+    let topics = sayable::topics(facts, types, origin, clock, &mut left_out);
+    let services = sayable::services(facts, origin, &mut left_out);
     for action in &facts.actions {
-        unsaid.decide(&format!("the language has no actions: {} of type {}", quoted(&action.path), quoted(&action.ty)));
+        left_out.decide(&format!(
+            "the language has no actions: {} of type {}",
+            quoted(&action.path),
+            quoted(&action.ty)
+        ));
     }
     let needed = types.needed(topics.iter().filter_map(|topic| topic.ty.as_deref()));
-    let named = name_all(facts, &needed, &topics, &services, &mut unsaid);
-    simulator::unseen(facts, &mut unsaid);
+    let named = name_all(facts, &needed, &topics, &services, &mut left_out);
+    simulator::unseen(facts, &mut left_out);
 
     let mut text = simulator::heading(facts);
     if facts.cut {
@@ -37,7 +41,7 @@ pub(super) fn space(facts: &Facts, types: &Types, origin: Origin<'_>) -> String 
         blocks::messages(system, types, &named.messages, &needed),
         topic_lines(system, types, &named),
         service_lines(system, &named),
-        unsaid.text(),
+        left_out.text(),
         nodes(&named),
     ];
     for section in sections.iter().filter(|section| !section.is_empty()) {

@@ -19,7 +19,7 @@ const DEEPEST: usize = 50;
 #[derive(Debug, Default)]
 pub struct Types {
     by_name: BTreeMap<String, Type>,
-    /// Types of topics that are no messages, by their words.
+    /// Types of topics that are not messages, by their words.
     plain: BTreeMap<String, WireType>,
     /// Those of them that turned out to be of no use, with the reason.
     refused: BTreeMap<String, String>,
@@ -70,7 +70,7 @@ impl Types {
             None => unknown(None),
         };
         let found = if interfaces::full_name(name, "msg").as_deref() != Some(name) {
-            unknown(Some("this is no type of messages in ROS".to_owned()))
+            unknown(Some("this is not a type of messages in ROS".to_owned()))
         } else if let Some(known) = interfaces::known(name) {
             of(TypeSource::Known, known)
         } else {
@@ -167,19 +167,19 @@ impl Types {
         }
     }
 
-    /// Adds the type of topics that are no messages; gives its words.
+    /// Adds the type of topics that are not messages; gives its words.
     pub(super) fn add_plain(&mut self, wire: WireType) -> String {
         let words = interfaces::in_words(&wire);
         self.plain.insert(words.clone(), wire);
         words
     }
 
-    /// Whether topics of this type are no messages.
+    /// Whether topics of this type are not messages.
     pub(super) fn is_plain(&self, words: &str) -> bool {
         self.plain.contains_key(words)
     }
 
-    /// The type of topics that are no messages.
+    /// The type of topics that are not messages.
     pub(super) fn wire(&self, words: &str) -> Option<&WireType> {
         self.plain.get(words)
     }
@@ -213,7 +213,7 @@ impl Types {
         }
     }
 
-    /// What messages of a type are in the language where that is no message: times, and points that need no block.
+    /// What messages of a type are in the language where that is not a message: times, and points that need no block.
     pub fn plain(&self, name: &str) -> Option<&'static str> {
         if interfaces::is_time(name) {
             return Some("real[s]");

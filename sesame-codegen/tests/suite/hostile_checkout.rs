@@ -411,7 +411,7 @@ fn no_message_of_the_command_holds_what_a_terminal_obeys() {
     fs::write(at("bad.sesame"), format!("{space}import \"{hostile}\" topic \"{hostile}\"")).unwrap();
     fs::write(at("sim.py"), "").unwrap();
     fs::write(at("bad.model"), format!("<a x=\"{hostile}\"><{hostile}")).unwrap();
-    fs::write(at("plain.model"), format!("{hostile} is no XML")).unwrap();
+    fs::write(at("plain.model"), format!("{hostile} is not XML")).unwrap();
     let missing = format!("missing{hostile}.sesame");
     let commands: [&[&str]; 13] = [
         &["check", "s.sesame"],

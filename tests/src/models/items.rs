@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::Draw;
 use super::words::{Names, docs, file, own_names, path, quoted, text};
 
-/// Units that are no time; the empty one is none.
+/// Units that are not time; the empty one is none.
 const UNITS: &[&str] = &["", "mm", "m", "rad", "deg", "m/s", "%", "N", "Hz", "kg*m^2", "W/A/s", ""];
 
 /// A type: as it is written, and what can be measured of it.

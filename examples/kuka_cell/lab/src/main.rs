@@ -76,7 +76,7 @@ fn reality(arguments: &[String]) -> Result<Reality, String> {
 
 fn number(option: &str, value: &str) -> Result<f64, String> {
     let number = value.trim().parse().ok().filter(|number: &f64| number.is_finite());
-    number.ok_or_else(|| format!("`{value}` is no number for `{option}`"))
+    number.ok_or_else(|| format!("`{value}` is not a number for `{option}`"))
 }
 
 fn not_negative(option: &str, value: &str) -> Result<f64, String> {
@@ -113,7 +113,7 @@ mod tests {
         let wrong = |arguments: &[&str]| read(arguments).unwrap_err();
         assert_eq!(wrong(&["--latency"]), "`--latency` needs a value, or is not an option");
         assert_eq!(wrong(&["--latency", "-1"]), "`--latency` is from 0 to 1000000, not -1");
-        assert_eq!(wrong(&["--noise", "NaN"]), "`NaN` is no number for `--noise`");
+        assert_eq!(wrong(&["--noise", "NaN"]), "`NaN` is not a number for `--noise`");
         assert_eq!(wrong(&["--zone-shift", "1,2"]), "`--zone-shift` takes three numbers");
         assert_eq!(wrong(&["--warp", "9"]), "there is no option `--warp`");
     }

@@ -405,7 +405,7 @@ impl Launched {
         if let Ok(number) = text.trim().parse() {
             return Ok(Some(number));
         }
-        let what = format!("is awaited on port `{text}`, which is no number from 1 to 65535");
+        let what = format!("is awaited on port `{text}`, which is not a number from 1 to 65535");
         Err(self.failed(at, Problem { what, last_lines: String::new(), not_started: true, killed: false }))
     }
 

@@ -224,7 +224,7 @@ fn a_monitor_hears_what_is_delivered_and_inbound_evidence_what_was_published() {
     let plan = CampaignPlan { operations: vec![lose], ..watched(vec![cell(true_one)]) };
     let ran = run(&plan, test(), &[a(10, 1.0), a(20, -1.0)], SECOND);
     assert_eq!(ran.decisions(0), [(0, None), (10, Some(0)), (20, None)]);
-    assert!(!ran.finished.operations[0].counters.any_effect(), "what a monitor knows anyway is no effect");
+    assert!(!ran.finished.operations[0].counters.any_effect(), "what a monitor knows anyway is not an effect");
     assert_eq!(ran.finished.unheard, ["a"]);
 }
 

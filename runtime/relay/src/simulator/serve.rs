@@ -22,7 +22,7 @@ const LINE_LIMIT: u64 = 16 << 20;
 
 /// Serves a simulator to a runner on the two streams, which for a program are its standard input and output, until the
 /// input ends. Anything else that the program says belongs on standard error. An error means that a stream failed, or
-/// that the other side is no runner. `start` makes the simulator of each run; most often it is [`Simulator::start`].
+/// that the other side is not a runner. `start` makes the simulator of each run; most often it is [`Simulator::start`].
 ///
 /// ```no_run
 /// # use sesame_relay::simulator::{Simulator, serve};
@@ -124,7 +124,7 @@ impl<R: BufRead, W: Write> Lines<R, W> {
         }
         match serde_json::from_str(&self.line) {
             Ok(request) => Ok(Some(request)),
-            Err(error) => Err(wrong(format!("what is no request: {error}"))),
+            Err(error) => Err(wrong(format!("what is not a request: {error}"))),
         }
     }
 
@@ -439,7 +439,7 @@ mod tests {
         let reason = |requests: &[&str]| served(requests).1.unwrap_err().to_string();
         assert_eq!(reason(&[r#"{"step":{"time":0.5}}"#]), "the runner sent a step before a reset");
         assert_eq!(reason(&[r#"{"deliver":[]}"#]), "the runner sent messages that nothing was published for");
-        assert!(reason(&["hello"]).starts_with("the runner sent what is no request: "));
+        assert!(reason(&["hello"]).starts_with("the runner sent what is not a request: "));
         let step = r#"{"step":{"time":0.5}}"#;
         let text = r#"{"deliver":[{"topic":"cart/target","value":"far"}]}"#;
         assert_eq!(reason(&[RESET, step, text]), "the runner sent \"far\" on `cart/target`");

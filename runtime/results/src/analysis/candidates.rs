@@ -76,7 +76,7 @@ pub struct Candidate {
     pub cost: f64,
 }
 
-/// Why a test is no candidate.
+/// Why a test is not a candidate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LeftOut {
     /// It is equal to this one, or differs only in its operation seeds.

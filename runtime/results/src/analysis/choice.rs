@@ -20,13 +20,13 @@ pub enum ChoiceError {
     /// Nothing can be compared.
     #[error("none of these tests is a candidate")]
     NoCandidates,
-    /// A test that is said to have been run is no candidate.
-    #[error("T{test} is no candidate, so it cannot count as run")]
+    /// A test that is said to have been run is not a candidate.
+    #[error("T{test} is not a candidate, so it cannot count as run")]
     NotACandidate {
         /// Its number.
         test: u32,
     },
-    /// The numbers are no problem to be solved.
+    /// The numbers are not a problem to be solved.
     #[error("{0}")]
     Invalid(String),
 }
@@ -282,7 +282,7 @@ mod tests {
         assert!(again.tests.len() > before.tests.len(), "{before:?} {again:?}");
         let stranger = BTreeSet::from([9999]);
         let refused = Choosing::new(&found, &terms, 0.5, &stranger).unwrap_err().to_string();
-        assert_eq!(refused, "T9999 is no candidate, so it cannot count as run");
+        assert_eq!(refused, "T9999 is not a candidate, so it cannot count as run");
     }
 
     #[test]

@@ -105,7 +105,7 @@ pub(crate) fn tally_words(tally: Tally) -> String {
 /// The outcomes that are findings themselves, by their words.
 pub(crate) const FAILURES: [&str; 2] = ["crash", "timeout"];
 
-/// The outcomes that say nothing about the system, by their words. They are no findings, but listed.
+/// The outcomes that say nothing about the system, by their words. They are not findings, but listed.
 pub(crate) const OF_ENVIRONMENT: [&str; 3] = ["launch_failed", "disconnect", "wrong_clock"];
 
 /// Whether a run ended with this outcome, as a verdict: violated if it did. No run is inconclusive about it.

@@ -50,13 +50,13 @@ pub enum GapError {
     /// They cannot be read.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// They are no results of a lab.
+    /// They are not results of a lab.
     #[error("{} has no results of a lab: `physical` runs tests in one, and `lab add` records those that people ran", path.display())]
     NotOfALab {
         /// The file.
         path: PathBuf,
     },
-    /// They are no results of tests that were simulated again for a lab.
+    /// They are not results of tests that were simulated again for a lab.
     #[error("{} has no results of `compensate`, which simulates the tests of a lab again", path.display())]
     NotCompensated {
         /// The file.

@@ -65,7 +65,7 @@ pub enum CodecError {
         /// How many it may have.
         bound: usize,
     },
-    /// What is to be written is no message.
+    /// What is to be written is not a message.
     #[error("it is not a message but {0}")]
     NoMessage(&'static str),
 }

@@ -33,7 +33,7 @@ fn plan() -> CampaignPlan {
     plan
 }
 
-/// That of a second worker in a folder of its own; a test is no runner.
+/// That of a second worker in a folder of its own; a test is not a runner.
 fn place_in(folder: &Path) -> Place {
     let folder = folder.to_owned();
     Place { worker: 2, folder: folder.clone(), in_runner: false, ..Place::of_worker(folder) }

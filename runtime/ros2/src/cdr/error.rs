@@ -60,7 +60,7 @@ pub enum CodecError {
         /// How many it may have.
         bound: u32,
     },
-    /// What is to be written is no message.
+    /// What is to be written is not a message.
     #[error("it is not a message but {0}")]
     NoMessage(&'static str),
 }

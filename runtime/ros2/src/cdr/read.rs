@@ -96,7 +96,7 @@ impl<'a> Input<'a> {
         if surplus > self.surplus { Err(CodecError::Long { surplus }) } else { Ok(()) }
     }
 
-    /// Text, of which the zero at the end is no part.
+    /// Text, of which the zero at the end is not part.
     fn text(&mut self) -> Result<Text, CodecError> {
         let length = self.length(None)?;
         let bytes = self.take(1, length)?;

@@ -262,7 +262,7 @@ proptest! {
         let whole = sample(&all, &raw, little);
         let codec = codec(&all, &Wanted::All);
         let short: Arc<[u8]> = whole[..cut.index(whole.len())].into();
-        // Padding may be missing at the end of nothing only; whatever is read, it is no panic.
+        // Padding may be missing at the end of nothing only; whatever is read, it does not panic.
         let _ = codec.read(short);
         let mut broken = whole.to_vec();
         broken[hit.index(whole.len())] = byte;

@@ -98,7 +98,7 @@ impl System {
             let Some((node, parameter)) = found else {
                 let known: Vec<String> = nodes().map(|(_, node)| format!("`{}/…`", node.name)).collect();
                 return Err(TransportError::Wiring(format!(
-                    "`{name}` is no parameter of a node; a node and its parameter are {}",
+                    "`{name}` is not a parameter of a node; a node and its parameter are {}",
                     known.join(", ")
                 )));
             };

@@ -156,7 +156,7 @@ proptest! {
         for conventions in all {
             if let Ok(guess) = guess(&payloads, conventions) {
                 for payload in &payloads {
-                    prop_assert!(fits(payload, &guess, conventions), "{payload} is no {}", in_words(&guess));
+                    prop_assert!(fits(payload, &guess, conventions), "{payload} is not a {}", in_words(&guess));
                 }
             }
         }

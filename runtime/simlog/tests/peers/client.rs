@@ -65,7 +65,7 @@ fn what_is_no_grpc_is_an_error() {
             drop(listener);
         });
         let asked = Client::connect(&patient(&url, 2000)).and_then(|mut client| client.set_step(20));
-        let said = asked.expect_err("that is no answer").to_string();
+        let said = asked.expect_err("that is not an answer").to_string();
         assert!(said.contains(&url), "{said}");
         answering.join().expect("it answers");
     }

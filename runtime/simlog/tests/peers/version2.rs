@@ -108,7 +108,7 @@ fn five_hundred_steps(arguments: &[&str]) {
 }
 
 fn text(value: &Value) -> &str {
-    let Value::Text(text) = value else { panic!("{value:?} is no text") };
+    let Value::Text(text) = value else { panic!("{value:?} is not text") };
     text
 }
 

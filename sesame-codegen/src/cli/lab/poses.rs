@@ -50,7 +50,7 @@ pub(super) enum PoseError {
         /// The unit.
         unit: String,
     },
-    /// Its samples are no motion.
+    /// Its samples are not motion.
     #[error("pose `{name}`: {error}")]
     Trace {
         /// Its name.

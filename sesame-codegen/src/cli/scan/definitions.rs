@@ -26,7 +26,7 @@ impl Definitions {
         let mut written = Vec::new();
         for folder in folders {
             if !folder.is_dir() {
-                bail!("{} is no folder; `--types` names one with packages such as `std_msgs`", folder.display());
+                bail!("{} is not a folder; `--types` names one with packages such as `std_msgs`", folder.display());
             }
             match folder.to_str() {
                 Some(text) if !text.trim().is_empty() && !text.chars().any(char::is_control) => {

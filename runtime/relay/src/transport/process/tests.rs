@@ -562,7 +562,7 @@ fn what_is_launched_ends_a_free_running_simulator_too() {
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
     let test = test_of(Vec::new());
     let observed = evaluate(&plan, &wires, &metrics, transport.as_mut(), &test, 1, &mut Custom::none()).unwrap();
-    let Outcome::Crash { message } = observed.outcome else { panic!("{:?} is no crash", observed.outcome) };
+    let Outcome::Crash { message } = observed.outcome else { panic!("{:?} is not a crash", observed.outcome) };
     assert!(message.contains("the bridge broke"), "{message}");
 }
 

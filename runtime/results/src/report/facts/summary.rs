@@ -211,7 +211,7 @@ pub struct Failure {
 }
 
 impl Failure {
-    /// Whether the environment broke it off: it is no finding.
+    /// Whether the environment broke it off: it is not a finding.
     pub fn is_of_environment(&self) -> bool {
         OF_ENVIRONMENT.contains(&self.outcome.as_str())
     }

@@ -138,7 +138,7 @@ impl<'t> Reader<'_, 't, '_> {
         Some(Row { test: test?, run: run?, outcome: outcome?, values })
     }
 
-    /// What is given for each metric; `None` if these are no values at all.
+    /// What is given for each metric; `None` if these are not values at all.
     fn values(&mut self, value: &'t RawValue) -> Option<Vec<At<Given>>> {
         let Ok(Members(members)) = serde_json::from_str(value.get()) else {
             self.say(value, || format!("`values` is {}; write an object with a member for each metric", kind(value)));

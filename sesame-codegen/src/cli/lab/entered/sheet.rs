@@ -117,7 +117,7 @@ pub(super) fn conversion(metric: &Metric, unit: Option<&str>, write: &str) -> Re
             format!("there is no unit {shown}; did you mean `{}`?", similar[0])
         }
         UnitError::Unknown { .. } => format!("there is no unit {shown}; write {write}"),
-        UnitError::TooLarge => format!("{shown} is no unit; write {write}"),
+        UnitError::TooLarge => format!("{shown} is not a unit; write {write}"),
     })?;
     // A unit that only its space knows is not converted.
     let own = metric.unit.as_deref().map(Unit::parse).transpose();

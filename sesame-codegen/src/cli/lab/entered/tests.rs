@@ -151,7 +151,7 @@ fn runs_are_recorded_appended_and_compared_with_the_campaign() {
     bench.write("monday.csv", text);
     bench.lab(&["add", "@42", "@monday.csv", "--hardware", "cell 2"]).unwrap();
     let recorded = bench.recorded();
-    assert_eq!(recorded.iter().map(|it| it.run).collect::<Vec<_>>(), [1, 1], "a blank row is no run");
+    assert_eq!(recorded.iter().map(|it| it.run).collect::<Vec<_>>(), [1, 1], "a blank row is not a run");
     assert_eq!(recorded[0].provenance.texts(), [Some("Ada, Ben"), Some("cell 2"), None, None]);
 
     // Tests that are run again in simulation leave forms and the folder valid.
