@@ -56,7 +56,8 @@ pub struct Run {
 }
 
 impl Run {
-    /// Time zero: no evidence is known, and each monitor decides for its safe state, which is not a loss of a guarantee.
+    /// Time zero: no evidence is known, and each monitor decides for its safe state, which does not lose a
+    /// guarantee.
     pub fn start(network: Arc<Network>, changes: &mut Changes) -> Self {
         let first = |&monitor| Decision { monitor, state: State::Safe, at: SimTime::ZERO, mitigate: false };
         changes.decisions.extend(network.order().iter().map(first));

@@ -1,9 +1,9 @@
 //! Scores of monitors as metrics, while a run goes on.
 //!
 //! A hazard is a fact of an instant: the metric of a requirement is outside of its bound when the instant is over, for
-//! the first time. So a value that a metric has only between two messages of one instant is not a hazard. The robustness
-//! of a temporal formula is known when the run is over, and its signal says when the formula was violated: scores of
-//! such requirements are computed then.
+//! the first time. So a value that a metric has only between two messages of one instant is not a hazard. The
+//! robustness of a temporal formula is known when the run is over, and its signal says when the formula was violated:
+//! scores of such requirements are computed then.
 
 use sesame_base::observation::{MetricObservation, MetricValue, Outcome, Reach};
 use sesame_base::robustness::{Quantifier, lost, quantifier};
