@@ -43,12 +43,29 @@ pub fn while_relayed(plan: &CampaignPlan, connect: &Connect, within: impl FnOnce
     });
 }
 
-/// Sesame's relay without a disturbance, until it is told to stop.
-pub fn relay(plan: &CampaignPlan, connect: &Connect, stop: &AtomicBool) {
-    while_relayed(plan, connect, |advance| {
-        while !stop.load(Ordering::Relaxed) {
-            advance(SimTime::from_nanos(50_000_000));
-        }
+/// Tells relays to stop, also when what is measured beside them fails.
+struct Stopped<'a>(&'a AtomicBool);
+
+impl Drop for Stopped<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Sesame's relay without a disturbance, and `other` beside it until it is told to stop, for as long as `within` takes.
+pub fn beside(plan: &CampaignPlan, connect: &Connect, other: impl FnOnce(&AtomicBool) + Send, within: impl FnOnce()) {
+    let stop = AtomicBool::new(false);
+    thread::scope(|scope| {
+        scope.spawn(|| other(&stop));
+        scope.spawn(|| {
+            while_relayed(plan, connect, |advance| {
+                while !stop.load(Ordering::Relaxed) {
+                    advance(SimTime::from_nanos(50_000_000));
+                }
+            });
+        });
+        let _stopped = Stopped(&stop);
+        within();
     });
 }
 

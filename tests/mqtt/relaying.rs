@@ -171,6 +171,31 @@ fn what_an_operation_changes_is_changed_and_the_rest_of_a_payload_stays() {
 }
 
 #[test]
+fn what_a_monitor_says_reaches_a_client_that_somebody_else_wrote() {
+    let Some(packages) = packages() else { return };
+    let folder = fresh_folder("mqtt_monitor");
+    let broker = Broker::start(&folder);
+    let text = space(&format!("mqtt://127.0.0.1:{}", broker.port), "", "topic state = \"eddi/state\" : int");
+    let monitor = "eddi drive publishes state {\n\
+                   evidence fast = peer.speed > 200m/s\n\
+                   guarantee quick integrity 2 = fast\n\
+                   otherwise slow\n}\n";
+    let mut system = System::new(&text.replacen("metric disturbed", &format!("{monitor}metric disturbed"), 1), &folder);
+    let port = broker.port.to_string();
+    let mut subscriber = Client::start(&packages, &["wait", &port, "eddi/state", "2", "1"]);
+    let publisher = RefCell::new(Client::start(&packages, &["publish", &port, UNDISTURBED, "400", "200", "1"]));
+    let ready = || publisher.borrow_mut().go();
+    let relayed = system.relay_until(&Test::default(), ready, || subscriber.has_ended());
+    relayed.unwrap_or_else(|error| panic!("{error}"));
+    publisher.into_inner().end();
+    let heard = subscriber.end();
+    assert_eq!(heard["heard"], 2);
+    let of_0_and_2 = "a953f09a1b6b6725b81956e9ad0b1eb49e3ad40004c04307ef8af6246a054116";
+    assert_eq!(heard["digest"], of_0_and_2, "at first `0`, then `2`");
+    assert_eq!(system.notes(), [""; 0]);
+}
+
+#[test]
 fn after_a_broker_restarts_every_topic_is_back() {
     let Some(packages) = packages() else { return };
     let folder = fresh_folder("mqtt_restart");

@@ -117,6 +117,32 @@ fn a_thousand_messages_reach_nodes_through_a_bridge_and_the_relay_however_they_a
 }
 
 #[test]
+fn what_a_monitor_says_reaches_nodes_behind_a_bridge() {
+    let Some(pythons) = Pythons::find() else { return };
+    let domain = Domain::free();
+    let port = free_port();
+    let _server = Server::start(&pythons, &domain, port);
+    let text = bridged(&domain, port, "", "", 60);
+    let state = "message State = \"std_msgs/msg/String\" { data: text }\ntopic state = \"/state\" : State\n";
+    let monitor = "eddi arm publishes state {\n\
+                   evidence stamped = peer.header.stamp > 0s\n\
+                   guarantee moves integrity 1 = stamped\n\
+                   otherwise rests\n}\n";
+    let text = text.replacen("topic peer", &format!("{state}topic peer"), 1);
+    let mut system = System::new(plan(&text.replacen("metric disturbed", &format!("{monitor}metric disturbed"), 1)));
+    let listening = ["--type", "std_msgs/msg/String", "--count", "2", "--topic", "/state", "--timeout", "20"];
+    let mut subscriber = Peer::start(&pythons.jazzy, &domain, "subscriber.py", &listening);
+    let speaking =
+        ["--type", JOINTS, "--count", "100", "--topic", "/peer/undisturbed", "--rate", "50", "--short", "--hold"];
+    let publisher = std::cell::RefCell::new(Peer::start(&pythons.jazzy, &domain, "publisher.py", &speaking));
+    let ready = || publisher.borrow_mut().go();
+    system.relay_until(&Test::default(), ready, || subscriber.has_ended());
+    publisher.into_inner().expect();
+    assert_eq!(subscriber.end().1["count"], 2, "`rests` at time zero, and `moves`: {:?}", system.all_notes());
+    assert_eq!(system.all_notes(), [""; 0]);
+}
+
+#[test]
 fn after_a_bridge_restarts_every_topic_is_back() {
     let Some(pythons) = Pythons::find() else { return };
     let domain = Domain::free();

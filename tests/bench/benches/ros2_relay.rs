@@ -5,12 +5,11 @@
 //! The nodes are participants of this process, on the loopback interface. The three ways take turns.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use sesame_bench::ways::{Measured, at_200_hz, exchange, plan, print, relay, rounds};
+use sesame_bench::ways::{Measured, at_200_hz, beside, exchange, plan, print, rounds};
 use sesame_tests::dds::{JOINTS, Reader, Writer, joints, number, participant};
 
 /// One that no example uses.
@@ -103,28 +102,15 @@ fn main() {
         reader: Reader::new(&subscriber, to, JOINTS),
         sent: 0,
     });
-    let stop = Arc::new(AtomicBool::new(false));
-    let relays = [
-        thread::spawn({
-            let stop = Arc::clone(&stop);
-            move || bare(&stop)
-        }),
-        thread::spawn({
-            let stop = Arc::clone(&stop);
-            move || relay(&plan, &sesame_ros2::ros2(PathBuf::from(".")), &stop)
-        }),
-    ];
-    // Until all have found each other.
-    thread::sleep(Duration::from_secs(5));
-    let (times, slow, fast) = if measured { (20, 400, 20_000) } else { (1, 20, 1_000) };
-    rounds(&mut ways, 1, |way| way.at_200_hz(20));
-    let names = ways.each_ref().map(|way| way.name);
-    let results = rounds(&mut ways, times, |way| way.at_200_hz(slow));
-    print("200 Hz", &names, &results);
-    let results = rounds(&mut ways, times, |way| way.at_saturation(fast));
-    print("saturation", &names, &results);
-    stop.store(true, Ordering::Relaxed);
-    for relay in relays {
-        relay.join().expect("no relay panics");
-    }
+    beside(&plan, &sesame_ros2::ros2(PathBuf::from(".")), bare, || {
+        // Until all have found each other.
+        thread::sleep(Duration::from_secs(5));
+        let (times, slow, fast) = if measured { (20, 400, 20_000) } else { (1, 20, 1_000) };
+        rounds(&mut ways, 1, |way| way.at_200_hz(20));
+        let names = ways.each_ref().map(|way| way.name);
+        let results = rounds(&mut ways, times, |way| way.at_200_hz(slow));
+        print("200 Hz", &names, &results);
+        let results = rounds(&mut ways, times, |way| way.at_saturation(fast));
+        print("saturation", &names, &results);
+    });
 }

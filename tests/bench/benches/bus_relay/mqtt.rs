@@ -2,13 +2,12 @@
 
 use std::path::PathBuf;
 use std::process::Command;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use rumqttc::{Client, Connection, Event, MqttOptions, NetworkOptions, Packet, QoS};
-use sesame_bench::ways::{Measured, at_200_hz, exchange, plan, print, relay, rounds};
+use sesame_bench::ways::{Measured, at_200_hz, beside, exchange, plan, print, rounds};
 
 use crate::processes::{Program, free_port, listens};
 use crate::{JOINT, Size, space};
@@ -121,29 +120,21 @@ fn through(size: Size, title: &str, configured: &str) {
     let joints = "message Joints { frame: text  position: list of real  velocity: list of real }\n\
                   topic peer = \"peer\" : Joints";
     let plan = plan(&space(&format!("mqtt \"mqtt://127.0.0.1:{port}\""), joints, JOINT));
-    let stop = Arc::new(AtomicBool::new(false));
-    let relays = [
-        thread::spawn({
-            let stop = Arc::clone(&stop);
-            move || bare(port, &stop)
-        }),
-        thread::spawn({
-            let stop = Arc::clone(&stop);
-            move || relay(&plan, &sesame_mqtt::mqtt(PathBuf::from(".")), &stop)
-        }),
-    ];
-    let mut ways = [
-        Way::new(port, "direct", "direct", "direct"),
-        Way::new(port, "a forwarder of bytes", "bare/undisturbed", "bare"),
-        Way::new(port, "Sesame", "peer/undisturbed", "peer"),
-    ];
-    thread::sleep(Duration::from_secs(3));
-    let names = ways.each_ref().map(|way| way.name);
-    rounds(&mut ways, 1, |way| way.measure(20));
-    let results = rounds(&mut ways, size.rounds, |way| way.measure(size.messages));
-    print(title, &names, &results);
-    stop.store(true, Ordering::Relaxed);
-    for relay in relays {
-        relay.join().expect("no relay panics");
-    }
+    beside(
+        &plan,
+        &sesame_mqtt::mqtt(PathBuf::from(".")),
+        |stop| bare(port, stop),
+        || {
+            let mut ways = [
+                Way::new(port, "direct", "direct", "direct"),
+                Way::new(port, "a forwarder of bytes", "bare/undisturbed", "bare"),
+                Way::new(port, "Sesame", "peer/undisturbed", "peer"),
+            ];
+            thread::sleep(Duration::from_secs(3));
+            let names = ways.each_ref().map(|way| way.name);
+            rounds(&mut ways, 1, |way| way.measure(20));
+            let results = rounds(&mut ways, size.rounds, |way| way.measure(size.messages));
+            print(title, &names, &results);
+        },
+    );
 }

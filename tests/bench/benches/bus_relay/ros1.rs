@@ -2,12 +2,10 @@
 
 use std::path::PathBuf;
 use std::process::Command;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use sesame_bench::ways::{Measured, named, plan, print, relay, rounds};
+use sesame_bench::ways::{Measured, beside, named, plan, print, rounds};
 use sesame_tests::workspace;
 
 use crate::processes::{Program, free_port, listens};
@@ -61,19 +59,19 @@ pub(crate) fn run(size: Size) {
         way("`relay` of ROS", "/bare/undisturbed", "/bare"),
         way("Sesame", "/peer/undisturbed", "/peer"),
     ];
-    let stop = Arc::new(AtomicBool::new(false));
-    let sesame = thread::spawn({
-        let stop = Arc::clone(&stop);
-        move || relay(&plan, &sesame_ros1::ros1(PathBuf::from(".")), &stop)
-    });
-    // Each sends until something comes back: nodes have to find each other.
-    for way in &mut ways {
-        way.peer.says("ready");
-    }
-    thread::sleep(Duration::from_secs(1));
-    let names = ways.each_ref().map(|way| way.name);
-    let results = rounds(&mut ways, size.rounds, |way| way.measure(size.messages));
-    print("ROS 1, 200 Hz", &names, &results);
-    stop.store(true, Ordering::Relaxed);
-    sesame.join().expect("no relay panics");
+    beside(
+        &plan,
+        &sesame_ros1::ros1(PathBuf::from(".")),
+        |_| (),
+        || {
+            // Each sends until something comes back: nodes have to find each other.
+            for way in &mut ways {
+                way.peer.says("ready");
+            }
+            thread::sleep(Duration::from_secs(1));
+            let names = ways.each_ref().map(|way| way.name);
+            let results = rounds(&mut ways, size.rounds, |way| way.measure(size.messages));
+            print("ROS 1, 200 Hz", &names, &results);
+        },
+    );
 }

@@ -4,12 +4,11 @@ use std::io::ErrorKind;
 use std::net::TcpStream;
 use std::path::PathBuf;
 use std::process::Command;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use sesame_bench::ways::{at_200_hz, exchange, named, plan, print, relay, rounds};
+use sesame_bench::ways::{at_200_hz, beside, exchange, named, plan, print, rounds};
 use sesame_tests::workspace;
 use tungstenite::{Error, Message, WebSocket, client};
 
@@ -133,31 +132,23 @@ pub(crate) fn run(size: Size) {
         "sensor_msgs/JointState",
     ]));
     let plan = plan(&space(&format!("rosbridge \"ws://127.0.0.1:{port}\""), JOINTS, JOINT));
-    let stop = Arc::new(AtomicBool::new(false));
-    let relays = [
-        thread::spawn({
-            let stop = Arc::clone(&stop);
-            move || bare(port, &stop)
-        }),
-        thread::spawn({
-            let stop = Arc::clone(&stop);
-            move || relay(&plan, &sesame_rosbridge::rosbridge(PathBuf::from(".")), &stop)
-        }),
-    ];
-    let mut ways = [
-        Way::new(port, "direct", "/direct", "/direct"),
-        Way::new(port, "a forwarder of texts", "/bare/undisturbed", "/bare"),
-        Way::new(port, "thirty lines of roslibpy", "/python/undisturbed", "/python"),
-        Way::new(port, "Sesame", "/peer/undisturbed", "/peer"),
-    ];
-    // Until all have found each other.
-    thread::sleep(Duration::from_secs(5));
-    let names = ways.each_ref().map(|way| way.name);
-    rounds(&mut ways, 1, |way| way.measure(20));
-    let results = rounds(&mut ways, size.rounds, |way| way.measure(size.messages));
-    print("rosbridge, 200 Hz", &names, &results);
-    stop.store(true, Ordering::Relaxed);
-    for relay in relays {
-        relay.join().expect("no relay panics");
-    }
+    beside(
+        &plan,
+        &sesame_rosbridge::rosbridge(PathBuf::from(".")),
+        |stop| bare(port, stop),
+        || {
+            let mut ways = [
+                Way::new(port, "direct", "/direct", "/direct"),
+                Way::new(port, "a forwarder of texts", "/bare/undisturbed", "/bare"),
+                Way::new(port, "thirty lines of roslibpy", "/python/undisturbed", "/python"),
+                Way::new(port, "Sesame", "/peer/undisturbed", "/peer"),
+            ];
+            // Until all have found each other.
+            thread::sleep(Duration::from_secs(5));
+            let names = ways.each_ref().map(|way| way.name);
+            rounds(&mut ways, 1, |way| way.measure(20));
+            let results = rounds(&mut ways, size.rounds, |way| way.measure(size.messages));
+            print("rosbridge, 200 Hz", &names, &results);
+        },
+    );
 }
