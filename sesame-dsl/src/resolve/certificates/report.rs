@@ -10,8 +10,9 @@ use sesame_plan::MonitorId;
 use super::group::{Group, leaves};
 use super::witness;
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
+use crate::model::Declaration;
 use crate::model::eddi::{Evidence, Gate, Guarantee};
-use crate::resolve::words::list;
+use crate::resolve::words::{list, quoted};
 use crate::span::Span;
 use crate::syntax::ast;
 
@@ -20,6 +21,12 @@ const LARGEST: usize = 200_000;
 
 /// Of more evidence it is not looked for which excludes each other.
 const MOST_EVIDENCE: usize = 40;
+
+/// How many names a note lists.
+const MOST_SHOWN: usize = 3;
+
+/// Why something was not decided.
+const GIVEN_UP: &str = "the search reached its limit";
 
 /// What is wrong with the monitors of a group, and what was not decided.
 pub(super) fn of(group: &Group<'_>, file: &ast::File, work: &mut u64) -> (Vec<Diagnostic>, Vec<(Span, String)>) {
@@ -34,7 +41,7 @@ pub(super) fn of(group: &Group<'_>, file: &ast::File, work: &mut u64) -> (Vec<Di
     };
     let reporter = Reporter::new(group, file, &found.findings);
     let diagnostics = found.findings.iter().filter_map(|finding| reporter.diagnostic(finding, work)).collect();
-    (diagnostics, found.undecided.iter().map(|question| reporter.undecided(question)).collect())
+    (diagnostics, reporter.undecided(&found.undecided))
 }
 
 struct Reporter<'a> {
@@ -249,23 +256,49 @@ impl<'a> Reporter<'a> {
         }
     }
 
-    fn undecided(&self, question: &Question) -> (Span, String) {
-        let (monitor, declaration, what) = match *question {
-            Question::Never(monitor, at) => (monitor, &self.guarantee(monitor, at).declaration, "can hold"),
-            Question::Always(monitor, at) => (monitor, &self.guarantee(monitor, at).declaration, "always holds"),
-            Question::NeverState(monitor, at) => {
-                (monitor, &self.guarantee(monitor, at).declaration, "can be the state")
-            }
-            Question::Order(monitor, at) => {
-                (monitor, &self.guarantee(monitor, at).declaration, "holds whenever a stronger guarantee does")
-            }
-            Question::Redundant(monitor, at) => (monitor, &self.evidence(monitor, at).declaration, "decides anything"),
+    /// What was not decided: questions of one kind about one monitor together, at the first declaration that they are
+    /// about.
+    fn undecided(&self, questions: &[Question]) -> Vec<(Span, String)> {
+        let mut notes: Vec<(MonitorId, [&str; 2], Vec<&Declaration>)> = Vec::new();
+        // Of what may never hold, it need not be said that it may never be the state.
+        let follows = |question: &&Question| match **question {
+            Question::NeverState(monitor, at) => questions.contains(&Question::Never(monitor, at)),
+            _ => false,
         };
-        let text = format!(
-            "whether `{}` of monitor `{}` {what} was not decided: the search reached its limit",
-            declaration.name,
-            self.name(monitor)
-        );
-        (declaration.span, text)
+        for &question in questions.iter().filter(|question| !follows(question)) {
+            let (monitor, what, declaration) = self.asked(question);
+            match notes.iter_mut().find(|(of, asked, _)| (*of, *asked) == (monitor, what)) {
+                Some((_, _, declarations)) => declarations.push(declaration),
+                None => notes.push((monitor, what, vec![declaration])),
+            }
+        }
+        let note = |(monitor, [of_one, of_many], declarations): (MonitorId, [&str; 2], Vec<&Declaration>)| {
+            let (shown, others) = declarations.split_at(declarations.len().min(MOST_SHOWN));
+            let names: Vec<&str> = shown.iter().map(|it| it.name.as_str()).collect();
+            let more = if others.is_empty() { String::new() } else { format!(" and {} others", others.len()) };
+            let names = if more.is_empty() { list(&names) } else { quoted(&names).join(", ") };
+            let what = if declarations.len() == 1 { of_one } else { of_many };
+            let monitor = self.name(monitor);
+            let text = format!("whether {names}{more} of monitor `{monitor}` {what} was not decided: {GIVEN_UP}");
+            (declarations[0].span, text)
+        };
+        notes.into_iter().map(note).collect()
+    }
+
+    /// The monitor that a question is about, what it asks of one part and of several, and the part.
+    fn asked(&self, question: Question) -> (MonitorId, [&'static str; 2], &'a Declaration) {
+        let guarantee = |monitor, at| &self.guarantee(monitor, at).declaration;
+        match question {
+            Question::Never(monitor, at) => (monitor, ["can hold"; 2], guarantee(monitor, at)),
+            Question::Always(monitor, at) => (monitor, ["always holds", "always hold"], guarantee(monitor, at)),
+            Question::NeverState(monitor, at) => (monitor, ["can be the state"; 2], guarantee(monitor, at)),
+            Question::Order(monitor, at) => {
+                let what = ["holds whenever a stronger guarantee does", "hold whenever a stronger guarantee does"];
+                (monitor, what, guarantee(monitor, at))
+            }
+            Question::Redundant(monitor, at) => {
+                (monitor, ["decides anything", "decide anything"], &self.evidence(monitor, at).declaration)
+            }
+        }
     }
 }
