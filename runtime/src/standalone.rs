@@ -95,7 +95,9 @@ fn carried_out(standalone: &Standalone) -> Result<ExitCode, Failure> {
     }
     let Some(connect) = &standalone.connect else {
         let how = match &plan.simulator.transport {
-            Transport::Process { .. } => "is a program, which the monitor starts: give it behind `--`, with its arguments",
+            Transport::Process { .. } => {
+                "is a program, which the monitor starts: give it behind `--`, with its arguments"
+            }
             _ => "is a part of its runner, and no other program reaches it",
         };
         let problem = format!("the simulator `{}` {how}; or give a recording with `--recording`", plan.simulator.name);
@@ -141,7 +143,8 @@ fn at(mut plan: CampaignPlan, options: &Options) -> Result<CampaignPlan, Failure
         url.clone_from(asked);
     }
     if !is_shared(url) {
-        let problem = format!("the address `{url}` is another one for each worker of a runner: choose one with `--url`");
+        let problem =
+            format!("the address `{url}` is another one for each worker of a runner: choose one with `--url`");
         return Err(Failure(visible(&problem)));
     }
     Ok(plan)

@@ -178,7 +178,9 @@ impl CampaignPlan {
             Transport::Ros2(ros2) => &mut ros2.interfaces,
             Transport::Rosbridge(rosbridge) => &mut rosbridge.interfaces,
             Transport::Ros1(ros1) => &mut ros1.interfaces,
-            Transport::InProcess { .. } | Transport::Process { .. } | Transport::Mqtt(_) | Transport::Simlog(_) => return,
+            Transport::InProcess { .. } | Transport::Process { .. } | Transport::Mqtt(_) | Transport::Simlog(_) => {
+                return;
+            }
         };
         let mut kept: Vec<Interface> = Vec::new();
         for interface in interfaces.iter().rev() {

@@ -119,8 +119,8 @@ fn line(plan: &CampaignPlan, wires: &WireTable, wire: Wire) -> Line {
 
 #[cfg(test)]
 mod tests {
-    use sesame_plan::testing::{evidence_above, guarantee, minimal, monitor, node, topic};
     use sesame_base::time::SimTime;
+    use sesame_plan::testing::{evidence_above, guarantee, minimal, monitor, node, topic};
     use sesame_plan::{Clock, Gate, MonitorId, Node, Ros2, Transport, Type};
 
     use super::*;

@@ -285,7 +285,9 @@ impl System {
             Some(Event::Returned { line, added }) => self.returned.record(self.lines[line].wire, added),
             Some(Event::Message { line, source, value, call, arrived }) => {
                 self.message(line, source, value, call, relay);
-                let sink_of = |delivery: &Delivery| self.sinks.get(&delivery.wire).filter(|(of, _)| *of == line && self.lines[line].cut);
+                let sink_of = |delivery: &Delivery| {
+                    self.sinks.get(&delivery.wire).filter(|(of, _)| *of == line && self.lines[line].cut)
+                };
                 let passed: Vec<usize> = self.deliveries.iter().filter_map(sink_of).map(|&(_, sink)| sink).collect();
                 self.deliver()?;
                 for &sink in &passed {

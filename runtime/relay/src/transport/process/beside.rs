@@ -86,7 +86,8 @@ where
     SO: Write,
 {
     let wires = WireTable::new(plan);
-    let table = MetricTable::new(plan, &wires, &[]).map_err(|error| BesideError::Runner { problem: error.to_string() })?;
+    let table =
+        MetricTable::new(plan, &wires, &[]).map_err(|error| BesideError::Runner { problem: error.to_string() })?;
     let Beside { from_runner, mut to_runner, from_simulator, mut to_simulator } = sides;
     let (queue, lines) = sync_channel(READ_AHEAD);
     read(from_runner, Side::Runner, queue.clone());

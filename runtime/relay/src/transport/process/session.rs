@@ -261,7 +261,9 @@ impl Topics {
             };
             let Some(wire) = topic.wire else {
                 if topic.subscribes {
-                    request::message(&mut self.outbox, path, self.timed.then_some(now), |out| out.extend_from_slice(value.get().as_bytes()));
+                    request::message(&mut self.outbox, path, self.timed.then_some(now), |out| {
+                        out.extend_from_slice(value.get().as_bytes())
+                    });
                 }
                 continue;
             };
