@@ -61,6 +61,15 @@ struct Options {
     /// The address of the bridge, broker or master; by default that of the space
     #[arg(long, value_name = "URL")]
     url: Option<String>,
+    /// Another name for a topic on a bus, as `/eddi/state:=/eddi/state/undisturbed`: where operations act on what the
+    /// monitor publishes, a runner asks for it. May be given several times, with `-r` before it or without
+    #[arg(short = 'r', long = "remap", value_name = "FROM:=TO", conflicts_with_all = ["recording", "program"])]
+    remap: Vec<String>,
+    #[arg(value_name = "FROM:=TO", hide = true, conflicts_with_all = ["recording", "program"])]
+    remap_too: Vec<String>,
+    /// What stands before rules of ROS 2
+    #[arg(long, hide = true)]
+    ros_args: bool,
     /// The simulator, with its arguments: a runner that starts this program in its place, as `process` does, reaches it
     /// through the monitor
     #[arg(last = true, value_name = "PROGRAM")]
@@ -121,8 +130,11 @@ fn options(plan: &CampaignPlan, monitor: &Monitor) -> Options {
     Options::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
 }
 
-/// The plan with the address that was asked for.
+/// The plan with the address and the names that were asked for.
 fn at(mut plan: CampaignPlan, options: &Options) -> Result<CampaignPlan, Failure> {
+    for rule in options.remap.iter().chain(&options.remap_too) {
+        remap(&mut plan, rule)?;
+    }
     let url = match &mut plan.simulator.transport {
         Transport::Ros2(ros2) => {
             if options.url.is_some() {
@@ -148,6 +160,19 @@ fn at(mut plan: CampaignPlan, options: &Options) -> Result<CampaignPlan, Failure
         return Err(Failure(visible(&problem)));
     }
     Ok(plan)
+}
+
+/// Gives a topic another name. As in ROS, names may begin with a slash or not.
+fn remap(plan: &mut CampaignPlan, rule: &str) -> Result<(), Failure> {
+    let Some((from, to)) = rule.split_once(":=").filter(|(from, to)| !from.is_empty() && !to.is_empty()) else {
+        return Err(Failure(format!("`{}` is no rule: write `FROM:=TO`, with names of topics", visible(rule))));
+    };
+    let is_it = |path: &&mut String| path.trim_start_matches('/') == from.trim_start_matches('/');
+    // A runner gives rules for all that a node publishes or hears; the others are not of this monitor.
+    for path in plan.topics.iter_mut().flat_map(|topic| &mut topic.paths).filter(is_it) {
+        to.clone_into(path);
+    }
+    Ok(())
 }
 
 fn refuse_address(options: &Options, what: &str) -> Result<(), Failure> {
