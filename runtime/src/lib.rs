@@ -22,6 +22,10 @@ mod interpreted;
 mod lab;
 #[cfg(feature = "campaign")]
 mod runner;
+#[cfg(any(feature = "campaign", feature = "standalone"))]
+mod said;
+#[cfg(feature = "standalone")]
+pub mod standalone;
 #[cfg(feature = "campaign")]
 #[cfg(test)]
 mod tampered;

@@ -7,6 +7,7 @@ mod fmt;
 mod gap;
 mod import;
 mod lab;
+mod monitor;
 mod progress;
 mod results;
 mod runner;
@@ -82,6 +83,9 @@ enum Command {
     Generate {
         #[command(flatten)]
         generation: Generation,
+        /// Instead of runners, write a monitor of the space as a program of its own.
+        #[arg(long, value_name = "NAME", conflicts_with = "campaign")]
+        eddi: Option<String>,
         /// Write nothing; exit with code 1 if anything would be written.
         #[arg(long, conflicts_with = "force")]
         check: bool,
@@ -203,14 +207,17 @@ pub fn run(
             commands::check_only(shell, language, &file, deny, diagnostics.format)
         }
         Command::Fmt { files, check, diagnostics } => fmt::fmt(shell, language, &files, check, diagnostics.format),
-        Command::Generate { generation, check, dry_run, self_contained, vendor } => {
+        Command::Generate { generation, eddi, check, dry_run, self_contained, vendor } => {
             let purpose = match (check, dry_run) {
                 (true, _) => Purpose::Check,
                 (false, true) => Purpose::DryRun,
                 (false, false) => Purpose::Write,
             };
             let options = Options { self_contained, vendor, ..generation.options() };
-            commands::generate(shell, language, &generation, &options, purpose)
+            match eddi {
+                Some(eddi) => monitor::generate(shell, language, &eddi, &generation, &options, purpose),
+                None => commands::generate(shell, language, &generation, &options, purpose),
+            }
         }
         Command::Run { generation, build, arguments } => runner::run(shell, language, &generation, build, &arguments),
         Command::Running(command) => runner::running(shell, language, &command, of_campaign),

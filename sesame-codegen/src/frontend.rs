@@ -8,12 +8,13 @@ use sesame_dsl::index::Kind;
 use sesame_dsl::model::{Space, Transport};
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::span::Span;
+use sesame_plan::NotAlone;
 
 use crate::certificate;
 use crate::input::{self, Unreadable};
 use crate::interfaces::Files;
-use crate::lower::lower;
-use crate::plan::RunnerPlan;
+use crate::lower::{lower, lower_monitor};
+use crate::plan::{MonitorPlan, RunnerPlan};
 use crate::uses;
 
 /// The language as the command needs it.
@@ -87,6 +88,9 @@ pub struct Checked {
     pub summary: String,
     /// A plan for each campaign; empty when there are errors.
     pub plans: Vec<RunnerPlan>,
+    /// Each monitor by its name, with its plan as a program of its own, or why it cannot be one; empty when there are
+    /// errors.
+    pub monitors: Vec<(String, Result<MonitorPlan, NotAlone>)>,
     /// What the space says and no runner uses yet, one sentence each.
     pub notes: Vec<String>,
 }
@@ -111,6 +115,11 @@ fn check(file: &str, text: &str, look: Look) -> Checked {
     // A plan names the file without its folder: the same space gives the same plan wherever it lies.
     let source = file.rsplit(['/', std::path::MAIN_SEPARATOR]).next().unwrap_or(file);
     let undecided = undecided(&analysis.undecided, &sources);
+    let monitors = analysis.model.iter().flat_map(|space| {
+        let named = move |id| space.eddis[id].declaration.name.clone();
+        space.eddis.iter().map(move |(id, _)| (named(id), lower_monitor(space, id, source, GENERATOR)))
+    });
+    let monitors = monitors.collect();
     let (summary, plans, notes) = match &analysis.model {
         Some(space) => {
             let plans = space.campaigns.iter().map(|(campaign, _)| lower(space, campaign, source, GENERATOR)).collect();
@@ -118,7 +127,7 @@ fn check(file: &str, text: &str, look: Look) -> Checked {
         }
         None => (String::new(), Vec::new(), Vec::new()),
     };
-    Checked { diagnostics, errors, warnings, undecided, summary, plans, notes }
+    Checked { diagnostics, errors, warnings, undecided, summary, plans, monitors, notes }
 }
 
 /// What could not be decided about monitors, with its places.

@@ -22,7 +22,7 @@ mod selection;
 mod system;
 mod transport;
 
-use sesame_dsl::model::{self, CampaignId, Space};
+use sesame_dsl::model::{self, CampaignId, EddiId, Space};
 use sesame_plan as plan;
 
 use self::id::topic_id;
@@ -30,7 +30,7 @@ use self::operation::custom_operations;
 use self::selection::{Selection, without_operations};
 use self::system::{lifecycle, message, node, topic, unit};
 use self::transport::transport;
-use crate::plan::{HookPlan, RunnerPlan};
+use crate::plan::{HookPlan, MonitorPlan, RunnerPlan};
 
 /// The plan of a campaign's runner. `source` is the `.sesame` file's name without its folder, `generator` the name and
 /// version of what generates.
@@ -75,6 +75,67 @@ pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str)
         compensation: None,
     };
     RunnerPlan { plan, hooks: hooks(space), operations: custom_operations(space), simulator_crate, system_file }
+}
+
+/// The plan of a monitor that is a program of its own, or why it cannot be one. `source` and `generator` are as for
+/// [`lower`].
+pub fn lower_monitor(
+    space: &Space,
+    monitor: EddiId,
+    source: &str,
+    generator: &str,
+) -> Result<MonitorPlan, plan::NotAlone> {
+    let name = space.eddis[monitor].declaration.name.clone();
+    let whole = plan::CampaignPlan {
+        schema: plan::SCHEMA,
+        generator: generator.to_owned(),
+        source: source.to_owned(),
+        space: space.declaration.name.clone(),
+        doc: space.declaration.doc.clone(),
+        simulator: plan::Simulator {
+            name: space.simulator.declaration.name.clone(),
+            transport: transport(space, &space.simulator.transport),
+            lifecycle: plan::Lifecycle::default(),
+        },
+        messages: space.messages.values().map(message).collect(),
+        topics: space.topics.values().map(|declared| topic(space, declared)).collect(),
+        nodes: space.nodes.values().map(node).collect(),
+        metrics: Vec::new(),
+        requirements: Vec::new(),
+        operations: Vec::new(),
+        tests: vec![without_operations()],
+        campaign: for_as_long_as_can_be(&name),
+        monitors: space.eddis.values().map(|eddi| monitor::monitor(space, eddi)).collect(),
+        labs: Vec::new(),
+        compensation: None,
+    };
+    let plan = whole.of_monitor_alone(monitor::monitor_id(monitor))?;
+    Ok(MonitorPlan { name, plan, system_file: space.file_of(&space.simulator.declaration).to_owned() })
+}
+
+/// A campaign of one run without operations that nothing ends.
+fn for_as_long_as_can_be(name: &str) -> plan::Campaign {
+    // The nanoseconds of simulation time are whole numbers, of which there are more for ten times as long.
+    const LONGEST: f64 = 1e9;
+    plan::Campaign {
+        name: name.to_owned(),
+        doc: String::new(),
+        objectives: Vec::new(),
+        operations: Vec::new(),
+        count: plan::Count { min: 0, max: 0 },
+        copies: plan::Copies::default(),
+        activation: plan::ActivationMode::Time,
+        search: plan::Search::Repeat { test: plan::KnownTestId(0), times: 1 },
+        coverage: None,
+        exploration: None,
+        confirm: None,
+        neighbours: None,
+        stop: Vec::new(),
+        seed: 0,
+        end_after: LONGEST,
+        end_when: None,
+        record: None,
+    }
 }
 
 fn hooks(space: &Space) -> Vec<HookPlan> {

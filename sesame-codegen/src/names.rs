@@ -111,6 +111,11 @@ pub fn parameters_type(operation: &str) -> String {
     hook_type(operation) + "Parameters"
 }
 
+/// The folder of a monitor that is a program of its own, inside the output folder.
+pub fn monitor_folder(monitor: &str) -> String {
+    format!("{monitor}_monitor")
+}
+
 /// The folder of a campaign inside the output folder; never that of the hooks or of what cargo builds.
 pub fn campaign_folder(campaign: &str) -> String {
     match campaign.to_ascii_lowercase().as_str() {

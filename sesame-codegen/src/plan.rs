@@ -27,6 +27,17 @@ pub struct RunnerPlan {
     pub system_file: String,
 }
 
+/// The plan of a monitor that is a program of its own.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MonitorPlan {
+    /// The monitor.
+    pub name: String,
+    /// Its [plan](CampaignPlan::of_monitor_alone).
+    pub plan: CampaignPlan,
+    /// The file that declares the simulator, as seen from the folder of the space's own.
+    pub system_file: String,
+}
+
 /// A metric that the user writes in Rust.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HookPlan {

@@ -8,3 +8,5 @@ pub const OPERATION_HOOK: &str = include_str!("../runner/operation_hook.rs.tera"
 pub const SHARED_README: &str = include_str!("../runner/shared_readme.md.tera");
 /// The README of a runner.
 pub const RUNNER_README: &str = include_str!("../runner/runner_readme.md.tera");
+/// The README of a monitor that is a program of its own.
+pub const MONITOR_README: &str = include_str!("../runner/monitor_readme.md.tera");

@@ -30,6 +30,7 @@ mod kuka_cell;
 mod lab_safety;
 mod large_results;
 mod latest;
+mod monitor_alone;
 mod monitors;
 mod optimisers;
 mod physical;

@@ -16,7 +16,7 @@ fn watched(name: &str) -> Project {
 }
 
 /// What a query of results gives, a text for each row.
-fn rows(results: &Path, sql: &str) -> Vec<String> {
+pub(crate) fn rows(results: &Path, sql: &str) -> Vec<String> {
     let open = Connection::open(results.join("results.sqlite")).unwrap();
     let mut statement = open.prepare(sql).unwrap();
     statement.query_map([], |row| row.get(0)).unwrap().collect::<Result<_, _>>().unwrap()

@@ -211,7 +211,8 @@ impl Brokers {
                 Ok(Some(Event::Message { line, source, value, call: None, arrived }))
             }
             Err(mismatch) => {
-                for topics in self.routes.said[line].clone() {
+                let said = if self.lines[line].cut { self.routes.said[line].clone() } else { Vec::new() };
+                for topics in said {
                     topics.iter().try_for_each(|topic| self.send(topic, &publish.payload, &manner))?;
                 }
                 let topic = topic.to_owned();

@@ -9,6 +9,7 @@
 //! every other quantity is in the unit its field, metric or topic declares (the unit on the wire), probabilities are in
 //! `0..=1`.
 
+mod alone;
 mod brokers;
 mod bus;
 mod campaign;
@@ -42,6 +43,7 @@ pub mod testing;
 mod validate;
 mod wiring;
 
+pub use alone::NotAlone;
 pub use brokers::*;
 pub use bus::*;
 pub use campaign::*;

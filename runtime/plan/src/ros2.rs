@@ -76,6 +76,10 @@ pub struct Wiring {
     /// The subscribers that operations distinguish (`to`).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub subscribers: Vec<NodeId>,
+    /// Whether the runner publishes there beside the nodes, which keep their names: it is a guest in their system. Such
+    /// a topic is not cut.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub joined: bool,
 }
 
 /// The layout of a message: an interface of ROS.

@@ -269,6 +269,7 @@ mod tests {
             cut: true,
             publishers: publishers.iter().copied().map(NodeId).collect(),
             subscribers: subscribers.iter().copied().map(NodeId).collect(),
+            joined: false,
         };
         plan.simulator.transport = Transport::Ros2(Ros2 {
             domain: 0,

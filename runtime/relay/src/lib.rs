@@ -17,7 +17,7 @@ pub mod json;
 pub mod lifecycle;
 pub mod message;
 pub mod metric;
-mod monitor;
+pub mod monitor;
 pub mod panic_capture;
 pub mod relay;
 pub mod simulator;

@@ -6,6 +6,7 @@
 //! Nothing is published here: whoever runs the monitors takes what is to be published and passes it on, as messages of
 //! the same instant. A recording that is fed to metrics takes nothing, because what was published is in it.
 
+mod decided;
 mod evidence;
 mod outlet;
 mod record;
@@ -23,6 +24,9 @@ use crate::metric::Metrics;
 use crate::value::Value;
 use crate::wire::{Wire, WireTable};
 
+pub use decided::{Cause, Decided};
+
+use decided::Told;
 use evidence::EvidenceState;
 use outlet::Outlets;
 use record::Record;
@@ -52,6 +56,7 @@ pub(crate) struct Monitors<'p> {
     outbox: VecDeque<(Wire, Value)>,
     record: Record,
     scores: Scores<'p>,
+    told: Told,
     /// The first problem with a message.
     problem: Option<String>,
 }
@@ -124,10 +129,22 @@ impl<'p> Monitors<'p> {
             outbox: VecDeque::new(),
             record: Record::new(plan),
             scores: Scores::new(plan),
+            told: Told::new(),
             problem: None,
         };
         monitors.take_changes(None);
+        monitors.told.only_if_asked();
         Some(monitors)
+    }
+
+    /// From now on, decisions are kept until they are [taken](Monitors::take_decided); those of time zero are there.
+    pub(crate) fn tell(&mut self) {
+        self.told.ask();
+    }
+
+    /// What was decided since the last call, if [somebody wants to be told](Monitors::tell).
+    pub(crate) fn take_decided(&mut self) -> Vec<Decided> {
+        self.told.take()
     }
 
     /// Whether evidence hears this wire's messages as they are delivered.
@@ -206,16 +223,19 @@ impl<'p> Monitors<'p> {
                 None if change.truth == Truth::True => ChangeCause::Held,
                 None => ChangeCause::Stale,
             };
+            self.told.changed(self.run.network(), change, &cause);
             self.record.change(self.run.network(), change, cause);
         }
         for decision in &changes.decisions {
             self.record.decision(decision);
+            self.told.decided(decision);
             self.scores.decided(decision);
             self.outlets.publish(self.plan, decision, &mut self.outbox);
         }
         if !changes.evidence.is_empty() || !changes.decisions.is_empty() {
             self.scores.changed();
         }
+        self.told.end_changes();
         changes.clear();
         self.changes = changes;
         self.due = self.run.due();

@@ -225,6 +225,7 @@ impl<'a> Relay<'a> {
     /// Adds a listener, which is told everything that happens from now on.
     pub fn tapped(mut self, listener: &'a mut dyn Listener) -> Self {
         self.taps.push(listener);
+        self.monitors.iter_mut().for_each(Monitors::tell);
         self
     }
 

@@ -28,7 +28,7 @@ use mcap::records::Metadata;
 use sesame_base::observation::{Observation, Outcome};
 use sesame_plan::{CampaignPlan, Test};
 
-pub use recording::{Fed, RecordedMetric, RecordedRun, RecordingError, feed};
+pub use recording::{Fed, RecordedMetric, RecordedRun, RecordingError, feed, feed_telling};
 pub use recover::recover;
 pub use signals::{Signal, signals};
 pub use writer::TraceWriter;

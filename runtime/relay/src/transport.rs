@@ -27,7 +27,7 @@ pub use in_process::in_process;
 #[cfg(feature = "process")]
 pub use process::end_simulators;
 #[cfg(feature = "process")]
-pub use process::process;
+pub use process::{Beside, BesideError, beside, process};
 #[cfg(all(feature = "process", target_os = "linux"))]
 pub use process::{become_simulator, keep_simulator};
 

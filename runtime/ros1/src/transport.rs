@@ -27,6 +27,9 @@ use crate::node::{Incoming, Node, Subscription};
 /// The name of the runner's node, before the number of its worker.
 const NODE: &str = "/sesame_relay_";
 
+/// The name of a guest's node, before that of its monitor.
+const GUEST: &str = "/sesame_monitor_";
+
 /// The type of a clock.
 const CLOCK: &str = "rosgraph_msgs/Clock";
 
@@ -57,7 +60,7 @@ fn at_place(plan: &CampaignPlan, ros1: &Ros1, place: Place) -> Box<dyn Transport
     let bus = Ros1Bus {
         plan: plan.clone(),
         ros1: ros1.clone(),
-        name: format!("{NODE}{}", place.worker),
+        name: node_name(plan, place.worker),
         node: None,
         lines: Vec::new(),
         roles: Vec::new(),
@@ -65,6 +68,14 @@ fn at_place(plan: &CampaignPlan, ros1: &Ros1, place: Place) -> Box<dyn Transport
         clock: None,
     };
     on_bus(plan, Box::new(bus), settings, place)
+}
+
+/// What this process is called as a node: of two nodes of one name, the master ends the first.
+fn node_name(plan: &CampaignPlan, worker: u32) -> String {
+    match plan.monitors.iter().find(|monitor| monitor.publishes.is_some()) {
+        Some(monitor) if plan.is_guest() => format!("{GUEST}{}", monitor.name),
+        _ => format!("{NODE}{worker}"),
+    }
 }
 
 /// What launched programs are given.
@@ -105,7 +116,8 @@ impl Ros1Bus {
         match wired.codec.read(Arc::clone(bytes)) {
             Ok(value) => Event::Message { line, source, value, call, arrived },
             Err(error) => {
-                for sink in 0..wired.line.sinks.len() {
+                let sinks = if wired.line.cut { wired.line.sinks.len() } else { 0 };
+                for sink in 0..sinks {
                     self.send(line, sink, bytes, call);
                 }
                 let (path, interface) = (&wired.line.path, &wired.interface);

@@ -132,7 +132,8 @@ impl System {
                     format!("domain {} is beyond the last one, {LAST_DOMAIN}; use fewer workers", self.domain);
                 return Err(TransportError::Wiring(problem));
             }
-            if self.reserved.is_none() {
+            // A guest is in a domain that others use.
+            if self.reserved.is_none() && !self.plan.is_guest() {
                 self.reserved = Some(Domain::take(self.domain)?);
             }
             let session = Session::join(&self.plan, &self.ros2, relay.wires(), self.domain)?;
@@ -186,7 +187,7 @@ impl Transport for System {
             Ok(Progress::Ended) => self.undo(None).map(|()| Progress::Ended),
             other => other,
         };
-        self.look_around();
+        let advanced = advanced.and_then(|progress| self.look_around().map(|()| progress));
         self.collect_notes();
         advanced.map_err(|error| self.fail(error))
     }
@@ -215,17 +216,24 @@ impl Transport for System {
 }
 
 impl System {
-    /// Notes who has come and gone, if it is time to look.
-    fn look_around(&mut self) {
+    /// Notes who has come and gone, if it is time to look. A guest connects to those who have come.
+    fn look_around(&mut self) -> Result<(), TransportError> {
         let now = now();
         if self.session.as_ref().is_none_or(|session| !session.watch.is_due(now)) {
-            return;
+            return Ok(());
+        }
+        if self.plan.is_guest() {
+            let Some(session) = &mut self.session else { return Ok(()) };
+            session.watch.looked(now);
+            session.discover()?;
+            return Ok(());
         }
         let nodes = (0u32..).map(NodeId).take(self.plan.nodes.len());
         let absent = nodes.filter(|&node| self.is_absent(node)).map(|node| in_ros(&self.plan, node)).collect();
         if let Some(session) = &mut self.session {
             session.look_around(&self.plan, now, &absent);
         }
+        Ok(())
     }
 
     /// Takes what the relay has added, and notes if that is more than its budget.

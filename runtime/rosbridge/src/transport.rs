@@ -316,7 +316,8 @@ impl Bridge {
             Ok(value) => Ok(Some(Event::Message { line, source, value, call, arrived })),
             Err(mismatch) => {
                 let text = message.to_string();
-                for sink in 0..self.lines[line].sinks.len() {
+                let sinks = if self.lines[line].cut { self.lines[line].sinks.len() } else { 0 };
+                for sink in 0..sinks {
                     self.publish_text(line, sink, &text, call)?;
                 }
                 let path = &self.lines[line].sources[source].path;
@@ -364,7 +365,9 @@ impl Bridge {
 
     /// Passes something on that belongs to no run, and forgets notes about it.
     fn pass_on(&mut self, event: Event) -> Result<(), TransportError> {
-        if let Event::Message { line, value, call, .. } = event {
+        if let Event::Message { line, value, call, .. } = event
+            && self.lines[line].cut
+        {
             for sink in 0..self.lines[line].sinks.len() {
                 self.publish(line, sink, &value, call)?;
             }

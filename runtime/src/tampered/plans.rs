@@ -246,7 +246,7 @@ fn arm() -> CampaignPlan {
             interface("Inner", WireType::String),
             interface("Outer", WireType::Sequence { of: Box::new(inner), bound: None }),
         ],
-        wiring: vec![Wiring { cut: true, publishers: vec![NodeId(0)], subscribers: Vec::new() }],
+        wiring: vec![Wiring { cut: true, publishers: vec![NodeId(0)], ..Wiring::default() }],
     });
     let lifecycle = Lifecycle {
         launch: Some(launch(ReadyWhen::Clock)),

@@ -122,15 +122,31 @@ pub(super) fn generate(
         None if checked.plans.is_empty() => bail!("{} has no campaign to generate for", generation.file.display()),
         None => (0..checked.plans.len()).collect(),
     };
-    let mode = match (purpose, generation.force) {
+    let mode = mode(purpose, generation);
+    let (out, report) = write(shell, generation, options, &checked, &chosen, mode)?;
+    conclude(shell, &out, &report, purpose, &generation.file)
+}
+
+/// How trees are applied.
+pub(super) fn mode(purpose: Purpose, generation: &Generation) -> Mode {
+    match (purpose, generation.force) {
         (Purpose::Check, _) | (Purpose::DryRun, false) => Mode::Check,
         (Purpose::DryRun, true) => Mode::CheckForce,
         (Purpose::Write, true) => Mode::Force,
         (Purpose::Write, false) => Mode::Write,
-    };
-    let (out, report) = write(shell, generation, options, &checked, &chosen, mode)?;
+    }
+}
+
+/// Shows what was asked for of a generation, and fails if files were to be up to date and are not.
+pub(super) fn conclude(
+    shell: Shell,
+    out: &Path,
+    report: &Report,
+    purpose: Purpose,
+    file: &Path,
+) -> anyhow::Result<ExitCode> {
     if purpose == Purpose::DryRun {
-        shell::asked_for(&visible(&preview(&out, &report)))?;
+        shell::asked_for(&visible(&preview(out, report)))?;
     }
     if purpose == Purpose::Check && report.out_of_date() {
         let files = report.files.iter().filter(|file| file.owner != Owner::Seed);
@@ -142,7 +158,7 @@ pub(super) fn generate(
             };
             shell.text(&visible(&format!("{} {what}", out.join(&file.path).display())));
         }
-        bail!("out of date: run `{}`", shell::command_for("generate", &generation.file));
+        bail!("out of date: run `{}`", shell::command_for("generate", file));
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -335,30 +351,33 @@ fn contents<'a>(trees: &'a [Tree], path: &str) -> Cow<'a, str> {
     trees.iter().find_map(in_tree).map_or_else(Cow::default, |file| file.text())
 }
 
+/// What was generated of a tree in a folder of its own; `more` goes behind it.
+pub(super) fn tell_tree(shell: Shell, out: &Path, tree: &Tree, report: &Report, mode: Mode, more: &str) {
+    let verb = if matches!(mode, Mode::Write | Mode::Force) { "Generated" } else { "Compared" };
+    let prefix = format!("{}/", tree.folder);
+    let files: Vec<_> = report.files.iter().filter(|file| file.path.starts_with(&prefix)).collect();
+    let written = files.iter().filter(|file| matches!(file.change, Change::Created | Change::Updated)).count();
+    let changed = match written {
+        0 => ", unchanged".to_owned(),
+        n if n == files.len() => String::new(),
+        n => format!(", {n} written"),
+    };
+    shell.did(verb, format!("{}: {} files{changed}{more}", out.join(&tree.folder).display(), files.len()));
+}
+
 /// What was generated.
 fn tell(shell: Shell, out: &Path, trees: &[Tree], report: &Report, mode: Mode, space: &RunnerPlan) {
-    let written = |files: &[&output::FileReport]| {
-        files.iter().filter(|file| matches!(file.change, Change::Created | Change::Updated)).count()
-    };
     let created: Vec<_> =
         report.files.iter().filter(|file| file.owner == Owner::User && file.change == Change::Created).collect();
     let kept = report.files.iter().filter(|file| file.owner == Owner::User && file.change == Change::Kept).count();
     let writes = matches!(mode, Mode::Write | Mode::Force);
-    let verb = if writes { "Generated" } else { "Compared" };
     for tree in trees.iter().filter(|tree| !tree.folder.is_empty()) {
-        let prefix = format!("{}/", tree.folder);
-        let files: Vec<_> = report.files.iter().filter(|file| file.path.starts_with(&prefix)).collect();
-        let changed = match written(&files) {
-            0 => ", unchanged".to_owned(),
-            n if n == files.len() => String::new(),
-            n => format!(", {n} written"),
-        };
         let hooks = match kept {
             0 => String::new(),
             1 => ", 1 hook kept".to_owned(),
             n => format!(", {n} hooks kept"),
         };
-        shell.did(verb, format!("{}: {} files{changed}{hooks}", out.join(&tree.folder).display(), files.len()));
+        tell_tree(shell, out, tree, report, mode, &hooks);
     }
     if writes {
         for hook in created {

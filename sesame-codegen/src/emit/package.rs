@@ -19,6 +19,18 @@ const LESS_OPTIMISED: [(&str, u8); 8] = [
     ("sesame-runtime", 1),
 ];
 
+/// The same of a monitor, which links less.
+const LESS_OPTIMISED_IN_MONITORS: [(&str, u8); 3] = [("clap_builder", 0), ("sesame-plan", 1), ("sesame-runtime", 1)];
+
+/// What a crate is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// The runner of a campaign.
+    Runner,
+    /// A monitor as a program of its own.
+    Monitor,
+}
+
 /// The dependencies, with these features of the runtime.
 pub(super) fn with_features(dependencies: &BTreeMap<String, Value>, features: &[&str]) -> BTreeMap<String, Value> {
     let mut dependencies = dependencies.clone();
@@ -42,10 +54,23 @@ pub(super) fn with_features(dependencies: &BTreeMap<String, Value>, features: &[
 }
 
 /// The manifest. Names of packages and dependencies are checked by those who made them; values are printed by toml.
-pub(super) fn cargo_toml(note: &str, package: &str, dependencies: &BTreeMap<String, Value>, vendored: bool) -> String {
+pub(super) fn cargo_toml(
+    kind: Kind,
+    note: &str,
+    package: &str,
+    dependencies: &BTreeMap<String, Value>,
+    vendored: bool,
+) -> String {
+    let (hooks, less_optimised) = match kind {
+        Kind::Runner => (
+            "# What hooks need goes into [dependencies] of the sesame.toml beside the .sesame file.\n",
+            &LESS_OPTIMISED[..],
+        ),
+        Kind::Monitor => ("", &LESS_OPTIMISED_IN_MONITORS[..]),
+    };
     let mut text = format!(
         "# {note}\n\
-         # What hooks need goes into [dependencies] of the sesame.toml beside the .sesame file.\n\
+         {hooks}\
          \n\
          [package]\n\
          name = {}\n\
@@ -61,17 +86,21 @@ pub(super) fn cargo_toml(note: &str, package: &str, dependencies: &BTreeMap<Stri
     }
     text.push_str(
         "\n\
-         # The runner is a workspace of its own, in any folder.\n\
+         # It is a workspace of its own, in any folder.\n\
          [workspace]\n",
     );
     if vendored {
         text.push_str("exclude = [\"vendor\"]\n");
     }
+    text.push_str(match kind {
+        Kind::Runner => {
+            "\n# Simulator and runtime run at full speed. Hooks and generated code are built quickly, since they change; build\n\
+             # scripts and macros are not optimised at all (a profile for package.\"*\" would do that too, and take twice as long).\n"
+        }
+        Kind::Monitor => "\n# The runtime runs at full speed.\n",
+    });
     text.push_str(
-        "\n\
-         # Simulator and runtime run at full speed. Hooks and generated code are built quickly, since they change; build\n\
-         # scripts and macros are not optimised at all (a profile for package.\"*\" would do that too, and take twice as long).\n\
-         [profile.dev]\n\
+        "[profile.dev]\n\
          opt-level = 3\n\
          debug = false\n\
          \n",
@@ -79,7 +108,7 @@ pub(super) fn cargo_toml(note: &str, package: &str, dependencies: &BTreeMap<Stri
     let own = format!("[profile.dev.package.{package}]\nopt-level = 1\ndebug = \"line-tables-only\"\n\n");
     text.push_str(&own);
     text.push_str("# What has little to do in a campaign, and would take long to optimise.\n");
-    for (name, level) in LESS_OPTIMISED {
+    for (name, level) in less_optimised {
         writeln!(text, "[profile.dev.package.{name}]\nopt-level = {level}").expect("text grows as needed");
     }
     text
@@ -109,7 +138,13 @@ mod tests {
     fn hostile_dependencies_stay_data() {
         assert!(!is_dependency("x\"]\n[evil"));
         let value: Value = toml::from_str("version = \"1\"\nfeatures = [\"a\\\"\\n[evil]\"]").unwrap();
-        let text = cargo_toml("note", "space-campaign", &BTreeMap::from([("x".to_owned(), value.clone())]), false);
+        let text = cargo_toml(
+            Kind::Runner,
+            "note",
+            "space-campaign",
+            &BTreeMap::from([("x".to_owned(), value.clone())]),
+            false,
+        );
         let parsed: toml::Table = toml::from_str(&text).unwrap();
         assert_eq!(parsed["dependencies"]["x"], value);
         assert_eq!(parsed.keys().collect::<Vec<_>>(), ["dependencies", "package", "profile", "workspace"]);

@@ -6,7 +6,7 @@ use sesame_plan::{MetricSource, Transport};
 
 use super::package;
 use crate::names;
-use crate::plan::RunnerPlan;
+use crate::plan::{MonitorPlan, RunnerPlan};
 
 /// Why no crate can be generated from a plan. The language refuses all of this with a place in the `.sesame` file; it
 /// is checked here again because what is generated from is data.
@@ -71,6 +71,14 @@ pub enum Problem {
 fn template_names() -> String {
     let names: Vec<&str> = sesame_templates::ALL.iter().map(|(name, _)| *name).collect();
     names.join(", ")
+}
+
+/// Everything that stands against generating the crate of a monitor: only its name and that of its space become names
+/// of files and packages, all else is data.
+pub(super) fn problems_of_monitor(monitor: &MonitorPlan) -> Vec<Problem> {
+    let names = [("space", &monitor.plan.space), ("monitor", &monitor.name)];
+    let bad = names.into_iter().filter(|(_, name)| !names::check(name));
+    bad.map(|(what, name)| Problem::Name { what, name: name.clone() }).collect()
 }
 
 /// Everything that stands against generating crates from these plans, with these dependencies.

@@ -70,5 +70,6 @@ fn wiring(space: &Space, topic: TopicId, stepped: bool) -> plan::Wiring {
         cut: on_it().next().is_some() || by_monitor(space, topic) || stepped && space.nodes.values().any(in_step),
         publishers: distinguished(|operation| &operation.from),
         subscribers: distinguished(|operation| &operation.to),
+        joined: false,
     }
 }

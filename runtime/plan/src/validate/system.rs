@@ -67,11 +67,12 @@ impl CampaignPlan {
     fn sound_wiring(&self, transport: &Transport) -> Checked {
         let (topics, wiring) = (self.topics.len(), transport.wiring().len());
         at("wiring", require(topics == wiring, || format!("there are {wiring} for {topics} topics")))?;
-        each("wiring", transport.wiring(), |Wiring { cut, publishers, subscribers }| {
+        each("wiring", transport.wiring(), |Wiring { cut, publishers, subscribers, joined }| {
             each("publishers", publishers, |&id| self.has_node(id))?;
             each("subscribers", subscribers, |&id| self.has_node(id))?;
             let distinguishes = !publishers.is_empty() || !subscribers.is_empty();
-            require(*cut || !distinguishes, || "distinguishes nodes of a topic that is not cut".to_owned())
+            require(*cut || !distinguishes, || "distinguishes nodes of a topic that is not cut".to_owned())?;
+            require(!(*cut && *joined), || "cuts a topic on which the runner publishes beside nodes".to_owned())
         })
     }
 

@@ -39,11 +39,7 @@ impl Record {
             return;
         }
         self.kept += 1;
-        let holds = match change.truth {
-            Truth::False => Some(false),
-            Truth::Unknown => None,
-            Truth::True => Some(true),
-        };
+        let holds = holds(change.truth);
         monitor.evidence.push(EvidenceChange { time: change.at.seconds(), evidence, holds, cause });
     }
 
@@ -56,5 +52,14 @@ impl Record {
             ));
         }
         self.monitors
+    }
+}
+
+/// Whether something holds; `None` if it is unknown.
+pub(super) fn holds(truth: Truth) -> Option<bool> {
+    match truth {
+        Truth::False => Some(false),
+        Truth::Unknown => None,
+        Truth::True => Some(true),
     }
 }

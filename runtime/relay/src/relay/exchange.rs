@@ -14,6 +14,8 @@ pub struct Delivery {
     pub wire: Wire,
     /// It comes from the message with this number among those published on the wire, from 0.
     pub index: u64,
+    /// When: a message that was held back may have been due before the time to which the relay was advanced.
+    pub at: SimTime,
     /// Whether it comes from a message that a monitor of the runner published, so that no node sent it: a transport
     /// that only listens to the wire has to publish it.
     pub by_monitor: bool,

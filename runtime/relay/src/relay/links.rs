@@ -21,7 +21,7 @@ fn plan_of(operations: Vec<Operation>) -> CampaignPlan {
     let mut plan = plan(operations);
     plan.nodes = vec![node("left"), node("right")];
     let mut wiring = vec![Wiring::default(); plan.topics.len()];
-    wiring[0] = Wiring { cut: true, publishers: vec![LEFT], subscribers: vec![LEFT, RIGHT] };
+    wiring[0] = Wiring { cut: true, publishers: vec![LEFT], subscribers: vec![LEFT, RIGHT], joined: false };
     plan.simulator.transport = Transport::Ros2(Ros2 {
         domain: 0,
         clock: Clock::Wall,

@@ -3,6 +3,7 @@
 use sesame_base::time::SimTime;
 
 use crate::metric::Metrics;
+use crate::monitor::Decided;
 use crate::value::Value;
 use crate::wire::Wire;
 
@@ -20,6 +21,10 @@ pub trait Listener {
     /// Simulation time is `now` from here on: all messages of earlier moments are known.
     fn advanced(&mut self, now: SimTime) {
         let _ = now;
+    }
+    /// A monitor decided.
+    fn decided(&mut self, decided: &Decided) {
+        let _ = decided;
     }
     /// The operation at this position of the test did something.
     fn operated(&mut self, now: SimTime, operation: usize, event: OperationEvent) {

@@ -39,6 +39,7 @@ impl Relay<'_> {
     fn decide(&mut self, deliveries: &mut Vec<Delivery>) {
         let Some(monitors) = &mut self.monitors else { return };
         monitors.decide(self.now);
+        self.tell_decided();
         // What is published may release messages that were held back; whoever empties the queue goes on with it.
         if self.publishing.busy {
             return;
@@ -56,9 +57,18 @@ impl Relay<'_> {
                     self.publishing.endless |= monitors.give_up() > 0;
                 }
             }
+            self.tell_decided();
         }
         self.publishing.busy = false;
         self.show_scores();
+    }
+
+    /// Tells listeners what monitors decided.
+    fn tell_decided(&mut self) {
+        let Some(monitors) = &mut self.monitors else { return };
+        for decided in monitors.take_decided() {
+            self.taps.iter_mut().for_each(|tap| tap.decided(&decided));
+        }
     }
 
     /// Conditions see what monitors are now.
@@ -153,6 +163,7 @@ impl Relay<'_> {
         if let Some(monitors) = &mut self.monitors {
             monitors.end(now, &mut self.metrics, fuzzing_time);
         }
+        self.tell_decided();
     }
 
     /// The run broke off.

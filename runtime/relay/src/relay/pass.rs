@@ -81,7 +81,7 @@ impl Relay<'_> {
             }
         }
         let Held { wire, published: index, by_monitor, value, .. } = message;
-        deliveries.push(Delivery { wire, index, by_monitor, value });
+        deliveries.push(Delivery { wire, index, at: now, by_monitor, value });
     }
 
     /// A message has passed all operations of the test on its wire.

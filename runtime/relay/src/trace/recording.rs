@@ -19,7 +19,7 @@ use sesame_plan::{CampaignPlan, MetricSource, OperationId, Side, Span, Type};
 use crate::json::{Shapes, decode};
 use crate::message::Mismatch;
 use crate::metric::{MetricTable, Metrics};
-use crate::monitor::Monitors;
+use crate::monitor::{Decided, Monitors};
 use crate::trace::records::records;
 use crate::trace::{ROLE, ROLE_DELIVERED, ROLE_PUBLISHED, RUN, SUBJECT, TOPIC};
 use crate::value::Value;
@@ -172,6 +172,17 @@ pub fn feed(
     wires: &WireTable,
     table: &MetricTable<'_>,
 ) -> Result<Fed, RecordingError> {
+    feed_telling(path, plan, wires, table, None)
+}
+
+/// As [`feed`], and tells what monitors decide, in order of time.
+pub fn feed_telling<'d>(
+    path: &Path,
+    plan: &CampaignPlan,
+    wires: &WireTable,
+    table: &MetricTable<'_>,
+    decided: Option<&'d mut (dyn FnMut(&Decided) + 'd)>,
+) -> Result<Fed, RecordingError> {
     let file = File::open(path)
         .map_err(|error| RecordingError::Unreadable { reason: error.to_string(), path: path.to_owned() })?;
     let mut feeder = Feeder {
@@ -184,6 +195,7 @@ pub fn feed(
         heard: BTreeSet::new(),
         shapes: Shapes::default(),
         monitors: None,
+        decided,
         metrics: table.start(),
         start: None,
         now: SimTime::ZERO,
@@ -192,6 +204,9 @@ pub fn feed(
         ending: None,
     };
     feeder.monitors = Monitors::new(&feeder.metrics, wires);
+    if feeder.decided.is_some() {
+        feeder.monitors.iter_mut().for_each(Monitors::tell);
+    }
     feeder.show_monitors();
     feeder.metrics.begin();
     read(file, path, &mut |record| feeder.record(record))?;
@@ -250,7 +265,7 @@ struct Line {
     delivered: bool,
 }
 
-struct Feeder<'a> {
+struct Feeder<'a, 'd> {
     plan: &'a CampaignPlan,
     wires: &'a WireTable,
     path: &'a Path,
@@ -266,6 +281,8 @@ struct Feeder<'a> {
     metrics: Metrics<'a>,
     /// `None` for a plan without monitors. What they publish is in the recording.
     monitors: Option<Monitors<'a>>,
+    /// Who is told what they decide.
+    decided: Option<&'d mut (dyn FnMut(&Decided) + 'd)>,
     /// Log time of the start of the run, in nanoseconds: zero in a trace, that of the first message elsewhere.
     start: Option<u64>,
     now: SimTime,
@@ -274,7 +291,7 @@ struct Feeder<'a> {
     ending: Option<BTreeMap<String, String>>,
 }
 
-impl Feeder<'_> {
+impl Feeder<'_, '_> {
     fn record(&mut self, record: Record<'_>) -> Result<(), RecordingError> {
         match record {
             Record::Metadata(Metadata { name, metadata }) if name == SUBJECT => {
@@ -382,6 +399,13 @@ impl Feeder<'_> {
             monitors.give_up();
             monitors.show(self.now, &mut self.metrics);
         }
+        self.tell_decided();
+    }
+
+    fn tell_decided(&mut self) {
+        if let (Some(monitors), Some(tell)) = (&mut self.monitors, &mut self.decided) {
+            monitors.take_decided().iter().for_each(&mut **tell);
+        }
     }
 
     fn finish(mut self) -> Result<Fed, RecordingError> {
@@ -446,6 +470,7 @@ impl Feeder<'_> {
             monitors.decide(self.now);
             monitors.break_off(self.now, &mut self.metrics);
         }
+        self.tell_decided();
         let (mut metrics, mut warnings) = self.metrics.finish(busy.as_deref().unwrap_or_default());
         if let Some(monitors) = self.monitors {
             warnings.extend(monitors.finish(self.now, &mut metrics, end.is_some()).1);

@@ -9,6 +9,7 @@
     reason = "an adapter: the keeper answers in place of a simulator that cannot be started"
 )]
 
+mod beside;
 mod fault;
 mod free_running;
 mod launched;
@@ -34,6 +35,8 @@ use crate::lifecycle::Kept;
 use crate::lifecycle::launch::{Launched, Place};
 use crate::lifecycle::{self, Program};
 use crate::transport::{Connect, Transport};
+
+pub use self::beside::{Beside, BesideError, beside};
 
 /// Ends all simulators of this process with everything they started. It does the same as closing each of them, but may
 /// be called from any thread, even while another one communicates with them.

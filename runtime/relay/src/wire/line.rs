@@ -3,6 +3,7 @@
 use sesame_plan::{CampaignPlan, Channel, NodeId, TopicId, Wiring};
 
 use super::{Wire, WireTable};
+use crate::relay::Delivery;
 
 /// A name in the middleware on which a transport listens.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -41,8 +42,16 @@ pub struct Line {
     pub cut: bool,
     /// Where its messages come from; nowhere if only the runner publishes them.
     pub sources: Vec<Source>,
-    /// Where they go; none if it is not cut.
+    /// Where they go. If it is not cut, nothing goes on: then it has a sink only where the runner publishes beside nodes,
+    /// for messages of its own.
     pub sinks: Vec<Sink>,
+}
+
+impl Line {
+    /// Whether a delivery goes to the sinks: of a line that is not cut, only messages of the runner's own do.
+    pub fn takes(&self, delivery: &Delivery) -> bool {
+        self.cut || delivery.by_monitor
+    }
 }
 
 /// The lines of a plan's topics, in the order of the wires; those of services are not among them.
@@ -81,8 +90,13 @@ fn wiring(plan: &CampaignPlan, topic: TopicId) -> Wiring {
 
 fn line(plan: &CampaignPlan, wires: &WireTable, wire: Wire) -> Line {
     let (topic, channel, path) = (wires.topic(wire), Channel::Topic, wires.path(wire).to_owned());
-    let Wiring { cut, publishers, .. } = wiring(plan, topic);
+    let Wiring { cut, publishers, joined, .. } = wiring(plan, topic);
     let source = |path: String, publisher| Source { wire, path, publisher };
+    if joined {
+        let heard = plan.is_read_by_monitor(topic).then(|| source(path.clone(), None));
+        let sinks = vec![Sink { wire, path: path.clone(), subscriber: None }];
+        return Line { wire, topic, channel, cut, sources: heard.into_iter().collect(), sinks, path };
+    }
     if !cut {
         return Line { wire, topic, channel, cut, sources: vec![source(path.clone(), None)], sinks: Vec::new(), path };
     }
@@ -106,10 +120,12 @@ fn line(plan: &CampaignPlan, wires: &WireTable, wire: Wire) -> Line {
 
 #[cfg(test)]
 mod tests {
+    use sesame_base::time::SimTime;
     use sesame_plan::testing::{evidence_above, guarantee, minimal, monitor, node, topic};
-    use sesame_plan::{Clock, FieldRef, Gate, Mitigation, MitigationValue, Node, Ros2, Transport, Type};
+    use sesame_plan::{Clock, FieldRef, Gate, Mitigation, MitigationValue, MonitorId, Node, Ros2, Transport, Type};
 
     use super::*;
+    use crate::value::Value;
 
     #[test]
     fn what_only_a_monitor_publishes_comes_from_nowhere() {
@@ -139,5 +155,26 @@ mod tests {
         assert_eq!(ends(&plan), [level.clone(), (vec!["safe/undisturbed".to_owned()], 1)]);
         plan.nodes = vec![node("arm")];
         assert_eq!(ends(&plan), [level, (Vec::new(), 1)]);
+    }
+
+    #[test]
+    fn a_guest_publishes_under_the_name_that_all_know_and_passes_nothing_on() {
+        let mut plan = minimal();
+        plan.topics = vec![topic("level", &["level"], Type::Real { unit: None }), topic("safe", &["safe"], Type::Bool)];
+        plan.monitors =
+            vec![monitor("cell", 1, vec![evidence_above("low", 0, 1.0)], vec![guarantee("ok", 1, Gate::Evidence(0))])];
+        let (interfaces, clock) = (Vec::new(), Clock::Wall);
+        let wiring = vec![Wiring { cut: true, ..Wiring::default() }; 2];
+        plan.simulator.transport =
+            Transport::Ros2(Ros2 { domain: 0, clock, step: None, reset: None, interfaces, wiring });
+        let plan = plan.of_monitor_alone(MonitorId(0)).unwrap();
+        let [level, safe] = &lines(&plan, &WireTable::new(&plan))[..] else { panic!("there are two topics") };
+        assert_eq!((level.sources[0].path.as_str(), level.sinks.len(), level.cut), ("level", 0, false));
+        assert_eq!((safe.sources.len(), safe.sinks[0].path.as_str(), safe.cut), (0, "safe", false));
+        let delivery = |by_monitor| {
+            let (wire, at) = (safe.wire, SimTime::ZERO);
+            Delivery { wire, index: 0, at, by_monitor, value: Value::Bool(true) }
+        };
+        assert!(safe.takes(&delivery(true)) && !safe.takes(&delivery(false)));
     }
 }

@@ -16,6 +16,17 @@ use crate::names;
 /// The name of the runner's node.
 const NODE: &str = "/sesame_relay";
 
+/// The name of a guest's node, before that of its monitor.
+const GUEST: &str = "/sesame_monitor_";
+
+/// What this process is called as a node.
+pub(super) fn node_name(plan: &CampaignPlan) -> String {
+    match plan.monitors.iter().find(|monitor| monitor.publishes.is_some()) {
+        Some(monitor) if plan.is_guest() => format!("{GUEST}{}", monitor.name),
+        _ => NODE.to_owned(),
+    }
+}
+
 /// How often it is looked who is there while nothing else happens.
 const LOOK: Duration = Duration::from_millis(20);
 
@@ -29,7 +40,7 @@ const STANDS: Duration = Duration::from_secs(3);
 
 impl Session {
     /// Connects to whoever has appeared; true if somebody new was found.
-    fn discover(&mut self) -> Result<bool, DdsError> {
+    pub(super) fn discover(&mut self) -> Result<bool, DdsError> {
         let (publishers, subscribers) = (self.publishers(), self.subscribers());
         let mut found = false;
         for connected in &mut self.lines {
@@ -44,8 +55,8 @@ impl Session {
                     found = true;
                 }
             }
-            // What only the runner publishes has no quality of service to take.
-            if readers.is_empty() || readers.iter().any(Option::is_some) {
+            // What only the runner publishes has no quality of service to take, and a guest waits for nobody.
+            if !line.cut || readers.is_empty() || readers.iter().any(Option::is_some) {
                 for (sink, writer) in line.sinks.iter().zip(writers.iter_mut()).filter(|(_, writer)| writer.is_none()) {
                     *writer = Some(self.dds.publish(&names::topic(&sink.path), type_name, qos)?);
                     found = true;
@@ -86,7 +97,7 @@ impl Session {
         let readers = self.lines.iter().flat_map(|connected| connected.readers.iter().flatten());
         let writers = self.lines.iter().flat_map(|connected| connected.writers.iter().flatten());
         let node = NodeEntities {
-            name: NODE.to_owned(),
+            name: self.name.clone(),
             readers: readers.filter_map(|&reader| self.dds.reader_guid(reader)).map(|guid| guid.to_bytes()).collect(),
             writers: writers.filter_map(|&writer| self.dds.writer_guid(writer)).map(|guid| guid.to_bytes()).collect(),
         };

@@ -16,6 +16,7 @@ use crate::dds::{DdsError, Endpoint, Participant, ReaderId, Received, Sample, Wr
 use crate::graph::{DISCOVERY_TOPIC, DISCOVERY_TYPE, Gid, NodeInfo, Nodes};
 use crate::names;
 use crate::parameters::Parameters;
+use crate::transport::assembly::node_name;
 use crate::transport::served::{Direction, Served, services};
 use crate::transport::service::{self, Client};
 use crate::transport::watch::Watch;
@@ -23,6 +24,8 @@ use crate::transport::wires::{absolute, lines_in_ros};
 
 /// A node of our own in the domain, with what it reads and writes.
 pub(super) struct Session {
+    /// The name of the node.
+    pub(super) name: String,
     pub(super) dds: Participant,
     pub(super) nodes: Nodes,
     pub(super) info: NodeInfo,
@@ -145,7 +148,8 @@ impl Session {
                 codec,
                 readers: vec![None; line.sources.len()],
                 writers: vec![None; line.sinks.len()],
-                qos: mirrored([]),
+                // Whoever comes later than a guest is to hear its state.
+                qos: if line.cut || line.sinks.is_empty() { mirrored([]) } else { latched(1) },
                 type_name: names::type_name(&interface),
                 interface,
                 line,
@@ -153,6 +157,7 @@ impl Session {
         }
         let caller = |path: &String| Caller { path: absolute(path), client: None };
         Ok(Session {
+            name: node_name(plan),
             nodes: Nodes::default(),
             info: NodeInfo::new(),
             info_reader,

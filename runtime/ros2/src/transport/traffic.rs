@@ -20,6 +20,7 @@ impl Session {
     pub(super) fn pass_on(&mut self, incoming: Incoming) -> Result<(), DdsError> {
         if let Incoming::Message(Message { origin, sample, .. }) = incoming {
             match origin {
+                Origin::Line(line, _) if !self.lines[line].line.cut => {}
                 Origin::Line(line, _) => {
                     for &writer in self.lines[line].writers.iter().flatten() {
                         self.dds.write(writer, sample.clone(), None)?;
@@ -230,9 +231,13 @@ impl Session {
         Ok(())
     }
 
-    fn deliver_one(&mut self, Delivery { wire, index, value, .. }: &Delivery) -> Result<(), DdsError> {
+    fn deliver_one(&mut self, delivery: &Delivery) -> Result<(), DdsError> {
+        let Delivery { wire, index, value, .. } = delivery;
         for connected in &self.lines {
             let Some(at) = connected.line.sinks.iter().position(|sink| sink.wire == *wire) else { continue };
+            if !connected.line.takes(delivery) {
+                return Ok(());
+            }
             let Some(writer) = connected.writers[at] else { return Ok(()) };
             let path = connected.line.sinks[at].path.clone();
             return match connected.codec.write(value) {

@@ -77,6 +77,11 @@ impl Watch {
         self.looked.is_none_or(|looked| now.duration_since(looked) >= LOOK)
     }
 
+    /// Somebody else looked, at this moment.
+    pub(super) fn looked(&mut self, now: Instant) {
+        self.looked = Some(now);
+    }
+
     /// Forgets whom an operation has taken away.
     pub(super) fn forget(&mut self, gone: impl Fn(GUID) -> bool) {
         self.there.retain(|&guid, _| !gone(guid));

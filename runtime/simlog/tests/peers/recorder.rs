@@ -69,7 +69,7 @@ impl Exchange for Recorder {
         let path = self.wires.path(wire).to_owned();
         let count = self.counts.entry(wire).or_default();
         if let Some(value) = (self.change)(&path, value.clone()) {
-            deliveries.push(Delivery { wire, index: *count, by_monitor: false, value });
+            deliveries.push(Delivery { wire, index: *count, at: now, by_monitor: false, value });
         }
         *count += 1;
         self.published.entry(path).or_default().push((now, value));

@@ -207,7 +207,8 @@ impl System {
         match event {
             Event::Message { line, value, call, .. } => {
                 heard.topics.insert(self.lines[line].topic);
-                for sink in 0..self.lines[line].sinks.len() {
+                let sinks = if self.lines[line].cut { self.lines[line].sinks.len() } else { 0 };
+                for sink in 0..sinks {
                     self.bus.publish(line, sink, &value, call)?;
                 }
             }
@@ -284,7 +285,9 @@ impl System {
             Some(Event::Returned { line, added }) => self.returned.record(self.lines[line].wire, added),
             Some(Event::Message { line, source, value, call, arrived }) => {
                 self.message(line, source, value, call, relay);
-                let sink_of = |delivery: &Delivery| self.sinks.get(&delivery.wire).filter(|(of, _)| *of == line);
+                let sink_of = |delivery: &Delivery| {
+                    self.sinks.get(&delivery.wire).filter(|(of, _)| *of == line && self.lines[line].cut)
+                };
                 let passed: Vec<usize> = self.deliveries.iter().filter_map(sink_of).map(|&(_, sink)| sink).collect();
                 self.deliver()?;
                 for &sink in &passed {
@@ -337,10 +340,12 @@ impl System {
 
     /// Publishes what is delivered; what was only listened to stays where it is.
     fn deliver(&mut self) -> Result<(), TransportError> {
-        for Delivery { wire, index, value, .. } in self.deliveries.drain(..) {
-            let Some(&(line, sink)) = self.sinks.get(&wire) else { continue };
-            let call = self.calls.get(&(self.lines[line].wire, index)).copied();
-            self.bus.publish(line, sink, &value, call)?;
+        for delivery in self.deliveries.drain(..) {
+            let Some(&(line, sink)) = self.sinks.get(&delivery.wire) else { continue };
+            if self.lines[line].takes(&delivery) {
+                let call = self.calls.get(&(self.lines[line].wire, delivery.index)).copied();
+                self.bus.publish(line, sink, &delivery.value, call)?;
+            }
         }
         Ok(())
     }

@@ -68,6 +68,9 @@ pub(super) struct Ready<'a> {
     /// Of a free-running simulator: whether it sends its simulation time; otherwise simulation time is wall time.
     #[serde(default)]
     pub(super) clock: bool,
+    /// Whether it wants to know when each message was delivered.
+    #[serde(default)]
+    pub(super) times: bool,
     /// Messages of time zero.
     #[serde(default, borrow)]
     pub(super) messages: Vec<Message<'a>>,
@@ -306,13 +309,22 @@ pub(super) mod request {
         line.extend_from_slice(b"]}\n");
     }
 
-    /// Adds `{"topic":"a","value":…}` to messages.
-    pub(in super::super) fn message(messages: &mut Vec<u8>, topic: &str, value: impl FnOnce(&mut Vec<u8>)) {
+    /// Adds `{"topic":"a","value":…}` to messages, or `{"topic":"a","time":0.02,"value":…}` if its time is to be there.
+    pub(in super::super) fn message(
+        messages: &mut Vec<u8>,
+        topic: &str,
+        time: Option<SimTime>,
+        value: impl FnOnce(&mut Vec<u8>),
+    ) {
         if !messages.is_empty() {
             messages.push(b',');
         }
         messages.extend_from_slice(b"{\"topic\":");
         quoted(topic, messages);
+        if let Some(time) = time {
+            messages.extend_from_slice(b",\"time\":");
+            number(time.seconds(), messages);
+        }
         messages.extend_from_slice(b",\"value\":");
         value(messages);
         messages.push(b'}');

@@ -55,6 +55,8 @@ pub(super) struct Topics {
     by_path: BTreeMap<String, Topic>,
     /// Per wire of the relay: whether the simulator subscribes to it.
     subscribed: Vec<bool>,
+    /// Whether the simulator is told when each message was delivered.
+    timed: bool,
     shapes: Shapes,
     pub(super) deliveries: Vec<Delivery>,
     /// Messages to be delivered, as JSON for the next line to the simulator.
@@ -211,6 +213,7 @@ impl Topics {
         ready: &Ready<'_>,
         relay: &mut dyn Exchange,
     ) -> Result<(), TransportError> {
+        self.timed = ready.times;
         let wires = relay.wires();
         for path in ready.publishes.iter().chain(&ready.subscribes) {
             let topic = Topic { wire: wires.find(path), publishes: false, subscribes: false };
@@ -258,7 +261,9 @@ impl Topics {
             };
             let Some(wire) = topic.wire else {
                 if topic.subscribes {
-                    request::message(&mut self.outbox, path, |out| out.extend_from_slice(value.get().as_bytes()));
+                    request::message(&mut self.outbox, path, self.timed.then_some(now), |out| {
+                        out.extend_from_slice(value.get().as_bytes())
+                    });
                 }
                 continue;
             };
@@ -275,7 +280,7 @@ impl Topics {
     /// Puts the relay's deliveries to subscribers into the outbox. A message that no operation intercepts is passed on
     /// byte for byte.
     pub(super) fn deliver(&mut self, relay: &dyn Exchange, published: Option<(Wire, &RawValue)>) {
-        for Delivery { wire, by_monitor, value, .. } in self.deliveries.drain(..) {
+        for Delivery { wire, at, by_monitor, value, .. } in self.deliveries.drain(..) {
             if !self.subscribed.get(wire.index()).copied().unwrap_or(false) {
                 continue;
             }
@@ -286,7 +291,8 @@ impl Topics {
                 passed.push(wire);
             }
             let untouched = published.filter(|&(from, _)| from == wire && !by_monitor && !relay.intercepts(wire));
-            request::message(&mut self.outbox, relay.wires().path(wire), |out| match untouched {
+            let time = self.timed.then_some(at);
+            request::message(&mut self.outbox, relay.wires().path(wire), time, |out| match untouched {
                 Some((_, raw)) => out.extend_from_slice(raw.get().as_bytes()),
                 None => json::encode(&value, out),
             });

@@ -1,0 +1,199 @@
+//! A monitor as a program of its own, which a generated `main` is nothing but a call of: beside a system on a bus,
+//! between a runner and its simulator, or on a recording.
+//!
+//! What it decides is what the runner's own monitor decides on the same messages: both run the same code.
+
+#![expect(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    reason = "an adapter: it starts a program and writes a file"
+)]
+
+mod beside;
+mod guest;
+mod show;
+
+use std::borrow::Cow;
+use std::ffi::OsString;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{CommandFactory as _, FromArgMatches as _, Parser};
+
+use sesame_base::visible::{visible, visible_lines};
+use sesame_plan::{CampaignPlan, Monitor, Transport, is_shared};
+use sesame_relay::metric::MetricTable;
+use sesame_relay::monitor::Decided;
+use sesame_relay::trace::feed_telling;
+use sesame_relay::transport::Connect;
+use sesame_relay::wire::WireTable;
+
+use crate::said::{Failure, Format, say};
+use crate::standalone::show::Shown;
+
+/// A monitor: what a generated crate hands to the runtime.
+#[derive(Debug, Clone)]
+pub struct Standalone {
+    /// The plan, as `monitor.plan.json` holds it.
+    pub plan: Cow<'static, str>,
+    /// How the system is reached; `None` for a simulator that is a program or a part of its runner.
+    pub connect: Option<Connect>,
+}
+
+const ABOUT: &str = "Exit codes: 0 done: the recording or the input has ended, or the monitor was stopped by Ctrl-C or \
+                     SIGTERM; 1 failed; 2 wrong usage.";
+
+#[derive(Debug, Parser)]
+#[command(version, after_help = ABOUT)]
+struct Options {
+    /// Run on a recording instead of a system: an MCAP file, as campaigns record with `record mcap`
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["program", "domain", "url"])]
+    recording: Option<PathBuf>,
+    /// How decisions are shown on standard output; as JSON there is one object in each line
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+    /// Write decisions into this file as well, as `--format json` shows them. It is written anew
+    #[arg(long, value_name = "FILE")]
+    decisions: Option<PathBuf>,
+    /// The domain of ROS 2; by default that of the space
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=232))]
+    domain: Option<u16>,
+    /// The address of the bridge, broker or master; by default that of the space
+    #[arg(long, value_name = "URL")]
+    url: Option<String>,
+    /// Another name for a topic on a bus, as `/eddi/state:=/eddi/state/undisturbed`: where operations act on what the
+    /// monitor publishes, a runner asks for it. May be given several times, with `-r` before it or without
+    #[arg(short = 'r', long = "remap", value_name = "FROM:=TO", conflicts_with_all = ["recording", "program"])]
+    remap: Vec<String>,
+    #[arg(value_name = "FROM:=TO", hide = true, conflicts_with_all = ["recording", "program"])]
+    remap_too: Vec<String>,
+    /// What stands before rules of ROS 2
+    #[arg(long, hide = true)]
+    ros_args: bool,
+    /// The simulator, with its arguments: a runner that starts this program in its place, as `process` does, reaches it
+    /// through the monitor
+    #[arg(last = true, value_name = "PROGRAM")]
+    program: Vec<OsString>,
+}
+
+/// The command line of a monitor. A generated `main` is nothing but this call.
+pub fn main(standalone: &Standalone) -> ExitCode {
+    carried_out(standalone).unwrap_or_else(|Failure(words)| {
+        say(format_args!("error: {}", visible_lines(&words)));
+        ExitCode::FAILURE
+    })
+}
+
+fn carried_out(standalone: &Standalone) -> Result<ExitCode, Failure> {
+    let plan: CampaignPlan = serde_json::from_str(&standalone.plan)
+        .map_err(|error| Failure(format!("this monitor's plan cannot be read: {error}")))?;
+    let published = plan.monitors.iter().find(|monitor| monitor.publishes.is_some());
+    let Some(monitor) = published.cloned() else {
+        return Err(Failure("this monitor's plan has no monitor that publishes".to_owned()));
+    };
+    let options = options(&plan, &monitor);
+    let on_a_bus = options.recording.is_none() && options.program.is_empty();
+    let plan = if on_a_bus { at(plan, &options)? } else { plan };
+    let mut shown = Shown::new(&plan, options.format, options.decisions.as_deref())?;
+    if let Some(recording) = &options.recording {
+        return on_recording(&plan, recording, shown);
+    }
+    if let Some((program, arguments)) = options.program.split_first() {
+        refuse_address(&options, "a simulator behind `--`")?;
+        return beside::run(&plan, program, arguments, &mut shown);
+    }
+    let Some(connect) = &standalone.connect else {
+        let how = match &plan.simulator.transport {
+            Transport::Process { .. } => {
+                "is a program, which the monitor starts: give it behind `--`, with its arguments"
+            }
+            _ => "is a part of its runner, and no other program reaches it",
+        };
+        let problem = format!("the simulator `{}` {how}; or give a recording with `--recording`", plan.simulator.name);
+        return Err(Failure(problem));
+    };
+    guest::run(&plan, connect, &mut shown)
+}
+
+fn options(plan: &CampaignPlan, monitor: &Monitor) -> Options {
+    let mut about = format!("Monitor `{}` of the space `{}`.", monitor.name, plan.space);
+    if !monitor.doc.is_empty() {
+        about = format!("{about}\n\n{}", monitor.doc);
+    }
+    let relied_on: Vec<String> =
+        plan.monitors.iter().filter(|it| it.name != monitor.name).map(|it| format!("`{}`", it.name)).collect();
+    if !relied_on.is_empty() {
+        about = format!("{about}\n\nIt relies on {}, which it evaluates, too.", relied_on.join(", "));
+    }
+    let command = Options::command().name(monitor.name.clone()).about(visible_lines(&about));
+    let matches = command.try_get_matches().unwrap_or_else(|error| error.exit());
+    Options::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
+}
+
+/// The plan with the address and the names that were asked for.
+fn at(mut plan: CampaignPlan, options: &Options) -> Result<CampaignPlan, Failure> {
+    for rule in options.remap.iter().chain(&options.remap_too) {
+        remap(&mut plan, rule)?;
+    }
+    let url = match &mut plan.simulator.transport {
+        Transport::Ros2(ros2) => {
+            if options.url.is_some() {
+                return Err(Failure("a system of ROS 2 has no address: choose its domain with `--domain`".to_owned()));
+            }
+            ros2.domain = options.domain.unwrap_or(ros2.domain);
+            return Ok(plan);
+        }
+        Transport::Rosbridge(rosbridge) => &mut rosbridge.remote.url,
+        Transport::Ros1(ros1) => &mut ros1.master,
+        Transport::Mqtt(mqtt) => &mut mqtt.broker.remote.url,
+        Transport::InProcess { .. } | Transport::Process { .. } | Transport::Simlog(_) => return Ok(plan),
+    };
+    if options.domain.is_some() {
+        return Err(Failure("only a system of ROS 2 has a domain: choose an address with `--url`".to_owned()));
+    }
+    if let Some(asked) = &options.url {
+        url.clone_from(asked);
+    }
+    if !is_shared(url) {
+        let problem =
+            format!("the address `{url}` is another one for each worker of a runner: choose one with `--url`");
+        return Err(Failure(visible(&problem)));
+    }
+    Ok(plan)
+}
+
+/// Gives a topic another name. As in ROS, names may begin with a slash or not.
+fn remap(plan: &mut CampaignPlan, rule: &str) -> Result<(), Failure> {
+    let Some((from, to)) = rule.split_once(":=").filter(|(from, to)| !from.is_empty() && !to.is_empty()) else {
+        return Err(Failure(format!("`{}` is no rule: write `FROM:=TO`, with names of topics", visible(rule))));
+    };
+    let is_it = |path: &&mut String| path.trim_start_matches('/') == from.trim_start_matches('/');
+    // A runner gives rules for all that a node publishes or hears; the others are not of this monitor.
+    for path in plan.topics.iter_mut().flat_map(|topic| &mut topic.paths).filter(is_it) {
+        to.clone_into(path);
+    }
+    Ok(())
+}
+
+fn refuse_address(options: &Options, what: &str) -> Result<(), Failure> {
+    match (&options.domain, &options.url) {
+        (None, None) => Ok(()),
+        _ => Err(Failure(format!("`--domain` and `--url` are for a system on a bus, not for {what}"))),
+    }
+}
+
+fn on_recording(plan: &CampaignPlan, recording: &std::path::Path, mut shown: Shown<'_>) -> Result<ExitCode, Failure> {
+    let wires = WireTable::new(plan);
+    let table = MetricTable::new(plan, &wires, &[])?;
+    let mut failure = None;
+    let mut tell = |decided: &Decided| {
+        if failure.is_none() {
+            failure = shown.decided(None, decided).err();
+        }
+    };
+    let fed = feed_telling(recording, plan, &wires, &table, Some(&mut tell))?;
+    for warning in &fed.warnings {
+        say(format_args!("warning: {}", visible(warning)));
+    }
+    failure.map_or(Ok(ExitCode::SUCCESS), Err)
+}
