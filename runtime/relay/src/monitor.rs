@@ -9,6 +9,8 @@
 mod evidence;
 mod outlet;
 mod record;
+#[cfg(feature = "mcap")]
+pub(crate) mod recorded;
 mod scores;
 
 use std::collections::VecDeque;
@@ -17,7 +19,7 @@ use std::sync::Arc;
 use sesame_base::observation::{ChangeCause, MetricObservation, MonitorObservation};
 use sesame_base::time::SimTime;
 use sesame_monitor::{Changes, EvidenceId, Network, Run, Truth};
-use sesame_plan::{CampaignPlan, MetricId, Side, TopicId};
+use sesame_plan::{CampaignPlan, MetricId, MonitorId, Side, TopicId};
 
 use crate::metric::Metrics;
 use crate::value::Value;
@@ -116,6 +118,11 @@ impl<'p> Monitors<'p> {
         };
         monitors.take_changes(None);
         Some(monitors)
+    }
+
+    /// These monitors send no mitigation.
+    pub(crate) fn withhold(&mut self, monitors: &[MonitorId]) {
+        self.outlets.withhold(monitors);
     }
 
     /// Whether evidence hears this wire's messages as they are delivered.

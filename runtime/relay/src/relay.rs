@@ -49,6 +49,8 @@ use crate::wire::{Wire, WireTable};
 
 pub use exchange::{Delivery, Exchange};
 pub use finished::Finished;
+#[cfg(feature = "mcap")]
+pub(crate) use marks::{beyond, reaching};
 pub use listener::{Listener, MessageRef, OperationEvent};
 
 /// The most messages that operations may hold back at once; beyond it, the oldest is released early, with a warning.
