@@ -49,9 +49,8 @@ fn delayed(
     let mut run = Run::start(Arc::clone(network), &mut changes);
     messages.retain(|(at, _)| *at <= recording.end.nanos());
     // Messages that are joined are one event as long as nothing comes between them.
-    let is_joined = |a: &(i64, usize), b: &(i64, usize)| {
-        a.0 == b.0 && (a.1 + 1..=b.1).all(|at| recording.messages[at].joined)
-    };
+    let is_joined =
+        |a: &(i64, usize), b: &(i64, usize)| a.0 == b.0 && (a.1 + 1..=b.1).all(|at| recording.messages[at].joined);
     for event in messages.chunk_by(is_joined) {
         let mut heard: Vec<(EvidenceId, Truth)> = Vec::new();
         for &(_, message) in event {

@@ -203,10 +203,10 @@ impl<'p> RecordedMonitors<'p> {
             found.pass(&mut run, at, &mut changes);
             run.observe(at, &heard, &mut changes);
             let path = self.wires.path(wire);
-            found.take(&mut changes, Some(&|| ChangeCause::Message {
-                topic: path.to_owned(),
-                index: self.indices[first],
-            }));
+            found.take(
+                &mut changes,
+                Some(&|| ChangeCause::Message { topic: path.to_owned(), index: self.indices[first] }),
+            );
         }
         found.pass(&mut run, self.recording.end, &mut changes);
         found.course.end = self.recording.end;

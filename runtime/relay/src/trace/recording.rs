@@ -234,10 +234,8 @@ fn busy_of(
     path: &Path,
 ) -> Result<Option<Vec<Span>>, RecordingError> {
     let Some(effects) = ending.get("operations") else { return Ok(None) };
-    let damaged = |_| RecordingError::Damaged {
-        problem: "what operations did cannot be read".to_owned(),
-        path: path.to_owned(),
-    };
+    let damaged =
+        |_| RecordingError::Damaged { problem: "what operations did cannot be read".to_owned(), path: path.to_owned() };
     timed(subject, effects).map(Some).map_err(damaged)
 }
 
@@ -412,8 +410,7 @@ impl Reader<'_> {
             |problem: &str| RecordingError::Damaged { problem: problem.to_owned(), path: self.path.to_owned() };
         let missing = self.wires.iter().filter(|wire| !self.heard.contains(wire)).map(|wire| self.wires.path(wire));
         let warnings = missing.map(|path| format!("topic `{path}` is not in the recording")).collect();
-        let mut found =
-            Ending { run: None, end: End::Whole(self.now), busy: None, warnings, messages: self.messages };
+        let mut found = Ending { run: None, end: End::Whole(self.now), busy: None, warnings, messages: self.messages };
         let (subject, ending) = match (&self.subject, &self.ending) {
             (Some(subject), Some(ending)) => (subject, ending),
             (Some(_), None) => return Err(damaged("it does not say how its run ended")),

@@ -13,7 +13,9 @@ use sesame_monitor::State;
 use sesame_monitor::compare::{compare, steps};
 use sesame_monitor::difference::disagreements;
 use sesame_monitor::tolerance::{Limit, Tolerance};
-use sesame_plan::testing::{evidence_above, guarantee, metric, minimal, monitor, operation, requirement, score, test_of, topic, use_of};
+use sesame_plan::testing::{
+    evidence_above, guarantee, metric, minimal, monitor, operation, requirement, score, test_of, topic, use_of,
+};
 use sesame_plan::{
     Bound, Choice, Distribution, Drain, Evidence, FieldRef, Gate, MetricSource, MonitorId, MonitorState, OperationKind,
     RequirementId, Score, Stale, StaleIs, Test, TopicId, Type,
@@ -68,11 +70,8 @@ impl Transport for Script {
 /// `near` is above zero on `a`; `lit` above zero on `b` for 20 ms, and false after 400 ms of silence; `seen` is what is
 /// published on `b`, whatever is made of it. An operation may delay what is on `b`.
 fn plan() -> CampaignPlan {
-    let lit = Evidence {
-        held: 0.02,
-        stale: Some(Stale { after: 0.4, is: StaleIs::False }),
-        ..evidence_above("lit", 1, 0.0)
-    };
+    let lit =
+        Evidence { held: 0.02, stale: Some(Stale { after: 0.4, is: StaleIs::False }), ..evidence_above("lit", 1, 0.0) };
     let seen = Evidence { side: Side::Inbound, ..evidence_above("seen", 1, 0.0) };
     let all = Gate::All(vec![Gate::Evidence(0), Gate::Evidence(1)]);
     let one = Gate::Any(vec![Gate::Evidence(1), Gate::Evidence(2)]);
