@@ -47,3 +47,4 @@ mod traces;
 mod unheard;
 mod unwritable_output;
 mod vendored;
+mod verification;

@@ -104,7 +104,9 @@ pub fn disagreements(network: &Network, monitor: MonitorId, first: &Course, seco
     let mut open = false;
     let mut now = Some(SimTime::ZERO);
     while let Some(at) = now.filter(|&at| at < end || at == SimTime::ZERO) {
-        sides.iter_mut().for_each(|side| side.advance(at));
+        for side in &mut sides {
+            side.advance(at);
+        }
         let [a, b] = &sides;
         if let Some(last) = found.last_mut().filter(|it| open && (it.first, it.second) != (a.state, b.state)) {
             last.to = at;

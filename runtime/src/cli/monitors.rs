@@ -120,6 +120,7 @@ pub(super) fn of_both_sides(
 
 /// A runner that reads no recordings leaves that step out.
 #[cfg(all(feature = "process", not(feature = "mcap")))]
+#[expect(clippy::unnecessary_wraps, reason = "as the one that reads recordings")]
 pub(super) fn of_both_sides(
     _: &Session,
     _: Option<&sesame_plan::Lab>,

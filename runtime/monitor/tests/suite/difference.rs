@@ -26,13 +26,13 @@ fn course(network: &Arc<Network>, messages: &[Message]) -> Course {
 }
 
 fn state(course: &Course, monitor: MonitorId, at: i64) -> State {
-    let decided = course.decisions.iter().filter(|it| it.monitor == monitor && it.at <= T(at));
-    decided.last().map_or(State::Safe, |decision| decision.state)
+    let mut decided = course.decisions.iter().filter(|it| it.monitor == monitor && it.at <= T(at));
+    decided.next_back().map_or(State::Safe, |decision| decision.state)
 }
 
 fn truth(course: &Course, evidence: EvidenceId, at: SimTime) -> Truth {
-    let changes = course.evidence.iter().filter(|it| it.evidence == evidence && it.at <= at);
-    changes.last().map_or(Truth::Unknown, |change| change.truth)
+    let mut changes = course.evidence.iter().filter(|it| it.evidence == evidence && it.at <= at);
+    changes.next_back().map_or(Truth::Unknown, |change| change.truth)
 }
 
 /// The state in the second run if this evidence were in it as in the first.

@@ -154,3 +154,85 @@ pub(super) fn conclusion(compared: &MonitorsCompared) -> String {
         tolerance.join(", ")
     ))
 }
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::report::facts::monitors::{
+        ComparedMonitor, DecisionDifference, DelayTolerance, EvidenceCause, EvidenceValue, MonitorDisagreement,
+        ShiftedDecision,
+    };
+
+    /// Monitors of which one decides differently, and the other at other times.
+    pub(in crate::report) fn sample() -> MonitorsCompared {
+        let cause = |at: f64, by: &str| Some(EvidenceCause { at, by: by.to_owned() });
+        let deviation = |late: Option<f64>| EvidenceDeviation {
+            monitor: "guard".to_owned(),
+            evidence: "lit".to_owned(),
+            first: EvidenceValue { value: "false".to_owned(), since: cause(2.2, "message 1 on camera/light") },
+            second: EvidenceValue { value: "unknown".to_owned(), since: None },
+            follows: late.and_then(|late| cause(2.2 + late, "stale")),
+            late,
+        };
+        let state = |state: &str, at: f64| Some(TimedState { state: state.to_owned(), at });
+        let recording = |name: &str, run: Option<&str>| ComparedRecording {
+            recording: name.into(),
+            run: run.map(str::to_owned),
+            messages: 6,
+            end: 3.0,
+        };
+        let monitor = |name: &str, difference: Option<DecisionDifference>, late: f64| ComparedMonitor {
+            monitor: name.to_owned(),
+            first: 4,
+            second: 2,
+            disagreements: vec![MonitorDisagreement {
+                from: 2.22,
+                to: 2.24,
+                first: "halted".to_owned(),
+                second: "go".to_owned(),
+                because: vec![deviation(Some(late))],
+            }],
+            difference,
+            furthest: Some(ShiftedDecision { decision: 1, state: "go".to_owned(), at: 0.1, late }),
+            omitted: 7,
+        };
+        let because = vec![deviation(Some(0.25)), deviation(None)];
+        let difference = DecisionDifference { decision: 2, first: state("halted", 2.22), second: None, because };
+        let tolerated = |delay: Option<f64>, given_up: bool| Tolerated {
+            delay,
+            breaks: delay.filter(|_| !given_up).map(|_| BrokenDecision {
+                monitor: "guard".to_owned(),
+                decision: 2,
+                recorded: state("halted", 2.22),
+                delayed: state("go", 2.26),
+            }),
+            given_up,
+        };
+        let topic = |topic: &str, first: Tolerated, second: Tolerated| DelayTolerance {
+            topic: topic.to_owned(),
+            evidence: vec!["guard.lit".to_owned()],
+            first,
+            second,
+        };
+        MonitorsCompared {
+            first: recording("a.mcap", Some("T1 of study (completed)")),
+            second: recording("b.mcap", None),
+            within: Some(0.1),
+            same: false,
+            monitors: vec![monitor("guard", Some(difference), 0.05), monitor("camera", None, -0.125)],
+            topics: vec![
+                topic("camera/light", tolerated(Some(0.02), false), tolerated(None, false)),
+                topic("cell/gap", tolerated(None, false), tolerated(Some(1.5), true)),
+            ],
+            warnings: vec![],
+        }
+    }
+
+    #[test]
+    fn what_differs_is_said_with_the_evidence_the_message_and_the_delay() {
+        let compared = sample();
+        let options = TextOptions { width: Some(120), colour: false };
+        let said = format!("{}\n{}\n", monitors_text(&compared, options), compared.objections().join("\n"));
+        insta::assert_snapshot!(said);
+    }
+}

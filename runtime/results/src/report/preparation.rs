@@ -1,5 +1,6 @@
 //! What preparatory testing found [SESAME 2023, §3.3]: whether the scenario holds without disturbance, in simulation
-//! and in a lab; what the relay adds; whether regression tests show the same on both sides; and whether monitors decide the same there.
+//! and in a lab; what the relay adds; whether regression tests show the same on both sides; and whether monitors decide
+//! the same there.
 //!
 //! Each step has its facts, which serialise to JSON as they are. Tables, sentences, text and page are made of them.
 

@@ -230,19 +230,17 @@ impl EvidenceDeviation {
             Some(EvidenceCause { at, by }) => format!("{} since {} ({by})", value.value, seconds(*at)),
             None => format!("{} since the beginning", value.value),
         };
-        let mut sentence =
-            format!("`{monitor}.{evidence}` is {} on the first and {} on the second", is(first), is(second));
-        match (late, follows) {
+        let then = match (late, follows) {
             (Some(late), Some(EvidenceCause { at, by })) if *late >= 0.0 => {
-                sentence += &format!(", where it follows {} later, at {} ({by})", seconds(*late), seconds(*at));
+                format!("where it follows {} later, at {} ({by})", seconds(*late), seconds(*at))
             }
             (Some(late), Some(EvidenceCause { at, by })) => {
-                sentence +=
-                    &format!(", which is {} earlier: the first follows at {} ({by})", seconds(-*late), seconds(*at));
+                format!("which is {} earlier: the first follows at {} ({by})", seconds(-*late), seconds(*at))
             }
-            _ => sentence += ", and the other does not follow",
-        }
-        sentence
+            _ => "and the other does not follow".to_owned(),
+        };
+        let (first, second) = (is(first), is(second));
+        format!("`{monitor}.{evidence}` is {first} on the first and {second} on the second, {then}")
     }
 }
 

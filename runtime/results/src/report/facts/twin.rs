@@ -174,7 +174,58 @@ pub fn twin(
 
 #[cfg(test)]
 mod tests {
+    use sesame_base::observation::{MetricObservation, MonitorDecision, MonitorObservation};
+    use sesame_plan::testing::{guarantee, monitor};
+    use sesame_plan::{Bound, Gate, Test};
+
     use super::*;
+    use crate::present::table::TextOptions;
+    use crate::record::{Origin, sample};
+    use crate::report::twin_text;
+
+    /// A run of the sample's plan with a monitor, in which the first requirement's metric went like this.
+    fn run(plan: &CampaignPlan, series: &[(f64, f64)], lost_at: &[f64]) -> TestRecord {
+        let mut record = sample::record(plan, 5, Origin::Search, Test::default());
+        let metric = plan.requirements[0].metric.index();
+        let last = series.last().map(|point| point.1);
+        record.observation.metrics[metric] = MetricObservation::whole(last, true, series.to_vec());
+        let decision = |time, state| MonitorDecision { time, state };
+        let mut decisions = vec![decision(0.0, MonitorState::Otherwise)];
+        for &time in lost_at {
+            decisions.push(decision(time - 0.5, MonitorState::Guarantee(0)));
+            decisions.push(decision(time, MonitorState::Otherwise));
+        }
+        record.observation.monitors = vec![MonitorObservation { decisions, ..MonitorObservation::default() }];
+        record
+    }
+
+    #[test]
+    fn a_test_beside_its_twin_says_when_mitigation_was_sent_and_how_early_that_was() {
+        let mut plan = sample::plan();
+        plan.monitors = vec![monitor("guard", 0, vec![], vec![guarantee("go", 1, Gate::Evidence(0))])];
+        plan.requirements.truncate(1);
+        let (inside, outside) = match plan.requirements[0].bound {
+            Bound::AtMost { value } => (value - 1.0, value + 1.0),
+            bound => panic!("{bound:?} is not what this test takes it for"),
+        };
+        let safe = [(0.0, inside)];
+        let violated = [(0.0, inside), (9.0, outside)];
+        let of = |test: &[(f64, f64)], lost_at: &[f64], twin: &[(f64, f64)]| {
+            let without = run(&plan, twin, lost_at).observation;
+            super::twin(&plan, &run(&plan, test, lost_at), &without, &[MonitorId(0)], true)
+        };
+        let in_time = of(&safe, &[6.5, 8.0], &violated);
+        let requirement = &in_time.requirements[0];
+        assert_eq!((requirement.verdict, requirement.lead), (MitigationVerdict::MitigatedInTime, Some(2.5)));
+        assert_eq!((in_time.mitigations.len(), in_time.passed), (2, true));
+        let too_late = of(&violated, &[9.5], &violated);
+        let requirement = &too_late.requirements[0];
+        assert_eq!((requirement.verdict, requirement.lead), (MitigationVerdict::MitigatedTooLate, Some(-0.5)));
+        assert_eq!(of(&violated, &[], &violated).requirements[0].verdict, MitigationVerdict::NotMitigated);
+        assert!(!too_late.passed);
+        let options = TextOptions { width: None, colour: false };
+        insta::assert_snapshot!([in_time, too_late].map(|twin| twin_text(&twin, options)).join("\n"));
+    }
 
     #[test]
     fn a_verdict_says_what_mitigation_was_worth() {
