@@ -16,6 +16,7 @@ mod gate;
 mod known;
 #[cfg(feature = "process")]
 mod mitm;
+mod monitors;
 #[cfg(feature = "process")]
 mod null;
 mod over_budget;
@@ -37,6 +38,7 @@ mod scratch;
 mod session;
 mod shrink;
 mod terminal;
+mod twin;
 mod view;
 
 #[cfg(feature = "process")]
@@ -63,7 +65,7 @@ pub use self::commands::{Internal, Running, Showing};
 /// What the exit codes of a runner mean.
 pub const EXIT_CODES: &str = "Exit codes: 0 done; 1 failed; 2 wrong usage; 3 done, but not as required (`known`: an \
                           expectation is not kept; `null`, `mitm`, `prepare`: what they say; `replay`: the test came out different; `replay-recording`: a metric \
-                          did; `--fail-on`: what it names was found; a campaign says too little: most of its tests broke \
+                          did; `monitors`: a monitor decides otherwise; `twin`: a hazard was not mitigated in time; `--fail-on`: what it names was found; a campaign says too little: most of its tests broke \
                           off, none was disturbed, or no requirement was judged); 130 stopped by the user.";
 
 #[derive(Debug, Parser)]

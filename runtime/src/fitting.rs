@@ -279,6 +279,7 @@ impl Simulations<'_> {
                 simulator_seed: derive_seed(seed, "compensate", &of_run),
                 trace: Some(TraceRequest { file: file.clone(), keep: Recorded::All }),
                 compensation: with.cloned(),
+                withheld: Vec::new(),
             });
             waiting.insert(number, (at, file));
         }

@@ -109,7 +109,7 @@ impl System {
         let wires = WireTable::new(&self.plan);
         let metrics = MetricTable::new(&self.plan, &wires, &[]).expect("the metrics need no hooks");
         let (transport, custom) = (&mut *self.transport, &mut Custom::none());
-        let run = Run { test, simulator_seed: 1 };
+        let run = Run { test, simulator_seed: 1, withheld: &[] };
         let run = evaluate_tapped(&self.plan, &wires, &metrics, transport, &run, custom, tap);
         (run.expect("the test fits the plan"), self.transport.incidents().notes)
     }

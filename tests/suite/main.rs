@@ -48,3 +48,4 @@ mod traces;
 mod unheard;
 mod unwritable_output;
 mod vendored;
+mod verification;

@@ -14,7 +14,7 @@ const PAGE: &str = "docs/json.md";
 const MARK: &str = "<!-- From here on a test writes this page; CONTRIBUTING.md says how. -->\n";
 
 /// What is printed: the heading, how the values come, and the type with its file.
-const PRINTED: [(&str, &str, &str, &str); 12] = [
+const PRINTED: [(&str, &str, &str, &str); 14] = [
     (
         "`run`, `resume`, `known`, `repeat`, `shrink`, `report`",
         "One object.",
@@ -32,6 +32,8 @@ const PRINTED: [(&str, &str, &str, &str); 12] = [
     ),
     ("`replay`", "One object.", "Replay", "runtime/results/src/report/facts/replay.rs"),
     ("`replay-recording`", "One object.", "RecordingReplay", "runtime/results/src/report/facts/recording.rs"),
+    ("`monitors`", "One object.", "MonitorsCompared", "runtime/results/src/report/facts/monitors.rs"),
+    ("`twin`", "One object.", "Twin", "runtime/results/src/report/facts/twin.rs"),
     ("`export`", "One object.", "Exported", "runtime/results/src/report/export.rs"),
     ("`digest`", "One object.", "Digest", "runtime/src/cli/view.rs"),
     (

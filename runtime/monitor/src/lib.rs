@@ -9,7 +9,7 @@
 //! - [`why`]: the evidence that decided.
 //! - [`check`]: guarantees that never or always hold, evidence that decides nothing, orders that contradict.
 //! - [`score`]: hazards foreseen and missed, lead times, false alarms.
-//! - [`compare`]: decisions on two recordings.
+//! - [`compare`]: decisions on two recordings; [`difference`]: why they differ.
 //! - [`tolerance`]: by how much messages may be late before decisions change.
 //! - [`truth`], [`gate`], [`evidence`]: what these are made of.
 //!
@@ -19,6 +19,7 @@
 pub mod check;
 mod circuit;
 pub mod compare;
+pub mod difference;
 pub mod evidence;
 pub mod gate;
 pub mod network;

@@ -52,6 +52,9 @@ pub struct Message {
     pub at: SimTime,
     /// In which stream.
     pub stream: u32,
+    /// Whether it is one event with the message before it: monitors decide on both together. It is the same message in
+    /// another stream, delivered as soon as it was published. No evidence hears both streams.
+    pub joined: bool,
 }
 
 /// The conditions of evidence over the messages of a recording.
@@ -112,8 +115,21 @@ pub fn tolerance(
     delayed: &[u32],
     monitors: &[MonitorId],
 ) -> Tolerance {
+    tolerances(network, recording, conditions, &[delayed], monitors)[0]
+}
+
+/// The tolerance of some monitors to a delay of each of these sets of streams, one after another: those of a topic, or
+/// of a piece of evidence.
+pub fn tolerances(
+    network: &Network,
+    recording: &Recording,
+    conditions: &mut dyn Conditions,
+    delayed: &[&[u32]],
+    monitors: &[MonitorId],
+) -> Vec<Tolerance> {
     let prepared = Prepared::new(network, recording, conditions);
-    of_streams(network, recording, &prepared, conditions, delayed, monitors)
+    let mut of = |delayed| of_streams(network, recording, &prepared, conditions, delayed, monitors);
+    delayed.iter().map(|delayed| of(delayed)).collect()
 }
 
 fn of_streams(
@@ -153,20 +169,6 @@ fn of_streams(
         }
     }
     Tolerance { delay: SimTime::MAX, limit: Limit::None }
-}
-
-/// The tolerance of some monitors to a delay of the streams of each piece of evidence, one after another; and the least
-/// of these.
-pub fn tolerances(
-    network: &Network,
-    recording: &Recording,
-    conditions: &mut dyn Conditions,
-    monitors: &[MonitorId],
-) -> (Vec<Tolerance>, Option<Tolerance>) {
-    let each: Vec<Tolerance> =
-        recording.streams.iter().map(|streams| tolerance(network, recording, conditions, streams, monitors)).collect();
-    let least = each.iter().copied().min_by_key(|tolerance| tolerance.delay);
-    (each, least)
 }
 
 /// The position of the first decision that a delay changes.

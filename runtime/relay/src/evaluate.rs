@@ -6,7 +6,7 @@ use std::time::Instant;
 use sesame_base::observation::{Observation, Outcome, WallTime};
 use sesame_base::time::SimTime;
 use sesame_plan::condition::Condition;
-use sesame_plan::{CampaignPlan, Moment, Test};
+use sesame_plan::{CampaignPlan, Moment, MonitorId, Test};
 
 use crate::files::{NoFiles, SpaceFiles};
 use crate::fuzz::{ChoiceError, OperationEntry};
@@ -31,7 +31,7 @@ pub fn evaluate(
     simulator_seed: u64,
     custom: &mut Custom<'_>,
 ) -> Result<Observation, ChoiceError> {
-    evaluate_tapped(plan, wires, metrics, transport, &Run { test, simulator_seed }, custom, None)
+    evaluate_tapped(plan, wires, metrics, transport, &Run { test, simulator_seed, withheld: &[] }, custom, None)
 }
 
 /// The input of a run.
@@ -41,6 +41,8 @@ pub struct Run<'a> {
     pub test: &'a Test,
     /// The seed of everything random in the simulator.
     pub simulator_seed: u64,
+    /// Monitors whose mitigation is not sent.
+    pub withheld: &'a [MonitorId],
 }
 
 /// As [`evaluate`], with a listener besides the metrics.
@@ -49,14 +51,14 @@ pub fn evaluate_tapped(
     wires: &WireTable,
     metrics: &MetricTable<'_>,
     transport: &mut dyn Transport,
-    &Run { test, simulator_seed }: &Run<'_>,
+    &Run { test, simulator_seed, withheld }: &Run<'_>,
     custom: &mut Custom<'_>,
     tap: Option<&mut dyn Listener>,
 ) -> Result<Observation, ChoiceError> {
     #[expect(clippy::disallowed_methods, reason = "how long a run took is recorded, and decides nothing")]
     let started = Instant::now();
     let relay = Relay::new(plan, wires, test, metrics.start(), custom.hooks)?;
-    let mut relay = relay.compensated(plan, test, simulator_seed);
+    let mut relay = relay.compensated(plan, test, simulator_seed).withholding(withheld);
     if let Some(tap) = tap {
         relay = relay.tapped(tap);
     }

@@ -10,6 +10,8 @@ mod decided;
 mod evidence;
 mod outlet;
 mod record;
+#[cfg(feature = "mcap")]
+pub(crate) mod recorded;
 mod scores;
 
 use std::collections::VecDeque;
@@ -18,7 +20,7 @@ use std::sync::Arc;
 use sesame_base::observation::{ChangeCause, MetricObservation, MonitorObservation};
 use sesame_base::time::SimTime;
 use sesame_monitor::{Changes, EvidenceId, Network, Run, Truth};
-use sesame_plan::{CampaignPlan, MetricId, Side, TopicId};
+use sesame_plan::{CampaignPlan, MetricId, MonitorId, Side, TopicId};
 
 use crate::metric::Metrics;
 use crate::value::Value;
@@ -145,6 +147,11 @@ impl<'p> Monitors<'p> {
     /// What was decided since the last call, if [somebody wants to be told](Monitors::tell).
     pub(crate) fn take_decided(&mut self) -> Vec<Decided> {
         self.told.take()
+    }
+
+    /// These monitors send no mitigation.
+    pub(crate) fn withhold(&mut self, monitors: &[MonitorId]) {
+        self.outlets.withhold(monitors);
     }
 
     /// Whether evidence hears this wire's messages as they are delivered.

@@ -50,6 +50,8 @@ use crate::wire::{Wire, WireTable};
 pub use exchange::{Delivery, Exchange};
 pub use finished::Finished;
 pub use listener::{Listener, MessageRef, OperationEvent};
+#[cfg(feature = "mcap")]
+pub(crate) use marks::{beyond, reaching};
 
 /// The most messages that operations may hold back at once; beyond it, the oldest is released early, with a warning.
 pub const HELD_LIMIT: usize = 100_000;

@@ -11,6 +11,9 @@
 
 #![expect(clippy::disallowed_methods, clippy::disallowed_types, reason = "an adapter: it writes and reads files")]
 
+mod feed;
+mod fuzzing_time;
+mod heard;
 mod recording;
 mod records;
 mod recover;
@@ -28,7 +31,10 @@ use mcap::records::Metadata;
 use sesame_base::observation::{Observation, Outcome};
 use sesame_plan::{CampaignPlan, Test};
 
-pub use recording::{Fed, RecordedMetric, RecordedRun, RecordingError, feed, feed_telling};
+pub use crate::monitor::recorded::{Heard, RecordedMonitors};
+pub use feed::{Fed, feed, feed_telling};
+pub use heard::monitors;
+pub use recording::{RecordedMetric, RecordedRun, RecordingError};
 pub use recover::recover;
 pub use signals::{Signal, signals};
 pub use writer::TraceWriter;

@@ -9,17 +9,24 @@ mod facts;
 mod file;
 mod html;
 mod junit;
+mod monitors;
 pub mod preparation;
 mod sentences;
 pub mod study;
 mod tables;
 mod text;
+mod twin;
 
+pub use self::twin::twin_text;
 pub use crate::analysis::confirmed::{ConfirmedTest, FindingAgain};
 pub use crate::present::number::quantity;
 pub use crate::present::table::TextOptions;
 pub use export::{ExportError, Exported, export};
 pub use facts::coverage::CoverageSummary;
+pub use facts::monitors::{
+    BrokenDecision, ComparedMonitor, ComparedRecording, DecisionDifference, DelayTolerance, EvidenceCause,
+    EvidenceDeviation, EvidenceValue, MonitorDisagreement, MonitorsCompared, ShiftedDecision, TimedState, Tolerated,
+};
 pub use facts::readable::sentence as readable_sentence;
 pub use facts::recording::{FedMetric, RecordingReplay, Sameness};
 pub use facts::repetition::{Repetition, ViolationRate};
@@ -34,9 +41,11 @@ pub use facts::summary::{
     Counts, ExpectationSummary, Failure, FrontTest, NotFinite, Objective, Quarantined, RequirementSummary, Spread,
     Summary, Worst, summary,
 };
+pub use facts::twin::{MitigationVerdict, SentMitigation, Twin, TwinRequirement, twin};
 pub use file::write_aside;
 pub use html::{page, write_page, write_page_with};
 pub use junit::{junit, write_junit};
+pub use monitors::monitors_text;
 pub use sentences::headline;
 pub use text::{confirmed_text, list_text, recording_text, replay_text, summary_text, test_text};
 

@@ -227,6 +227,7 @@ impl Evaluator<'_> {
                     simulator_seed,
                     trace: None,
                     compensation: self.compensation(),
+                    withheld: Vec::new(),
                 });
                 waiting.insert(job, (number, position, simulator_seed));
             }

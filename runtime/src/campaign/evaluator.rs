@@ -118,6 +118,7 @@ impl<'a> Evaluator<'a> {
                     simulator_seed: test.simulator_seed,
                     trace: self.traces.as_ref().map(|traces| traces.request(&test)),
                     compensation: self.compensation(),
+                    withheld: Vec::new(),
                 });
                 waiting.insert(test.number, test);
             }

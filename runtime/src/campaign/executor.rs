@@ -9,7 +9,7 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use sesame_base::observation::Observation;
-use sesame_plan::{Compensation, Recorded, Test};
+use sesame_plan::{Compensation, MonitorId, Recorded, Test};
 use sesame_relay::transport::added::AddedOnWire;
 
 /// Carries out tests, in any order.
@@ -40,6 +40,9 @@ pub struct Job {
     pub trace: Option<TraceRequest>,
     /// What brings the simulation closer to a lab in this run, in place of what the worker's plan says.
     pub compensation: Option<Compensation>,
+    /// Monitors whose mitigation is not sent in this run.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub withheld: Vec<MonitorId>,
 }
 
 /// Asks for the trace of a test.

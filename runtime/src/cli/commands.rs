@@ -11,7 +11,9 @@ use crate::campaign;
 use crate::cli::compensate;
 use crate::cli::failure::Failure;
 use crate::cli::session::Session;
-use crate::cli::{confirm, explore, export, known, repeat, replay, replay_recording, report, run, shrink, view};
+use crate::cli::{
+    confirm, explore, export, known, monitors, repeat, replay, replay_recording, report, run, shrink, twin, view,
+};
 #[cfg(feature = "process")]
 use crate::cli::{mitm, null, physical, prepare};
 #[cfg(feature = "process")]
@@ -39,7 +41,7 @@ pub enum Running {
     /// Let topics pass through the relay, one more in each stage, and measure what that adds and changes
     #[cfg(feature = "process")]
     Mitm(mitm::Options),
-    /// Prepare a campaign: `null`, `mitm` and `known` in this order, up to the first that fails
+    /// Prepare a campaign: `null`, `mitm`, `known` and `monitors` in this order, up to the first that fails
     #[cfg(feature = "process")]
     Prepare(prepare::Options),
     /// Fit the simulation to what a lab recorded, and say how much smaller the reality gap is then
@@ -51,6 +53,10 @@ pub enum Running {
     Shrink(shrink::Options),
     /// Feed a recording to the campaign's metrics, without a simulator
     ReplayRecording(replay_recording::Options),
+    /// Compare what the monitors decide on two recordings, and say how late messages may be
+    Monitors(monitors::Options),
+    /// Run a recorded test again without the mitigation of its monitors, and say what that was worth
+    Twin(twin::Options),
 }
 
 /// What shows recorded results: it needs neither the runner nor its plan.
@@ -149,6 +155,8 @@ impl Running {
             Running::Replay(options) => replay::replay(session, options),
             Running::Shrink(options) => shrink::shrink(session, options),
             Running::ReplayRecording(options) => replay_recording::replay_recording(session, options),
+            Running::Monitors(options) => monitors::monitors(session, options),
+            Running::Twin(options) => twin::twin(session, options),
         }
     }
 }

@@ -5,9 +5,9 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-#[cfg(feature = "process")]
-use sesame_plan::Lab;
 use sesame_plan::{CampaignPlan, KnownTestId, Task};
+#[cfg(feature = "process")]
+use sesame_plan::{Lab, Recorded};
 #[cfg(feature = "process")]
 use sesame_results::record::Repository;
 #[cfg(feature = "process")]
@@ -99,9 +99,14 @@ pub(super) fn sides(
     found: &mut Found,
 ) -> Result<bool, Failure> {
     let tests = chosen(&session.plan, names).map_err(Failure)?;
+    // What monitors decide on both sides can be compared then.
+    let recorded = cfg!(feature = "mcap") && lab.is_some() && !session.plan.monitors.is_empty();
     let side = |session: &Session, lab: Option<&Lab>| -> Result<Option<Repository>, Failure> {
         let task = Task::Known { tests: tests.clone(), lab: lab.map(|lab| lab.name.clone()) };
-        let plan = plan_of(&session.plan, &task, seed);
+        let mut plan = plan_of(&session.plan, &task, seed);
+        if recorded {
+            plan.campaign.record = Some(Recorded::All);
+        }
         // Of its own: equal seeds would make a stand-in for the lab repeat the runs of the simulation.
         let run = seed.unwrap_or(plan.campaign.seed);
         let run = lab.map_or(run, |lab| derive_seed(run, &format!("lab {}", lab.name), &[]));
@@ -115,6 +120,8 @@ pub(super) fn sides(
     }
     let compared = in_lab.as_ref().map(|(lab, repository)| (*lab, repository));
     found.preparation.known = Some(preparation::known(&simulation, compared)?);
+    let at = found.files.len();
+    found.known = in_lab.as_ref().map(|_| [at, at + 1]);
     found.files.push(("Regression tests, simulation".to_owned(), simulation));
     let named = |(lab, repository): (&Lab, Repository)| (format!("Regression tests, lab {}", lab.name), repository);
     found.files.extend(in_lab.map(named));

@@ -183,6 +183,8 @@ pub(super) struct Found {
     pub(super) preparation: Preparation,
     /// The results, each with what it is.
     pub(super) files: Vec<(String, Repository)>,
+    /// The positions among them of the regression tests in simulation and in the lab, if both ran.
+    pub(super) known: Option<[usize; 2]>,
     /// Whether a step could not be carried out.
     pub(super) broken: bool,
 }
@@ -203,7 +205,7 @@ struct Concluded<'a> {
 impl Found {
     /// Writes the page and prints what was found.
     fn show(&self, session: &Session, folder: &Path, format: Format) -> Result<ExitCode, Failure> {
-        let Found { preparation, files, broken } = self;
+        let Found { preparation, files, broken, known: _ } = self;
         let page = folder.join("report.html");
         let named: Vec<(&str, &Repository)> = files.iter().map(|(name, file)| (name.as_str(), file)).collect();
         let html = preparation::page(&session.plan, preparation, &named)?;

@@ -9,7 +9,7 @@ use crate::cli::failure::Failure;
 use crate::cli::preparation::{Call, Found, PreparationArgs, Work, carry_out, lab_of};
 use crate::cli::session::Session;
 use crate::cli::terminal::say;
-use crate::cli::{known, mitm, null};
+use crate::cli::{known, mitm, monitors, null};
 
 /// How often things are run, and where.
 #[derive(Debug, Args)]
@@ -61,7 +61,14 @@ pub(super) fn prepare(session: &Session, options: &Options) -> Result<ExitCode, 
         }
         known::sides(session, work, lab, &[], options.seed, found)
     };
-    let steps: [Step<'_>; 3] = [("null", &observe), ("mitm", &relay), ("known", &test)];
+    let verify = |_: &Work<'_>, found: &mut Found| {
+        monitors::of_both_sides(session, lab, found)?;
+        Ok(true)
+    };
+    let mut steps: Vec<Step<'_>> = vec![("null", &observe), ("mitm", &relay), ("known", &test)];
+    if !session.plan.monitors.is_empty() {
+        steps.push(("monitors", &verify));
+    }
     carry_out(session, call, |work| in_order(work, &steps, options.keep_going))
 }
 

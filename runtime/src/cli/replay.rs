@@ -62,6 +62,7 @@ pub(super) fn replay(session: &Session, options: &Options) -> Result<ExitCode, F
         simulator_seed: record.simulator_seed,
         trace,
         compensation: repository.plan().compensation.clone(),
+        withheld: Vec::new(),
     };
     let ended = run_single(job, &settings, &interrupted);
     files.finish()?;

@@ -117,7 +117,7 @@ pub(crate) fn run(plan: &CampaignPlan, test: &Test, script: &Script) -> (Observa
     let mut transport = in_process::<Robot>().transport(plan);
     let mut ledger = Ledger::new(&wires);
     set_script(script.clone());
-    let run = Run { test, simulator_seed: 1 };
+    let run = Run { test, simulator_seed: 1, withheld: &[] };
     let observation =
         evaluate_tapped(plan, &wires, &metrics, transport.as_mut(), &run, &mut Custom::none(), Some(&mut ledger));
     let observation = observation.expect("made-up tests fit their plans");

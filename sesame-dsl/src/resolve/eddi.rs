@@ -10,7 +10,7 @@ use crate::similar::most_similar;
 use crate::span::Span;
 use crate::syntax::ast::eddi::{self as written, State};
 use crate::syntax::ast::{self, Name};
-use sesame_plan::Monitor;
+use sesame_plan::{Channel, Monitor};
 
 /// The names inside a monitor, and what each stands for.
 pub(super) type Members<'a> = BTreeMap<&'a str, (Member, Span)>;
@@ -78,6 +78,9 @@ impl<'a> Resolver<'a> {
 
     fn published(&mut self, name: &'a Name) -> Option<TopicId> {
         let index = self.find(name, Kind::Topic)?;
+        if !self.is_of_no_service(TopicId::from_index(index), name.span, "a monitor cannot publish its state") {
+            return None;
+        }
         let topic = self.system.topics[index].as_ref()?;
         let carries = |ty: &Type| matches!(ty, Type::Bool | Type::Int(None) | Type::Text);
         let fits = match topic.ty {
@@ -100,6 +103,26 @@ impl<'a> Resolver<'a> {
              or a message of one such field",
         ));
         None
+    }
+
+    /// Refuses one direction of a service: a runner calls no services, and no client waits for an answer of a monitor.
+    fn is_of_no_service(&mut self, topic: TopicId, span: Span, what: &str) -> bool {
+        let Some(topic) = &self.system.topics[topic.index()] else { return false };
+        let direction = match topic.channel {
+            Channel::Topic => return true,
+            Channel::Request => "requests",
+            Channel::Reply => "replies",
+        };
+        let (name, path) = (&topic.declaration.name, &topic.written);
+        let title = format!("{what} on `{name}`, which is a service's");
+        let diagnostic = Diagnostic::new(Code::BAD_MONITOR, span, title)
+            .label(format!("these are the {direction} of the service `{path}`"))
+            .note(
+                "a monitor neither calls a service nor answers for one; name a topic to which a node of the system \
+                 subscribes",
+            );
+        self.report(diagnostic);
+        false
     }
 
     /// An external monitor does what it does; the runner sends nothing in its place.
@@ -233,6 +256,9 @@ impl<'a> Resolver<'a> {
 
     fn mitigation(&mut self, path: &'a ast::Path, value: &'a written::Mitigation) -> Option<Mitigation> {
         let (field, ty) = self.field(path)?;
+        if !self.is_of_no_service(field.topic, path.span, "a monitor cannot send its mitigation") {
+            return None;
+        }
         let what = format!("`{}`", self.text(path.span));
         let value = match (value, ty) {
             (written::Mitigation::Truth(truth, _), Type::Bool) => MitigationValue::Bool(*truth),

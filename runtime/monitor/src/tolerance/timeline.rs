@@ -11,7 +11,7 @@ use crate::truth::Truth;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Change {
     pub(super) at: SimTime,
-    /// The position of the message in the recording; `None` for a timer.
+    /// The position in the recording of the first message of the event; `None` for a timer.
     pub(super) message: Option<usize>,
     pub(super) evidence: EvidenceId,
     pub(super) truth: Truth,
@@ -31,6 +31,8 @@ pub(super) struct Heard {
     pub(super) at: SimTime,
     /// The position of the message in the recording.
     pub(super) message: usize,
+    /// The position of the first message of its event.
+    pub(super) event: usize,
     /// The position of its stream among those of the evidence.
     pub(super) place: usize,
 }
@@ -39,14 +41,18 @@ pub(super) struct Heard {
 pub(super) fn heard(recording: &Recording) -> Vec<Vec<Heard>> {
     let streams = recording.streams.iter().flatten().max().map_or(0, |&last| last as usize + 1);
     let mut messages = vec![Vec::new(); streams];
+    let mut event = 0;
     for (message, it) in recording.messages.iter().enumerate() {
+        if !it.joined {
+            event = message;
+        }
         if let Some(messages) = messages.get_mut(it.stream as usize) {
-            messages.push((message, it.at));
+            messages.push((message, event, it.at));
         }
     }
     let of_evidence = recording.streams.iter().map(|streams| {
         let of_stream = streams.iter().enumerate().flat_map(|(place, &stream)| {
-            messages[stream as usize].iter().map(move |&(message, at)| Heard { at, message, place })
+            messages[stream as usize].iter().map(move |&(message, event, at)| Heard { at, message, event, place })
         });
         let mut all: Vec<Heard> = of_stream.collect();
         all.sort_unstable_by_key(|heard| heard.message);
@@ -72,7 +78,7 @@ pub(super) fn timeline(
             changes.push(Change { at, message, evidence, truth });
         }
     };
-    for &Heard { at, message, place } in heard.iter().take_while(|heard| heard.at <= end) {
+    for &Heard { at, message, event, place } in heard.iter().take_while(|heard| heard.at <= end) {
         while automaton.due(rule) <= at.nanos() {
             let due = SimTime::from_nanos(automaton.due(rule));
             automaton.pass(rule, due);
@@ -80,7 +86,7 @@ pub(super) fn timeline(
         }
         latest[place] = Some(message);
         automaton.observe(rule, at, conditions.truth(evidence, message, &latest));
-        add(at, Some(message), automaton.value());
+        add(at, Some(event), automaton.value());
     }
     while automaton.due(rule) <= end.nanos() {
         let due = automaton.due(rule);

@@ -4,6 +4,7 @@
 #![expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the numbers of tests are small")]
 
 mod check;
+mod difference;
 mod naive;
 mod random;
 mod run;

@@ -33,9 +33,14 @@ impl<'p> EvidenceState<'p> {
     ) -> Result<Truth, String> {
         hear(&self.evidence.inputs, topic, value, &mut self.heard)?;
         self.held.hold(&self.evidence.inputs, &self.heard, member);
-        let Some(inputs) = self.held.values() else { return Ok(Truth::Unknown) };
-        let moment = Moment::new(inputs, now.seconds());
-        let truth = Truth::from(holds(&self.evidence.condition, &moment));
-        Ok(if moment.undefined().is_some() { Truth::Unknown } else { truth })
+        Ok(truth_of(self.evidence, &self.held, now))
     }
+}
+
+/// What the condition of evidence comes to with these values.
+pub(super) fn truth_of(evidence: &Evidence, held: &HeldInputs, now: SimTime) -> Truth {
+    let Some(inputs) = held.values() else { return Truth::Unknown };
+    let moment = Moment::new(inputs, now.seconds());
+    let truth = Truth::from(holds(&evidence.condition, &moment));
+    if moment.undefined().is_some() { Truth::Unknown } else { truth }
 }

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use sesame_monitor::{Decision, State};
-use sesame_plan::{CampaignPlan, FieldRef, Mitigation, MitigationValue, Monitor, MonitorState, Type};
+use sesame_plan::{CampaignPlan, FieldRef, Mitigation, MitigationValue, Monitor, MonitorId, MonitorState, Type};
 
 use crate::metric::sample;
 use crate::value::{Fields, Record, Text, Value};
@@ -50,6 +50,13 @@ impl<'p> Outlets<'p> {
             }
         }
         Outlets { monitors, last }
+    }
+
+    /// These monitors send no mitigation.
+    pub(super) fn withhold(&mut self, monitors: &[MonitorId]) {
+        for monitor in monitors {
+            self.monitors[monitor.index()].mitigation = None;
+        }
     }
 
     /// A message is delivered.

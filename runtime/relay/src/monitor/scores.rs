@@ -5,10 +5,9 @@
 //! robustness of a temporal formula is known when the run is over, and its signal says when the formula was violated:
 //! scores of such requirements are computed then.
 
-use sesame_base::observation::{MetricObservation, MetricValue, Outcome, Reach};
-use sesame_base::robustness::{Quantifier, lost, quantifier};
+use sesame_base::hazard;
+use sesame_base::observation::{MetricObservation, Outcome, Reach};
 use sesame_base::time::SimTime;
-use sesame_base::verdict::{Verdict, ends, verdict};
 use sesame_monitor::compare::Step;
 use sesame_monitor::score::{Score as Scored, Scorer, score};
 use sesame_monitor::{Decision, Run, State, Truth};
@@ -215,7 +214,9 @@ impl<'p> Scores<'p> {
     pub(super) fn finish(self, end: SimTime, metrics: &mut [MetricObservation], whole: bool) {
         for MetricScore { metric, monitor, score: of, late, .. } in self.metrics {
             let (Some(steps), Some(requirement)) = (late, of.requirement()) else { continue };
-            let hazard = hazard_of_formula(self.plan, requirement, &metrics[..]);
+            let of_formula = &metrics[self.plan.requirement(requirement).metric.index()];
+            let hazard = hazard::of_formula(self.plan, requirement, &Outcome::Completed, of_formula);
+            let hazard = hazard.map(SimTime::from_seconds);
             let RequirementId(number) = requirement;
             let hazards: Vec<(u32, SimTime)> = hazard.map(|at| (number, at.min(end))).into_iter().collect();
             let horizon = match of {
@@ -246,34 +247,6 @@ impl MetricScore {
     fn grows(&self) -> bool {
         matches!(self.score, Score::TimeIn { state } if state == planned(self.state))
     }
-}
-
-/// When a requirement on the robustness of a formula was violated; `None` if it was not.
-fn hazard_of_formula(
-    plan: &CampaignPlan,
-    requirement: RequirementId,
-    metrics: &[MetricObservation],
-) -> Option<SimTime> {
-    let declared = plan.requirement(requirement);
-    let MetricSource::Robustness { robustness } = &plan.metric(declared.metric).source else { return None };
-    let observed = &metrics[declared.metric.index()];
-    let shown = MetricValue::from(observed);
-    if verdict(declared.bound, &Outcome::Completed, shown) != Verdict::Violated {
-        return None;
-    }
-    let value = shown.value?;
-    let quantifier = quantifier(&robustness.formula);
-    let (low, _, high, _) = ends(declared.bound);
-    let by_single_times = match quantifier {
-        Some(Quantifier::Always) => low.is_some_and(|low| value <= low),
-        Some(Quantifier::Eventually) => high.is_some_and(|high| value >= high),
-        None => false,
-    };
-    let spans = lost(&observed.robustness, quantifier, declared.bound, value);
-    let first = spans.first().filter(|_| by_single_times).map(|span| span.start);
-    // Otherwise it took the whole run.
-    let decided = first.or(observed.series.last().map(|point| point.0))?;
-    Some(SimTime::from_seconds(decided))
 }
 
 /// What a score is, of all that a monitor was worth.

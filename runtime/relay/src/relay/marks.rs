@@ -3,12 +3,12 @@
 use sesame_base::time::SimTime;
 
 /// The first nanosecond whose seconds are at least this number.
-pub(super) fn reaching(number: f64) -> i64 {
+pub(crate) fn reaching(number: f64) -> i64 {
     first(number, |seconds| seconds >= number)
 }
 
 /// The first nanosecond whose seconds are above this number.
-pub(super) fn beyond(number: f64) -> i64 {
+pub(crate) fn beyond(number: f64) -> i64 {
     first(number, |seconds| seconds > number)
 }
 

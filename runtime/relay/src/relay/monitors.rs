@@ -10,7 +10,7 @@
 
 use sesame_base::time::SimTime;
 use sesame_plan::condition::Operand;
-use sesame_plan::{NodeId, Side};
+use sesame_plan::{MonitorId, NodeId, Side};
 
 use crate::monitor::Monitors;
 use crate::relay::marks::{beyond, reaching};
@@ -20,6 +20,15 @@ use crate::value::Value;
 use crate::wire::Wire;
 
 impl Relay<'_> {
+    /// The same relay in which these monitors send no mitigation. Everything else that they do stays as it is.
+    #[must_use]
+    pub(crate) fn withholding(mut self, monitors: &[MonitorId]) -> Self {
+        if let Some(all) = &mut self.monitors {
+            all.withhold(monitors);
+        }
+        self
+    }
+
     /// Monitors hear a message.
     pub(super) fn monitors_hear(&mut self, side: Side, wire: Wire, index: u64, value: &Value) {
         if let Some(monitors) = &mut self.monitors {

@@ -1,4 +1,4 @@
-//! Replays a recording: feeds metrics from it instead of a simulator.
+//! Recordings are read: their messages in order of time, and how the recorded run ended.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -11,15 +11,13 @@ use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOp
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 
-use sesame_base::observation::{MetricObservation, OperationEffect};
+use sesame_base::observation::OperationEffect;
 use sesame_base::time::SimTime;
 use sesame_base::visible::visible;
-use sesame_plan::{CampaignPlan, MetricSource, OperationId, Side, Span, Type};
+use sesame_plan::{CampaignPlan, OperationId, Span, Type};
 
 use crate::json::{Shapes, decode};
 use crate::message::Mismatch;
-use crate::metric::{MetricTable, Metrics};
-use crate::monitor::{Decided, Monitors};
 use crate::trace::records::records;
 use crate::trace::{ROLE, ROLE_DELIVERED, ROLE_PUBLISHED, RUN, SUBJECT, TOPIC};
 use crate::value::Value;
@@ -30,19 +28,6 @@ const LIMIT: usize = 1 << 26;
 
 /// How much is read at once, in bytes.
 const BLOCK: usize = 1 << 16;
-
-/// The result of feeding a recording to a campaign's metrics.
-#[derive(Debug)]
-pub struct Fed {
-    /// The recorded run, if a runner recorded it.
-    pub run: Option<RecordedRun>,
-    /// Per metric of the plan. Without a run, the actions of operations are unknown, and so is `fuzzing_time()`.
-    pub metrics: Vec<MetricObservation>,
-    /// Warnings for the user.
-    pub warnings: Vec<String>,
-    /// Messages fed, as published.
-    pub messages: u64,
-}
 
 /// The run that a trace is of.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -161,31 +146,54 @@ fn listed(found: &[String]) -> String {
     if names.is_empty() { "none at all".to_owned() } else { names.join(", ") }
 }
 
-/// Feeds the messages of a recording to the metrics of a plan, in order of time and without a simulator.
-///
-/// The trace of a runner is fed in the same order as in its run. In any other recording, the JSON messages on topics of
-/// the space count, with times since the first of them, both as published and as delivered. The file is read once from
-/// start to end; memory holds one record at a time.
-pub fn feed(
-    path: &Path,
-    plan: &CampaignPlan,
-    wires: &WireTable,
-    table: &MetricTable<'_>,
-) -> Result<Fed, RecordingError> {
-    feed_telling(path, plan, wires, table, None)
+/// A message of a recording, as it passes.
+pub(super) struct Passing<'v> {
+    pub(super) time: SimTime,
+    pub(super) wire: Wire,
+    /// Whether this is the message as it was published.
+    pub(super) published: bool,
+    /// Whether this is the message as it was delivered.
+    pub(super) delivered: bool,
+    /// Its number among those published on its wire.
+    pub(super) index: u64,
+    pub(super) value: &'v Value,
 }
 
-/// As [`feed`], and tells what monitors decide, in order of time.
-pub fn feed_telling<'d>(
+/// What a recording says when all of its messages have passed.
+pub(super) struct Ending {
+    /// The recorded run, if a runner recorded it.
+    pub(super) run: Option<RecordedRun>,
+    pub(super) end: End,
+    /// When operations that count in `fuzzing_time()` were active or held messages back; `None` where that is not
+    /// known.
+    pub(super) busy: Option<Vec<Span>>,
+    /// Warnings for the user.
+    pub(super) warnings: Vec<String>,
+    /// Messages, as published.
+    pub(super) messages: u64,
+}
+
+/// How a recording ends.
+pub(super) enum End {
+    /// The run came to its end then; of a recording that no runner made, with its last message.
+    Whole(SimTime),
+    /// The run broke off, if that is known, then.
+    BrokenOff(Option<SimTime>),
+}
+
+/// Passes the messages of a recording on, in order of time and without a simulator.
+///
+/// Those of a runner's trace come in the same order as in its run. Of any other recording, the JSON messages on topics
+/// of the space count, with times since the first of them, both as published and as delivered. The file is read once
+/// from start to end; memory holds one record at a time.
+pub(super) fn pass(
     path: &Path,
     plan: &CampaignPlan,
     wires: &WireTable,
-    table: &MetricTable<'_>,
-    decided: Option<&'d mut (dyn FnMut(&Decided) + 'd)>,
-) -> Result<Fed, RecordingError> {
-    let file = File::open(path)
-        .map_err(|error| RecordingError::Unreadable { reason: error.to_string(), path: path.to_owned() })?;
-    let mut feeder = Feeder {
+    each: &mut dyn FnMut(&Passing<'_>) -> Result<(), RecordingError>,
+) -> Result<Ending, RecordingError> {
+    let file = open(path)?;
+    let mut reader = Reader {
         plan,
         wires,
         path,
@@ -194,23 +202,45 @@ pub fn feed_telling<'d>(
         delivered_apart: vec![false; wires.len()],
         heard: BTreeSet::new(),
         shapes: Shapes::default(),
-        monitors: None,
-        decided,
-        metrics: table.start(),
         start: None,
         now: SimTime::ZERO,
         messages: 0,
         subject: None,
         ending: None,
     };
-    feeder.monitors = Monitors::new(&feeder.metrics, wires);
-    if feeder.decided.is_some() {
-        feeder.monitors.iter_mut().for_each(Monitors::tell);
-    }
-    feeder.show_monitors();
-    feeder.metrics.begin();
-    read(file, path, &mut |record| feeder.record(record))?;
-    feeder.finish()
+    read(file, path, &mut |record| reader.record(record, each))?;
+    reader.finish()
+}
+
+/// When operations that count in `fuzzing_time()` were active or held messages back, as the trace of a runner says at
+/// its end; `None` of any other recording.
+pub(super) fn busy(path: &Path) -> Result<Option<Vec<Span>>, RecordingError> {
+    let (mut subject, mut ending) = (None, None);
+    read(open(path)?, path, &mut |record| {
+        match record {
+            Record::Metadata(Metadata { name, metadata }) if name == SUBJECT => subject = Some(metadata),
+            Record::Metadata(Metadata { name, metadata }) if name == RUN => ending = Some(metadata),
+            _ => {}
+        }
+        Ok(())
+    })?;
+    let Some((subject, ending)) = subject.zip(ending) else { return Ok(None) };
+    busy_of(&subject, &ending, path)
+}
+
+fn busy_of(
+    subject: &BTreeMap<String, String>,
+    ending: &BTreeMap<String, String>,
+    path: &Path,
+) -> Result<Option<Vec<Span>>, RecordingError> {
+    let Some(effects) = ending.get("operations") else { return Ok(None) };
+    let damaged =
+        |_| RecordingError::Damaged { problem: "what operations did cannot be read".to_owned(), path: path.to_owned() };
+    timed(subject, effects).map(Some).map_err(damaged)
+}
+
+fn open(path: &Path) -> Result<File, RecordingError> {
+    File::open(path).map_err(|error| RecordingError::Unreadable { reason: error.to_string(), path: path.to_owned() })
 }
 
 /// Reads a file from start to end, a record at a time.
@@ -265,7 +295,7 @@ struct Line {
     delivered: bool,
 }
 
-struct Feeder<'a, 'd> {
+struct Reader<'a> {
     plan: &'a CampaignPlan,
     wires: &'a WireTable,
     path: &'a Path,
@@ -278,11 +308,6 @@ struct Feeder<'a, 'd> {
     /// Wires with a channel.
     heard: BTreeSet<Wire>,
     shapes: Shapes,
-    metrics: Metrics<'a>,
-    /// `None` for a plan without monitors. What they publish is in the recording.
-    monitors: Option<Monitors<'a>>,
-    /// Who is told what they decide.
-    decided: Option<&'d mut (dyn FnMut(&Decided) + 'd)>,
     /// Log time of the start of the run, in nanoseconds: zero in a trace, that of the first message elsewhere.
     start: Option<u64>,
     now: SimTime,
@@ -291,8 +316,12 @@ struct Feeder<'a, 'd> {
     ending: Option<BTreeMap<String, String>>,
 }
 
-impl Feeder<'_, '_> {
-    fn record(&mut self, record: Record<'_>) -> Result<(), RecordingError> {
+impl Reader<'_> {
+    fn record(
+        &mut self,
+        record: Record<'_>,
+        each: &mut dyn FnMut(&Passing<'_>) -> Result<(), RecordingError>,
+    ) -> Result<(), RecordingError> {
         match record {
             Record::Metadata(Metadata { name, metadata }) if name == SUBJECT => {
                 self.subject = Some(metadata);
@@ -300,7 +329,7 @@ impl Feeder<'_, '_> {
             }
             Record::Metadata(Metadata { name, metadata }) if name == RUN => self.ending = Some(metadata),
             Record::Channel(channel) => self.channel(&channel)?,
-            Record::Message { header, data } => self.message(header, &data)?,
+            Record::Message { header, data } => self.message(header, &data, each)?,
             _ => {}
         }
         Ok(())
@@ -335,7 +364,12 @@ impl Feeder<'_, '_> {
         Ok(())
     }
 
-    fn message(&mut self, header: MessageHeader, data: &[u8]) -> Result<(), RecordingError> {
+    fn message(
+        &mut self,
+        header: MessageHeader,
+        data: &[u8],
+        each: &mut dyn FnMut(&Passing<'_>) -> Result<(), RecordingError>,
+    ) -> Result<(), RecordingError> {
         let Some(&Line { wire, delivered }) = self.channels.get(&header.channel_id) else { return Ok(()) };
         let start = *self.start.get_or_insert(header.log_time);
         let since = header.log_time.checked_sub(start).and_then(|since| i64::try_from(since).ok());
@@ -346,7 +380,6 @@ impl Feeder<'_, '_> {
                 path: self.path.to_owned(),
             });
         };
-        self.pass_to(time);
         self.now = time;
         let ty = &self.plan.topic(self.wires.topic(wire)).ty;
         let value = payload(self.plan, &mut self.shapes, ty, data).map_err(|reason| RecordingError::WrongType {
@@ -355,60 +388,18 @@ impl Feeder<'_, '_> {
             reason: visible(&reason),
             path: self.path.to_owned(),
         })?;
-        let index = u64::from(header.sequence);
-        if delivered {
-            self.metrics.delivery(time, wire, &value);
-            self.monitors_hear(Side::Outbound, wire, index, &value);
-            return Ok(());
-        }
-        self.messages += 1;
-        self.metrics.message(time, wire, &value);
-        self.monitors_hear(Side::Inbound, wire, index, &value);
-        if !self.delivered_apart[wire.index()] {
-            self.metrics.delivery(time, wire, &value);
-            self.monitors_hear(Side::Outbound, wire, index, &value);
-        }
-        Ok(())
+        self.messages += u64::from(!delivered);
+        each(&Passing {
+            time,
+            wire,
+            published: !delivered,
+            delivered: delivered || !self.delivered_apart[wire.index()],
+            index: u64::from(header.sequence),
+            value: &value,
+        })
     }
 
-    fn monitors_hear(&mut self, side: Side, wire: Wire, index: u64, value: &Value) {
-        if let Some(monitors) = &mut self.monitors {
-            monitors.hear(self.now, side, wire, index, value);
-        }
-    }
-
-    /// Time passes up to an instant: monitors learn that the last one is over, and what is due until then happens.
-    fn pass_to(&mut self, time: SimTime) {
-        let Some(monitors) = &mut self.monitors else { return };
-        let mut now = self.now;
-        while now < time {
-            monitors.decide(now);
-            monitors.show(now, &mut self.metrics);
-            self.metrics.settle();
-            monitors.end_instant(now, &mut self.metrics, SimTime::ZERO);
-            now = monitors.next_due().map_or(time, |due| due.min(time));
-            self.metrics.advance_to(now);
-            monitors.tick(now, &mut self.metrics);
-            monitors.advance(now);
-        }
-        self.show_monitors();
-    }
-
-    fn show_monitors(&mut self) {
-        if let Some(monitors) = &mut self.monitors {
-            monitors.give_up();
-            monitors.show(self.now, &mut self.metrics);
-        }
-        self.tell_decided();
-    }
-
-    fn tell_decided(&mut self) {
-        if let (Some(monitors), Some(tell)) = (&mut self.monitors, &mut self.decided) {
-            monitors.take_decided().iter().for_each(&mut **tell);
-        }
-    }
-
-    fn finish(mut self) -> Result<Fed, RecordingError> {
+    fn finish(self) -> Result<Ending, RecordingError> {
         if self.heard.is_empty() {
             return Err(RecordingError::NoTopics {
                 found: self.other_topics.into_iter().collect(),
@@ -417,72 +408,36 @@ impl Feeder<'_, '_> {
         }
         let damaged =
             |problem: &str| RecordingError::Damaged { problem: problem.to_owned(), path: self.path.to_owned() };
-        let mut busy: Option<Vec<Span>> = None;
-        let mut end = Some(self.now);
-        let (mut run, mut broken_off) = (None, None);
-        if let (Some(subject), Some(ending)) = (&self.subject, &self.ending) {
-            let text = |entries: &BTreeMap<String, String>, key: &str| entries.get(key).cloned().unwrap_or_default();
-            let metrics = match ending.get("metrics") {
-                Some(metrics) => serde_json::from_str(metrics).map_err(|_| damaged("its metrics cannot be read"))?,
-                None => Vec::new(),
-            };
-            busy = match ending.get("operations") {
-                Some(effects) => {
-                    Some(timed(subject, effects).map_err(|_| damaged("what operations did cannot be read"))?)
-                }
-                None => None,
-            };
-            let outcome = text(ending, "outcome");
-            end = match ending.get("end_s") {
-                Some(end) if matches!(outcome.as_str(), "completed" | "no_effect" | "void") => {
-                    let seconds = end.parse().map_err(|_| damaged("its end is not a number"))?;
-                    Some(SimTime::from_seconds(seconds).max(self.now))
-                }
-                // Hooks are not told of the end of a run that failed.
-                _ => None,
-            };
-            if end.is_none() {
-                broken_off = ending.get("end_s").and_then(|end| end.parse().ok()).map(SimTime::from_seconds);
-            }
-            run = Some(RecordedRun {
-                space: text(subject, "space"),
-                campaign: text(subject, "campaign"),
-                test: text(subject, "test"),
-                outcome,
-                metrics,
-            });
-        } else if self.subject.is_some() {
-            return Err(damaged("it does not say how its run ended"));
-        }
-        if let Some(at) = broken_off {
-            self.pass_to(at);
-            self.metrics.advance_to(at);
-            self.now = self.now.max(at);
-        }
-        if let Some(end) = end {
-            self.pass_to(end);
-            self.now = end;
-            self.metrics.end(end);
-            if let Some(monitors) = &mut self.monitors {
-                monitors.end(end, &mut self.metrics, SimTime::ZERO);
-            }
-        } else if let Some(monitors) = &mut self.monitors {
-            monitors.decide(self.now);
-            monitors.break_off(self.now, &mut self.metrics);
-        }
-        self.tell_decided();
-        let (mut metrics, mut warnings) = self.metrics.finish(busy.as_deref().unwrap_or_default());
-        if let Some(monitors) = self.monitors {
-            warnings.extend(monitors.finish(self.now, &mut metrics, end.is_some()).1);
-        }
-        for (observed, metric) in metrics.iter_mut().zip(&self.plan.metrics) {
-            if matches!(metric.source, MetricSource::FuzzingTime) && busy.is_none() {
-                *observed = MetricObservation::default();
-            }
-        }
         let missing = self.wires.iter().filter(|wire| !self.heard.contains(wire)).map(|wire| self.wires.path(wire));
-        warnings.extend(missing.map(|path| format!("topic `{path}` is not in the recording")));
-        Ok(Fed { run, metrics, warnings, messages: self.messages })
+        let warnings = missing.map(|path| format!("topic `{path}` is not in the recording")).collect();
+        let mut found = Ending { run: None, end: End::Whole(self.now), busy: None, warnings, messages: self.messages };
+        let (subject, ending) = match (&self.subject, &self.ending) {
+            (Some(subject), Some(ending)) => (subject, ending),
+            (Some(_), None) => return Err(damaged("it does not say how its run ended")),
+            (None, _) => return Ok(found),
+        };
+        let text = |entries: &BTreeMap<String, String>, key: &str| entries.get(key).cloned().unwrap_or_default();
+        let metrics = match ending.get("metrics") {
+            Some(metrics) => serde_json::from_str(metrics).map_err(|_| damaged("its metrics cannot be read"))?,
+            None => Vec::new(),
+        };
+        found.busy = busy_of(subject, ending, self.path)?;
+        let outcome = text(ending, "outcome");
+        found.end = match ending.get("end_s") {
+            Some(end) if matches!(outcome.as_str(), "completed" | "no_effect" | "void") => {
+                let seconds = end.parse().map_err(|_| damaged("its end is not a number"))?;
+                End::Whole(SimTime::from_seconds(seconds).max(self.now))
+            }
+            end => End::BrokenOff(end.and_then(|end| end.parse().ok()).map(SimTime::from_seconds)),
+        };
+        found.run = Some(RecordedRun {
+            space: text(subject, "space"),
+            campaign: text(subject, "campaign"),
+            test: text(subject, "test"),
+            outcome,
+            metrics,
+        });
+        Ok(found)
     }
 }
 

@@ -1,6 +1,7 @@
 //! The facts of reports, each computed once from the results. They serialise to JSON as they are.
 
 pub(super) mod coverage;
+pub(super) mod monitors;
 pub(super) mod readable;
 pub(super) mod recording;
 pub(super) mod repetition;
@@ -9,4 +10,5 @@ pub(super) mod show;
 pub(super) mod shrinking;
 pub(super) mod stacked;
 pub(super) mod summary;
+pub(super) mod twin;
 pub(super) mod wording;

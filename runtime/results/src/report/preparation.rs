@@ -1,10 +1,12 @@
 //! What preparatory testing found [SESAME 2023, §3.3]: whether the scenario holds without disturbance, in simulation
-//! and in a lab; what the relay adds; and whether regression tests show the same on both sides.
+//! and in a lab; what the relay adds; whether regression tests show the same on both sides; and whether monitors decide
+//! the same there.
 //!
 //! Each step has its facts, which serialise to JSON as they are. Tables, sentences, text and page are made of them.
 
 mod known;
 mod mitm;
+mod monitors;
 mod null;
 mod page;
 mod series;
@@ -18,6 +20,7 @@ use serde::Serialize;
 
 pub use known::{ExpectationSides, KnownSides, KnownTesting, known};
 pub use mitm::{AddedToTopic, Budget, Drift, MitmTesting, Stage, mitm};
+pub use monitors::{MonitorTest, MonitorTesting, monitors};
 pub use null::{NullTesting, null};
 pub use page::{Files, page};
 pub use sides::{MetricSides, RequirementSides, Values, VerdictCounts};
@@ -35,6 +38,9 @@ pub struct Preparation {
     /// Regression tests on both sides (2C).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub known: Option<KnownTesting>,
+    /// What monitors decide on both sides (2D).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub monitors: Option<MonitorTesting>,
     /// Steps that were left out, each in a sentence that says why.
     pub left_out: Vec<String>,
 }
@@ -45,7 +51,8 @@ impl Preparation {
         let null = self.null.iter().flat_map(|it| &it.objections);
         let mitm = self.mitm.iter().flat_map(|it| &it.objections);
         let known = self.known.iter().flat_map(|it| &it.objections);
-        null.chain(mitm).chain(known).map(String::as_str).collect()
+        let monitors = self.monitors.iter().flat_map(|it| &it.objections);
+        null.chain(mitm).chain(known).chain(monitors).map(String::as_str).collect()
     }
 
     /// The steps that were carried out, and whether each passed.
@@ -53,6 +60,7 @@ impl Preparation {
         let null = self.null.as_ref().map(|it| ("null", it.objections.is_empty()));
         let mitm = self.mitm.as_ref().map(|it| ("mitm", it.objections.is_empty()));
         let known = self.known.as_ref().map(|it| ("known", it.objections.is_empty()));
-        [null, mitm, known].into_iter().flatten().collect()
+        let monitors = self.monitors.as_ref().map(|it| ("monitors", it.objections.is_empty()));
+        [null, mitm, known, monitors].into_iter().flatten().collect()
     }
 }

@@ -142,7 +142,7 @@ pub fn recording_text(replay: &RecordingReplay, options: TextOptions) -> String 
     format!("{name}: {} fed\n{table}", plural(messages, "message", "messages"))
 }
 
-fn paragraph(text: &mut String, sentence: &str, options: TextOptions) {
+pub(super) fn paragraph(text: &mut String, sentence: &str, options: TextOptions) {
     for line in wrap(sentence, options.width.unwrap_or(usize::MAX)) {
         text.push_str(&line);
         text.push('\n');
@@ -150,7 +150,7 @@ fn paragraph(text: &mut String, sentence: &str, options: TextOptions) {
 }
 
 /// A table under its title; nothing if it has no rows.
-fn section(text: &mut String, title: &str, table: &Table, options: TextOptions) {
+pub(super) fn section(text: &mut String, title: &str, table: &Table, options: TextOptions) {
     if table.is_empty() {
         return;
     }

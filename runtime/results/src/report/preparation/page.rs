@@ -7,8 +7,10 @@ use crate::present::number::plural;
 use crate::present::table::Table;
 use crate::record::{RecordError, Repository};
 use crate::report::html::policy;
+use crate::report::monitors::{conclusion, decisions, disagreements, tolerances};
 use crate::report::preparation::known::KnownTesting;
 use crate::report::preparation::mitm::MitmTesting;
+use crate::report::preparation::monitors::{MonitorTest, MonitorTesting};
 use crate::report::preparation::null::NullTesting;
 use crate::report::preparation::text::{about_latency, about_stages};
 use crate::report::preparation::{Preparation, tables};
@@ -31,6 +33,9 @@ pub fn page(plan: &CampaignPlan, preparation: &Preparation, files: &Files<'_>) -
     }
     if let Some(it) = &preparation.known {
         known(&mut body, it);
+    }
+    if let Some(it) = &preparation.monitors {
+        monitors(&mut body, it);
     }
     body.open("section", &[("id", "provenance")]);
     body.element("h2", &[], "Where this comes from");
@@ -124,6 +129,21 @@ fn known(body: &mut Markup, it: &KnownTesting) {
         part(body, "Requirements", &tables::known_requirements(it));
     }
     details(body, "Metrics", &tables::known_metrics(it));
+    body.close();
+}
+
+fn monitors(body: &mut Markup, it: &MonitorTesting) {
+    section(body, "monitors", "Decisions of monitors", &it.objections);
+    said(
+        body,
+        &format!("The first recording of each test is that of the simulation, the second that of lab {}.", it.lab),
+    );
+    for MonitorTest { test, compared } in &it.tests {
+        part(body, test, &decisions(compared));
+        said(body, &conclusion(compared));
+        details(body, "Different states", &disagreements(compared));
+        details(body, "Delay tolerance", &tolerances(compared));
+    }
     body.close();
 }
 

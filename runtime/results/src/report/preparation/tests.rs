@@ -14,6 +14,7 @@ use sesame_plan::{
 use super::*;
 use crate::present::table::TextOptions;
 use crate::record::{Origin, Recorder, Repository, TestRecord, sample};
+use crate::report::monitors::tests::sample as compared_monitors;
 
 const OPTIONS: TextOptions = TextOptions { width: Some(100), colour: false };
 
@@ -201,12 +202,26 @@ fn text_and_page_show_everything_and_the_page_needs_nothing_but_itself() {
         null: Some(compared(&[60.0, 61.0], &[70.5, 70.5], &hall())),
         mitm: Some(stages(Some(0.005), SAME, &[20; 200])),
         known: None,
+        monitors: Some(monitors(
+            "hall",
+            vec![MonitorTest { test: "<leaning>".to_owned(), compared: compared_monitors() }],
+        )),
         left_out: vec!["`known` is left out: <none>.".to_owned()],
     };
-    assert_eq!(preparation.steps(), [("null", false), ("mitm", false)]);
-    assert_eq!(preparation.objections().len(), 3, "{:?}", preparation.objections());
+    assert_eq!(preparation.steps(), [("null", false), ("mitm", false), ("monitors", false)]);
+    assert_eq!(preparation.objections().len(), 5, "{:?}", preparation.objections());
     let said = text(&preparation, OPTIONS);
-    for part in ["hall", "60.50 ± 0.71 s", "link0", "null failed", "mitm failed", "`known` is left out", "violated"] {
+    for part in [
+        "hall",
+        "60.50 ± 0.71 s",
+        "link0",
+        "null failed",
+        "mitm failed",
+        "monitors failed",
+        "camera/light",
+        "`known` is left out",
+        "violated",
+    ] {
         assert!(said.contains(part), "{part}:\n{said}");
     }
     preparation.known = Some(KnownTesting { lab: None, tests: Vec::new(), objections: Vec::new() });
@@ -214,11 +229,11 @@ fn text_and_page_show_everything_and_the_page_needs_nothing_but_itself() {
     let options = roxmltree::ParsingOptions { allow_dtd: true, ..roxmltree::ParsingOptions::default() };
     let document = roxmltree::Document::parse_with_options(&html, options).unwrap();
     let ids: Vec<&str> = document.descendants().filter_map(|node| node.attribute("id")).collect();
-    for id in ["objections", "null", "mitm", "known", "provenance"] {
+    for id in ["objections", "null", "mitm", "known", "monitors", "provenance"] {
         assert_eq!(ids.iter().filter(|known| **known == id).count(), 1, "{id}");
     }
     let items = document.descendants().filter(|node| node.has_tag_name("li")).count();
-    assert_eq!(items, 3, "each objection is named");
+    assert_eq!(items, 5, "each objection is named");
     assert!(document.descendants().filter(|node| node.has_tag_name("figure")).count() > 1, "series are drawn");
     assert!(!html.contains("http://") && !html.contains("https://") && !html.contains("<none>"));
     let json = serde_json::to_value(&preparation).unwrap();

@@ -2,13 +2,14 @@
 
 use crate::present::number::plural;
 use crate::present::table::{Table, TextOptions, visible, wrap};
+use crate::report::monitors::{conclusion, decisions, tolerances};
 use crate::report::preparation::mitm::MitmTesting;
 use crate::report::preparation::{Preparation, tables};
 
 /// What was found, step by step, and at the end what is not as required.
 pub fn text(preparation: &Preparation, options: TextOptions) -> String {
     let mut text = String::new();
-    let Preparation { null, mitm, known, left_out } = preparation;
+    let Preparation { null, mitm, known, monitors, left_out } = preparation;
     if let Some(null) = null {
         heading(&mut text, "Without disturbance", options);
         let lab = null.lab.as_deref();
@@ -42,6 +43,14 @@ pub fn text(preparation: &Preparation, options: TextOptions) -> String {
             section(&mut text, "Requirements", &tables::known_requirements(known), options);
         }
         section(&mut text, "Metrics", &tables::known_metrics(known), options);
+    }
+    if let Some(monitors) = monitors {
+        heading(&mut text, "Decisions of monitors", options);
+        for it in &monitors.tests {
+            section(&mut text, &visible(&it.test), &decisions(&it.compared), options);
+            section(&mut text, "Delay tolerance", &tolerances(&it.compared), options);
+            sentence(&mut text, &conclusion(&it.compared), options);
+        }
     }
     text.push('\n');
     for left_out in left_out {
