@@ -19,6 +19,12 @@ pub use crate::analysis::confirmed::{ConfirmedTest, FindingAgain};
 pub use crate::present::number::quantity;
 pub use crate::present::table::TextOptions;
 pub use export::{ExportError, Exported, export};
+pub use facts::certificate::campaign::{HazardSummary, MissedHazard, MonitorSummary, MonitorsSummary, StateShare};
+pub use facts::certificate::moment::{MomentError, MomentReport, MonitorMoment, PartReport, show_at};
+pub use facts::certificate::test::{
+    ChangeReport, DecisionReport, EvidenceReport, HazardReport, MonitorReport, StateReport,
+};
+pub use facts::certificate::why::{BecauseReport, WhyReport};
 pub use facts::coverage::CoverageSummary;
 pub use facts::readable::sentence as readable_sentence;
 pub use facts::recording::{FedMetric, RecordingReplay, Sameness};
@@ -38,7 +44,7 @@ pub use file::write_aside;
 pub use html::{page, write_page, write_page_with};
 pub use junit::{junit, write_junit};
 pub use sentences::headline;
-pub use text::{confirmed_text, list_text, recording_text, replay_text, summary_text, test_text};
+pub use text::{confirmed_text, list_text, moment_text, recording_text, replay_text, summary_text, test_text};
 
 #[cfg(test)]
 mod tests;

@@ -15,7 +15,7 @@ use crate::report::html::generations::generations;
 use crate::report::html::header::header;
 use crate::report::html::policy::policy;
 use crate::report::html::test::test;
-use crate::report::html::{cells, regions, shrinking};
+use crate::report::html::{cells, monitors, regions, shrinking, tree};
 use crate::report::sentences::{QUARANTINED, once_sentence};
 use crate::report::tables;
 
@@ -53,6 +53,7 @@ fn page_in(repository: &Repository, folder: &Path, digest: &str) -> Result<Strin
     if let Some(shrinking) = &summary.shrinking {
         shrinking::shrinking(&mut body, shrinking, &drawn);
     }
+    monitors::monitors(&mut body, repository.plan(), &summary, &drawn);
     requirements(&mut body, &summary, &drawn);
     front(&mut body, repository, &summary, &rows, &drawn);
     all_tests(&mut body, repository, &summary, &rows, &drawn)?;
@@ -61,6 +62,7 @@ fn page_in(repository: &Repository, folder: &Path, digest: &str) -> Result<Strin
         cells::coverage(&mut body, repository.plan(), coverage, &drawn);
     }
     regions::regions(&mut body, repository)?;
+    tree::certificates(&mut body, repository.plan());
     sections(&mut body, &summary, &drawn);
     for group in groups.iter().filter(|group| !group.tests.is_empty()) {
         body.open("section", &[]);
@@ -85,6 +87,24 @@ fn page_in(repository: &Repository, folder: &Path, digest: &str) -> Result<Strin
 const MARKS: &str =
     "Outlined: planned; filled: active. Red: the value up to then is outside the bound of a requirement.";
 
+/// What the lanes of a certificate mean.
+const MISSED: &str = "Of each monitor its state over time, the higher the stronger; dashed: its safe state. Below it its \
+                      evidence: filled: true; a line at the bottom: false; dashed: unknown. Vertical: a requirement was \
+                      violated, solid where the monitor had not foreseen it. ▼: mitigation was sent. Point at a state to \
+                      see why it was so.";
+
+/// Tests that get a timeline because monitors missed hazards in them.
+const MOST_MISSED: usize = 8;
+
+/// Tests in which monitors missed hazards.
+fn missed(summary: &Summary) -> Vec<u32> {
+    let mut tests: Vec<u32> =
+        summary.monitors.iter().flat_map(|monitors| &monitors.missed).map(|missed| missed.test.0).collect();
+    tests.dedup();
+    tests.truncate(MOST_MISSED);
+    tests
+}
+
 /// Tests that get a timeline, under a heading.
 struct Group {
     title: &'static str,
@@ -96,6 +116,8 @@ fn chosen(summary: &Summary, rows: &[TestRow]) -> Vec<Group> {
     let reference: Vec<u32> =
         rows.iter().filter(|row| row.origin == Origin::Reference).map(|row| row.number).take(1).collect();
     let all: Vec<u32> = summary.front.iter().map(|test| test.number).collect();
+    let missed = missed(summary);
+    let all: Vec<u32> = all.into_iter().filter(|number| !missed.contains(number)).collect();
     let front = evenly(&all, TIMELINES);
     let worst = summary.requirements.iter().filter_map(|requirement| requirement.worst.as_ref());
     let worst = worst.filter_map(|worst| rows.iter().find(|row| row.number == worst.test.0));
@@ -103,7 +125,7 @@ fn chosen(summary: &Summary, rows: &[TestRow]) -> Vec<Group> {
     let known = rows.iter().filter(|row| matches!(row.origin, Origin::Known(_))).take(8);
     let mut more: Vec<u32> = Vec::new();
     for row in worst.chain(failed).chain(known) {
-        if !front.contains(&row.number) && !more.contains(&row.number) {
+        if ![&front, &more, &missed].iter().any(|others| others.contains(&row.number)) {
             more.push(row.number);
         }
     }
@@ -114,6 +136,7 @@ fn chosen(summary: &Summary, rows: &[TestRow]) -> Vec<Group> {
     };
     let shrunk = summary.shrinking.as_ref().map_or_else(Vec::new, Shrinking::ends);
     more.retain(|number| !shrunk.contains(number));
+    let missed: Vec<u32> = missed.into_iter().filter(|it| !shrunk.contains(it) && !reference.contains(it)).collect();
     let shrunk_caption = "The test before and after it was shrunk.".to_owned();
     vec![
         Group { title: "Before and after", caption: shrunk_caption, tests: shrunk },
@@ -122,6 +145,7 @@ fn chosen(summary: &Summary, rows: &[TestRow]) -> Vec<Group> {
             caption: "The run without disturbance, for comparison.".to_owned(),
             tests: reference,
         },
+        Group { title: "Tests with missed hazards", caption: MISSED.to_owned(), tests: missed },
         Group { title: "Tests on the front", caption: front_caption, tests: front },
         Group {
             title: "More tests to look at",
