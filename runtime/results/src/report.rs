@@ -20,6 +20,7 @@ pub use crate::present::number::quantity;
 pub use crate::present::table::TextOptions;
 pub use export::{ExportError, Exported, export};
 pub use facts::certificate::campaign::{HazardSummary, MissedHazard, MonitorSummary, MonitorsSummary, StateShare};
+pub use facts::certificate::mend::{Mend, MendedTest, mend};
 pub use facts::certificate::moment::{MomentError, MomentReport, MonitorMoment, PartReport, show_at};
 pub use facts::certificate::test::{
     ChangeReport, DecisionReport, EvidenceReport, HazardReport, MonitorReport, StateReport,
@@ -41,7 +42,7 @@ pub use facts::summary::{
     Summary, Worst, summary,
 };
 pub use file::write_aside;
-pub use html::{page, write_page, write_page_with};
+pub use html::{page, write_page, write_page_against, write_page_with};
 pub use junit::{junit, write_junit};
 pub use sentences::headline;
 pub use text::{confirmed_text, list_text, moment_text, recording_text, replay_text, summary_text, test_text};

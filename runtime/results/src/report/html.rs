@@ -8,6 +8,7 @@ mod front;
 mod generations;
 mod header;
 mod legend;
+mod mend;
 mod monitors;
 mod page;
 mod policy;
@@ -19,5 +20,5 @@ mod test;
 mod timeline;
 mod tree;
 
-pub use page::{page, write_page, write_page_with};
+pub use page::{page, write_page, write_page_against, write_page_with};
 pub(crate) use policy::policy;

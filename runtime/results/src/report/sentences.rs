@@ -11,6 +11,7 @@ use crate::present::number::{self, fixed, join_words, plural};
 use crate::present::table::visible;
 use crate::record::{Standing, Verdict};
 use crate::report::facts::certificate::campaign::MonitorsSummary;
+use crate::report::facts::certificate::mend::Mend;
 use crate::report::facts::coverage::CoverageSummary;
 use crate::report::facts::readable::short_numbers;
 use crate::report::facts::repetition::ViolationRate;
@@ -83,6 +84,20 @@ pub(crate) fn monitors_sentence(monitors: &MonitorsSummary) -> String {
         all => {
             format!("In {of} monitors foresaw {foreseen} of {} and missed {missed}", plural(all, "hazard", "hazards"))
         }
+    }
+}
+
+/// What a mend changed, in a sentence.
+pub(crate) fn mend_sentence(mend: &Mend) -> String {
+    let Mend { tests, missed_before, missed_after, .. } = mend;
+    match tests {
+        0 => "No test is in both results; `export` writes a test for the `.sesame` file, and `known` runs it under \
+              either certificate"
+            .to_owned(),
+        _ => format!(
+            "Of {} in both results, hazards were missed in {missed_before} before and in {missed_after} after",
+            plural(*tests, "test", "tests")
+        ),
     }
 }
 

@@ -14,7 +14,7 @@ use crate::report::facts::show::{TestList, TestReport};
 use crate::report::facts::shrinking::Shrinking;
 use crate::report::facts::summary::Summary;
 use crate::report::sentences::{
-    QUARANTINED, beyond_sentence, confirmation_sentence, counts_sentence, coverage_sentence, headline,
+    QUARANTINED, beyond_sentence, confirmation_sentence, counts_sentence, coverage_sentence, headline, mend_sentence,
     monitors_sentence, once_sentence, outcome_sentence, shrinking_sentence, values_sentence,
 };
 use crate::report::tables;
@@ -41,6 +41,19 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
     section(&mut text, "Requirements", &tables::requirements(summary), options);
     if let Some(found) = &summary.monitors {
         monitors(&mut text, found, options);
+    }
+    if let Some(mend) = &summary.mend {
+        let mut table = tables::monitors::mended(mend);
+        let more = table.truncate(ROWS);
+        section(&mut text, "Before and after the mend", &table, options);
+        if more > 0 {
+            paragraph(&mut text, &format!("and {more} more; `--format json` has all"), options);
+        }
+        paragraph(&mut text, &format!("{}.", mend_sentence(mend)), options);
+        if let Some(difference) = &mend.difference {
+            let words = format!("warning: not only the monitors differ: {}", visible(difference));
+            paragraph(&mut text, &words, options);
+        }
     }
     section(&mut text, "Regression tests", &tables::expectations(&summary.expectations), options);
     if let Some(repetition) = &summary.repetition {
@@ -107,7 +120,7 @@ pub fn moment_text(moment: &MomentReport, options: TextOptions) -> String {
         for why in &monitor.why {
             paragraph(&mut text, &visible(&why.sentence), options);
             for because in &why.because {
-                paragraph(&mut text, &format!("  {}", visible(&because.words(&monitor.monitor))), options);
+                text.push_str(&format!("    {}\n", visible(&because.words(&monitor.monitor))));
             }
         }
     }

@@ -2,6 +2,7 @@
 
 pub(in crate::report) mod campaign;
 mod history;
+pub(in crate::report) mod mend;
 pub(in crate::report) mod moment;
 pub(in crate::report) mod test;
 pub(in crate::report) mod why;

@@ -267,8 +267,8 @@ fn decision_title(monitor: &MonitorReport, decision: &DecisionReport) -> String 
     let kind = if decision.is_safe() { "safe state".to_owned() } else { format!("integrity {}", decision.integrity) };
     let mut title =
         format!("{}: {} ({kind}) from {from} to {}", monitor.monitor, decision.state, seconds(decision.until));
-    if let Some(cause) = &decision.cause {
-        let _ = write!(title, "\nCaused by: {}", cause_text(cause));
+    if decision.cause.is_some() {
+        let _ = write!(title, "\nCaused by: {}", decision.cause_text().replace('`', ""));
     }
     for why in &decision.why {
         let _ = write!(title, "\n{}", why.sentence.replace('`', ""));

@@ -1,7 +1,5 @@
 //! What the monitors of a campaign were worth, missed hazards first.
 
-use sesame_plan::CampaignPlan;
-
 use crate::present::markup::Markup;
 use crate::report::facts::summary::Summary;
 use crate::report::sentences::{MONITORS_CAPTION, monitors_sentence};
@@ -11,7 +9,7 @@ use crate::report::tables::monitors as tables;
 const MISSED: usize = 50;
 
 /// The section on monitors; nothing in results without any.
-pub(super) fn monitors(body: &mut Markup, plan: &CampaignPlan, summary: &Summary, drawn: &[u32]) {
+pub(super) fn monitors(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
     let Some(found) = &summary.monitors else { return };
     body.open("section", &[("id", "monitors")]);
     body.element("h2", &[], "Monitors");
@@ -28,10 +26,8 @@ pub(super) fn monitors(body: &mut Markup, plan: &CampaignPlan, summary: &Summary
     tables::hazards(found).html(body, drawn);
     body.element("p", &[("class", "quiet")], MONITORS_CAPTION);
     tables::monitors(found).html(body, drawn);
-    if !plan.monitors.is_empty() {
-        body.open("p", &[("class", "quiet")]);
-        body.element("a", &[("href", "#certificates")], "The certificates as trees");
-        body.close();
-    }
+    body.open("p", &[("class", "quiet")]);
+    body.element("a", &[("href", "#certificates")], "The certificates as trees");
+    body.close();
     body.close();
 }

@@ -15,7 +15,7 @@ use crate::report::html::generations::generations;
 use crate::report::html::header::header;
 use crate::report::html::policy::policy;
 use crate::report::html::test::test;
-use crate::report::html::{cells, monitors, regions, shrinking, tree};
+use crate::report::html::{cells, mend, monitors, regions, shrinking, tree};
 use crate::report::sentences::{QUARANTINED, once_sentence};
 use crate::report::tables;
 
@@ -29,18 +29,34 @@ pub fn write_page(repository: &Repository, path: &Path) -> Result<(), RecordErro
 
 /// The same for results whose digest is known already.
 pub fn write_page_with(repository: &Repository, path: &Path, digest: &str) -> Result<(), RecordError> {
+    write_page_against(repository, None, path, digest)
+}
+
+/// The same with results of before the certificates were mended: the page shows the same tests before and after.
+pub fn write_page_against(
+    repository: &Repository,
+    before: Option<&Repository>,
+    path: &Path,
+    digest: &str,
+) -> Result<(), RecordError> {
     let beside = path.parent() == Some(repository.folder());
     let folder = if beside { Path::new("") } else { repository.folder() };
-    write_aside(path, &page_in(repository, folder, digest)?).map_err(|e| RecordError::io("write the page", path, e))
+    let page = page_in(repository, before, folder, digest)?;
+    write_aside(path, &page).map_err(|e| RecordError::io("write the page", path, e))
 }
 
 /// The page, from a campaign's results; a run may still be going on. Links to traces lead from the run's folder.
 pub fn page(repository: &Repository) -> Result<String, RecordError> {
-    page_in(repository, Path::new(""), &repository.digest()?)
+    page_in(repository, None, Path::new(""), &repository.digest()?)
 }
 
 /// The page; `folder` is the path of the run's folder relative to the page.
-fn page_in(repository: &Repository, folder: &Path, digest: &str) -> Result<String, RecordError> {
+fn page_in(
+    repository: &Repository,
+    before: Option<&Repository>,
+    folder: &Path,
+    digest: &str,
+) -> Result<String, RecordError> {
     let rows = repository.tests()?;
     let members = repository.latest_result_set()?.map_or_else(Vec::new, |set| set.members);
     let summary = summarise(repository, &rows, &members)?;
@@ -53,7 +69,10 @@ fn page_in(repository: &Repository, folder: &Path, digest: &str) -> Result<Strin
     if let Some(shrinking) = &summary.shrinking {
         shrinking::shrinking(&mut body, shrinking, &drawn);
     }
-    monitors::monitors(&mut body, repository.plan(), &summary, &drawn);
+    monitors::monitors(&mut body, &summary, &drawn);
+    if let Some(before) = before {
+        mend::before_and_after(&mut body, repository, before, &drawn)?;
+    }
     requirements(&mut body, &summary, &drawn);
     front(&mut body, repository, &summary, &rows, &drawn);
     all_tests(&mut body, repository, &summary, &rows, &drawn)?;

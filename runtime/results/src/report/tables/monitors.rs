@@ -3,6 +3,7 @@
 use crate::present::number;
 use crate::present::table::{Cell, Column, Datum, Table};
 use crate::report::facts::certificate::campaign::MonitorsSummary;
+use crate::report::facts::certificate::mend::Mend;
 use crate::report::facts::certificate::test::{HazardReport, MonitorReport};
 use crate::report::facts::certificate::why::cause_text;
 
@@ -100,6 +101,30 @@ pub(in crate::report) fn monitors(summary: &MonitorsSummary) -> Table {
     table
 }
 
+/// Tests in which hazards were missed before a mend, or are after it.
+pub(in crate::report) fn mended(mend: &Mend) -> Table {
+    let mut table = Table::with([
+        Column::heading("test"),
+        Column::words("before it was"),
+        Column::words("missed before"),
+        Column::words("missed after"),
+    ]);
+    for test in &mend.changed {
+        let seed = if test.same_seed { "" } else { ", other simulator seed" };
+        let words = |missed: &[String]| match missed {
+            [] => Datum::text("none").quiet(),
+            missed => Datum::Text(missed.join(", ")).bad_if(true),
+        };
+        table.row([
+            Datum::Test(test.test).into(),
+            Cell::from(Datum::Text(format!("{}{seed}", test.before))),
+            words(&test.missed_before),
+            words(&test.missed_after),
+        ]);
+    }
+    table
+}
+
 /// The hazards of a test, missed ones first.
 pub(in crate::report) fn hazards_of_test(monitors: &[MonitorReport]) -> Table {
     let mut table = Table::with([
@@ -138,7 +163,7 @@ pub(in crate::report) fn decisions(monitors: &[MonitorReport]) -> Table {
     for monitor in monitors {
         for decision in &monitor.decisions {
             let cause = match (&decision.cause, decision.at > 0.0) {
-                (Some(cause), _) => Datum::Text(cause_text(cause)),
+                (Some(_), _) => Datum::Text(decision.cause_text()),
                 (None, false) => Datum::text("the beginning"),
                 (None, true) => Datum::Missing,
             };

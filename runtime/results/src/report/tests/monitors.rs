@@ -13,9 +13,20 @@ fn monitored() -> (tempfile::TempDir, Repository) {
     (folder, repository)
 }
 
-/// The page on such a campaign.
+/// The same tests before and after a certificate was mended.
+fn mended() -> ([tempfile::TempDir; 2], [Repository; 2]) {
+    let folders = [(); 2].map(|()| tempfile::tempdir().unwrap());
+    let before = sample::campaign(folders[0].path(), &sample::monitored_plan(), 40);
+    let after = sample::campaign(folders[1].path(), &sample::mended_plan(), 40);
+    (folders, [before, after])
+}
+
+/// The page on such campaigns.
 pub(super) fn monitored_page() -> String {
-    page(&monitored().1).unwrap()
+    let ([_before, folder], [before, after]) = mended();
+    let path = folder.path().join("report.html");
+    write_page_against(&after, Some(&before), &path, &after.digest().unwrap()).unwrap();
+    std::fs::read_to_string(path).unwrap()
 }
 
 /// A test with a missed hazard, and one with a hazard that was foreseen.
@@ -132,7 +143,7 @@ fn a_moment_shows_the_values_of_a_certificate_and_what_decided() {
 
 #[test]
 fn the_page_shows_certificates_over_time_and_marks_missed_hazards_in_words() {
-    let html = monitored_page();
+    let html = page(&monitored().1).unwrap();
     let document = parsed(&html);
     let section = |id: &str| document.descendants().find(|node| node.attribute("id") == Some(id)).unwrap();
     let text = |node: roxmltree::Node<'_, '_>| -> String {
@@ -175,6 +186,70 @@ fn lanes_and_trees_are_drawn() {
     insta::assert_snapshot!("certificate_lanes", lanes.replace("><", ">\n<"));
     let trees = html.split_once("<h3 id=\"certificate-1\">").unwrap().1.split_once("</section>").unwrap().0;
     insta::assert_snapshot!("certificate_tree", trees.replace("><", ">\n<"));
+}
+
+#[test]
+fn a_mend_is_shown_in_the_same_tests_before_and_after() {
+    let (_folders, [before, after]) = mended();
+    let mend = mend(&after, &before).unwrap();
+    let [old, new] = [&before, &after].map(|side| summary(side).unwrap().monitors.unwrap().missed);
+    let tests_of = |missed: &[MissedHazard]| missed.iter().map(|missed| missed.test).collect::<Vec<_>>();
+    assert_eq!((mend.tests, &mend.difference), (41, &None), "all but the crash and the duplicate");
+    assert_eq!((mend.missed_before, mend.missed_after), (old.len(), new.len()));
+    assert!(0 < mend.missed_after && mend.missed_after < mend.missed_before, "{mend:#?}");
+    assert!(mend.changed.iter().all(|test| test.test == test.before && test.same_seed));
+    let of = |side: fn(&MendedTest) -> &Vec<String>| {
+        let mut tests: Vec<_> = mend.changed.iter().filter(|it| !side(it).is_empty()).map(|it| it.test).collect();
+        tests.sort();
+        tests
+    };
+    assert_eq!((of(|it| &it.missed_before), of(|it| &it.missed_after)), (tests_of(&old), tests_of(&new)));
+    // In text, in JSON, and on the page.
+    let mut summary = summary(&after).unwrap();
+    assert_eq!(serde_json::to_value(&summary).unwrap()["mend"], serde_json::Value::Null);
+    summary.mend = Some(Mend { before: "before".into(), ..mend.clone() });
+    let text = summary_text(&summary, WIDE);
+    let (_, text) = text.split_once("Before and after the mend\n").unwrap();
+    insta::assert_snapshot!("mend", text.split("\n\n").next().unwrap());
+    let html = monitored_page();
+    let document = parsed(&html);
+    let section = document.descendants().find(|node| node.attribute("id") == Some("mend")).unwrap();
+    let sides: Vec<&str> = section
+        .descendants()
+        .filter(|node| node.attribute("class").is_some_and(|class| class.starts_with("side")))
+        .map(|node| node.text().unwrap())
+        .collect();
+    assert_eq!(sides.len(), 2 * mend.changed.len().min(12));
+    for (test, pair) in mend.changed.iter().zip(sides.chunks(2)) {
+        let words = |side: &str, missed: &[String]| match missed {
+            [] => format!("{side}: no hazard missed"),
+            missed => format!("{side}: hazard of {} MISSED", missed.join(", ")),
+        };
+        assert_eq!(pair, [words("Before", &test.missed_before), words("After", &test.missed_after)]);
+    }
+}
+
+#[test]
+fn tests_are_the_same_by_what_they_do_and_other_changes_are_named() {
+    let folders = [(); 2].map(|()| tempfile::tempdir().unwrap());
+    let before = sample::campaign(folders[0].path(), &sample::monitored_plan(), 20);
+    let mut plan = sample::mended_plan();
+    plan.requirements[1].bound = sesame_plan::Bound::AtMost { value: 2.0 };
+    let mut recorder = crate::record::Recorder::create(folders[1].path(), &plan, 42, 1).unwrap();
+    // Other numbers, as if they had been exported; the last one does not exist before.
+    for (number, mut record) in
+        (0..).zip(sample::records(&plan, 19).into_iter().skip(15).chain(sample::records(&plan, 30).pop()))
+    {
+        record.number = number;
+        record.parents = Vec::new();
+        recorder.commit(&record).unwrap();
+    }
+    let after = recorder.finish("all evaluations done").unwrap();
+    let mend = mend(&after, &before).unwrap();
+    assert_eq!(mend.tests, after.tests().unwrap().len() - 1);
+    assert_eq!(mend.difference.as_deref(), Some("requirement `R2` has changed"));
+    assert!(mend.changed.iter().all(|test| test.before.0 == test.test.0 + 15), "{mend:#?}");
+    assert!(!mend.changed.is_empty());
 }
 
 #[test]

@@ -13,8 +13,9 @@ use sesame_monitor::{State, Truth};
 use sesame_notation as notation;
 use sesame_plan::{CampaignPlan, MonitorId};
 
+use crate::present::number::join_words;
 use crate::report::facts::certificate::history::History;
-use crate::report::facts::certificate::why::{WhyReport, explained, named, word};
+use crate::report::facts::certificate::why::{WhyReport, cause_text, explained, named, word};
 
 /// What a monitor did in a test.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -83,6 +84,8 @@ pub struct DecisionReport {
     pub mitigation: Option<String>,
     /// What changed the evidence that led to it; `None` of the decision at time zero.
     pub cause: Option<ChangeCause>,
+    /// The evidence that changed then, with the monitor's name before a dot.
+    pub changed: Vec<String>,
     /// Why no stronger guarantee held, and why this one did, the strongest first.
     pub why: Vec<WhyReport>,
 }
@@ -123,6 +126,17 @@ impl DecisionReport {
         own.into_iter().chain(stronger).map(|why| why.sentence.as_str()).collect::<Vec<_>>().join("; ")
     }
 
+    /// What led to it, in words: a message, or the evidence that changed without one.
+    pub(in crate::report) fn cause_text(&self) -> String {
+        let names = join_words(&self.changed.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>());
+        match &self.cause {
+            Some(ChangeCause::Held) => format!("{names} held for long enough"),
+            Some(ChangeCause::Stale) => format!("silence about {names}"),
+            Some(cause) => cause_text(cause),
+            None => "the beginning".to_owned(),
+        }
+    }
+
     /// Whether it is the safe state.
     pub(in crate::report) fn is_safe(&self) -> bool {
         self.integrity == 0
@@ -150,7 +164,7 @@ pub(in crate::report) fn monitors(plan: &CampaignPlan, observation: &Observation
         let decided = decisions.iter().enumerate().map(|(at, decision)| {
             let (state, integrity) = named(monitor, decision.state.into());
             let mitigation = monitor.otherwise.mitigation.as_ref().filter(|_| integrity == 0 && at > 0);
-            let (cause, why) = reasons.remove(&(id, at)).unwrap_or_default();
+            let Reason { cause, changed, why } = reasons.remove(&(id, at)).unwrap_or_default();
             DecisionReport {
                 at: decision.time,
                 until: decisions.get(at + 1).map_or(end, |next| next.time),
@@ -158,6 +172,7 @@ pub(in crate::report) fn monitors(plan: &CampaignPlan, observation: &Observation
                 integrity,
                 mitigation: mitigation.map(|mitigation| notation::mitigation(plan, mitigation)),
                 cause,
+                changed,
                 why,
             }
         });
@@ -202,7 +217,12 @@ fn hazard_report(plan: &CampaignPlan, hazard: &MonitorHazard) -> HazardReport {
 }
 
 /// What caused a decision, and why it was made.
-type Reason = (Option<ChangeCause>, Vec<WhyReport>);
+#[derive(Default)]
+struct Reason {
+    cause: Option<ChangeCause>,
+    changed: Vec<String>,
+    why: Vec<WhyReport>,
+}
 
 /// The reason of each decision, by monitor and position.
 fn reasons(plan: &CampaignPlan, shown: &[MonitorObservation]) -> BTreeMap<(MonitorId, usize), Reason> {
@@ -226,8 +246,13 @@ fn reasons(plan: &CampaignPlan, shown: &[MonitorObservation]) -> BTreeMap<(Monit
             }
             let whys = known.entry((id, values.truths.clone()));
             let whys = whys.or_insert_with(|| why_state(moment, id, Depth::Evidence));
+            let why = whys.iter().map(|why| explained(why, values)).collect();
+            let changed = event.into_iter().flat_map(|event| history.changes(event)).map(|(monitor, change)| {
+                let monitor = plan.monitor(monitor);
+                format!("{}.{}", monitor.name, monitor.evidence[change.evidence as usize].name)
+            });
             let cause = event.map(|event| history.cause(event).clone());
-            reasons.insert((id, *place), (cause, whys.iter().map(|why| explained(why, values)).collect()));
+            reasons.insert((id, *place), Reason { cause, changed: changed.collect(), why });
             *place += 1;
         }
     });
