@@ -52,8 +52,49 @@ fn a_monitor_stops_the_robot_and_misses_what_operations_hide_from_it() {
         "clear 4.1 1 message camera/light 40",
     ];
     assert_eq!(rows(&results, changes)[..5], expected);
+    // The missed hazard is in the results, and in all that is shown of them.
+    let hazards = "SELECT test_name || ' ' || monitor || ' ' || requirement || ' ' || time_s || ' ' || foreseen FROM hazards \
+                   ORDER BY test";
+    assert_eq!(rows(&results, hazards)[0], "T1 transport R1 9.1 0");
+    let show = |arguments: &[&str]| {
+        let all = [&["-c", "attacks"], arguments, &["--results", results.to_str().unwrap()]].concat();
+        project.sesamec("show", &all).expect(0).out
+    };
+    let shown = show(&["T1"]);
+    assert!(shown.contains("R1         9.100 s  MISSED"), "{shown}");
+    assert!(shown.contains("`fast` does not hold because `far` is false; sent `drive.speed = 0m/s`"), "{shown}");
+    let moment = show(&["T1", "--at", "9.1s"]);
+    assert!(moment.contains("transport: fast\n") && moment.contains("`fast` holds because "), "{moment}");
+    assert!(moment.contains("    `far` true since 0.100 s: message 0 of cell/gap\n"), "{moment}");
+    let json: serde_json::Value = serde_json::from_str(&show(&["T1", "--at", "9600ms", "--format", "json"])).unwrap();
+    assert_eq!(json["monitors"][0]["state"], "halted");
+    assert_eq!(json["monitors"][0]["why"][0]["because"][0]["evidence"], "far");
+    let list = project.sesamec("list", &["-c", "attacks", "--results", results.to_str().unwrap()]).expect(0).out;
+    assert!(list.lines().nth(2).unwrap().contains("R1 by transport"), "{list}");
+    let page = fs::read_to_string(results.join("report.html")).unwrap();
+    assert!(page.contains("hazard of R1 missed by transport") && page.contains("id=\"certificates\""));
     // What a monitor says is changed on its way, and not what it decides.
     assert_eq!(decisions("T3", "transport"), decisions("T0", "transport"));
+}
+
+#[test]
+fn a_mended_certificate_is_compared_with_the_one_of_before_in_the_same_tests() {
+    let project = watched("monitors_mended");
+    project.sesamec("known", &["-c", "attacks"]).expect(0);
+    // It hears the gap as well as the camera, and stops where less than two metres are left.
+    let mended = fs::read_to_string(&project.space).unwrap();
+    let mended = mended.replace("evidence  far = gap > 500mm", "evidence  far = gap > 2m");
+    fs::write(&project.space, mended).unwrap();
+    let second = project.sesamec("known", &["-c", "attacks"]);
+    assert!(second.out.contains("expectation"), "it is not as the tests expect any more: {}", second.out);
+    let [before, after] = ["known", "known-2"].map(|name| project.runners.join("attacks/results").join(name));
+    let arguments = ["-c", "attacks", "--results", after.to_str().unwrap(), "--before", before.to_str().unwrap()];
+    let report = project.sesamec("report", &arguments).expect(0).out;
+    assert!(report.contains("Before and after the mend"), "{report}");
+    assert!(report.contains("Of 4 tests in both results, hazards were missed in 2 before and in 0 after"), "{report}");
+    assert!(!report.contains("not only the monitors differ"), "{report}");
+    let page = fs::read_to_string(after.join("report.html")).unwrap();
+    assert!(page.contains("Before: hazard of R1 by transport MISSED") && page.contains("After: no hazard missed"));
 }
 
 #[test]

@@ -221,6 +221,16 @@ pub fn score(
     hazards: &[(u32, SimTime)],
     end: SimTime,
 ) -> Score {
+    scorer(guarantees, horizon, decisions, hazards).end(end)
+}
+
+/// A [`Scorer`] that was told of these decisions and hazards.
+pub fn scorer(
+    guarantees: u32,
+    horizon: Option<SimTime>,
+    decisions: &[Step<State>],
+    hazards: &[(u32, SimTime)],
+) -> Scorer {
     let mut scorer = Scorer::new(guarantees, horizon);
     let mut hazards = hazards.iter().peekable();
     for step in decisions {
@@ -231,5 +241,5 @@ pub fn score(
         scorer.decide(step.at, step.state);
     }
     hazards.for_each(|&(requirement, at)| scorer.hazard(at, requirement));
-    scorer.end(end)
+    scorer
 }

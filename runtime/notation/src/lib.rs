@@ -8,6 +8,7 @@
 
 mod campaign;
 pub mod condition;
+mod monitor;
 mod number;
 mod operation;
 mod test;
@@ -17,6 +18,7 @@ mod unit;
 pub use campaign::{
     Clause, campaign, campaign_block, coverage_clause, end_clause, operations_clause, repeat_clause, search_clause,
 };
+pub use monitor::{evidence, mitigation};
 pub use operation::{Clauses, constraint, custom_domain, integer_constraint, operation, resource};
 pub use test::{activation, activation_named, expectation, simulator_seed, test_block, test_member, test_operation};
 pub use text::{doc_comment, is_name, quoted};

@@ -4,7 +4,10 @@
 use serde::{Deserialize, Serialize};
 
 use crate::formula::Condition;
-use crate::{CampaignPlan, FieldRef, Input, MonitorId, MonitorPart, MonitorState, Side, TopicId, Type};
+use crate::{
+    CampaignPlan, FieldRef, Input, MetricSource, MonitorId, MonitorPart, MonitorState, RequirementId, Score, Side,
+    TopicId, Type,
+};
 
 /// A runtime monitor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -69,6 +72,40 @@ impl CampaignPlan {
             },
             ty => fits(ty).then_some((ty, None)),
         }
+    }
+
+    /// The requirements whose hazards each monitor is to foresee, by monitor and then by requirement: those for which
+    /// metrics score it. Where no metric scores hazards, every monitor is to foresee those of every requirement that
+    /// does not bound a score of a monitor.
+    pub fn hazards_to_foresee(&self) -> Vec<(MonitorId, RequirementId)> {
+        let scored = self.metrics.iter().filter_map(|metric| match metric.source {
+            MetricSource::Monitor { monitor, score } => Some((monitor, score.requirement()?)),
+            _ => None,
+        });
+        let mut pairs: Vec<(MonitorId, RequirementId)> = scored.collect();
+        if pairs.is_empty() {
+            let is_of_system = |metric: &MetricSource| !matches!(metric, MetricSource::Monitor { .. });
+            let requirements = (0..).map(RequirementId).zip(&self.requirements);
+            let requirements: Vec<RequirementId> =
+                requirements.filter(|(_, it)| is_of_system(&self.metric(it.metric).source)).map(|(id, _)| id).collect();
+            let monitors = (0..).map(MonitorId).take(self.monitors.len());
+            pairs = monitors.flat_map(|monitor| requirements.iter().map(move |&id| (monitor, id))).collect();
+        }
+        pairs.sort_unstable();
+        pairs.dedup();
+        pairs
+    }
+
+    /// For how long after the beginning of an alarm of a monitor a hazard of a requirement justifies it, in seconds: as
+    /// the first metric says that counts such false alarms. `None` where it has to be within the alarm.
+    pub fn alarm_horizon(&self, monitor: MonitorId, requirement: RequirementId) -> Option<f64> {
+        let counted = self.metrics.iter().find_map(|metric| match metric.source {
+            MetricSource::Monitor { monitor: of, score: Score::FalseAlarms { requirement: bound, within } } => {
+                (of == monitor && bound == requirement).then_some(within)
+            }
+            _ => None,
+        });
+        counted.flatten()
     }
 
     /// Whether a monitor publishes its state on a topic, so that nobody else needs to know the topic.

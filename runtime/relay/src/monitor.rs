@@ -309,9 +309,12 @@ impl<'p> Monitors<'p> {
         metrics: &mut [MetricObservation],
         whole: bool,
     ) -> (Vec<MonitorObservation>, Vec<String>) {
-        self.scores.finish(end, metrics, whole);
+        let hazards = self.scores.finish(end, metrics, whole);
         let mut warnings: Vec<String> = self.problem.into_iter().collect();
-        let monitors = self.record.finish(&mut warnings);
+        let mut monitors = self.record.finish(&mut warnings);
+        for (monitor, hazards) in monitors.iter_mut().zip(hazards) {
+            monitor.hazards = hazards;
+        }
         (monitors, warnings)
     }
 }

@@ -22,6 +22,13 @@ pub use crate::analysis::confirmed::{ConfirmedTest, FindingAgain};
 pub use crate::present::number::quantity;
 pub use crate::present::table::TextOptions;
 pub use export::{ExportError, Exported, export};
+pub use facts::certificate::campaign::{HazardSummary, MissedHazard, MonitorSummary, MonitorsSummary, StateShare};
+pub use facts::certificate::mend::{Mend, MendedTest, mend};
+pub use facts::certificate::moment::{MomentError, MomentReport, MonitorMoment, PartReport, show_at};
+pub use facts::certificate::test::{
+    ChangeReport, DecisionReport, EvidenceReport, HazardReport, MonitorReport, StateReport,
+};
+pub use facts::certificate::why::{BecauseReport, WhyReport};
 pub use facts::coverage::CoverageSummary;
 pub use facts::monitors::{
     BrokenDecision, ComparedMonitor, ComparedRecording, DecisionDifference, DelayTolerance, EvidenceCause,
@@ -43,11 +50,11 @@ pub use facts::summary::{
 };
 pub use facts::twin::{MitigationVerdict, SentMitigation, Twin, TwinRequirement, twin};
 pub use file::write_aside;
-pub use html::{page, write_page, write_page_with};
+pub use html::{page, write_page, write_page_against, write_page_with};
 pub use junit::{junit, write_junit};
 pub use monitors::monitors_text;
 pub use sentences::headline;
-pub use text::{confirmed_text, list_text, recording_text, replay_text, summary_text, test_text};
+pub use text::{confirmed_text, list_text, moment_text, recording_text, replay_text, summary_text, test_text};
 
 #[cfg(test)]
 mod tests;

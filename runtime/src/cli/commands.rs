@@ -72,6 +72,10 @@ pub enum Showing {
     Show {
         /// The test, for example `T158`
         test: String,
+        /// Show the certificates of monitors at this moment, for example `12.3s`: the value of each part, and why each
+        /// guarantee held or did not
+        #[arg(long, value_name = "TIME", value_parser = view::moment)]
+        at: Option<f64>,
         /// Which run, and how it is shown
         #[command(flatten)]
         which: view::Which,
@@ -168,7 +172,7 @@ impl Showing {
             Showing::Export(options) => export::export(results, options),
             Showing::Report(options) => report::report(results, options),
             Showing::List(which) => view::list(results, which),
-            Showing::Show { test, which } => view::show(results, which, test),
+            Showing::Show { test, at, which } => view::show(results, which, test, *at),
             Showing::Digest(which) => view::digest(results, which),
         }
     }

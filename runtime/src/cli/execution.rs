@@ -348,13 +348,25 @@ pub(super) fn report_outcome(
     page: &Path,
     output: &OutputArgs,
 ) -> Result<ExitCode, Failure> {
+    report_against(repository, None, folder, page, output)
+}
+
+/// The same, compared with results from before certificates were mended.
+pub(super) fn report_against(
+    repository: &Repository,
+    before: Option<&Repository>,
+    folder: &Path,
+    page: &Path,
+    output: &OutputArgs,
+) -> Result<ExitCode, Failure> {
     let waiting = Waiting::on(repository.evaluated()?, "making the page");
     let digest = repository.digest()?;
-    report::write_page_with(repository, page, &digest)?;
+    report::write_page_against(repository, before, page, &digest)?;
     if let Some(junit) = &output.junit {
         report::write_junit(repository, junit)?;
     }
-    let summary = report::summary(repository)?;
+    let mut summary = report::summary(repository)?;
+    summary.mend = before.map(|before| report::mend(repository, before)).transpose()?;
     drop(waiting);
     match output.format {
         Format::Text => {

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use crate::cli::execution::{OutputArgs, report_outcome};
+use crate::cli::execution::{OutputArgs, report_against, shown};
 use crate::cli::failure::Failure;
 use crate::cli::results_folder::open;
 
@@ -18,6 +18,10 @@ pub struct Options {
     /// File of the page; by default `report.html` beside the results
     #[arg(long, value_name = "FILE")]
     output: Option<PathBuf>,
+    /// Folder of a run from before certificates of monitors were mended: the page shows in the same tests which hazards
+    /// were missed before and after
+    #[arg(long, value_name = "DIR")]
+    before: Option<PathBuf>,
     #[command(flatten)]
     outcome: OutputArgs,
 }
@@ -26,5 +30,14 @@ pub(super) fn report(results: &Path, options: &Options) -> Result<ExitCode, Fail
     let repository = open(results, options.results.as_deref())?;
     let folder = repository.path().parent().unwrap_or(results);
     let page = options.output.clone().unwrap_or_else(|| folder.join("report.html"));
-    report_outcome(&repository, folder, &page, &options.outcome)
+    let before = options.before.as_deref().map(|before| open(results, Some(before))).transpose()?;
+    if let Some(before) = &before {
+        for side in [before, &repository].into_iter().filter(|side| side.plan().monitors.is_empty()) {
+            return Err(Failure(format!(
+                "{} has no monitors, so there is no certificate to compare; `compare` compares runs",
+                shown(side.path())
+            )));
+        }
+    }
+    report_against(&repository, before.as_ref(), folder, &page, &options.outcome)
 }

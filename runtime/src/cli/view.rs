@@ -31,7 +31,26 @@ pub(super) fn list(results: &Path, which: &Which) -> Result<ExitCode, Failure> {
     }
 }
 
-pub(super) fn show(results: &Path, which: &Which, test: &str) -> Result<ExitCode, Failure> {
+/// A moment of a test from the command line, in seconds: `12.3s`, `12.3` or `300ms`.
+pub(super) fn moment(text: &str) -> Result<f64, String> {
+    let (digits, scale) = match (text.strip_suffix("ms"), text.strip_suffix('s')) {
+        (Some(digits), _) => (digits, 1e3),
+        (None, Some(digits)) => (digits, 1.0),
+        (None, None) => (text, 1.0),
+    };
+    let number: Option<f64> = digits.trim_end().parse().ok();
+    let number = number.filter(|number| number.is_finite() && *number >= 0.0);
+    number.map(|number| number / scale).ok_or_else(|| "not a time, such as `12.3s` or `300ms`".to_owned())
+}
+
+pub(super) fn show(results: &Path, which: &Which, test: &str, at: Option<f64>) -> Result<ExitCode, Failure> {
+    if let Some(at) = at {
+        let shown = report::show_at(&open(results, which.results.as_deref())?, test, at)?;
+        return match which.format {
+            Format::Text => print(&report::moment_text(&shown, text_options())),
+            Format::Json => print_json(&shown),
+        };
+    }
     let shown = report::show(&open(results, which.results.as_deref())?, test)?;
     match which.format {
         Format::Text => print(&report::test_text(&shown, text_options())),
@@ -52,5 +71,21 @@ pub(super) fn digest(results: &Path, which: &Which) -> Result<ExitCode, Failure>
     match which.format {
         Format::Text => print(&format!("{digest}\n")),
         Format::Json => print_json(&Digest { digest }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::moment;
+
+    #[test]
+    fn moments_are_seconds_or_milliseconds() {
+        assert_eq!(
+            ["12.3s", "12.3", "300ms", "0", "1 s"].map(|text| moment(text).unwrap()),
+            [12.3, 12.3, 0.3, 0.0, 1.0]
+        );
+        for wrong in ["", "s", "-1s", "inf", "NaN", "3min"] {
+            assert!(moment(wrong).is_err(), "{wrong}");
+        }
     }
 }

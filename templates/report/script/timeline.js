@@ -12,12 +12,17 @@
       const from = end * share(rect.getAttribute("x"));
       return { rect, from, to: from + end * share(rect.getAttribute("width")) };
     });
-    const points = [...figure.querySelectorAll(".plot > circle, .plot > .ended")].map(mark => {
-      const keys = mark.tagName === "circle" ? ["cx"] : ["x1", "x2"];
+    const marks = ".plot > circle, .plot > .ended, .plot > .hazard, .plot > .hazard-name, .plot > .mark";
+    const points = [...figure.querySelectorAll(marks)].map(mark => {
+      const keys = mark.tagName === "circle" ? ["cx"] : mark.tagName === "text" ? ["x"] : ["x1", "x2"];
       return { mark, keys, time: end * share(mark.getAttribute(keys[0])) };
     });
+    const names = [...figure.querySelectorAll(".plot > .state-name")].map(name => {
+      const until = end * share(name.dataset.until);
+      return { name, from: end * share(name.getAttribute("x")), to: until, letters: name.textContent.length };
+    });
     const rows = plots.slice(0, -1).map(plot => rowOf(plot, spans));
-    return { figure, end, axis, spans, points, rows, other: null };
+    return { figure, end, axis, spans, points, names, rows, other: null };
   });
   if (!figures.length) { return; }
 
@@ -32,6 +37,7 @@
     if (row.metric === undefined) {
       row.name = plot.closest(".row").querySelector(".label b").textContent;
       row.seen = spans.filter(span => span.rect.parentNode === plot && span.rect.matches(".seen"));
+      row.states = spans.filter(span => span.rect.parentNode === plot && span.rect.dataset.state);
       return row;
     }
     row.frame = plot.querySelector("svg");
@@ -78,7 +84,7 @@
   const percent = share => 100 * share + "%";
   function draw() {
     const { ticks, decimals } = ticksBetween(zoom.from, zoom.to, 8);
-    figures.forEach(({ axis, spans, points, rows }) => {
+    figures.forEach(({ axis, spans, points, names, rows }) => {
       axis.replaceChildren(...ticks.map((tick, n) => part("text", {
         "class": n % 2 ? "tick middle wide" : "tick middle", x: percent(shareOf(tick)), y: 14,
       }, tick.toFixed(decimals) + (n + 1 === ticks.length ? " s" : ""))));
@@ -93,6 +99,13 @@
         rect.setAttribute("visibility", right > left || (right === left && left > 0 && left < 1) ? "visible" : "hidden");
         rect.setAttribute("x", percent(left));
         rect.setAttribute("width", percent(Math.max(0, right - left)));
+      });
+      // The name of a state stands where the part of its band begins that is seen, if it has room there.
+      names.forEach(({ name, from, to, letters }) => {
+        const left = Math.max(0, shareOf(from)), right = Math.min(1, shareOf(to));
+        name.setAttribute("x", percent(left));
+        const room = (right - left) * axis.getBoundingClientRect().width;
+        name.classList.toggle("out", room < 7 * letters + 10);
       });
       points.forEach(({ mark, keys, time }) => {
         const share = shareOf(time);
@@ -117,6 +130,8 @@
         row.cursor.setAttribute("x2", percent(x));
         if (!here) { return; }
         if (row.seen) {
+          const state = row.states.find(span => span.from <= at.time && at.time < span.to);
+          if (state) { values.push(row.name + ": " + state.rect.dataset.state); }
           if (row.seen.some(span => span.from <= at.time && at.time < span.to)) { active.push(row.name); }
           return;
         }

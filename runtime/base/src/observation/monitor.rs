@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use sesame_plan::MonitorState;
+use sesame_plan::{MonitorState, RequirementId};
 
 /// The most decisions and changes of evidence of one run that are kept, those of all its monitors together.
 pub const CHANGES_KEPT: usize = 10_000;
@@ -15,6 +15,10 @@ pub struct MonitorObservation {
     pub decisions: Vec<MonitorDecision>,
     /// Changes of its evidence in order of time. Before its first change, evidence is unknown.
     pub evidence: Vec<EvidenceChange>,
+    /// The hazards that it was to foresee, in order of time; see
+    /// [`hazards_to_foresee`](sesame_plan::CampaignPlan::hazards_to_foresee).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub hazards: Vec<MonitorHazard>,
     /// How many later decisions and changes are left out, because a run keeps at most [`CHANGES_KEPT`].
     #[serde(default, skip_serializing_if = "is_zero")]
     pub omitted: u64,
@@ -32,6 +36,18 @@ pub struct MonitorDecision {
     pub time: f64,
     /// The state from then on.
     pub state: MonitorState,
+}
+
+/// A requirement was violated for the first time in the run.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct MonitorHazard {
+    /// Which.
+    pub requirement: RequirementId,
+    /// Simulation time in seconds.
+    pub time: f64,
+    /// For how long the monitor had been in its safe state, in seconds; `None` if it was not, so that it missed the
+    /// hazard.
+    pub lead: Option<f64>,
 }
 
 /// The value of a piece of evidence changed.

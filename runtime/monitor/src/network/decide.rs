@@ -1,7 +1,7 @@
 //! States of monitors, as the values of evidence change.
 
 use sesame_base::time::SimTime;
-use sesame_plan::MonitorId;
+use sesame_plan::{MonitorId, MonitorState};
 
 use super::{EvidenceId, Network};
 use crate::circuit::{NodeIndex, Values};
@@ -14,6 +14,24 @@ pub enum State {
     Guarantee(u32),
     /// No guarantee holds: [`sesame_plan::Monitor::otherwise`].
     Safe,
+}
+
+impl From<MonitorState> for State {
+    fn from(state: MonitorState) -> Self {
+        match state {
+            MonitorState::Guarantee(at) => State::Guarantee(at),
+            MonitorState::Otherwise => State::Safe,
+        }
+    }
+}
+
+impl From<State> for MonitorState {
+    fn from(state: State) -> Self {
+        match state {
+            State::Guarantee(at) => MonitorState::Guarantee(at),
+            State::Safe => MonitorState::Otherwise,
+        }
+    }
 }
 
 /// A monitor begins with a state, or changes it.

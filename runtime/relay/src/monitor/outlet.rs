@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use sesame_monitor::{Decision, State};
-use sesame_plan::{CampaignPlan, FieldRef, Mitigation, MitigationValue, Monitor, MonitorId, MonitorState, Type};
+use sesame_plan::{CampaignPlan, FieldRef, Mitigation, MitigationValue, Monitor, MonitorId, Type};
 
 use crate::metric::sample;
 use crate::value::{Fields, Record, Text, Value};
@@ -115,7 +115,7 @@ fn said(monitor: &Monitor, state: State, ty: &Type) -> Value {
     match ty {
         Type::Bool => Value::Bool(state != State::Safe),
         Type::Int { .. } => Value::Int(i64::from(integrity(monitor, state))),
-        _ => Value::Text(Text::from(monitor.state_name(planned(state)))),
+        _ => Value::Text(Text::from(monitor.state_name(state.into()))),
     }
 }
 
@@ -124,13 +124,5 @@ pub(super) fn integrity(monitor: &Monitor, state: State) -> u32 {
     match state {
         State::Guarantee(at) => monitor.guarantees[at as usize].integrity,
         State::Safe => 0,
-    }
-}
-
-/// A state, as plans name it.
-pub(super) fn planned(state: State) -> MonitorState {
-    match state {
-        State::Guarantee(at) => MonitorState::Guarantee(at),
-        State::Safe => MonitorState::Otherwise,
     }
 }

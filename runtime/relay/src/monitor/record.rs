@@ -4,8 +4,6 @@ use sesame_base::observation::{CHANGES_KEPT, ChangeCause, EvidenceChange, Monito
 use sesame_monitor::{Decision, Network, Truth};
 use sesame_plan::CampaignPlan;
 
-use super::outlet::planned;
-
 /// Decisions and changes of evidence, as they come.
 pub(super) struct Record {
     monitors: Vec<MonitorObservation>,
@@ -26,7 +24,7 @@ impl Record {
             return;
         }
         self.kept += 1;
-        let decision = MonitorDecision { time: decision.at.seconds(), state: planned(decision.state) };
+        let decision = MonitorDecision { time: decision.at.seconds(), state: decision.state.into() };
         monitor.decisions.push(decision);
     }
 

@@ -6,7 +6,7 @@
 //! scores of such requirements are computed then.
 
 use sesame_base::hazard;
-use sesame_base::observation::{MetricObservation, Outcome, Reach};
+use sesame_base::observation::{MetricObservation, MonitorHazard, Outcome, Reach};
 use sesame_base::time::SimTime;
 use sesame_monitor::compare::Step;
 use sesame_monitor::score::{Score as Scored, Scorer, score};
@@ -15,13 +15,15 @@ use sesame_plan::{
     Bound, CampaignPlan, MetricId, MetricSource, MonitorId, MonitorPart, MonitorState, RequirementId, Score,
 };
 
-use super::outlet::{integrity, planned};
+use super::outlet::integrity;
 use crate::metric::{Metrics, Shown};
 
 /// The scores of a plan.
 pub(super) struct Scores<'p> {
     plan: &'p CampaignPlan,
     metrics: Vec<MetricScore>,
+    /// What monitors made of hazards, whether or not a metric says so.
+    judged: Vec<Judged>,
     /// The requirements whose hazards are scored, but for those that are known when the run is over.
     watched: Vec<Watched>,
     /// The instants at which alarms become false because no hazard has come.
@@ -41,6 +43,15 @@ struct MetricScore {
     state: State,
     scorer: Scorer,
     /// The decisions, if the score is computed when the run is over.
+    late: Option<Vec<Step<State>>>,
+}
+
+/// The hazard of a requirement, and a monitor that is to foresee it.
+struct Judged {
+    monitor: MonitorId,
+    requirement: RequirementId,
+    scorer: Scorer,
+    /// The decisions, if the hazard is known when the run is over.
     late: Option<Vec<Step<State>>>,
 }
 
@@ -73,17 +84,21 @@ impl<'p> Scores<'p> {
                 Score::FalseAlarms { within, .. } => within.map(SimTime::from_seconds),
                 _ => None,
             };
-            let guarantees = plan.monitor(monitor).guarantees.len();
             scored.push(MetricScore {
                 metric,
                 monitor,
                 score,
                 state: State::Safe,
-                scorer: Scorer::new(u32::try_from(guarantees).unwrap_or(u32::MAX), horizon),
+                scorer: Scorer::new(guarantees(plan, monitor), horizon),
                 late: score.requirement().is_some_and(is_late).then(Vec::new),
             });
         }
-        let mut requirements: Vec<RequirementId> = scored.iter().filter_map(|it| it.score.requirement()).collect();
+        let judged = plan.hazards_to_foresee().into_iter().map(|(monitor, requirement)| {
+            let late = is_late(requirement).then(Vec::new);
+            Judged { monitor, requirement, scorer: Scorer::new(guarantees(plan, monitor), None), late }
+        });
+        let judged: Vec<Judged> = judged.collect();
+        let mut requirements: Vec<RequirementId> = judged.iter().map(|it| it.requirement).collect();
         requirements.sort_unstable();
         requirements.dedup();
         let watched = requirements.into_iter().filter(|&requirement| !is_late(requirement)).map(|requirement| {
@@ -91,7 +106,8 @@ impl<'p> Scores<'p> {
             let fuzzing_time = matches!(plan.metric(declared.metric).source, MetricSource::FuzzingTime);
             Watched { requirement, metric: declared.metric, bound: declared.bound, fuzzing_time, found: false }
         });
-        Scores { plan, watched: watched.collect(), metrics: scored, deadlines: Vec::new(), changed: true, ended: false }
+        let watched = watched.collect();
+        Scores { plan, watched, judged, metrics: scored, deadlines: Vec::new(), changed: true, ended: false }
     }
 
     /// A monitor decided.
@@ -106,6 +122,12 @@ impl<'p> Scores<'p> {
                 && decision.mitigate
             {
                 self.deadlines.push(decision.at + SimTime::from_seconds(within) + SimTime::from_nanos(1));
+            }
+        }
+        for it in self.judged.iter_mut().filter(|it| it.monitor == decision.monitor) {
+            match &mut it.late {
+                Some(late) => late.push(Step { at: decision.at, state: decision.state }),
+                None => it.scorer.decide(decision.at, decision.state),
             }
         }
         self.changed = true;
@@ -187,6 +209,9 @@ impl<'p> Scores<'p> {
                 for it in self.metrics.iter_mut().filter(|it| it.score.requirement() == Some(watched.requirement)) {
                     it.scorer.hazard(now, number);
                 }
+                for it in self.judged.iter_mut().filter(|it| it.requirement == watched.requirement) {
+                    it.scorer.hazard(now, number);
+                }
                 self.changed = true;
             }
         }
@@ -210,21 +235,24 @@ impl<'p> Scores<'p> {
         self.show(now, run, metrics);
     }
 
-    /// All is over: computes the scores of temporal formulas.
-    pub(super) fn finish(self, end: SimTime, metrics: &mut [MetricObservation], whole: bool) {
+    /// All is over: computes the scores of temporal formulas. Returns the hazards that each monitor was to foresee.
+    pub(super) fn finish(
+        self,
+        end: SimTime,
+        metrics: &mut [MetricObservation],
+        whole: bool,
+    ) -> Vec<Vec<MonitorHazard>> {
+        let hazards = self.hazards(end, metrics);
         for MetricScore { metric, monitor, score: of, late, .. } in self.metrics {
             let (Some(steps), Some(requirement)) = (late, of.requirement()) else { continue };
-            let of_formula = &metrics[self.plan.requirement(requirement).metric.index()];
-            let hazard = hazard::of_formula(self.plan, requirement, &Outcome::Completed, of_formula);
-            let hazard = hazard.map(SimTime::from_seconds);
+            let hazard = hazard_of_formula(self.plan, requirement, metrics);
             let RequirementId(number) = requirement;
             let hazards: Vec<(u32, SimTime)> = hazard.map(|at| (number, at.min(end))).into_iter().collect();
             let horizon = match of {
                 Score::FalseAlarms { within, .. } => within.map(SimTime::from_seconds),
                 _ => None,
             };
-            let guarantees = u32::try_from(self.plan.monitor(monitor).guarantees.len()).unwrap_or(u32::MAX);
-            let mut scored = score(guarantees, horizon, &steps, &hazards, end);
+            let mut scored = score(guarantees(self.plan, monitor), horizon, &steps, &hazards, end);
             if !whole {
                 // Which alarms were false is not known of a run that broke off.
                 scored.false_alarms = 0;
@@ -240,13 +268,51 @@ impl<'p> Scores<'p> {
             let changes = value.filter(|&value| observed.series.last().is_none_or(|last| last.1 != value));
             observed.series.extend(changes.map(|value| (at.seconds(), value)));
         }
+        hazards
     }
+
+    /// Per monitor the hazards that it was to foresee, in the order of time.
+    fn hazards(&self, end: SimTime, metrics: &[MetricObservation]) -> Vec<Vec<MonitorHazard>> {
+        let mut found = vec![Vec::new(); self.plan.monitors.len()];
+        for it in &self.judged {
+            let scored = match &it.late {
+                None => it.scorer.end(end),
+                Some(steps) => {
+                    let hazard = hazard_of_formula(self.plan, it.requirement, metrics);
+                    let hazards: Vec<_> = hazard.map(|at| (it.requirement.0, at.min(end))).into_iter().collect();
+                    score(guarantees(self.plan, it.monitor), None, steps, &hazards, end)
+                }
+            };
+            found[it.monitor.index()].extend(scored.hazards.iter().map(|hazard| MonitorHazard {
+                requirement: it.requirement,
+                time: hazard.at.seconds(),
+                lead: hazard.lead.map(SimTime::seconds),
+            }));
+        }
+        found.iter_mut().for_each(|hazards| hazards.sort_by(|a, b| a.time.total_cmp(&b.time)));
+        found
+    }
+}
+
+/// How many guarantees a monitor has.
+fn guarantees(plan: &CampaignPlan, monitor: MonitorId) -> u32 {
+    u32::try_from(plan.monitor(monitor).guarantees.len()).unwrap_or(u32::MAX)
 }
 
 impl MetricScore {
     fn grows(&self) -> bool {
-        matches!(self.score, Score::TimeIn { state } if state == planned(self.state))
+        matches!(self.score, Score::TimeIn { state } if self.state == State::from(state))
     }
+}
+
+/// When a requirement on the robustness of a formula was violated; `None` if it was not.
+fn hazard_of_formula(
+    plan: &CampaignPlan,
+    requirement: RequirementId,
+    metrics: &[MetricObservation],
+) -> Option<SimTime> {
+    let observed = &metrics[plan.requirement(requirement).metric.index()];
+    hazard::of_formula(plan, requirement, &Outcome::Completed, observed).map(SimTime::from_seconds)
 }
 
 /// What a score is, of all that a monitor was worth.

@@ -5,7 +5,7 @@
 
 use rusqlite::{Connection, Transaction, params};
 
-use sesame_base::observation::{ChangeCause, EvidenceChange, MonitorDecision, MonitorObservation};
+use sesame_base::observation::{ChangeCause, EvidenceChange, MonitorDecision, MonitorHazard, MonitorObservation};
 use sesame_plan::{CampaignPlan, Monitor, MonitorState};
 
 use crate::record::columns::index;
@@ -24,18 +24,35 @@ pub(super) const OBJECTS: [&str; 8] = [
     "evidence",
 ];
 
+/// The table of hazards, and the view of it: the first results with monitors have none.
+pub(super) const HAZARDS: &str = include_str!("hazards.sql");
+
+pub(super) const HAZARD_OBJECTS: [&str; 2] = ["monitor_hazards", "hazards"];
+
 /// Whether results have the tables, which were [recognised](super::recognise).
 pub(super) fn are_in(connection: &Connection) -> rusqlite::Result<bool> {
-    connection.query_row(
-        "SELECT EXISTS (SELECT 1 FROM sqlite_schema WHERE type = 'table' AND name = 'monitor_decisions')",
-        [],
-        |row| row.get(0),
-    )
+    is_in(connection, "monitor_decisions")
+}
+
+/// Whether they have the table of hazards.
+pub(super) fn have_hazards(connection: &Connection) -> rusqlite::Result<bool> {
+    is_in(connection, "monitor_hazards")
+}
+
+fn is_in(connection: &Connection, table: &str) -> rusqlite::Result<bool> {
+    let there = "SELECT EXISTS (SELECT 1 FROM sqlite_schema WHERE type = 'table' AND name = ?1)";
+    connection.query_row(there, [table], |row| row.get(0))
 }
 
 /// Makes the tables for a plan with monitors, unless they are there.
 pub(super) fn install(connection: &Connection, plan: &CampaignPlan) -> rusqlite::Result<()> {
-    if plan.monitors.is_empty() || are_in(connection)? {
+    if plan.monitors.is_empty() {
+        return Ok(());
+    }
+    if !have_hazards(connection)? {
+        connection.execute_batch(HAZARDS)?;
+    }
+    if are_in(connection)? {
         return Ok(());
     }
     connection.execute_batch(DDL)?;
@@ -63,7 +80,7 @@ pub(super) fn write(
     test: u32,
     shown: &[MonitorObservation],
 ) -> rusqlite::Result<()> {
-    for (id, (monitor, MonitorObservation { decisions, evidence, omitted })) in
+    for (id, (monitor, MonitorObservation { decisions, evidence, hazards, omitted })) in
         plan.monitors.iter().zip(shown).enumerate()
     {
         let id = index(id);
@@ -85,6 +102,13 @@ pub(super) fn write(
                      VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
                 )?
                 .execute(params![test, id, index(at), time, evidence, holds, cause.word(), path, message])?;
+        }
+        for MonitorHazard { requirement, time, lead } in hazards {
+            transaction
+                .prepare_cached(
+                    "INSERT INTO monitor_hazards (test, monitor, requirement, time_s, lead_s) VALUES (?1, ?2, ?3, ?4, ?5)",
+                )?
+                .execute(params![test, id, requirement.0, time, lead])?;
         }
         if *omitted > 0 {
             transaction

@@ -66,6 +66,14 @@ impl Repository {
         self.records(number..=number, true)?.pop().ok_or_else(missing)
     }
 
+    /// The seed that the simulator had in each test.
+    pub fn simulator_seeds(&self) -> Result<BTreeMap<u32, u64>, RecordError> {
+        let seeds = self.read("SELECT number, simulator_seed FROM tests ORDER BY number", [], |row| {
+            Ok((row.get(0)?, row.get::<_, String>(1)?))
+        })?;
+        seeds.into_iter().map(|(number, seed)| Ok((number, self.seed(&seed)?))).collect()
+    }
+
     /// The tests whose numbers lie in this range, in their order. Without their time series, which are most of what
     /// there is of a test, reading many at once takes a small part of the time that each takes by itself.
     pub fn records(&self, numbers: RangeInclusive<u32>, series: bool) -> Result<Vec<TestRecord>, RecordError> {

@@ -77,7 +77,8 @@ pub(super) fn tables(connection: &Connection, path: &Path, schema: i64) -> Resul
         (relay_latencies::TABLE, relay_latencies::DDL),
     ];
     let of_monitors = monitors::OBJECTS.map(|name| (name, monitors::DDL));
-    for (name, ddl) in at_will.into_iter().chain(of_monitors) {
+    let of_hazards = monitors::HAZARD_OBJECTS.map(|name| (name, monitors::HAZARDS));
+    for (name, ddl) in at_will.into_iter().chain(of_monitors).chain(of_hazards) {
         if schema >= STANDARD_WORDS_SINCE && found.contains_key(name) {
             let mut ours = sound(made_by(&["CREATE TABLE tests (number INTEGER PRIMARY KEY)", ddl]));
             ours.retain(|ours, _| ours == name);

@@ -1,6 +1,8 @@
 //! A made-up campaign for tests: the shape of a real one (robot cell, four requirements, every outcome) without a
 //! simulator.
 
+mod monitors;
+
 use std::path::Path;
 
 use sesame_base::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, Reach, WallTime};
@@ -14,6 +16,8 @@ use sesame_plan::{
 use sesame_rng::Stream;
 use sesame_search as search;
 use sesame_search::indicators::Indicators;
+
+pub use monitors::{mended_plan, monitored_plan};
 
 use crate::record::{Event, EventKind, Origin, Recorder, Repository, ResultSet, Status, TestRecord};
 
@@ -283,7 +287,8 @@ fn random_test(plan: &CampaignPlan, seed: u64, number: u32) -> Test {
 
 /// The record of a test of this plan that was run.
 pub fn record(plan: &CampaignPlan, number: u32, origin: Origin, test: Test) -> TestRecord {
-    let observation = observe(plan, &test, u64::from(number));
+    let mut observation = observe(plan, &test, u64::from(number));
+    monitors::watch(plan, &test, &mut observation);
     TestRecord {
         number,
         origin,
@@ -312,6 +317,7 @@ pub fn records(plan: &CampaignPlan, searched: u32) -> Vec<TestRecord> {
                 let crash = Outcome::Crash { message: "the simulator panicked: index out of bounds".to_owned() };
                 break_off(plan, &mut record.observation, crash);
                 record.observation.end = 31.42;
+                monitors::watch(plan, &record.test, &mut record.observation);
                 record.observation.warnings = vec!["`top_speed` refused the value NaN at 12.000 s".to_owned()];
             }
             23 => {

@@ -65,6 +65,8 @@ pub(super) fn unrecordable(record: &TestRecord) -> Option<String> {
         let decisions = monitor.decisions.iter().map(|decision| ("the time of a decision", decision.time));
         numbers
             .extend(decisions.chain(monitor.evidence.iter().map(|it| ("the time of a change of evidence", it.time))));
+        let hazards = monitor.hazards.iter().flat_map(|it| [Some(it.time), it.lead]).flatten();
+        numbers.extend(hazards.map(|time| ("the time of a hazard", time)));
     }
     if let Some((what, number)) = numbers.into_iter().find(|(_, number)| !number.is_finite()) {
         return Some(format!("{what} is {number}"));

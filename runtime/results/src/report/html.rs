@@ -2,11 +2,14 @@
 
 mod all_tests;
 mod cells;
+pub(super) mod certificate;
 mod command;
 mod front;
 mod generations;
 mod header;
 mod legend;
+mod mend;
+mod monitors;
 mod page;
 mod policy;
 mod published;
@@ -15,6 +18,7 @@ mod scatter;
 mod shrinking;
 mod test;
 mod timeline;
+mod tree;
 
-pub use page::{page, write_page, write_page_with};
+pub use page::{page, write_page, write_page_against, write_page_with};
 pub(crate) use policy::policy;

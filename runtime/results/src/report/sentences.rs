@@ -3,12 +3,15 @@
 use std::fmt::Write as _;
 
 use sesame_base::observation::Counters;
+use sesame_base::test_number::TestNumber;
 use sesame_plan::{Confirmation, Span, Statistic};
 
 use crate::analysis::confirmed::ConfirmedTest;
 use crate::present::number::{self, fixed, join_words, plural};
 use crate::present::table::visible;
 use crate::record::{Standing, Verdict};
+use crate::report::facts::certificate::campaign::MonitorsSummary;
+use crate::report::facts::certificate::mend::Mend;
 use crate::report::facts::coverage::CoverageSummary;
 use crate::report::facts::readable::short_numbers;
 use crate::report::facts::repetition::ViolationRate;
@@ -36,6 +39,9 @@ pub fn headline(summary: &Summary) -> String {
         0 => "no requirement violated".to_owned(),
         n => format!("{} violated ({})", plural(n, "requirement", "requirements"), violated.join(", ")),
     });
+    if let Some(monitors) = &summary.monitors {
+        parts.extend(missed_words(monitors));
+    }
     let satisfied = summary.expectations.iter().filter(|expectation| expectation.verdict == Verdict::Satisfied).count();
     match summary.expectations.len() {
         0 => {}
@@ -60,6 +66,45 @@ pub fn headline(summary: &Summary) -> String {
     }
     sentence
 }
+
+/// In how many tests monitors missed hazards, unless in none.
+fn missed_words(monitors: &MonitorsSummary) -> Option<String> {
+    let mut tests: Vec<TestNumber> = monitors.missed.iter().map(|missed| missed.test).collect();
+    tests.dedup();
+    (!tests.is_empty()).then(|| format!("hazards missed in {}", plural(tests.len(), "test", "tests")))
+}
+
+/// What the monitors of a campaign did, in a sentence.
+pub(crate) fn monitors_sentence(monitors: &MonitorsSummary) -> String {
+    let foreseen: usize = monitors.hazards.iter().map(|pair| pair.foreseen).sum();
+    let missed: usize = monitors.hazards.iter().map(|pair| pair.missed).sum();
+    let of = plural(monitors.tests, "test", "tests");
+    match foreseen + missed {
+        0 => format!("In {of} there was no hazard that a monitor was to foresee"),
+        all => {
+            format!("In {of} monitors foresaw {foreseen} of {} and missed {missed}", plural(all, "hazard", "hazards"))
+        }
+    }
+}
+
+/// What a mend changed, in a sentence.
+pub(crate) fn mend_sentence(mend: &Mend) -> String {
+    let Mend { tests, missed_before, missed_after, .. } = mend;
+    match tests {
+        0 => "No test is in both results; `export` writes a test for the `.sesame` file, and `known` runs it under \
+              either certificate"
+            .to_owned(),
+        _ => format!(
+            "Of {} in both results, hazards were missed in {missed_before} before and in {missed_after} after",
+            plural(*tests, "test", "tests")
+        ),
+    }
+}
+
+/// What hazards, lead times and alarms are.
+pub(crate) const MONITORS_CAPTION: &str = "A hazard is the first violation of a requirement in a test. It is foreseen if the monitor is in its safe state then; \
+     the lead time is how long it has been. It is missed if it is not. An alarm is the loss of the last guarantee; it is \
+     false if no hazard follows in it, for which mitigation may be the reason.";
 
 /// What the table of quarantined tests is called.
 pub(crate) const QUARANTINED: &str = "Quarantined: crashed in three runs, and not run again";

@@ -1,5 +1,7 @@
 //! The tables of reports: each is put together once, and text and HTML render it.
 
+pub(super) mod monitors;
+
 use crate::analysis::confirmed::{ConfirmedTest, FindingAgain, tally_words};
 use crate::analysis::regions::Rule;
 use crate::present::number::{self, plural, titled};
@@ -202,7 +204,9 @@ pub(super) fn list(list: &TestList) -> Table {
             .zip(&list.units)
             .map(|(metric, unit)| Column::metric(&titled(metric, unit.as_deref()), None)),
     );
-    columns.extend([Column::line("violates"), Column::sentence("operations")]);
+    columns.push(Column::line("violates"));
+    columns.extend(list.monitors.then(|| Column::line("missed")));
+    columns.push(Column::sentence("operations"));
     let mut table = Table::with(columns);
     for test in &list.tests {
         let outcome = match test.duplicate_of {
@@ -218,7 +222,9 @@ pub(super) fn list(list: &TestList) -> Table {
         ];
         let value = |at: usize| Datum::real(test.values.get(at).and_then(|shown| shown.value));
         cells.extend((0..list.metrics.len()).map(value));
-        cells.extend([Datum::Text(test.violates.join(" ")), Datum::text(&test.operations)]);
+        cells.push(Datum::Text(test.violates.join(" ")));
+        cells.extend(list.monitors.then(|| Datum::Text(test.missed.join(", "))));
+        cells.push(Datum::text(&test.operations));
         table.row(cells);
     }
     table

@@ -7,6 +7,7 @@ use super::*;
 use crate::record::{Origin, Repository, Standing, Verdict, sample};
 
 mod browser;
+mod monitors;
 mod page;
 mod robustness;
 mod run_again;

@@ -1,18 +1,26 @@
 //! Reports as text for a terminal.
 
+use sesame_base::visible::visible_lines;
+
 use crate::analysis::confirmed::ConfirmedTest;
 use crate::present::number::{join_words, plural};
 use crate::present::table::{Table, TextOptions, visible, wrap};
+use crate::report::facts::certificate::campaign::MonitorsSummary;
+use crate::report::facts::certificate::moment::MomentReport;
+use crate::report::facts::certificate::test::MonitorReport;
 use crate::report::facts::recording::RecordingReplay;
 use crate::report::facts::replay::Replay;
 use crate::report::facts::show::{TestList, TestReport};
 use crate::report::facts::shrinking::Shrinking;
 use crate::report::facts::summary::Summary;
 use crate::report::sentences::{
-    QUARANTINED, beyond_sentence, confirmation_sentence, counts_sentence, coverage_sentence, headline, once_sentence,
-    outcome_sentence, shrinking_sentence, values_sentence,
+    QUARANTINED, beyond_sentence, confirmation_sentence, counts_sentence, coverage_sentence, headline, mend_sentence,
+    monitors_sentence, once_sentence, outcome_sentence, shrinking_sentence, values_sentence,
 };
 use crate::report::tables;
+
+/// Rows of a table that may be very long.
+const ROWS: usize = 40;
 
 /// What a campaign found: the front, the requirements, crashes and timeouts, and how many tests had no effect.
 pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
@@ -31,6 +39,22 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
         section(&mut text, "Values", &tables::spreads(&summary.spreads), options);
     }
     section(&mut text, "Requirements", &tables::requirements(summary), options);
+    if let Some(found) = &summary.monitors {
+        monitors(&mut text, found, options);
+    }
+    if let Some(mend) = &summary.mend {
+        let mut table = tables::monitors::mended(mend);
+        let more = table.truncate(ROWS);
+        section(&mut text, "Before and after the mend", &table, options);
+        if more > 0 {
+            paragraph(&mut text, &format!("and {more} more; `--format json` has all"), options);
+        }
+        paragraph(&mut text, &format!("{}.", mend_sentence(mend)), options);
+        if let Some(difference) = &mend.difference {
+            let words = format!("warning: not only the monitors differ: {}", visible(difference));
+            paragraph(&mut text, &words, options);
+        }
+    }
     section(&mut text, "Regression tests", &tables::expectations(&summary.expectations), options);
     if let Some(repetition) = &summary.repetition {
         section(&mut text, &repetition.title, &tables::violation_rates(&repetition.requirements), options);
@@ -51,6 +75,54 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
     }
     for warning in &summary.warnings {
         paragraph(&mut text, &format!("warning: {}", visible(warning)), options);
+    }
+    text
+}
+
+/// What monitors were worth, missed hazards first.
+fn monitors(text: &mut String, found: &MonitorsSummary, options: TextOptions) {
+    let mut missed = tables::monitors::missed_hazards(found);
+    let more = missed.truncate(ROWS);
+    section(text, "Missed hazards", &missed, options);
+    if more > 0 {
+        paragraph(text, &format!("and {more} more; `list` marks them all"), options);
+    }
+    section(text, "Hazards", &tables::monitors::hazards(found), options);
+    section(text, "Monitors", &tables::monitors::monitors(found), options);
+    paragraph(text, &format!("{}.", monitors_sentence(found)), options);
+}
+
+/// What the monitors of a test did.
+fn monitors_of_test(text: &mut String, monitors: &[MonitorReport], options: TextOptions) {
+    section(text, "Hazards", &tables::monitors::hazards_of_test(monitors), options);
+    for (title, mut table) in [
+        ("Decisions of monitors", tables::monitors::decisions(monitors)),
+        ("Evidence", tables::monitors::evidence(monitors)),
+    ] {
+        let more = table.truncate(ROWS);
+        section(text, title, &table, options);
+        if more > 0 {
+            paragraph(text, &format!("and {more} more; `--format json` has all"), options);
+        }
+    }
+}
+
+/// The certificates of a test at a moment.
+pub fn moment_text(moment: &MomentReport, options: TextOptions) -> String {
+    let mut text = String::new();
+    let at = tables::monitors::seconds(moment.at);
+    paragraph(&mut text, &options.heading(&format!("{} at {at}", moment.test)), options);
+    for monitor in &moment.monitors {
+        text.push('\n');
+        text.push_str(&visible_lines(&monitor.text));
+        let since = tables::monitors::seconds(monitor.since);
+        paragraph(&mut text, &format!("`{}` since {since}", monitor.state), options);
+        for why in &monitor.why {
+            paragraph(&mut text, &visible(&why.sentence), options);
+            for because in &why.because {
+                text.push_str(&format!("    {}\n", visible(&because.words(&monitor.monitor))));
+            }
+        }
     }
     text
 }
@@ -103,6 +175,7 @@ pub fn test_text(test: &TestReport, options: TextOptions) -> String {
     if let Some(sentence) = beyond_sentence(&test.requirements) {
         paragraph(&mut text, sentence, options);
     }
+    monitors_of_test(&mut text, &test.monitors, options);
     if let Some(confirmed) = &test.confirmed {
         section(&mut text, "Run again", &tables::findings(confirmed), options);
     }

@@ -2,9 +2,9 @@
 
 use rusqlite::Connection;
 
-use sesame_base::observation::{ChangeCause, EvidenceChange, MonitorDecision, MonitorObservation};
+use sesame_base::observation::{ChangeCause, EvidenceChange, MonitorDecision, MonitorHazard, MonitorObservation};
 use sesame_plan::testing::{evidence_above, guarantee, monitor, topic};
-use sesame_plan::{CampaignPlan, Gate, MonitorState, Type};
+use sesame_plan::{CampaignPlan, Gate, MonitorState, RequirementId, Type};
 
 use super::folder;
 use crate::record::{DATABASE, Origin, Recorder, Repository, sample};
@@ -29,6 +29,10 @@ fn shown() -> MonitorObservation {
             decision(2.500_000_001, MonitorState::Otherwise),
         ],
         evidence: vec![change(1.5, Some(true), message), change(2.500_000_001, None, ChangeCause::Stale)],
+        hazards: vec![
+            MonitorHazard { requirement: RequirementId(0), time: 2.0, lead: None },
+            MonitorHazard { requirement: RequirementId(2), time: 3.5, lead: Some(0.999_999_999) },
+        ],
         omitted: 4,
     }
 }
@@ -60,6 +64,24 @@ fn what_a_monitor_did_comes_back_with_its_test_and_sql_reads_it_with_names() {
         "SELECT evidence || ' ' || coalesce(holds, '?') || ' ' || cause || coalesce(' ' || path || message, '') FROM evidence",
     );
     assert_eq!(evidence, ["ok 1 message a7", "ok ? stale"]);
+    let hazards = rows(
+        "SELECT monitor || ' ' || requirement || ' ' || time_s || ' ' || foreseen || ' ' || coalesce(lead_s, '-') \
+         FROM hazards WHERE test_name = 'T3' ORDER BY time_s",
+    );
+    assert_eq!(hazards, ["cell R1 2.0 0 -", "cell R3 3.5 1 0.999999999"]);
+}
+
+#[test]
+fn results_of_before_hazards_were_recorded_are_read_and_go_on() {
+    let folder = folder();
+    drop(recorded(folder.path(), vec![shown()]));
+    let open = Connection::open(folder.path().join(DATABASE)).unwrap();
+    open.execute_batch("DROP VIEW hazards; DROP TABLE monitor_hazards").unwrap();
+    let repository = Repository::open(folder.path()).unwrap();
+    let read = repository.test(3).unwrap().observation.monitors;
+    assert_eq!(read, [MonitorObservation { hazards: Vec::new(), ..shown() }]);
+    crate::record::monitors::install(&open, &plan()).unwrap();
+    assert!(crate::record::monitors::have_hazards(&open).unwrap());
 }
 
 #[test]

@@ -19,6 +19,8 @@ use crate::record::{
     EventKind, Judge, MetricValue, Origin, RecordError, Repetition, Repository, Tally, TestRecord, TestRow, Verdict,
     verdict, violation_spans,
 };
+use crate::report::facts::certificate::campaign::missed_by_test;
+use crate::report::facts::certificate::test::{MonitorReport, monitors};
 use crate::report::facts::readable;
 use crate::report::facts::repetition::run_word;
 use crate::report::facts::stacked::{Stacked, stacked_in};
@@ -49,6 +51,9 @@ pub struct ListedTest {
     pub measured: BTreeMap<String, Option<f64>>,
     /// Names of the requirements it violates.
     pub violates: Vec<String>,
+    /// Hazards that monitors missed in it, as in `R1 by transport`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub missed: Vec<String>,
     /// Its operations, as in `jitter_link0 ×2, lose_link0`.
     pub operations: String,
 }
@@ -60,6 +65,9 @@ pub struct TestList {
     pub metrics: Vec<String>,
     /// Their units.
     pub units: Vec<Option<String>>,
+    /// Whether the space has monitors.
+    #[serde(skip)]
+    pub(crate) monitors: bool,
     /// The tests, by number.
     pub tests: Vec<ListedTest>,
 }
@@ -104,6 +112,9 @@ pub struct TestReport {
     pub metrics: Vec<MetricReport>,
     /// All requirements of the space.
     pub requirements: Vec<VerdictReport>,
+    /// All monitors of the space, if it has any and what they did was recorded.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub monitors: Vec<MonitorReport>,
     /// Findings of its fresh runs, if it was run again.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub confirmed: Option<ConfirmedTest>,
@@ -226,13 +237,19 @@ pub fn list(repository: &Repository) -> Result<TestList, RecordError> {
     let plan = repository.plan();
     let front = repository.latest_result_set()?.map_or_else(Vec::new, |set| set.members);
     let judge = repository.judge()?;
+    let rows = repository.tests()?;
+    let missed = missed_by_test(repository, &rows)?;
+    let missed = |row: &TestRow| missed.get(&row.duplicate_of.unwrap_or(row.number)).cloned().unwrap_or_default();
     Ok(TestList {
+        monitors: !plan.monitors.is_empty(),
         metrics: plan.metrics.iter().map(|metric| metric.name.clone()).collect(),
         units: plan.metrics.iter().map(|metric| metric.unit.clone()).collect(),
-        tests: repository
-            .tests()?
+        tests: rows
             .iter()
-            .map(|row| listed(plan, repository.task(), &judge, row, front.contains(&row.number)))
+            .map(|row| ListedTest {
+                missed: missed(row),
+                ..listed(plan, repository.task(), &judge, row, front.contains(&row.number))
+            })
             .collect(),
     })
 }
@@ -254,6 +271,7 @@ fn listed(plan: &CampaignPlan, task: &Task, judge: &Judge<'_>, row: &TestRow, fr
             .map(|(metric, shown)| (metric.name.clone(), shown.value))
             .collect(),
         violates: wording::violated(plan, judge, row),
+        missed: Vec::new(),
         operations: wording::operations(plan, row),
     }
 }
@@ -321,6 +339,7 @@ pub(crate) fn report_on(
             })
             .collect(),
         requirements: verdicts(plan, record, fresh),
+        monitors: monitors(plan, observation),
         confirmed: None,
         warnings: observation.warnings.iter().map(|text| readable::sentence(plan, text)).collect(),
         notes: Vec::new(),

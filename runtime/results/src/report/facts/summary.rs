@@ -16,6 +16,8 @@ use crate::present::number;
 use crate::record::{
     EventKind, Judge, MetricValue, Origin, RecordError, Repository, Standing, TestRow, Verdict, is_quarantined, verdict,
 };
+use crate::report::facts::certificate::campaign::{MonitorsSummary, monitors_summary};
+use crate::report::facts::certificate::mend::Mend;
 use crate::report::facts::coverage::{CoverageSummary, coverage};
 use crate::report::facts::readable;
 use crate::report::facts::repetition::{Repetition, repetition};
@@ -50,6 +52,12 @@ pub struct Summary {
     pub once: usize,
     /// All requirements of the space, in its order.
     pub requirements: Vec<RequirementSummary>,
+    /// What the monitors of the space were worth, if it has any and what they did was recorded.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub monitors: Option<MonitorsSummary>,
+    /// How the monitors did in the same tests before, if these results are compared with others.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mend: Option<Mend>,
     /// Expectations of regression tests, in the order of the tests.
     pub expectations: Vec<ExpectationSummary>,
     /// Crashes and timeouts, and runs that the environment broke off, by test: of its first run, and those that only
@@ -303,6 +311,8 @@ pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: &[u3
             .iter()
             .map(|requirement| summarise_requirement(plan, &judge, requirement, rows))
             .collect(),
+        monitors: monitors_summary(repository, rows)?,
+        mend: None,
         expectations: expectations(plan, rows),
         repetition: repetition(plan, repository.task(), rows),
         shrinking: shrinking(repository, rows)?,

@@ -15,7 +15,7 @@ use crate::report::html::generations::generations;
 use crate::report::html::header::header;
 use crate::report::html::policy::policy;
 use crate::report::html::test::test;
-use crate::report::html::{cells, regions, shrinking};
+use crate::report::html::{cells, mend, monitors, regions, shrinking, tree};
 use crate::report::sentences::{QUARANTINED, once_sentence};
 use crate::report::tables;
 
@@ -29,18 +29,34 @@ pub fn write_page(repository: &Repository, path: &Path) -> Result<(), RecordErro
 
 /// The same for results whose digest is known already.
 pub fn write_page_with(repository: &Repository, path: &Path, digest: &str) -> Result<(), RecordError> {
+    write_page_against(repository, None, path, digest)
+}
+
+/// The same with results of before the certificates were mended: the page shows the same tests before and after.
+pub fn write_page_against(
+    repository: &Repository,
+    before: Option<&Repository>,
+    path: &Path,
+    digest: &str,
+) -> Result<(), RecordError> {
     let beside = path.parent() == Some(repository.folder());
     let folder = if beside { Path::new("") } else { repository.folder() };
-    write_aside(path, &page_in(repository, folder, digest)?).map_err(|e| RecordError::io("write the page", path, e))
+    let page = page_in(repository, before, folder, digest)?;
+    write_aside(path, &page).map_err(|e| RecordError::io("write the page", path, e))
 }
 
 /// The page, from a campaign's results; a run may still be going on. Links to traces lead from the run's folder.
 pub fn page(repository: &Repository) -> Result<String, RecordError> {
-    page_in(repository, Path::new(""), &repository.digest()?)
+    page_in(repository, None, Path::new(""), &repository.digest()?)
 }
 
 /// The page; `folder` is the path of the run's folder relative to the page.
-fn page_in(repository: &Repository, folder: &Path, digest: &str) -> Result<String, RecordError> {
+fn page_in(
+    repository: &Repository,
+    before: Option<&Repository>,
+    folder: &Path,
+    digest: &str,
+) -> Result<String, RecordError> {
     let rows = repository.tests()?;
     let members = repository.latest_result_set()?.map_or_else(Vec::new, |set| set.members);
     let summary = summarise(repository, &rows, &members)?;
@@ -53,6 +69,10 @@ fn page_in(repository: &Repository, folder: &Path, digest: &str) -> Result<Strin
     if let Some(shrinking) = &summary.shrinking {
         shrinking::shrinking(&mut body, shrinking, &drawn);
     }
+    monitors::monitors(&mut body, &summary, &drawn);
+    if let Some(before) = before {
+        mend::before_and_after(&mut body, repository, before, &drawn)?;
+    }
     requirements(&mut body, &summary, &drawn);
     front(&mut body, repository, &summary, &rows, &drawn);
     all_tests(&mut body, repository, &summary, &rows, &drawn)?;
@@ -61,6 +81,7 @@ fn page_in(repository: &Repository, folder: &Path, digest: &str) -> Result<Strin
         cells::coverage(&mut body, repository.plan(), coverage, &drawn);
     }
     regions::regions(&mut body, repository)?;
+    tree::certificates(&mut body, repository.plan());
     sections(&mut body, &summary, &drawn);
     for group in groups.iter().filter(|group| !group.tests.is_empty()) {
         body.open("section", &[]);
@@ -85,6 +106,24 @@ fn page_in(repository: &Repository, folder: &Path, digest: &str) -> Result<Strin
 const MARKS: &str =
     "Outlined: planned; filled: active. Red: the value up to then is outside the bound of a requirement.";
 
+/// What the lanes of a certificate mean.
+const MISSED: &str = "Of each monitor its state over time, the higher the stronger; dashed: its safe state. Below it its \
+                      evidence: filled: true; a line at the bottom: false; dashed: unknown. Vertical: a requirement was \
+                      violated, solid where the monitor had not foreseen it. ▼: mitigation was sent. Point at a state to \
+                      see why it was so.";
+
+/// Tests that get a timeline because monitors missed hazards in them.
+const MOST_MISSED: usize = 8;
+
+/// Tests in which monitors missed hazards.
+fn missed(summary: &Summary) -> Vec<u32> {
+    let mut tests: Vec<u32> =
+        summary.monitors.iter().flat_map(|monitors| &monitors.missed).map(|missed| missed.test.0).collect();
+    tests.dedup();
+    tests.truncate(MOST_MISSED);
+    tests
+}
+
 /// Tests that get a timeline, under a heading.
 struct Group {
     title: &'static str,
@@ -96,6 +135,8 @@ fn chosen(summary: &Summary, rows: &[TestRow]) -> Vec<Group> {
     let reference: Vec<u32> =
         rows.iter().filter(|row| row.origin == Origin::Reference).map(|row| row.number).take(1).collect();
     let all: Vec<u32> = summary.front.iter().map(|test| test.number).collect();
+    let missed = missed(summary);
+    let all: Vec<u32> = all.into_iter().filter(|number| !missed.contains(number)).collect();
     let front = evenly(&all, TIMELINES);
     let worst = summary.requirements.iter().filter_map(|requirement| requirement.worst.as_ref());
     let worst = worst.filter_map(|worst| rows.iter().find(|row| row.number == worst.test.0));
@@ -103,7 +144,7 @@ fn chosen(summary: &Summary, rows: &[TestRow]) -> Vec<Group> {
     let known = rows.iter().filter(|row| matches!(row.origin, Origin::Known(_))).take(8);
     let mut more: Vec<u32> = Vec::new();
     for row in worst.chain(failed).chain(known) {
-        if !front.contains(&row.number) && !more.contains(&row.number) {
+        if ![&front, &more, &missed].iter().any(|others| others.contains(&row.number)) {
             more.push(row.number);
         }
     }
@@ -114,6 +155,7 @@ fn chosen(summary: &Summary, rows: &[TestRow]) -> Vec<Group> {
     };
     let shrunk = summary.shrinking.as_ref().map_or_else(Vec::new, Shrinking::ends);
     more.retain(|number| !shrunk.contains(number));
+    let missed: Vec<u32> = missed.into_iter().filter(|it| !shrunk.contains(it) && !reference.contains(it)).collect();
     let shrunk_caption = "The test before and after it was shrunk.".to_owned();
     vec![
         Group { title: "Before and after", caption: shrunk_caption, tests: shrunk },
@@ -122,6 +164,7 @@ fn chosen(summary: &Summary, rows: &[TestRow]) -> Vec<Group> {
             caption: "The run without disturbance, for comparison.".to_owned(),
             tests: reference,
         },
+        Group { title: "Tests with missed hazards", caption: MISSED.to_owned(), tests: missed },
         Group { title: "Tests on the front", caption: front_caption, tests: front },
         Group {
             title: "More tests to look at",

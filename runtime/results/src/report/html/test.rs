@@ -12,6 +12,9 @@ use crate::report::html::timeline::timeline;
 use crate::report::sentences::{beyond_sentence, outcome_sentence};
 use crate::report::tables;
 
+/// Rows of a table that may be very long.
+const ROWS: usize = 50;
+
 /// Draws a test of these results; `folder` is the path of the run's folder relative to the page.
 pub(super) fn test(
     body: &mut Markup,
@@ -44,6 +47,16 @@ fn heading(body: &mut Markup, summary: &Summary, report: &TestReport) {
     }
     for requirement in report.requirements.iter().filter(|requirement| requirement.verdict == Verdict::Violated) {
         body.element("span", &[("class", "chip"), ("title", &requirement.text)], &requirement.requirement);
+    }
+    for monitor in &report.monitors {
+        for hazard in monitor.missed() {
+            let title = format!(
+                "{} had not foreseen the hazard of {} at {:.3} s",
+                monitor.monitor, hazard.requirement, hazard.at
+            );
+            let words = format!("hazard of {} missed by {}", hazard.requirement, monitor.monitor);
+            body.element("span", &[("class", "chip missed"), ("title", &title)], &words);
+        }
     }
     body.close();
     let values: Vec<String> = summary
@@ -78,6 +91,19 @@ fn figures(body: &mut Markup, report: &TestReport, command: &str) {
         tables::verdicts(&report.requirements).html(body, &[]);
         if let Some(sentence) = beyond_sentence(&report.requirements) {
             body.element("p", &[("class", "quiet")], sentence);
+        }
+    }
+    for mut table in [
+        tables::monitors::hazards_of_test(&report.monitors),
+        tables::monitors::decisions(&report.monitors),
+        tables::monitors::evidence(&report.monitors),
+    ] {
+        let more = table.truncate(ROWS);
+        if !table.is_empty() {
+            table.html(body, &[]);
+        }
+        if more > 0 {
+            body.element("p", &[("class", "quiet")], &format!("And {more} more; the test in JSON has all."));
         }
     }
     for warning in &report.warnings {

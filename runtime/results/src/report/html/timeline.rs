@@ -14,6 +14,7 @@ use crate::present::number;
 use crate::record::{MetricValue, TestRecord};
 use crate::report::facts::show::{OperationReport, TestReport, decided_at, violated_when};
 use crate::report::facts::wording::value_text;
+use crate::report::html::certificate;
 use crate::report::sentences::{choices_text, effect_text, planned_text, spans_text};
 
 /// Height of a lane of an operation, in pixels.
@@ -38,9 +39,20 @@ pub(crate) fn timeline(markup: &mut Markup, plan: &CampaignPlan, record: &TestRe
     let until = coordinate(time.high);
     markup.open("figure", &[("class", "timeline"), ("aria-label", &label), ("data-end", &until)]);
     lanes(markup, &time, &report.operations, broke_off);
+    certificate::lanes(markup, &time, &report.monitors, (end, broke_off));
     for id in shown_metrics(plan, record) {
         series(markup, plan, &time, id, &record.observation.metrics[id], (end, broke_off));
     }
+    time_axis(markup, &time);
+    if let Some(at) = broke_off {
+        let words = format!("Broke off at {}: {}.", number::quantity(at, Some("s")), report.outcome);
+        markup.element("p", &[("class", "quiet")], &words);
+    }
+    markup.close();
+}
+
+/// The numbers of the time axis.
+pub(super) fn time_axis(markup: &mut Markup, time: &Axis) {
     row(markup, |markup| markup.element("span", &[("class", "quiet")], "simulation time"));
     markup.open("svg", &[("class", "plot"), ("height", "24"), ("aria-hidden", "true")]);
     let labels = time.labels();
@@ -52,15 +64,10 @@ pub(crate) fn timeline(markup: &mut Markup, plan: &CampaignPlan, record: &TestRe
     }
     markup.close();
     markup.close();
-    if let Some(at) = broke_off {
-        let words = format!("Broke off at {}: {}.", number::quantity(at, Some("s")), report.outcome);
-        markup.element("p", &[("class", "quiet")], &words);
-    }
-    markup.close();
 }
 
 /// Opens a row and writes its label; the caller adds the plot and closes the row.
-fn row(markup: &mut Markup, label: impl FnOnce(&mut Markup)) {
+pub(super) fn row(markup: &mut Markup, label: impl FnOnce(&mut Markup)) {
     markup.open("div", &[("class", "row")]);
     markup.open("div", &[("class", "label")]);
     label(markup);
@@ -289,7 +296,7 @@ fn series(
 }
 
 /// The time axis's lines, and what lies behind the end of a run that broke off.
-fn backdrop(markup: &mut Markup, time: &Axis, broke_off: Option<f64>) {
+pub(super) fn backdrop(markup: &mut Markup, time: &Axis, broke_off: Option<f64>) {
     for tick in &time.ticks {
         let x = percent(time.share(*tick));
         markup.leaf("line", &[("class", "grid"), ("x1", &x), ("x2", &x), ("y1", "0"), ("y2", "100%")]);

@@ -9,6 +9,7 @@ use std::process::Command;
 
 use serde_json::Value;
 
+use super::monitors::monitored_page;
 use super::page::full_page;
 use crate::present::number;
 use crate::report::study;
@@ -139,6 +140,31 @@ fn the_table_of_tests_sorts_filters_and_selects_everywhere() {
 fn timelines_have_a_cursor_a_zoom_and_a_second_test() {
     let Some(browser) = browser() else { return };
     assert_checks(browser, include_str!("browser/timelines.js"), 10);
+}
+
+#[test]
+fn certificates_can_be_read_on_any_screen_and_keep_with_the_policy() {
+    let Some(browser) = browser() else { return };
+    let html = monitored_page();
+    let (shown, log) = opened(browser, &html, 1280, Scheme::Light);
+    assert!(
+        shown.contains("<select") && !log.contains("Content Security Policy") && !log.contains("Uncaught"),
+        "{log}"
+    );
+    for scheme in [Scheme::Light, Scheme::Dark] {
+        let found = findings(browser, &html, include_str!("browser/contrast.js"), 1280, scheme);
+        assert!(found["measured"].as_u64().unwrap() > 500, "{found}");
+        let low = found["low"].as_array().unwrap();
+        assert!(low.is_empty(), "{scheme:?}: {low:#?}");
+    }
+    let found = findings(browser, &html, include_str!("browser/narrow.js"), 390, Scheme::Light);
+    assert_eq!(found["beyond"], Value::Array(Vec::new()), "what is wider than the screen");
+}
+
+#[test]
+fn certificates_follow_the_cursor_and_the_zoom() {
+    let Some(browser) = browser() else { return };
+    assert_checks_of(browser, &monitored_page(), include_str!("browser/certificates.js"), 1280, 6);
 }
 
 #[test]

@@ -1,0 +1,210 @@
+//! The tables of what runtime monitors did.
+
+use crate::present::number;
+use crate::present::table::{Cell, Column, Datum, Table};
+use crate::report::facts::certificate::campaign::MonitorsSummary;
+use crate::report::facts::certificate::mend::Mend;
+use crate::report::facts::certificate::test::{HazardReport, MonitorReport};
+use crate::report::facts::certificate::why::cause_text;
+
+/// A time in seconds, to the millisecond.
+pub(in crate::report) fn seconds(time: f64) -> String {
+    number::with_unit(number::fixed(time, 3), Some("s"))
+}
+
+fn at(time: f64) -> Datum {
+    Datum::text(seconds(time))
+}
+
+fn maybe_at(time: Option<f64>) -> Datum {
+    time.map_or(Datum::Missing, at)
+}
+
+/// What a monitor made of a hazard.
+pub(in crate::report) fn foreseen_text(hazard: &HazardReport) -> String {
+    match hazard.lead {
+        Some(lead) => format!("foreseen {} before", seconds(lead)),
+        None => "MISSED".to_owned(),
+    }
+}
+
+/// Tests in which hazards were missed.
+pub(in crate::report) fn missed_hazards(summary: &MonitorsSummary) -> Table {
+    let mut table = Table::with([
+        Column::heading("test"),
+        Column::words("missed by"),
+        Column::words("hazard of"),
+        Column::number("at"),
+        Column::words("state then"),
+    ]);
+    for missed in &summary.missed {
+        table.row([
+            Datum::Test(missed.test).into(),
+            Datum::text(&missed.monitor).into(),
+            Datum::text(&missed.requirement).bad_if(true),
+            at(missed.at).into(),
+            Cell::from(Datum::text(&missed.state)),
+        ]);
+    }
+    table
+}
+
+/// Hazards foreseen and missed, and alarms without one.
+pub(in crate::report) fn hazards(summary: &MonitorsSummary) -> Table {
+    let mut table = Table::with([
+        Column::heading("monitor"),
+        Column::words("hazards of"),
+        Column::number("missed"),
+        Column::number("foreseen"),
+        Column::number("least lead"),
+        Column::number("median lead"),
+        Column::number("false alarms"),
+    ]);
+    for pair in &summary.hazards {
+        table.row([
+            Datum::text(&pair.monitor).into(),
+            Datum::text(&pair.requirement).into(),
+            Datum::count(pair.missed).bad_if(pair.missed > 0),
+            Datum::count(pair.foreseen).into(),
+            maybe_at(pair.least_lead).into(),
+            maybe_at(pair.median_lead).into(),
+            Cell::from(Datum::Whole(i64::from(pair.false_alarms))),
+        ]);
+    }
+    table
+}
+
+/// How monitors changed their states, and how long they were in each.
+pub(in crate::report) fn monitors(summary: &MonitorsSummary) -> Table {
+    let mut table = Table::with([
+        Column::heading("monitor"),
+        Column::number("median changes"),
+        Column::words("most changes"),
+        Column::number("shortest stay"),
+        Column::number("alarms"),
+        Column::number("mitigations"),
+        Column::sentence("time in each state"),
+    ]);
+    let whole = |count: u64| i64::try_from(count).map_or(Datum::Missing, Datum::Whole);
+    for monitor in &summary.monitors {
+        let states = monitor.states.iter().map(|it| format!("{} {:.1} %", it.state, 100.0 * it.share));
+        table.row([
+            Datum::text(&monitor.monitor),
+            Datum::Lone(monitor.median_changes),
+            monitor.most_changes.map_or(Datum::Missing, |(test, most)| Datum::OfTest(test, format!("({most})"))),
+            maybe_at(monitor.shortest_stay),
+            whole(monitor.alarms),
+            monitor.mitigations.map_or(Datum::Missing, whole),
+            Datum::Text(states.collect::<Vec<_>>().join(", ")),
+        ]);
+    }
+    table
+}
+
+/// Tests in which hazards were missed before a mend, or are after it.
+pub(in crate::report) fn mended(mend: &Mend) -> Table {
+    let mut table = Table::with([
+        Column::heading("test"),
+        Column::words("before it was"),
+        Column::words("missed before"),
+        Column::words("missed after"),
+    ]);
+    for test in &mend.changed {
+        let seed = if test.same_seed { "" } else { ", other simulator seed" };
+        let words = |missed: &[String]| match missed {
+            [] => Datum::text("none").quiet(),
+            missed => Datum::Text(missed.join(", ")).bad_if(true),
+        };
+        table.row([
+            Datum::Test(test.test).into(),
+            Cell::from(Datum::Text(format!("{}{seed}", test.before))),
+            words(&test.missed_before),
+            words(&test.missed_after),
+        ]);
+    }
+    table
+}
+
+/// The hazards of a test, missed ones first.
+pub(in crate::report) fn hazards_of_test(monitors: &[MonitorReport]) -> Table {
+    let mut table = Table::with([
+        Column::heading("monitor"),
+        Column::words("hazard of"),
+        Column::number("at"),
+        Column::words("outcome"),
+        Column::sentence("sentence"),
+    ]);
+    for missed in [true, false] {
+        for monitor in monitors {
+            for hazard in monitor.hazards.iter().filter(|hazard| hazard.foreseen != missed) {
+                table.row([
+                    Datum::text(&monitor.monitor).into(),
+                    Datum::text(&hazard.requirement).into(),
+                    at(hazard.at).into(),
+                    Datum::text(foreseen_text(hazard)).bad_if(missed),
+                    Cell::from(Datum::text(&hazard.text)),
+                ]);
+            }
+        }
+    }
+    table
+}
+
+/// The decisions of a test, with their reasons.
+pub(in crate::report) fn decisions(monitors: &[MonitorReport]) -> Table {
+    let mut table = Table::with([
+        Column::heading("monitor"),
+        Column::number("at"),
+        Column::words("state"),
+        Column::number("for"),
+        Column::words("caused by"),
+        Column::sentence("because"),
+    ]);
+    for monitor in monitors {
+        for decision in &monitor.decisions {
+            let cause = match (&decision.cause, decision.at > 0.0) {
+                (Some(_), _) => Datum::Text(decision.cause_text()),
+                (None, false) => Datum::text("the beginning"),
+                (None, true) => Datum::Missing,
+            };
+            let mut because = decision.reason();
+            if let Some(mitigation) = &decision.mitigation {
+                because += &format!("; sent `{mitigation}`");
+            }
+            table.row([
+                Datum::text(&monitor.monitor),
+                at(decision.at),
+                Datum::text(&decision.state),
+                at(decision.until - decision.at),
+                cause,
+                Datum::Text(because),
+            ]);
+        }
+    }
+    table
+}
+
+/// The changes of evidence in a test.
+pub(in crate::report) fn evidence(monitors: &[MonitorReport]) -> Table {
+    let mut table = Table::with([
+        Column::heading("monitor"),
+        Column::words("evidence"),
+        Column::number("at"),
+        Column::words("is"),
+        Column::sentence("caused by"),
+    ]);
+    for monitor in monitors {
+        for evidence in &monitor.evidence {
+            for change in &evidence.changes {
+                table.row([
+                    Datum::text(&monitor.monitor),
+                    Datum::text(&evidence.evidence),
+                    at(change.at),
+                    Datum::text(&change.is),
+                    Datum::Text(cause_text(&change.cause)),
+                ]);
+            }
+        }
+    }
+    table
+}
