@@ -14,7 +14,15 @@ use sesame_grammar::{GRAMMAR, Rule, SesameParser};
 #[expect(clippy::disallowed_methods, reason = "the crate is pure; its tests read their corpus")]
 fn files() -> Vec<(PathBuf, String)> {
     let crate_folder = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let folders = ["tests/good", "tests/bad", "tests/format", "../examples/kuka_cell", "../examples/two_robots"];
+    let folders = [
+        "tests/good",
+        "tests/bad",
+        "tests/format",
+        "../examples/a50_cell",
+        "../examples/kuka_cell",
+        "../examples/transport",
+        "../examples/two_robots",
+    ];
     let mut files = Vec::new();
     for folder in folders {
         for entry in std::fs::read_dir(crate_folder.join(folder)).expect("the corpus can be listed") {

@@ -174,6 +174,20 @@ impl Arm {
                 servo.advance(limits, part, disturbance);
             }
         }
+        self.stand_as_joints_do(n_parts, part);
+    }
+
+    /// The same with all drives off and the brakes on, with this share of their force.
+    pub fn brake(&mut self, n_parts: u32, part: f64, share: f64) {
+        for (servo, limits) in self.servos.iter_mut().zip(&self.model.joints) {
+            for _ in 0..n_parts {
+                servo.brake(limits, part, share);
+            }
+        }
+        self.stand_as_joints_do(n_parts, part);
+    }
+
+    fn stand_as_joints_do(&mut self, n_parts: u32, part: f64) {
         let before = self.posture.gripper;
         self.posture = kinematics::posture(&self.model.geometry, &self.model.base, &self.joints());
         self.gripper_speed = (self.posture.gripper - before).length() / (f64::from(n_parts) * part);

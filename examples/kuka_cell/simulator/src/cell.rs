@@ -10,6 +10,7 @@ use crate::lab::Reality;
 use crate::noise::TorqueNoise;
 use crate::plc::Plc;
 use crate::program::programs;
+use crate::safety::SafetyConcept;
 use crate::zones::ZoneMonitor;
 
 /// The topic of the fastest gripper's speed, in m/s.
@@ -27,6 +28,14 @@ const LONGEST_PART: SimTime = SimTime::from_nanos(4_000_000);
 /// The gearbox cell without randomness: the same messages give the same run for every seed.
 #[derive(Debug, Clone)]
 pub struct Cell(World);
+
+/// The same with the [safety concept](crate::safety) of its transport: a scanner of the zones with people, a brake of
+/// the product arm, and a stop that others can command.
+#[derive(Debug, Clone)]
+pub struct TransportCell {
+    world: World,
+    safety: SafetyConcept,
+}
 
 /// The gearbox cell with torque noise drawn from the run's seed.
 #[derive(Debug, Clone)]
@@ -85,6 +94,20 @@ impl Simulator for Cell {
     }
 }
 
+impl Simulator for TransportCell {
+    fn start(setup: &Setup, bus: &mut Bus<'_>) -> Result<Self, SimulatorError> {
+        Ok(TransportCell { world: World::start(setup, bus)?, safety: SafetyConcept::open(bus) })
+    }
+
+    fn step(&mut self, bus: &mut Bus<'_>) -> Result<Progress, SimulatorError> {
+        let braking = self.safety.braking(bus);
+        self.world.step_braking(bus, &[[0.0; 6]; 3], braking);
+        let clearance = self.world.monitor.clearance_from_people(&self.world.arms[0]);
+        self.safety.publish(clearance, self.world.step.seconds(), bus);
+        Ok(Progress::Running)
+    }
+}
+
 impl Simulator for NoisyCell {
     fn start(setup: &Setup, bus: &mut Bus<'_>) -> Result<Self, SimulatorError> {
         let world = World::start(setup, bus)?;
@@ -121,6 +144,7 @@ struct World {
     conveyors: [Conveyor; 2],
     monitor: ZoneMonitor,
     gripper_speed: Port,
+    step: SimTime,
     n_parts: u32,
     part_seconds: f64,
 }
@@ -158,16 +182,26 @@ impl World {
             arms,
             conveyors,
             gripper_speed: bus.open(GRIPPER_SPEED_TOPIC),
+            step,
             n_parts,
             part_seconds: step.seconds() / f64::from(n_parts),
         })
     }
 
     fn step(&mut self, bus: &mut Bus<'_>, disturbances: &[[f64; 6]; 3]) {
-        self.plc.scan(bus);
-        for (arm, disturbance) in self.arms.iter_mut().zip(disturbances) {
+        self.step_braking(bus, disturbances, None);
+    }
+
+    /// The same while the product arm is stopped by its brake, with this share of the brake's force.
+    fn step_braking(&mut self, bus: &mut Bus<'_>, disturbances: &[[f64; 6]; 3], braking: Option<f64>) {
+        self.plc.scan(braking.map_or(SimTime::ZERO, |_| self.step), bus);
+        for (at, (arm, disturbance)) in self.arms.iter_mut().zip(disturbances).enumerate() {
             arm.receive(bus);
-            arm.advance(self.n_parts, self.part_seconds, disturbance);
+            // The first one moves the product.
+            match braking.filter(|_| at == 0) {
+                Some(force) => arm.brake(self.n_parts, self.part_seconds, force),
+                None => arm.advance(self.n_parts, self.part_seconds, disturbance),
+            }
             arm.publish_state(bus);
         }
         for conveyor in &mut self.conveyors {

@@ -17,11 +17,12 @@ pub mod lab;
 pub mod noise;
 pub mod plc;
 pub mod program;
+pub mod safety;
 pub mod sequence;
 pub mod servo;
 pub mod zones;
 
-pub use cell::{Cell, GRIPPER_SPEED_TOPIC, NoisyCell, RealCell};
+pub use cell::{Cell, GRIPPER_SPEED_TOPIC, NoisyCell, RealCell, TransportCell};
 pub use plc::CYCLE_TIME_TOPIC;
 pub use program::TAKT_SECONDS;
 pub use sequence::{IN_POSITION_MONITORING, IN_POSITION_TOLERANCE};

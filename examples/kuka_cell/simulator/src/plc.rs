@@ -57,7 +57,10 @@ impl Plc {
     }
 
     /// One PLC cycle: reads the measurements of the axes, advances the sequences, sends all targets.
-    pub fn scan(&mut self, bus: &mut Bus<'_>) {
+    ///
+    /// `paused` is for how long the product arm's sequence has been held up since the last cycle.
+    pub fn scan(&mut self, paused: SimTime, bus: &mut Bus<'_>) {
+        self.arms[0].sequence.pause(paused);
         let now = bus.now();
         if self.cycle_done && now - self.cycle_begun >= SimTime::from_seconds(TAKT_SECONDS) {
             self.begin_cycle(now);

@@ -89,6 +89,11 @@ impl<const N: usize> Sequence<N> {
         self.from = self.set_points;
     }
 
+    /// Lets this much time not count: the set points stay as they are.
+    pub fn pause(&mut self, time: SimTime) {
+        self.begun = self.begun + time;
+    }
+
     /// Whether all steps are done.
     pub fn is_done(&self) -> bool {
         self.current == self.steps.len()

@@ -43,6 +43,9 @@ const SPEED_GAIN: f64 = 4.0 * POSITION_GAIN;
 /// The part of the highest acceleration that braking plans with; the rest is for the speed loop's own lag.
 const BRAKING_SHARE: f64 = 0.7;
 
+/// How much harder a brake of full force brakes than the drive can.
+const BRAKE_STRENGTH: f64 = 2.0;
+
 impl Servo {
     /// An axis at rest, holding its position.
     pub fn at_rest(position: f64) -> Self {
@@ -78,6 +81,20 @@ impl Servo {
         let acceleration =
             (SPEED_GAIN * (wanted - self.speed)).clamp(-limits.acceleration, limits.acceleration) + disturbance;
         self.speed = (self.speed + acceleration * dt).clamp(-limits.speed, limits.speed);
+        self.travel(limits, dt);
+    }
+
+    /// The same with the drive switched off and a brake instead, with this share of its force: none lets the axis roll.
+    pub fn brake(&mut self, limits: &AxisLimits, dt: f64, share: f64) {
+        let lost = BRAKE_STRENGTH * share * limits.acceleration * dt;
+        self.speed = (self.speed.abs() - lost).max(0.0).copysign(self.speed);
+        self.travel(limits, dt);
+        // Where the drive takes over once the brake is released.
+        self.target = self.position;
+        self.smoothed = self.position;
+    }
+
+    fn travel(&mut self, limits: &AxisLimits, dt: f64) {
         self.position += self.speed * dt;
         if self.position > limits.upper {
             self.position = limits.upper;

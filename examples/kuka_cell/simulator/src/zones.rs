@@ -43,6 +43,9 @@ pub const ZONES: [Zone; 9] = [
     Zone { name: "ZTRIG3", lowest: [-2.25, -1.30, 0.40], highest: [-1.95, -1.0, 0.70] },
 ];
 
+/// The first of them are where people work.
+const ZONES_WITH_PEOPLE: usize = 3;
+
 /// The pairs of arms whose distance is measured, by position in the cell's arms, with the end of the topic.
 const PAIRS: [(usize, usize, &str); 3] = [(0, 1, "ZR270073"), (0, 2, "ZR270072"), (1, 2, "ZR270073R270072")];
 
@@ -80,6 +83,14 @@ impl ZoneMonitor {
             grippers: arms.each_ref().map(|arm| Text::from(arm.model().gripper_name)),
             pairs: pairs.collect(),
         }
+    }
+
+    /// The distance of an arm's gripper to the nearest zone in which people work, Z1 to Z3, in m.
+    pub fn clearance_from_people(&self, arm: &Arm) -> f64 {
+        let people = self.zones.iter().take(ZONES_WITH_PEOPLE);
+        people
+            .map(|(cuboid, ..)| sphere_to_cuboid(arm.posture().gripper, GRIPPER_RADIUS, cuboid))
+            .fold(f64::INFINITY, f64::min)
     }
 
     /// Publishes all levels for the present postures.
