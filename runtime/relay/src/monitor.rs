@@ -51,7 +51,7 @@ pub(crate) struct Monitors<'p> {
     message: Option<(Wire, u64)>,
     /// Kept to be used again.
     changes: Changes,
-    /// When evidence changes next if nothing is heard until then.
+    /// Before this instant no evidence changes if nothing is heard until then.
     due: Option<SimTime>,
     outlets: Outlets<'p>,
     /// What is to be published.
@@ -245,7 +245,7 @@ impl<'p> Monitors<'p> {
         self.told.end_changes();
         changes.clear();
         self.changes = changes;
-        self.due = self.run.due();
+        self.due = self.run.due_not_before();
     }
 
     /// The next message that is to be published.

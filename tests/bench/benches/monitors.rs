@@ -3,6 +3,7 @@
 
 use std::fmt::Write as _;
 use std::hint::black_box;
+use std::time::{Duration, Instant};
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 
@@ -56,9 +57,9 @@ fn space(certificates: usize, topics: Topics) -> String {
     )
 }
 
-/// Passes messages on these wires in turn through a relay: one each millisecond, with values that change what holds
-/// every hundredth time.
-fn pass(plan: &CampaignPlan, wires: &WireTable, metrics: &MetricTable<'_>, heard: &[Wire]) {
+/// How long messages on these wires in turn take through a relay: one each millisecond, with values that change what
+/// holds every hundredth time.
+fn pass(plan: &CampaignPlan, wires: &WireTable, metrics: &MetricTable<'_>, heard: &[Wire]) -> Duration {
     let test = Test::default();
     let mut relay = Relay::new(plan, wires, &test, metrics.start(), &[]).expect("the test fits");
     relay.begin();
@@ -66,6 +67,7 @@ fn pass(plan: &CampaignPlan, wires: &WireTable, metrics: &MetricTable<'_>, heard
         relay.subscribed(wire);
     }
     let mut deliveries = Vec::new();
+    let begin = Instant::now();
     for step in 0..MESSAGES {
         let now = SimTime::from_nanos(i64::from(step) * 1_000_000);
         relay.advance(now, &mut deliveries);
@@ -74,6 +76,7 @@ fn pass(plan: &CampaignPlan, wires: &WireTable, metrics: &MetricTable<'_>, heard
         black_box(&deliveries);
         deliveries.clear();
     }
+    begin.elapsed()
 }
 
 fn monitors(criterion: &mut Criterion) {
@@ -83,7 +86,9 @@ fn monitors(criterion: &mut Criterion) {
         let wires = WireTable::new(plan);
         let metrics = MetricTable::new(plan, &wires, &[]).expect("the space has no hooks");
         let heard: Vec<Wire> = wires.iter().filter(|&wire| is_heard(wires.path(wire))).collect();
-        group.bench_function(name, |bencher| bencher.iter(|| pass(plan, &wires, &metrics, &heard)));
+        group.bench_function(name, |bencher| {
+            bencher.iter_custom(|times| (0..times).map(|_| pass(plan, &wires, &metrics, &heard)).sum());
+        });
     };
     let is_own = |path: &str| path.starts_with('s') && path.contains('_');
     let five = sesame_bench::plan_of(&space(5, Topics::Own));
@@ -95,7 +100,7 @@ fn monitors(criterion: &mut Criterion) {
     measure(BenchmarkId::new("no monitors", "the same messages"), &none, &is_own);
     let five = sesame_bench::plan_of(&space(5, Topics::One));
     measure(BenchmarkId::new("50 evidence, 20 guarantees", "all hear each message"), &five, &|path| path == "shared");
-    for others in [0, 10, 100] {
+    for others in [0, 10, 100, 300] {
         let plan = sesame_bench::plan_of(&space(1 + others, Topics::Own));
         let is_of_first = |path: &str| path.starts_with("s0_");
         measure(BenchmarkId::new("one certificate hears, others do not", others), &plan, &is_of_first);

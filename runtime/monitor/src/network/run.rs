@@ -55,6 +55,9 @@ pub struct Run {
     timers: Timers,
 }
 
+/// What is near enough for its time to be known exactly, in nanoseconds.
+const NEAR: i64 = 100_000_000;
+
 impl Run {
     /// Time zero: no evidence is known, and each monitor decides for its safe state, which does not lose a
     /// guarantee.
@@ -104,6 +107,16 @@ impl Run {
             self.timers.put_off_first(due);
         }
         None
+    }
+
+    /// An instant before which nothing changes if nothing is heard until then, and most often the one of [`Run::due`]:
+    /// what is further away than [`NEAR`] may be later. Messages put timers off, so that most times that are far away
+    /// never come, and need not be known exactly.
+    pub fn due_not_before(&mut self) -> Option<SimTime> {
+        match self.timers.first() {
+            Some((_, time)) if time.saturating_sub(self.now.nanos()) > NEAR => Some(SimTime::from_nanos(time)),
+            _ => self.due(),
+        }
     }
 
     /// Time passes: all that is due until this instant, and at it, happens.

@@ -78,6 +78,10 @@ impl HeldInputs {
         for &(at, value) in heard {
             self.known[at] = true;
             let members = &mut self.members[at];
+            if let [last] = members.as_mut_slice() {
+                (*last, self.inputs[at]) = (Some(value), value);
+                continue;
+            }
             if let Some(last) = members.get_mut(member) {
                 *last = Some(value);
             }

@@ -5,7 +5,6 @@ use sesame_base::time::SimTime;
 use sesame_monitor::{Decision, EvidenceChange, Network};
 use sesame_plan::{MonitorId, MonitorState};
 
-use super::outlet::planned;
 use super::record::holds;
 
 /// A change of a monitor's state, or its state at time zero.
@@ -71,7 +70,7 @@ impl Told {
             let now = self.changes.iter().filter(|(at, _)| *at == decision.at);
             let causes = now.map(|(_, cause)| cause.clone()).collect();
             let (at, monitor) = (decision.at, decision.monitor);
-            self.decided.push(Decided { at, monitor, state: planned(decision.state), causes });
+            self.decided.push(Decided { at, monitor, state: decision.state.into(), causes });
         }
     }
 
