@@ -15,6 +15,7 @@ mod examples;
 mod faults;
 mod links;
 mod lock_step;
+mod monitor;
 mod prepared;
 mod proxies;
 mod rosbridge;

@@ -75,7 +75,7 @@ pub fn monitor(monitor: &MonitorPlan, environment: &Environment) -> Result<Tree,
         space: plan.space.clone(),
         source: rust::one_line(&plan.source),
         monitor: name.clone(),
-        doc: doc_lines(&plan.monitors.iter().find(|it| it.name == *name).map_or("", |it| it.doc.as_str())),
+        doc: doc_lines(plan.monitors.iter().find(|it| it.name == *name).map_or("", |it| it.doc.as_str())),
         program,
         bus: bus(&plan.simulator.transport).to_owned(),
     };
