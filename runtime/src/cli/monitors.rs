@@ -171,10 +171,11 @@ fn recording(session: &Session, options: &Options, named: &std::path::Path) -> R
     let duplicate_of = repository.row(number)?.duplicate_of;
     repository.trace(number, duplicate_of).ok_or_else(|| {
         let original = TestNumber(duplicate_of.unwrap_or(number)).to_string();
-        let again = session.caller.command("replay", &[&original, "--record", "--results", &shown(repository.folder())]);
+        let folder = shown(repository.folder());
+        let again = session.caller.command("replay", &[&original, "--record", "--results", &folder]);
         Failure(format!(
-            "{} has no recording: `record mcap all` in the campaign makes one of each test, and this one of this test, if \
-             it comes out the same:\n    {again}",
+            "{} has no recording: `record mcap all` in the campaign makes one of each test, and this makes one of this \
+             test, if it comes out the same:\n    {again}",
             TestNumber(number)
         ))
     })

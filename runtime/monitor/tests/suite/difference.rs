@@ -70,8 +70,8 @@ proptest! {
             let found = disagreements(&network, monitor, &a, &b);
             for at in 0..END {
                 let states = (state(&a, monitor, at), state(&b, monitor, at));
-                let covering: Vec<&Disagreement> = found.iter().filter(|it| it.from <= T(at) && T(at) < it.to).collect();
-                let covered: Vec<_> = covering.iter().map(|it| (it.first, it.second)).collect();
+                let covering = found.iter().filter(|it: &&Disagreement| it.from <= T(at) && T(at) < it.to);
+                let covered: Vec<_> = covering.map(|it| (it.first, it.second)).collect();
                 prop_assert_eq!(covered, if states.0 == states.1 { vec![] } else { vec![states] });
             }
             for it in &found {

@@ -87,8 +87,8 @@ mod tests {
             bound in 0..60_i64,
         ) {
             let seconds = |nanos: i64| SimTime::from_nanos(nanos).seconds();
-            let busy: Vec<Span> =
-                spans.iter().map(|&(from, length)| Span { start: seconds(from), end: seconds(from + length) }).collect();
+            let span = |&(from, length): &(i64, i64)| Span { start: seconds(from), end: seconds(from + length) };
+            let busy: Vec<Span> = spans.iter().map(span).collect();
             let found = FuzzingTime::new(&busy, &[Bound::AtMost { value: seconds(bound) }]);
             let total = |now: i64| spans.iter().map(|&(from, length)| (now - from).clamp(0, length)).sum::<i64>();
             for now in 0..80 {
