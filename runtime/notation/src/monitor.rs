@@ -1,4 +1,4 @@
-//! Parts of runtime monitors: evidence with its condition, how long that must hold and when it is stale; and mitigation.
+//! Parts of runtime monitors: evidence with its condition, how long that must hold and when it is stale; mitigation.
 //!
 //! Numbers are in the unit of the field on the wire with which they are compared, whichever unit the space uses.
 
