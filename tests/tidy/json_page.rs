@@ -14,7 +14,7 @@ const PAGE: &str = "docs/json.md";
 const MARK: &str = "<!-- From here on a test writes this page; CONTRIBUTING.md says how. -->\n";
 
 /// What is printed: the heading, how the values come, and the type with its file.
-const PRINTED: [(&str, &str, &str, &str); 14] = [
+const PRINTED: [(&str, &str, &str, &str); 15] = [
     (
         "`run`, `resume`, `known`, `repeat`, `shrink`, `report`",
         "One object.",
@@ -24,6 +24,7 @@ const PRINTED: [(&str, &str, &str, &str); 14] = [
     ("`null`, `mitm`, `known --lab`, `prepare`", "One object.", "Concluded", "runtime/src/cli/preparation.rs"),
     ("`list`", "One object.", "TestList", "runtime/results/src/report/facts/show.rs"),
     ("`show`", "One object.", "TestReport", "runtime/results/src/report/facts/show.rs"),
+    ("`show --at`", "One object.", "MomentReport", "runtime/results/src/report/facts/certificate/moment.rs"),
     (
         "`confirm`",
         "A list with an object for each test that was run again.",

@@ -1,6 +1,8 @@
-//! Parts of runtime monitors: evidence with its condition, how long that must hold and when it is stale; and mitigation.
+//! Parts of runtime monitors: evidence with its condition, how long that must hold and when it is stale; mitigation.
 //!
 //! Numbers are in the unit of the field on the wire with which they are compared, whichever unit the space uses.
+
+use std::fmt::Write as _;
 
 use sesame_plan::{
     CampaignPlan, Comparison, Condition, Evidence, Expression, FieldRef, Input, Members, Mitigation, MitigationValue,
@@ -15,14 +17,14 @@ pub fn evidence(plan: &CampaignPlan, evidence: &Evidence) -> String {
     let names = Names { plan, inputs: &evidence.inputs };
     let mut text = names.condition(&evidence.condition);
     if evidence.held > 0.0 {
-        text += &format!(" held {}", Unit::SECONDS.number(evidence.held));
+        let _ = write!(text, " held {}", Unit::SECONDS.number(evidence.held));
     }
     if let Some(stale) = evidence.stale {
         let is = match stale.is {
             StaleIs::False => "false",
             StaleIs::Unknown => "unknown",
         };
-        text += &format!(" stale after {} is {is}", Unit::SECONDS.number(stale.after));
+        let _ = write!(text, " stale after {} is {is}", Unit::SECONDS.number(stale.after));
     }
     if evidence.side == Side::Inbound {
         text += " inbound";

@@ -190,7 +190,9 @@
   figures.forEach((drawn, at) => {
     const { figure, rows } = drawn, bar = barBefore(figure);
     bar.classList.add("of-timeline");
-    const others = figures.filter(other => other !== drawn);
+    // Only metrics have lines that can be laid over each other.
+    const hasLines = of => of.rows.some(row => row.frame);
+    const others = hasLines(drawn) ? figures.filter(other => other !== drawn && hasLines(other)) : [];
     if (others.length) {
       const field = choice(bar, "compare with (dashed)", ["–"].concat(others.map(other => nameOf(other.figure))), 0,
         () => compare(drawn, field.value === "0" ? null : others[field.value - 1]));

@@ -289,7 +289,9 @@ impl<'p> Scores<'p> {
                 lead: hazard.lead.map(SimTime::seconds),
             }));
         }
-        found.iter_mut().for_each(|hazards| hazards.sort_by(|a, b| a.time.total_cmp(&b.time)));
+        for hazards in &mut found {
+            hazards.sort_by(|a, b| a.time.total_cmp(&b.time));
+        }
         found
     }
 }

@@ -344,6 +344,33 @@ fn scores_are_metrics_during_the_run_and_at_its_end() {
     assert_eq!(ran.finished.metrics[9].series, [(0.0, 0.0), (1.0, 2.0)]);
 }
 
+/// The hazards that are recorded: monitor, requirement, time, lead.
+fn hazards(ran: &Ran) -> Vec<(usize, u32, f64, Option<f64>)> {
+    let monitors = ran.finished.monitors.iter().enumerate();
+    monitors.flat_map(|(at, it)| it.hazards.iter().map(move |it| (at, it.requirement.0, it.time, it.lead))).collect()
+}
+
+#[test]
+fn hazards_are_recorded_whether_or_not_a_metric_scores_them() {
+    let gap = |at, value| (at, "gap", Value::Real(value));
+    let second = |second: i64| second * SECOND;
+    let foreseen = [gap(0, 5.0), a(second(1), 1.0), a(second(2), -1.0), gap(second(4), 0.5), a(second(6), 1.0)];
+    let missed = [gap(0, 5.0), a(second(1), 1.0), gap(second(4), 0.5), a(second(5), -1.0), gap(second(6), 0.2)];
+    let with = scored(ok(), &[Score::MissedHazards { requirement: RequirementId(0) }]);
+    let without = watched(vec![cell(ok())]);
+    for plan in [&with, &without] {
+        assert_eq!(hazards(&run(plan, vec![], &foreseen, second(8))), [(0, 0, 4.0, Some(2.0))]);
+        assert_eq!(hazards(&run(plan, vec![], &missed, second(8))), [(0, 0, 4.0, None)]);
+        assert_eq!(hazards(&run(plan, vec![], &missed[..2], second(8))), []);
+    }
+    // A metric that grows with time crosses its bound between two changes of its series.
+    let mut growing = scored(ok(), &[Score::TimeIn { state: MonitorState::Guarantee(0) }]);
+    growing.requirements.push(requirement("R2", 1, Bound::AtMost { value: 2.0 }));
+    growing.metrics.push(score("missed", 0, Score::MissedHazards { requirement: RequirementId(1) }));
+    let ran = run(&growing, vec![], &missed, second(8));
+    assert_eq!((hazards(&ran), ran.value(2)), (vec![(0, 1, 3.000_000_001, None)], Some(1.0)));
+}
+
 #[test]
 fn a_violation_between_two_messages_of_an_instant_is_no_hazard() {
     let plan = scored(ok(), &[Score::MissedHazards { requirement: RequirementId(0) }]);
@@ -379,8 +406,10 @@ fn the_hazard_of_a_temporal_formula_is_when_its_signal_lost_the_bound() {
     let foreseen = [gap(0, 5.0), a(SECOND, 1.0), a(2 * SECOND, -1.0), gap(4, 0.5), a(5 * SECOND, 1.0)];
     let ran = run(&plan, vec![], &foreseen, 8 * SECOND);
     assert_eq!((ran.value(1), ran.value(2)), (Some(0.0), Some(2.0)));
+    assert_eq!(hazards(&ran), [(0, 0, 4.0, Some(2.0))]);
     let ran = run(&plan, vec![], &[gap(0, 5.0), a(SECOND, 1.0), gap(4, 0.5), a(5 * SECOND, -1.0)], 8 * SECOND);
     assert_eq!((ran.value(1), ran.value(2)), (Some(1.0), None));
+    assert_eq!(hazards(&ran), [(0, 0, 4.0, None)]);
     assert_eq!(ran.finished.metrics[1].series, [(0.0, 0.0), (4.0, 1.0)]);
     let ran = run(&plan, vec![], &[gap(0, 5.0), a(SECOND, 1.0)], 8 * SECOND);
     assert_eq!((ran.value(1), ran.value(2)), (Some(0.0), None));

@@ -1,5 +1,7 @@
 //! Reports as text for a terminal.
 
+use std::fmt::Write as _;
+
 use sesame_base::visible::visible_lines;
 
 use crate::analysis::confirmed::ConfirmedTest;
@@ -120,7 +122,7 @@ pub fn moment_text(moment: &MomentReport, options: TextOptions) -> String {
         for why in &monitor.why {
             paragraph(&mut text, &visible(&why.sentence), options);
             for because in &why.because {
-                text.push_str(&format!("    {}\n", visible(&because.words(&monitor.monitor))));
+                let _ = writeln!(text, "    {}", visible(&because.words(&monitor.monitor)));
             }
         }
     }

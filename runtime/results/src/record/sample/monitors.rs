@@ -81,7 +81,7 @@ pub(super) fn watch(plan: &CampaignPlan, test: &Test, observation: &mut Observat
     }
     let Ok(network) = Network::new(&plan.monitors) else { return };
     observation.metrics.truncate(5);
-    let mut shown = run(plan, test, Arc::new(network), observation.end);
+    let mut shown = run(plan, test, &Arc::new(network), observation.end);
     for (monitor, requirement) in plan.hazards_to_foresee() {
         let declared = plan.requirement(requirement);
         let series = observation.metrics.get(declared.metric.index()).map_or(&[][..], |shown| &shown.series);
@@ -111,11 +111,11 @@ pub(super) fn watch(plan: &CampaignPlan, test: &Test, observation: &mut Observat
     observation.monitors = shown;
 }
 
-fn run(plan: &CampaignPlan, test: &Test, network: Arc<Network>, end: f64) -> Vec<MonitorObservation> {
+fn run(plan: &CampaignPlan, test: &Test, network: &Arc<Network>, end: f64) -> Vec<MonitorObservation> {
     let mut shown = vec![MonitorObservation::default(); plan.monitors.len()];
     let mut changes = Changes::default();
-    let mut run = Run::start(Arc::clone(&network), &mut changes);
-    take(&mut shown, &network, &mut changes, None);
+    let mut run = Run::start(Arc::clone(network), &mut changes);
+    take(&mut shown, network, &mut changes, None);
     let on = |topic: usize, time: f64, kind: &dyn Fn(&OperationKind) -> bool, lag: f64| {
         test.operations.iter().any(|used| {
             let (start, end) = window(used);
@@ -132,7 +132,7 @@ fn run(plan: &CampaignPlan, test: &Test, network: Arc<Network>, end: f64) -> Vec
         }
         let now = SimTime::from_seconds(time);
         run.advance(now, &mut changes);
-        take(&mut shown, &network, &mut changes, None);
+        take(&mut shown, network, &mut changes, None);
         for (topic, declared) in plan.topics.iter().enumerate() {
             if on(topic, time, &|kind| *kind == OperationKind::Blackhole, 0.0) {
                 continue;
@@ -147,13 +147,13 @@ fn run(plan: &CampaignPlan, test: &Test, network: Arc<Network>, end: f64) -> Vec
             let heard: Vec<(EvidenceId, Truth)> = ids.filter(reads).map(|id| (id, truth)).collect();
             run.observe(now, &heard, &mut changes);
             let message = ChangeCause::Message { topic: declared.paths[0].clone(), index: tick };
-            take(&mut shown, &network, &mut changes, Some(message));
+            take(&mut shown, network, &mut changes, Some(&message));
         }
         tick += 1;
     }
 }
 
-fn take(shown: &mut [MonitorObservation], network: &Network, changes: &mut Changes, message: Option<ChangeCause>) {
+fn take(shown: &mut [MonitorObservation], network: &Network, changes: &mut Changes, message: Option<&ChangeCause>) {
     for change in &changes.evidence {
         let (MonitorId(monitor), evidence) = network.owner(change.evidence);
         let holds = match change.truth {
@@ -161,7 +161,7 @@ fn take(shown: &mut [MonitorObservation], network: &Network, changes: &mut Chang
             known => Some(known.holds()),
         };
         let own = if holds == Some(true) { ChangeCause::Held } else { ChangeCause::Stale };
-        let cause = message.clone().unwrap_or(own);
+        let cause = message.cloned().unwrap_or(own);
         shown[monitor as usize].evidence.push(EvidenceChange { time: change.at.seconds(), evidence, holds, cause });
     }
     for decision in &changes.decisions {

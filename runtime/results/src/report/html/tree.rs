@@ -44,7 +44,7 @@ pub(super) fn certificates(body: &mut Markup, plan: &CampaignPlan) {
             continue;
         }
         body.open("div", &[("class", "scroll")]);
-        draw(body, tree, &monitor.name);
+        draw(body, &tree, &monitor.name);
         body.close();
     }
     body.close();
@@ -140,7 +140,7 @@ fn gate(plan: &CampaignPlan, monitor: &Monitor, it: &Gate) -> Node {
     }
 }
 
-fn draw(body: &mut Markup, tree: Node, name: &str) {
+fn draw(body: &mut Markup, tree: &Node, name: &str) {
     let mut widths = Vec::new();
     tree.widths(0, &mut widths);
     let mut drawn = Drawing { boxes: Markup::default(), edges: Markup::default(), columns: Vec::new(), bottom: 1.0 };
@@ -149,7 +149,7 @@ fn draw(body: &mut Markup, tree: Node, name: &str) {
         drawn.columns.push(x);
         x += width + BETWEEN;
     }
-    drawn.node(&tree, 0);
+    drawn.node(tree, 0);
     let (width, height) = (coordinate(x - BETWEEN + 1.0), coordinate(drawn.bottom - GAP + 1.0));
     let frame = format!("0 0 {width} {height}");
     let label = format!("The certificate of {name}");

@@ -1,5 +1,7 @@
 //! The tables of what runtime monitors did.
 
+use std::fmt::Write as _;
+
 use crate::present::number;
 use crate::present::table::{Cell, Column, Datum, Table};
 use crate::report::facts::certificate::campaign::MonitorsSummary;
@@ -169,7 +171,7 @@ pub(in crate::report) fn decisions(monitors: &[MonitorReport]) -> Table {
             };
             let mut because = decision.reason();
             if let Some(mitigation) = &decision.mitigation {
-                because += &format!("; sent `{mitigation}`");
+                let _ = write!(because, "; sent `{mitigation}`");
             }
             table.row([
                 Datum::text(&monitor.monitor),
