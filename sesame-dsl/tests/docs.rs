@@ -42,8 +42,9 @@ fn pages() -> Vec<(String, String)> {
         .map(|file| format!("docs/{}", file.file_name().and_then(|name| name.to_str()).expect("names are plain")))
         .collect();
     assert!(paths.len() >= 2, "guide and reference are there");
-    let others = ["README.md", "examples/kuka_cell/README.md", "examples/two_robots/README.md"];
-    paths.extend(others.map(str::to_owned));
+    let examples = ["a50_cell", "kuka_cell", "transport", "two_robots"];
+    paths.extend(examples.map(|example| format!("examples/{example}/README.md")));
+    paths.push("README.md".to_owned());
     paths.sort();
     paths.into_iter().map(|path| (path.clone(), read(&path))).collect()
 }

@@ -256,6 +256,30 @@ fn recorded_timings_are_observed_intervals_and_what_never_activated_has_no_point
     assert_eq!(rows(&["sspr"], &untimed).len(), 1, "nobody recorded when its operations were active");
 }
 
+#[test]
+fn the_conserts_of_the_original_are_watched_and_their_warnings_are_lead_times() {
+    let Some(out) = imported("kuka-a50-eddi.model", "imported_conserts") else { return };
+    let text = fs::read_to_string(out.join("kuka-a50-eddi.sesame")).unwrap();
+    let monitor = text.split("eddi Consert_Robot_Left external {").nth(1).expect("the ConSert is a monitor");
+    let monitor = monitor.split('}').next().unwrap();
+    assert_eq!([monitor.matches("evidence ").count(), monitor.matches("guarantee ").count()], [2, 2], "{monitor}");
+    for (metric, monitor) in [
+        ("M4_EDDIWarningTime", "Consert_Robot_Left"),
+        ("M7_EDDIWarningTimeHighOnly", "Consert_Robot_Left_high"),
+        ("M8_EDDIWarningTimeMediumOnly", "Consert_Robot_Left_medium"),
+    ] {
+        let metric = format!("metric {metric} maximise default -99999s = lead_time({monitor}, R1)");
+        assert!(text.contains(&metric), "no `{metric}` in\n{text}");
+    }
+    assert!(text.contains("= M1_collisionDriveShaft <= 0\n"), "{text}");
+    // M5 and M6 are what the ConSert's evidence is about, as far as the file says, and stay hooks.
+    assert!(text.contains("metric M5_KR22Aligned maximise default 100 { hook on KR22_left_sim_aligned_centerpoint }"));
+    let again =
+        import(&legacy().unwrap().join("kuka-a50-eddi.model"), &fresh_folder("imported_conserts_told")).expect(0);
+    assert!(again.err.contains("the file does not say which guarantee is stronger"), "{}", again.err);
+    assert!(again.err.contains("What it decides from is not in the file"), "{}", again.err);
+}
+
 /// What a user does: import, name the simulator, generate, fill in the hook, run. As docs/import.md tells it.
 #[test]
 fn an_imported_experiment_runs_on_the_built_in_cell() {

@@ -1,6 +1,7 @@
 //! Behaviour across crates, as a user meets it.
 #![cfg(test)]
 
+mod a50_cell;
 mod architecture;
 mod building;
 mod choice;
@@ -45,6 +46,7 @@ mod stl;
 mod strategies;
 mod tampering;
 mod traces;
+mod transport;
 mod unheard;
 mod unwritable_output;
 mod vendored;

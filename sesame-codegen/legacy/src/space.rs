@@ -33,13 +33,15 @@ pub(crate) fn map(original: &Original, file: &str, notes: &mut Notes) -> Result<
         first_ends: first_ends(original, &holders),
         mapped: Mapped { holders, ..Mapped::default() },
         messages: Messages::default(),
+        conserts: Vec::new(),
         topics: Vec::new(),
     };
     let topics = writer.topics();
     if writer.topics.iter().all(Option::is_none) {
         return Err("it declares no variables, so there is nothing that could be disturbed".to_owned());
     }
-    let metrics = writer.metrics();
+    let mut monitors = writer.monitors();
+    let metrics = writer.metrics(&mut monitors);
     // Fields that only operations speak of are declared by them, so messages come last.
     let operations = writer.operations();
     let (tests, campaigns) = campaigns::write(&mut writer);
@@ -49,7 +51,7 @@ pub(crate) fn map(original: &Original, file: &str, notes: &mut Notes) -> Result<
         "// Imported by sesamec from {called}. The file is yours: units, names and simulator are for you to settle.\n\
          space {space}\n\n{system}\n"
     );
-    for part in [metrics, operations, tests, campaigns] {
+    for part in [monitors, metrics, operations, tests, campaigns] {
         if !part.is_empty() {
             let _ = write!(text, "\n{}", part.trim_start_matches('\n'));
         }
@@ -168,15 +170,21 @@ impl Writer<'_> {
         text
     }
 
-    fn metrics(&mut self) -> String {
+    fn metrics(&mut self, monitors: &mut String) -> String {
         let mut text = String::new();
+        let mut warnings = Vec::new();
         let published: Vec<Reference> =
             self.original.system.nodes.iter().flat_map(|node| node.publishes.iter().copied()).collect();
-        for metric in &self.original.metrics {
+        for (at, metric) in self.original.metrics.iter().enumerate() {
             let shown = printable(&metric.name);
             if metric.source == MetricSource::Timing {
                 self.notes.say(Kind::LeftOut, format!("metric `{shown}`: it is not a number, it only kept time"));
                 self.mapped.metrics.push(None);
+                continue;
+            }
+            if let Some(warned) = self.warned(at, monitors) {
+                self.mapped.metrics.push(Some(warned.name.clone()));
+                warnings.push(warned);
                 continue;
             }
             let name = self.name("metric", &metric.name);
@@ -213,6 +221,7 @@ impl Writer<'_> {
             }
             self.mapped.metrics.push(Some(name));
         }
+        text.push_str(&self.lead_times(&warnings));
         text
     }
 

@@ -198,6 +198,18 @@ impl Messages {
         }
     }
 
+    /// What follows a topic of this type where a condition reads the one truth in it: nothing, or a field.
+    pub(crate) fn truth(&self, ty: &Type) -> Option<String> {
+        match ty {
+            Type::Bool => Some(String::new()),
+            Type::Message(at) => match &self.list[*at].fields[..] {
+                [(field, Type::Bool)] => Some(format!(".{field}")),
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+
     /// A type in the words of the language.
     pub(crate) fn words(&self, ty: &Type) -> String {
         match ty {

@@ -2,6 +2,7 @@
 
 use sesame_plan::Span;
 
+use crate::monitors::Consert;
 use crate::naming::Names;
 use crate::notes::{Kind, Notes};
 use crate::original::{Activation, Original, Reference};
@@ -34,6 +35,8 @@ pub(crate) struct Writer<'o> {
     pub(crate) messages: Messages,
     /// By position of what tests hold: the earliest end of a test that may hold it, in seconds.
     pub(crate) first_ends: Vec<f64>,
+    /// Monitors of the original.
+    pub(crate) conserts: Vec<Consert>,
     /// By position of the variable.
     pub(crate) topics: Vec<Option<(String, Type)>>,
 }

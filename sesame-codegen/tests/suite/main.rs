@@ -2,6 +2,7 @@
 #![cfg(test)]
 
 mod command;
+mod consert_originals;
 mod emission;
 mod emitted;
 mod hostile_checkout;
