@@ -162,10 +162,13 @@ struct Between<'a> {
     line: Line,
 }
 
+/// A line of a side; without one, the side has closed its stream.
+type Said = (Side, Option<Vec<u8>>);
+
 impl Between<'_> {
     /// The next line of either side, waited for at most this long; `None` if there was none. A side that has closed its
     /// stream says so once, by no line.
-    fn next(&mut self, wait: Option<Duration>) -> Result<Option<(Side, Option<Vec<u8>>)>, BesideError> {
+    fn next(&mut self, wait: Option<Duration>) -> Result<Option<Said>, BesideError> {
         let received = match wait {
             Some(wait) => self.lines.recv_timeout(wait),
             None => self.lines.recv().map_err(|_| RecvTimeoutError::Disconnected),
@@ -197,14 +200,13 @@ impl Between<'_> {
             match self.next(None)? {
                 Some((Side::Runner, line)) => return Ok(line),
                 // Before the first line, and between tests, it may end; whoever waits for it is told then.
-                Some((Side::Simulator, None)) => {}
+                Some((Side::Simulator, None)) | None => {}
                 Some((Side::Simulator, Some(line))) => {
                     self.line.bytes = line;
                     let problem = format!("comes after everything was answered: {}", self.line.shown());
                     let remedy = "give one answer to each line; in this test there is one too many";
                     return Err(BesideError::Simulator(self.line.wrong(problem, remedy)));
                 }
-                None => {}
             }
         }
     }

@@ -262,7 +262,7 @@ impl Topics {
             let Some(wire) = topic.wire else {
                 if topic.subscribes {
                     request::message(&mut self.outbox, path, self.timed.then_some(now), |out| {
-                        out.extend_from_slice(value.get().as_bytes())
+                        out.extend_from_slice(value.get().as_bytes());
                     });
                 }
                 continue;
