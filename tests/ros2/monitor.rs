@@ -78,7 +78,7 @@ fn a_monitor_beside_real_nodes_publishes_what_the_runner_decides_on_the_same_rec
     let (program, talker) = (built(&domain), workspace().join("tests/ros2/peers/talker.py"));
     let nodes = format!(
         r#"node talker {{ publishes angle  launch "{}" "{}" "{{ros-args}}" }}
-  node watch  {{ publishes state  subscribes angle  launch "{}" "--domain" "{{domain}}" "{{ros-args}}" }}"#,
+  node guard  {{ publishes state  subscribes angle  launch "{}" "--domain" "{{domain}}" "{{ros-args}}" }}"#,
         python.display(),
         talker.display(),
         program.display()
