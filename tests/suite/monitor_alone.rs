@@ -46,7 +46,7 @@ campaign watch {{
     )
 }
 
-const BUILT_IN: &str = r#"
+const BUILT_IN: &str = r"
 /// Stops the robot.
 eddi transport publishes state {
   demand    sees from eddi camera
@@ -61,7 +61,7 @@ eddi camera publishes sight {
   guarantee sees       integrity 1 = bright
   otherwise blind
 }
-"#;
+";
 
 const EXTERNAL: &str = "eddi transport external on state { guarantee fast integrity 2  otherwise halted }";
 

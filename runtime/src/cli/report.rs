@@ -31,13 +31,13 @@ pub(super) fn report(results: &Path, options: &Options) -> Result<ExitCode, Fail
     let folder = repository.path().parent().unwrap_or(results);
     let page = options.output.clone().unwrap_or_else(|| folder.join("report.html"));
     let before = options.before.as_deref().map(|before| open(results, Some(before))).transpose()?;
-    if let Some(before) = &before {
-        for side in [before, &repository].into_iter().filter(|side| side.plan().monitors.is_empty()) {
-            return Err(Failure(format!(
-                "{} has no monitors, so there is no certificate to compare; `compare` compares runs",
-                shown(side.path())
-            )));
-        }
+    if let Some(before) = &before
+        && let Some(side) = [before, &repository].into_iter().find(|side| side.plan().monitors.is_empty())
+    {
+        return Err(Failure(format!(
+            "{} has no monitors, so there is no certificate to compare; `compare` compares runs",
+            shown(side.path())
+        )));
     }
     report_against(&repository, before.as_ref(), folder, &page, &options.outcome)
 }

@@ -43,15 +43,16 @@ impl Simulator for Commanded {
 fn run<S: Simulator>(tamper: impl FnMut(f64, &str, Value) -> Option<Value> + 'static) -> Bench<S> {
     let mut tamper = tamper;
     let tamper: Tamper = Box::new(move |now, topic, value| tamper(now.seconds(), topic, value));
-    let mut bench = Bench::start_tampered(&setup(0), Some(tamper)).unwrap();
-    bench.run_until(SimTime::from_seconds(70.0)).unwrap();
+    let mut bench = Bench::start_tampered(&setup(0), Some(tamper)).expect("the cell starts");
+    bench.run_until(SimTime::from_seconds(70.0)).expect("the cell runs");
     bench
 }
 
 /// The column is turned towards the people beside the inspection, from 30 s to 35 s.
+#[expect(clippy::unnecessary_wraps, reason = "it is handed on as what may also drop messages")]
 fn pushed(now: f64, topic: &str, value: Value) -> Option<Value> {
     let pushed = topic == target_topic(PRODUCT, 0) && (30.0..35.0).contains(&now);
-    Some(if pushed { Value::Real(value.number_at::<&str>(&[]).unwrap() - 0.28) } else { value })
+    Some(if pushed { Value::Real(value.number_at::<&str>(&[]).expect("a joint is a number") - 0.28) } else { value })
 }
 
 /// The smallest distance to a zone with people.
