@@ -42,8 +42,8 @@ pub struct Line {
     pub cut: bool,
     /// Where its messages come from; nowhere if only the runner publishes them.
     pub sources: Vec<Source>,
-    /// Where they go. If it is not cut, nothing goes on: then it has a sink only where the runner publishes beside nodes,
-    /// for messages of its own.
+    /// Where they go. If it is not cut, nothing goes on: then it has a sink only where the runner publishes beside
+    /// nodes, for messages of its own.
     pub sinks: Vec<Sink>,
 }
 
