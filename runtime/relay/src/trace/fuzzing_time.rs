@@ -65,6 +65,9 @@ impl FuzzingTime {
 
     /// The first nanosecond at which it is at least this.
     fn when(&self, wanted: i64) -> Option<SimTime> {
+        if wanted <= 0 {
+            return Some(SimTime::ZERO);
+        }
         let ends = self.pieces.iter().skip(1).map(|&(_, total, _)| total);
         let mut pieces = self.pieces.iter().zip(ends);
         let (&(from, total, pace), _) = pieces.find(|(_, end)| wanted <= *end)?;
