@@ -94,6 +94,16 @@ enum Zero {
     Steps,
 }
 
+impl Zero {
+    /// Simulation time now where it is wall time; else what it was.
+    fn wall_clock(self, was: SimTime) -> SimTime {
+        match self {
+            Zero::Wall(zero) => SimTime::from_nanos(i64::try_from(zero.elapsed().as_nanos()).unwrap_or(i64::MAX)),
+            Zero::Clock(_) | Zero::Steps => was,
+        }
+    }
+}
+
 impl System {
     fn new(plan: CampaignPlan, ros2: Ros2, folder: PathBuf) -> Self {
         let place = Place::of_worker(folder).remapping(&plan).in_domain(ros2.domain);

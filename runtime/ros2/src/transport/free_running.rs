@@ -15,7 +15,7 @@ use super::{SILENCE, System, Zero, now, silent};
 impl System {
     /// Waits for what comes next: a message, a tick of the clock, or the moment at which the relay has something to do.
     pub(super) fn run_freely(&mut self, until: SimTime, relay: &mut dyn Exchange) -> Result<Progress, TransportError> {
-        self.read_wall_clock(until);
+        self.now = self.zero.wall_clock(self.now).min(until);
         relay.advance(self.now, &mut self.deliveries);
         self.carry_out(relay)?;
         if self.now >= until {
@@ -32,7 +32,7 @@ impl System {
         let Some(session) = &mut self.session else { return Ok(Progress::Ended) };
         let incoming = session.wait_watching(timeout, &mut self.launched)?;
         // What came in came while it was waited for.
-        self.read_wall_clock(until);
+        self.now = self.zero.wall_clock(self.now).min(until);
         if let Zero::Clock(zero) = self.zero {
             // A simulator that is paused may go on to publish the time at which it was.
             let is_tick = |it: &Incoming| matches!(it, Incoming::Clock(nanos) if nanos - zero > self.now.nanos());
@@ -62,12 +62,6 @@ impl System {
             self.carry_out(relay)?;
         }
         Ok(Progress::Running)
-    }
-
-    fn read_wall_clock(&mut self, until: SimTime) {
-        if let Zero::Wall(zero) = self.zero {
-            self.now = SimTime::from_nanos(i64::try_from(zero.elapsed().as_nanos()).unwrap_or(i64::MAX)).min(until);
-        }
     }
 
     /// Publishes what is delivered, and does what operations want done.

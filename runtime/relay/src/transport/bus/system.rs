@@ -66,6 +66,16 @@ enum Zero {
     Clock(i64),
 }
 
+impl Zero {
+    /// Simulation time now where it is wall time; else what it was.
+    fn wall_clock(self, was: SimTime) -> SimTime {
+        match self {
+            Zero::Wall(zero) => SimTime::from_nanos(i64::try_from(zero.elapsed().as_nanos()).unwrap_or(i64::MAX)),
+            Zero::Clock(_) => was,
+        }
+    }
+}
+
 /// What was heard since the programs were launched.
 #[derive(Debug, Default)]
 struct Heard {
@@ -263,7 +273,7 @@ impl System {
 
     /// Waits for what comes next: a message, a tick of the clock, or the moment at which the relay has something to do.
     fn run(&mut self, until: SimTime, relay: &mut dyn Exchange) -> Result<Progress, TransportError> {
-        self.read_wall_clock(until);
+        self.now = self.zero.wall_clock(self.now).min(until);
         relay.advance(self.now, &mut self.deliveries);
         self.deliver()?;
         if self.now >= until {
@@ -278,7 +288,7 @@ impl System {
         };
         let received = self.bus.receive(timeout.min(WATCH))?;
         // What was received came while it was waited for.
-        self.read_wall_clock(until);
+        self.now = self.zero.wall_clock(self.now).min(until);
         match received {
             None => self.launched.check()?,
             Some(Event::Note(note)) => self.note(note),
@@ -303,12 +313,6 @@ impl System {
             return Err(no_tick());
         }
         Ok(Progress::Running)
-    }
-
-    fn read_wall_clock(&mut self, until: SimTime) {
-        if let Zero::Wall(zero) = self.zero {
-            self.now = SimTime::from_nanos(i64::try_from(zero.elapsed().as_nanos()).unwrap_or(i64::MAX)).min(until);
-        }
     }
 
     fn tick(&mut self, nanos: i64, until: SimTime, relay: &mut dyn Exchange) -> Result<(), TransportError> {
