@@ -110,7 +110,7 @@ impl Run {
     }
 
     /// An instant before which nothing changes if nothing is heard until then, and most often the one of [`Run::due`]:
-    /// what is further away than [`NEAR`] may be later. Messages put timers off, so that most times that are far away
+    /// what is further away than 0.1 s may be later. Messages put timers off, so that most times that are far away
     /// never come, and need not be known exactly.
     pub fn due_not_before(&mut self) -> Option<SimTime> {
         match self.timers.first() {
