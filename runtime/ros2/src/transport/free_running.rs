@@ -15,9 +15,7 @@ use super::{SILENCE, System, Zero, now, silent};
 impl System {
     /// Waits for what comes next: a message, a tick of the clock, or the moment at which the relay has something to do.
     pub(super) fn run_freely(&mut self, until: SimTime, relay: &mut dyn Exchange) -> Result<Progress, TransportError> {
-        if let Zero::Wall(zero) = self.zero {
-            self.now = SimTime::from_nanos(i64::try_from(zero.elapsed().as_nanos()).unwrap_or(i64::MAX)).min(until);
-        }
+        self.read_wall_clock(until);
         relay.advance(self.now, &mut self.deliveries);
         self.carry_out(relay)?;
         if self.now >= until {
@@ -33,13 +31,15 @@ impl System {
         let timeout = self.slow_down().map_or(timeout, |next| next.min(timeout)).min(LOOK);
         let Some(session) = &mut self.session else { return Ok(Progress::Ended) };
         let incoming = session.wait_watching(timeout, &mut self.launched)?;
+        // What came in came while it was waited for.
+        self.read_wall_clock(until);
         if let Zero::Clock(zero) = self.zero {
             // A simulator that is paused may go on to publish the time at which it was.
             let is_tick = |it: &Incoming| matches!(it, Incoming::Clock(nanos) if nanos - zero > self.now.nanos());
             if incoming.iter().any(is_tick) {
                 self.ticked = now();
             } else if self.ticked.elapsed() >= SILENCE {
-                return Err(session.no_tick());
+                return Err(self.session.as_ref().map_or_else(|| silent(TICK.to_owned()), Session::no_tick));
             }
         }
         for incoming in incoming {
@@ -62,6 +62,12 @@ impl System {
             self.carry_out(relay)?;
         }
         Ok(Progress::Running)
+    }
+
+    fn read_wall_clock(&mut self, until: SimTime) {
+        if let Zero::Wall(zero) = self.zero {
+            self.now = SimTime::from_nanos(i64::try_from(zero.elapsed().as_nanos()).unwrap_or(i64::MAX)).min(until);
+        }
     }
 
     /// Publishes what is delivered, and does what operations want done.
@@ -101,7 +107,7 @@ impl Session {
             ClockReader::Topic { path, .. } => format!(", on `{path}`,"),
             ClockReader::Wall => String::new(),
         };
-        silent(format!("a tick of the clock of the simulator{on}"))
+        silent(format!("{TICK}{on}"))
     }
 
     /// As [`Session::wait`], and looks meanwhile whether the launched programs still run.
@@ -124,6 +130,9 @@ impl Session {
         }
     }
 }
+
+/// What is awaited of a clock.
+const TICK: &str = "a tick of the clock of the simulator";
 
 /// How often it is looked whether launched programs still run, while nothing comes in.
 const WATCH: Duration = Duration::from_millis(100);

@@ -263,9 +263,7 @@ impl System {
 
     /// Waits for what comes next: a message, a tick of the clock, or the moment at which the relay has something to do.
     fn run(&mut self, until: SimTime, relay: &mut dyn Exchange) -> Result<Progress, TransportError> {
-        if let Zero::Wall(zero) = self.zero {
-            self.now = SimTime::from_nanos(i64::try_from(zero.elapsed().as_nanos()).unwrap_or(i64::MAX)).min(until);
-        }
+        self.read_wall_clock(until);
         relay.advance(self.now, &mut self.deliveries);
         self.deliver()?;
         if self.now >= until {
@@ -278,7 +276,10 @@ impl System {
             }
             Zero::Clock(_) => SILENCE.saturating_sub(self.ticked.elapsed()),
         };
-        match self.bus.receive(timeout.min(WATCH))? {
+        let received = self.bus.receive(timeout.min(WATCH))?;
+        // What was received came while it was waited for.
+        self.read_wall_clock(until);
+        match received {
             None => self.launched.check()?,
             Some(Event::Note(note)) => self.note(note),
             Some(Event::Clock(nanos)) => self.tick(nanos, until, relay)?,
@@ -302,6 +303,12 @@ impl System {
             return Err(no_tick());
         }
         Ok(Progress::Running)
+    }
+
+    fn read_wall_clock(&mut self, until: SimTime) {
+        if let Zero::Wall(zero) = self.zero {
+            self.now = SimTime::from_nanos(i64::try_from(zero.elapsed().as_nanos()).unwrap_or(i64::MAX)).min(until);
+        }
     }
 
     fn tick(&mut self, nanos: i64, until: SimTime, relay: &mut dyn Exchange) -> Result<(), TransportError> {
