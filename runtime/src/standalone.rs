@@ -3,12 +3,6 @@
 //!
 //! What it decides is what the runner's own monitor decides on the same messages: both run the same code.
 
-#![expect(
-    clippy::disallowed_methods,
-    clippy::disallowed_types,
-    reason = "an adapter: it starts a program and writes a file"
-)]
-
 mod beside;
 mod guest;
 mod show;
