@@ -4,9 +4,10 @@ use std::time::{Duration, Instant};
 
 use sesame_base::time::SimTime;
 
+use super::between::{Between, Clocked, Side};
+use super::error::BesideError;
 use super::hearing::{Hearing, publish};
 use super::request::Request;
-use super::{BesideError, Between, Clocked, Side};
 use crate::relay::PUBLISHED_LIMIT;
 use crate::transport::process::protocol::{SimulatorMessage, request};
 

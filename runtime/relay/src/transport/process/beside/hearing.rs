@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use sesame_base::time::SimTime;
 use sesame_plan::{CampaignPlan, Side};
 
-use super::BesideError;
+use super::error::BesideError;
 use super::request::Delivered;
 use crate::json::{self, Shapes};
 use crate::metric::Metrics;

@@ -4,9 +4,10 @@ use serde_json::value::RawValue;
 
 use sesame_base::time::SimTime;
 
+use super::between::Between;
+use super::error::BesideError;
 use super::hearing::{Hearing, publish};
 use super::request::{Request, Step};
-use super::{BesideError, Between};
 use crate::relay::PUBLISHED_LIMIT;
 use crate::transport::process::protocol::{Message, SimulatorMessage, request};
 

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use serde::Deserialize;
 use serde_json::value::RawValue;
 
-use super::BesideError;
+use super::error::BesideError;
 
 /// A line of the runner.
 #[derive(Debug, Deserialize)]

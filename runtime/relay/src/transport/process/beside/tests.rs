@@ -1,5 +1,6 @@
-use std::io::{BufRead as _, PipeReader, PipeWriter, pipe};
+use std::io::{BufRead as _, BufReader, PipeReader, PipeWriter, pipe};
 use std::sync::{Arc, Mutex};
+use std::thread;
 
 use serde_json::{Value as Json, json};
 use sesame_base::time::SimTime;
