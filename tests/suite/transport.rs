@@ -25,7 +25,7 @@ fn one_command_finds_missed_hazards_and_none_after_the_mend() {
     assert_eq!(pages.len(), 2, "{}", said.out);
     for page in pages {
         let page = fs::read_to_string(folder.join(page)).unwrap();
-        assert!(page.contains("cannot_transport"), "the page shows the monitor");
+        assert!(page.contains("The certificate foresees every hazard"), "the page shows the requirement");
     }
     // Without disturbance nothing is stopped, and with a worker more or less nothing is different.
     let results = folder.join("transport/attack/results/42");

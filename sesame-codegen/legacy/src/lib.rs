@@ -2,9 +2,9 @@
 //! `.sesame` file and results.
 //!
 //! A file is read into an [`Original`] (`xml`, `dialect`, `read`), which is mapped to the text of a space that passes
-//! `check` (`space`, `campaigns`, `known_tests`, `monitors`, all with `writer`; `parts`, `types`, `naming`), and its performed
-//! tests to records (`results`). Everything that changes on the way is listed in [`Notes`]. No name or text of the file
-//! becomes anything but a name, a quoted text or a comment.
+//! `check` (`space`, `campaigns`, `known_tests`, `monitors`, all with `writer`; `parts`, `types`, `naming`), and
+//! its performed tests to records (`results`). Everything that changes on the way is listed in [`Notes`]. No name or
+//! text of the file becomes anything but a name, a quoted text or a comment.
 
 mod campaigns;
 mod dialect;

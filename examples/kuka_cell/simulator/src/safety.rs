@@ -1,7 +1,7 @@
 //! The safety concept of the transport: a scanner sees how near the product arm comes to people, and a brake stops it.
 //!
-//! The concept acts on what it is told. That the scanner sees and the brake holds is not its business: a runtime monitor
-//! above it vouches for both, and stops the transport if it cannot.
+//! The concept acts on what it is told. That the scanner sees and the brake holds is not its business: a runtime
+//! monitor above it vouches for both, and stops the transport if it cannot.
 
 use std::sync::Arc;
 
@@ -19,7 +19,8 @@ pub const SUPPLY_TOPIC: &str = "hall/air_supply";
 pub const BRAKE_TOPIC: &str = "brakes/R3200ProductMove/pressure";
 /// The topic on which `true` stops the transport: → safety PLC.
 pub const STOP_TOPIC: &str = "plc/stop_transport";
-/// The topic that says whether the transport is safe: → safety PLC. A stop only holds while the last message is `false`.
+/// The topic that says whether the transport is safe: → safety PLC. A stop only holds while the last message is
+/// `false`.
 pub const PERMISSION_TOPIC: &str = "eddi/safe";
 /// The topic of whether the transport stands: safety PLC → whoever watches it.
 pub const STANDS_TOPIC: &str = "plc/transport_stands";
