@@ -1,4 +1,4 @@
-//! The A50 drive-shaft cell: its known tests come out as they are known, and its ConSert is watched.
+//! The A50 drive-shaft cell: its known tests come out as they are known, and its `ConSert` is watched.
 
 use std::fs;
 

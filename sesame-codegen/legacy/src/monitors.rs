@@ -1,7 +1,7 @@
-//! Runtime monitors of the original (EDDIs, as ConSerts): what of them is in a file, as `external` monitors.
+//! Runtime monitors of the original (EDDIs, as `ConSert`s): what of them is in a file, as `external` monitors.
 //!
-//! A file has no certificates. It has the variables on which a ConSert says whether a guarantee holds, named
-//! `CONSERT/guarantee_NAME`, and metrics of how long before a violation it warned. What the ConSert decides from is
+//! A file has no certificates. It has the variables on which a `ConSert` says whether a guarantee holds, named
+//! `CONSERT/guarantee_NAME`, and metrics of how long before a violation it warned. What the `ConSert` decides from is
 //! neither in the file nor guessed here: what became of it is a note.
 
 use std::fmt::Write as _;
@@ -14,7 +14,7 @@ use crate::original::{Metric, MetricSource};
 use crate::writer::{Writer, called_before};
 use crate::xml::printable;
 
-/// How the last part of the name of a variable begins on which a ConSert says whether a guarantee holds.
+/// How the last part of the name of a variable begins on which a `ConSert` says whether a guarantee holds.
 const GUARANTEE: &str = "guarantee";
 
 /// What the name of a metric of warnings contains.
@@ -29,7 +29,7 @@ const STRENGTHS: [&str; 3] = ["high", "medium", "low"];
 /// How many monitors a space may have, and guarantees a monitor.
 const MOST: usize = 1000;
 
-/// A ConSert, in the names of the space.
+/// A `ConSert`, in the names of the space.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Consert {
     /// Its name.
@@ -66,7 +66,7 @@ pub(crate) struct Warned {
 }
 
 impl Writer<'_> {
-    /// The ConSerts of the file, as monitors of the space.
+    /// The `ConSert`s of the file, as monitors of the space.
     pub(crate) fn monitors(&mut self) -> String {
         let mut found: Vec<(String, Vec<Guarantee>)> = Vec::new();
         for ((path, _), topic) in self.original.system.variables.iter().zip(&self.topics) {
@@ -106,7 +106,10 @@ impl Writer<'_> {
             }
             self.notes.say(
                 Kind::Mapped,
-                format!("ConSert `{shown}` is an `external` monitor: what it says is watched. What it decides from is not in the file"),
+                format!(
+                    "ConSert `{shown}` is an `external` monitor: what it says is watched. What it decides from is not in \
+                     the file"
+                ),
             );
             if guarantees.len() > 1 {
                 let order: Vec<String> = guarantees.iter().map(|guarantee| format!("`{}`", guarantee.name)).collect();
@@ -127,7 +130,7 @@ impl Writer<'_> {
         text
     }
 
-    /// Whether a metric is of how long a ConSert warned before a hazard; declares a monitor of one guarantee if it
+    /// Whether a metric is of how long a `ConSert` warned before a hazard; declares a monitor of one guarantee if it
     /// regards one only.
     pub(crate) fn warned(&mut self, at: usize, monitors: &mut String) -> Option<Warned> {
         let original = self.original;
