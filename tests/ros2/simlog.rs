@@ -187,8 +187,9 @@ fn disturbances_of_what_controllers_say_and_are_granted_come_to_the_same_over_si
 }
 
 /// Forty tests of ten seconds of the cell, which are to take less than 40 s; twice as much on a machine with something
-/// else to do. A step waits more than it computes, so there are more workers than processors. What 32 bits leave out grows where arms swing past each other (up to 1.7e-5 in one test of forty), so
-/// the nodes of ROS 2 have numbers of 32 bits here, too.
+/// else to do. A step waits more than it computes, so there are more workers than processors. What 32 bits leave out
+/// grows where arms swing past each other (up to 1.7e-5 in one test of forty), so the nodes of ROS 2 have numbers of 32
+/// bits here, too.
 #[test]
 #[ignore = "takes three minutes, and builds an optimised sesamec"]
 fn forty_tests_over_simlog_are_quick_and_come_to_the_same_as_over_ros2() {
