@@ -34,6 +34,7 @@ mod replay_recording;
 mod report;
 mod results_folder;
 mod run;
+mod run_again;
 mod scratch;
 mod session;
 mod shrink;
@@ -165,7 +166,7 @@ pub(crate) fn asked_beside_reports(repository: &sesame_results::record::Reposito
     let words = |error: sesame_results::record::RecordError| error.to_string();
     drop(gate::every_objection(&sesame_results::report::summary(repository).map_err(words)?, repository));
     let record = repository.find(test).and_then(|number| repository.test(number)).map_err(words)?;
-    replay::limit(&record);
+    run_again::limit(&record);
     drop(shrink::failing(repository, &record, &[]).map_err(|Failure(words)| words)?);
     Ok(())
 }

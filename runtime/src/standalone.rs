@@ -159,7 +159,7 @@ fn at(mut plan: CampaignPlan, options: &Options) -> Result<CampaignPlan, Failure
 /// Gives a topic another name. As in ROS, names may begin with a slash or not.
 fn remap(plan: &mut CampaignPlan, rule: &str) -> Result<(), Failure> {
     let Some((from, to)) = rule.split_once(":=").filter(|(from, to)| !from.is_empty() && !to.is_empty()) else {
-        return Err(Failure(format!("`{}` is no rule: write `FROM:=TO`, with names of topics", visible(rule))));
+        return Err(Failure(format!("`{}` is not a rule: write `FROM:=TO`, with names of topics", visible(rule))));
     };
     let is_it = |path: &&mut String| path.trim_start_matches('/') == from.trim_start_matches('/');
     // A runner gives rules for all that a node publishes or hears; the others are not of this monitor.

@@ -43,19 +43,6 @@ pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str)
     };
     let system_file = space.file_of(&space.simulator.declaration).to_owned();
     let plan = plan::CampaignPlan {
-        schema: plan::SCHEMA,
-        generator: generator.to_owned(),
-        source: source.to_owned(),
-        space: space.declaration.name.clone(),
-        doc: space.declaration.doc.clone(),
-        simulator: plan::Simulator {
-            name: space.simulator.declaration.name.clone(),
-            transport: transport(space, &space.simulator.transport),
-            lifecycle: lifecycle(&space.lifecycle),
-        },
-        messages: space.messages.values().map(message).collect(),
-        topics: space.topics.values().map(|declared| topic(space, declared)).collect(),
-        nodes: space.nodes.values().map(node).collect(),
         metrics: selection.metrics.iter().map(|&id| metric(&space.metrics[id])).collect(),
         requirements: space.requirements.values().map(|requirement| selection.requirement(requirement)).collect(),
         operations: selection
@@ -69,10 +56,8 @@ pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str)
             let tests = selection.tests.iter();
             tests.map(|&id| selection.test(space, &space.tests[id], declared.end_after)).collect()
         },
-        campaign: selection.campaign(space, declared),
-        monitors: space.eddis.values().map(|eddi| monitor::monitor(space, eddi)).collect(),
         labs: space.physicals.values().map(|lab| selection.lab(space, lab)).collect(),
-        compensation: None,
+        ..of_system(space, selection.campaign(space, declared), source, generator)
     };
     RunnerPlan { plan, hooks: hooks(space), operations: custom_operations(space), simulator_crate, system_file }
 }
@@ -86,7 +71,15 @@ pub fn lower_monitor(
     generator: &str,
 ) -> Result<MonitorPlan, plan::NotAlone> {
     let name = space.eddis[monitor].declaration.name.clone();
-    let whole = plan::CampaignPlan {
+    let mut whole = of_system(space, for_as_long_as_can_be(&name), source, generator);
+    whole.tests = vec![without_operations()];
+    let plan = whole.of_monitor_alone(monitor::monitor_id(monitor))?;
+    Ok(MonitorPlan { name, plan, system_file: space.file_of(&space.simulator.declaration).to_owned() })
+}
+
+/// The plan of a campaign with nothing but the system and its monitors: no metrics, operations, tests or labs.
+fn of_system(space: &Space, campaign: plan::Campaign, source: &str, generator: &str) -> plan::CampaignPlan {
+    plan::CampaignPlan {
         schema: plan::SCHEMA,
         generator: generator.to_owned(),
         source: source.to_owned(),
@@ -95,7 +88,7 @@ pub fn lower_monitor(
         simulator: plan::Simulator {
             name: space.simulator.declaration.name.clone(),
             transport: transport(space, &space.simulator.transport),
-            lifecycle: plan::Lifecycle::default(),
+            lifecycle: lifecycle(&space.lifecycle),
         },
         messages: space.messages.values().map(message).collect(),
         topics: space.topics.values().map(|declared| topic(space, declared)).collect(),
@@ -103,14 +96,12 @@ pub fn lower_monitor(
         metrics: Vec::new(),
         requirements: Vec::new(),
         operations: Vec::new(),
-        tests: vec![without_operations()],
-        campaign: for_as_long_as_can_be(&name),
+        tests: Vec::new(),
+        campaign,
         monitors: space.eddis.values().map(|eddi| monitor::monitor(space, eddi)).collect(),
         labs: Vec::new(),
         compensation: None,
-    };
-    let plan = whole.of_monitor_alone(monitor::monitor_id(monitor))?;
-    Ok(MonitorPlan { name, plan, system_file: space.file_of(&space.simulator.declaration).to_owned() })
+    }
 }
 
 /// A campaign of one run without operations that nothing ends.

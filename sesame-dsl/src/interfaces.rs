@@ -124,23 +124,14 @@ pub fn wire_type(written: &str) -> Option<WireType> {
 }
 
 fn scalar(name: &str) -> Option<WireType> {
-    let primitive = match name {
-        "bool" => Primitive::Bool,
-        "int8" => Primitive::Int8,
-        "uint8" | "byte" | "char" => Primitive::Uint8,
-        "int16" => Primitive::Int16,
-        "uint16" => Primitive::Uint16,
-        "int32" => Primitive::Int32,
-        "uint32" => Primitive::Uint32,
-        "int64" => Primitive::Int64,
-        "uint64" => Primitive::Uint64,
-        "float32" => Primitive::Float32,
-        "float64" => Primitive::Float64,
-        "string" => return Some(WireType::String),
-        "wstring" => return Some(WireType::WString),
-        _ => return full_name(name, "msg").map(|name| WireType::Interface { name }),
-    };
-    Some(WireType::Primitive { primitive })
+    match name {
+        "string" => Some(WireType::String),
+        "wstring" => Some(WireType::WString),
+        _ => match Primitive::named(name) {
+            Some(primitive) => Some(WireType::Primitive { primitive }),
+            None => full_name(name, "msg").map(|name| WireType::Interface { name }),
+        },
+    }
 }
 
 /// The names of types that are not interfaces, for suggestions.

@@ -108,7 +108,7 @@ fn element(package: &str, written: &str) -> Result<WireType, String> {
     {
         return Err(format!("`{written}` is not a bounded text"));
     }
-    if let Some(primitive) = primitive(name) {
+    if let Some(primitive) = Primitive::named(name) {
         return Ok(WireType::Primitive { primitive });
     }
     let name = match name {
@@ -133,22 +133,4 @@ fn element(package: &str, written: &str) -> Result<WireType, String> {
 
 fn capital(name: &str) -> &'static str {
     if name == "time" { "Time" } else { "Duration" }
-}
-
-/// A number or truth value of `.msg` files.
-pub(crate) fn primitive(name: &str) -> Option<Primitive> {
-    Some(match name {
-        "bool" => Primitive::Bool,
-        "byte" | "char" | "uint8" => Primitive::Uint8,
-        "int8" => Primitive::Int8,
-        "int16" => Primitive::Int16,
-        "uint16" => Primitive::Uint16,
-        "int32" => Primitive::Int32,
-        "uint32" => Primitive::Uint32,
-        "int64" => Primitive::Int64,
-        "uint64" => Primitive::Uint64,
-        "float32" => Primitive::Float32,
-        "float64" => Primitive::Float64,
-        _ => return None,
-    })
 }

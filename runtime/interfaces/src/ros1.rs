@@ -7,7 +7,7 @@
 
 use sesame_plan::{Interface, Primitive, WireType};
 
-use crate::msg::{array, primitive};
+use crate::msg::array;
 use crate::{Constant, Definition, DefinitionError, Field, is_name};
 
 /// The types of `time` and `duration`.
@@ -88,7 +88,7 @@ pub fn text(interface: &Interface) -> String {
 /// A type as `.msg` files of ROS 1 write it.
 fn written(ty: &WireType) -> String {
     match ty {
-        WireType::Primitive { primitive } => format!("{primitive:?}").to_lowercase(),
+        WireType::Primitive { primitive } => primitive.name().to_owned(),
         WireType::String | WireType::WString => "string".to_owned(),
         WireType::Interface { name } => {
             let time = TIMES.iter().find(|(_, interface)| interface == name);
@@ -226,5 +226,5 @@ fn message(package: &str, written: &str) -> Option<String> {
 
 /// A number of ROS 1, where a `byte` has a sign.
 fn of_ros1(written: &str) -> Option<Primitive> {
-    if written == "byte" { Some(Primitive::Int8) } else { primitive(written) }
+    if written == "byte" { Some(Primitive::Int8) } else { Primitive::named(written) }
 }

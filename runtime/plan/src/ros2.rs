@@ -165,6 +165,41 @@ pub enum Primitive {
 }
 
 impl Primitive {
+    /// The one of this name in `.msg` files.
+    pub fn named(name: &str) -> Option<Self> {
+        Some(match name {
+            "bool" => Primitive::Bool,
+            "int8" => Primitive::Int8,
+            "uint8" | "byte" | "char" => Primitive::Uint8,
+            "int16" => Primitive::Int16,
+            "uint16" => Primitive::Uint16,
+            "int32" => Primitive::Int32,
+            "uint32" => Primitive::Uint32,
+            "int64" => Primitive::Int64,
+            "uint64" => Primitive::Uint64,
+            "float32" => Primitive::Float32,
+            "float64" => Primitive::Float64,
+            _ => return None,
+        })
+    }
+
+    /// Its name in `.msg` files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Primitive::Bool => "bool",
+            Primitive::Int8 => "int8",
+            Primitive::Uint8 => "uint8",
+            Primitive::Int16 => "int16",
+            Primitive::Uint16 => "uint16",
+            Primitive::Int32 => "int32",
+            Primitive::Uint32 => "uint32",
+            Primitive::Int64 => "int64",
+            Primitive::Uint64 => "uint64",
+            Primitive::Float32 => "float32",
+            Primitive::Float64 => "float64",
+        }
+    }
+
     /// How many bytes a value has. It is also its alignment in CDR, version 1.
     pub const fn size(self) -> usize {
         match self {

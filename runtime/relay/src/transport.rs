@@ -12,6 +12,7 @@ mod in_process;
 mod process;
 
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
@@ -30,6 +31,11 @@ pub use process::end_simulators;
 pub use process::{Beside, BesideError, beside, process};
 #[cfg(all(feature = "process", target_os = "linux"))]
 pub use process::{become_simulator, keep_simulator};
+
+/// Simulation time where it is wall time since the start of a run.
+pub fn wall_time_since(start: Instant) -> SimTime {
+    SimTime::from_nanos(i64::try_from(start.elapsed().as_nanos()).unwrap_or(i64::MAX))
+}
 
 /// A connection to a simulator.
 pub trait Transport {

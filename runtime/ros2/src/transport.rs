@@ -26,7 +26,7 @@ use sesame_relay::lifecycle::launch::{Launched, Place};
 use sesame_relay::relay::{Delivery, Exchange};
 use sesame_relay::simulator::Progress;
 use sesame_relay::transport::added::{AddedOnWire, join, objections};
-use sesame_relay::transport::{Capabilities, Connect, Incidents, Transport, TransportError};
+use sesame_relay::transport::{Capabilities, Connect, Incidents, Transport, TransportError, wall_time_since};
 use sesame_relay::wire::WireTable;
 
 use self::domain::Domain;
@@ -98,7 +98,7 @@ impl Zero {
     /// Simulation time now where it is wall time; else what it was.
     fn wall_clock(self, was: SimTime) -> SimTime {
         match self {
-            Zero::Wall(zero) => SimTime::from_nanos(i64::try_from(zero.elapsed().as_nanos()).unwrap_or(i64::MAX)),
+            Zero::Wall(zero) => wall_time_since(zero),
             Zero::Clock(_) | Zero::Steps => was,
         }
     }

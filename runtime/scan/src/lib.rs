@@ -21,5 +21,16 @@ pub use samples::Samples;
 /// The type of clocks in ROS.
 pub const CLOCK: &str = "rosgraph_msgs/msg/Clock";
 
+/// The services that every node of ROS 2 has for its parameters and types, by the last part of their names.
+pub const OF_EVERY_NODE: [&str; 7] = [
+    "describe_parameters",
+    "get_parameter_types",
+    "get_parameters",
+    "list_parameters",
+    "set_parameters",
+    "set_parameters_atomically",
+    "get_type_description",
+];
+
 /// The node of publishers and subscribers of which nobody says to which node they belong.
 pub const NOBODY: &str = "?";

@@ -23,9 +23,9 @@ use crate::cli::execution::{
 };
 use crate::cli::failure::{Failure, STOPPED};
 use crate::cli::progress_line::wait;
-use crate::cli::replay::limit;
 use crate::cli::results_folder::{open, refuse_other_model, run_folder};
 use crate::cli::run::compensated_name;
+use crate::cli::run_again::limit;
 use crate::cli::scratch::Scratch;
 use crate::cli::session::Session;
 use crate::cli::terminal::{Format, print, print_json, say, text_options};

@@ -6,17 +6,13 @@ use std::time::Duration;
 
 use clap::Args;
 
-use sesame_base::observation::Outcome;
 use sesame_base::test_number::TestNumber;
-use sesame_plan::Recorded;
-use sesame_results::record::{TestRecord, differences, trace_file};
+use sesame_results::record::{differences, trace_file};
 use sesame_results::report::{Replay, replay_text};
 
-use crate::campaign::{Job, JobResult, SingleSettings, TraceRequest, default_timeout, run_single};
-use crate::cli::execution::{claim_files, interruptible, refuse_unfilled, seconds, shown};
+use crate::cli::execution::{seconds, shown};
 use crate::cli::failure::{Failure, NOT_AS_REQUIRED, STOPPED};
-use crate::cli::results_folder::{open, refuse_changed};
-use crate::cli::scratch::Scratch;
+use crate::cli::run_again::{Again, Asked, run_again};
 use crate::cli::session::Session;
 use crate::cli::terminal::Format;
 use crate::cli::terminal::{print, print_json, say, text_options};
@@ -40,62 +36,40 @@ pub struct Options {
 }
 
 pub(super) fn replay(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
-    let Session { plan, results, .. } = session;
-    let repository = open(results, options.which.results.as_deref())?;
-    let record = repository.test(repository.find(&options.test)?)?;
-    refuse_changed(session, &repository, record.number)?;
-    let files = claim_files(&session.runner, plan)?;
-    refuse_unfilled(&session.runner, plan, true)?;
-    let interrupted = interruptible()?;
-    let folder = Scratch::new("replay")?;
-    // It gets its place once it is known to be of the recorded run.
-    let recorded = folder.path().join("recorded.mcap");
-    let trace = options.record.then(|| TraceRequest { file: recorded.clone(), keep: Recorded::All });
-    let settings = SingleSettings {
-        program: session.program.clone().recording(options.record),
-        directory: folder.path().to_owned(),
-        timeout: options.timeout.unwrap_or_else(|| limit(&record)),
-    };
-    let job = Job {
-        number: record.number,
-        test: record.test.clone(),
-        simulator_seed: record.simulator_seed,
-        trace,
-        compensation: repository.plan().compensation.clone(),
+    let asked = Asked {
+        run: "replay",
+        test: &options.test,
+        results: options.which.results.as_deref(),
+        record: options.record,
+        timeout: options.timeout,
         withheld: Vec::new(),
     };
-    let ended = run_single(job, &settings, &interrupted);
-    files.finish()?;
-    let Some(JobResult { observation: again, notes, lock_stepped, trace_failure, .. }) = ended? else {
-        say(format_args!("stopped; a replay leaves nothing behind"));
-        return Ok(ExitCode::from(STOPPED));
-    };
-    for note in notes {
-        say(format_args!("{note}"));
-    }
-    if !lock_stepped {
+    let Some(again) = run_again(session, asked)? else { return Ok(ExitCode::from(STOPPED)) };
+    let Again { repository, record, lock_stepped, .. } = &again;
+    if !*lock_stepped {
         say(format_args!("note: the simulator runs freely, so this run may differ from the recorded one"));
     }
-    let differences = differences(repository.plan(), &record.test, &record.observation, &again);
+    let differences = differences(repository.plan(), &record.test, &record.observation, &again.observation);
     let replay = Replay {
         test: TestNumber(record.number),
         simulator_seed: record.simulator_seed,
         same: differences.is_empty(),
         differences,
     };
-    if let Some(reason) = trace_failure {
+    if let Some(reason) = &again.trace_failure {
         return Err(Failure(format!("the trace of {} could not be written: {reason}", replay.test)));
     }
+    // The trace gets its place once it is known to be of the recorded run.
     if options.record && replay.same {
         let file = trace_file(repository.folder(), record.number);
-        keep(&recorded, &file)?;
+        keep(&again.trace, &file)?;
         say(format_args!("recorded in {}", shown(&file)));
     }
     match options.which.format {
         Format::Text => print(&replay_text(&replay, text_options()))?,
         Format::Json => print_json(&replay)?,
     };
-    Ok(ExitCode::from(if replay.same || !lock_stepped { 0 } else { NOT_AS_REQUIRED }))
+    Ok(ExitCode::from(if replay.same || !*lock_stepped { 0 } else { NOT_AS_REQUIRED }))
 }
 
 /// Puts a trace into its place, whole or not at all.
@@ -107,12 +81,4 @@ fn keep(recorded: &Path, file: &Path) -> Result<(), Failure> {
     let beside = file.with_extension("mcap.unfinished");
     std::fs::copy(recorded, &beside).map_err(cannot)?;
     std::fs::rename(&beside, file).map_err(cannot)
-}
-
-/// How long the test may take now.
-pub(super) fn limit(record: &TestRecord) -> Duration {
-    match record.observation.outcome {
-        Outcome::Timeout { limit } => Duration::from_secs_f64(limit),
-        _ => default_timeout(record.observation.wall.run),
-    }
 }

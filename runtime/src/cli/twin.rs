@@ -7,16 +7,12 @@ use std::time::Duration;
 use clap::Args;
 
 use sesame_base::test_number::TestNumber;
-use sesame_plan::Recorded;
 use sesame_results::report::{Twin, twin as compare, twin_text};
 
-use crate::campaign::{Job, JobResult, SingleSettings, TraceRequest, run_single};
-use crate::cli::execution::{claim_files, interruptible, refuse_unfilled, seconds, shown};
+use crate::cli::execution::{seconds, shown};
 use crate::cli::failure::{Failure, NOT_AS_REQUIRED, STOPPED};
 use crate::cli::monitors::chosen;
-use crate::cli::replay::limit;
-use crate::cli::results_folder::{open, refuse_changed};
-use crate::cli::scratch::Scratch;
+use crate::cli::run_again::{Again, Asked, run_again};
 use crate::cli::session::Session;
 use crate::cli::terminal::{Format, print, print_json, say, text_options};
 use crate::cli::view::Which;
@@ -41,7 +37,7 @@ pub struct Options {
 }
 
 pub(super) fn twin(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
-    let Session { plan, results, .. } = session;
+    let plan = &session.plan;
     let withheld = chosen(plan, &options.without, |monitor| {
         monitor.otherwise.mitigation.is_some() || options.without.contains(&monitor.name)
     })?;
@@ -55,54 +51,33 @@ pub(super) fn twin(session: &Session, options: &Options) -> Result<ExitCode, Fai
     if let Some(file) = options.record.as_ref().filter(|file| file.exists()) {
         return Err(Failure(format!("{} exists already, and is not overwritten", shown(file))));
     }
-    let repository = open(results, options.which.results.as_deref())?;
-    let record = repository.test(repository.find(&options.test)?)?;
-    refuse_changed(session, &repository, record.number)?;
-    let files = claim_files(&session.runner, plan)?;
-    refuse_unfilled(&session.runner, plan, true)?;
-    let interrupted = interruptible()?;
-    let folder = Scratch::new("twin")?;
-    let recorded = folder.path().join("recorded.mcap");
-    let trace = options.record.is_some().then(|| TraceRequest { file: recorded.clone(), keep: Recorded::All });
-    let settings = SingleSettings {
-        program: session.program.clone().recording(options.record.is_some()),
-        directory: folder.path().to_owned(),
-        timeout: options.timeout.unwrap_or_else(|| limit(&record)),
-    };
-    let job = Job {
-        number: record.number,
-        test: record.test.clone(),
-        simulator_seed: record.simulator_seed,
-        trace,
-        compensation: repository.plan().compensation.clone(),
+    let asked = Asked {
+        run: "twin",
+        test: &options.test,
+        results: options.which.results.as_deref(),
+        record: options.record.is_some(),
+        timeout: options.timeout,
         withheld: withheld.clone(),
     };
-    let ended = run_single(job, &settings, &interrupted);
-    files.finish()?;
-    let Some(JobResult { observation, notes, lock_stepped, trace_failure, .. }) = ended? else {
-        say(format_args!("stopped; a twin leaves nothing behind"));
-        return Ok(ExitCode::from(STOPPED));
-    };
-    for note in notes {
-        say(format_args!("{note}"));
-    }
-    if !lock_stepped {
+    let Some(again) = run_again(session, asked)? else { return Ok(ExitCode::from(STOPPED)) };
+    let Again { repository, record, lock_stepped, .. } = &again;
+    if !*lock_stepped {
         say(format_args!("note: the simulator runs freely, so chance also makes the twin differ from the test"));
     }
     if record.observation.monitors.iter().any(|monitor| monitor.omitted > 0) {
         let test = TestNumber(record.number);
         say(format_args!("note: {test} has more decisions of monitors than are kept, so mitigations may be missing"));
     }
-    if let Some(reason) = trace_failure {
+    if let Some(reason) = &again.trace_failure {
         return Err(Failure(format!("the trace of the twin could not be written: {reason}")));
     }
     if let Some(file) = &options.record {
         let cannot = |error: std::io::Error| Failure(format!("cannot write the trace: {error}: {}", shown(file)));
         let mut to = std::fs::File::create_new(file).map_err(cannot)?;
-        std::io::copy(&mut std::fs::File::open(&recorded).map_err(cannot)?, &mut to).map_err(cannot)?;
+        std::io::copy(&mut std::fs::File::open(&again.trace).map_err(cannot)?, &mut to).map_err(cannot)?;
         say(format_args!("recorded in {}", shown(file)));
     }
-    let found: Twin = compare(repository.plan(), &record, &observation, &withheld, lock_stepped);
+    let found: Twin = compare(repository.plan(), record, &again.observation, &withheld, *lock_stepped);
     match options.which.format {
         Format::Text => print(&twin_text(&found, text_options()))?,
         Format::Json => print_json(&found)?,

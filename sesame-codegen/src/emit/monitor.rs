@@ -26,7 +26,7 @@ struct Readme {
     monitor: String,
     doc: Vec<String>,
     program: String,
-    /// How the monitor reaches its system, in words; empty if it is no bus.
+    /// How the monitor reaches its system, in words; empty if it is not a bus.
     bus: String,
 }
 

@@ -175,7 +175,7 @@ fn written(ty: &Ty) -> String {
     match ty {
         // A `byte` has a sign in ROS 1, and none in ROS 2.
         Ty::Primitive(Primitive::Int8 | Primitive::Uint8) => "int8".to_owned(),
-        Ty::Primitive(primitive) => format!("{primitive:?}").to_lowercase(),
+        Ty::Primitive(primitive) => primitive.name().to_owned(),
         Ty::String => "string".to_owned(),
         Ty::Shape(_) => "message".to_owned(),
         Ty::Array(of, length) => format!("{}[{length}]", written(of)),

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use sesame_scan::{Arrivals, Facts, FoundAction, FoundNode, FoundService, FoundTopic, NOBODY, System};
+use sesame_scan::{Arrivals, Facts, FoundAction, FoundNode, FoundService, FoundTopic, NOBODY, OF_EVERY_NODE, System};
 
 use crate::names::{self, Kind};
 
@@ -20,17 +20,6 @@ pub(super) struct Seen {
     pub(super) transient_local: bool,
     pub(super) hash: Option<String>,
 }
-
-/// The services that every node has, by their last part.
-const OF_EVERY_NODE: [&str; 7] = [
-    "describe_parameters",
-    "get_parameter_types",
-    "get_parameters",
-    "list_parameters",
-    "set_parameters",
-    "set_parameters_atomically",
-    "get_type_description",
-];
 
 /// What is between the path of an action and the names of its topics and services.
 const ACTION: &str = "/_action/";

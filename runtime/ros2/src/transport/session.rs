@@ -148,7 +148,7 @@ impl Session {
                 codec,
                 readers: vec![None; line.sources.len()],
                 writers: vec![None; line.sinks.len()],
-                // Whoever comes later than a guest is to hear its state.
+                // A node that comes later than a guest is to hear its state.
                 qos: if line.cut || line.sinks.is_empty() { mirrored([]) } else { latched(1) },
                 type_name: names::type_name(&interface),
                 interface,

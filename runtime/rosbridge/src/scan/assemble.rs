@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use sesame_interfaces::ros1::interface;
 use sesame_plan::Dialect;
-use sesame_scan::{Facts, FoundNode, FoundService, FoundTopic, System};
+use sesame_scan::{Facts, FoundNode, FoundService, FoundTopic, OF_EVERY_NODE, System};
 
 use super::rosapi::{Details, MOST_NAMES};
 
@@ -24,18 +24,8 @@ pub(super) struct Graph {
 const NOT_OF_THE_SYSTEM: [&str; 5] =
     ["/rosout", "/rosout_agg", "/parameter_events", "/client_count", "/connected_clients"];
 
-/// The services that every node has, by their last part.
-const OF_EVERY_NODE: [&str; 9] = [
-    "describe_parameters",
-    "get_parameter_types",
-    "get_parameters",
-    "list_parameters",
-    "set_parameters",
-    "set_parameters_atomically",
-    "get_type_description",
-    "get_loggers",
-    "set_logger_level",
-];
+/// The services that every node of ROS 1 has for what it logs, by their last part.
+const OF_LOGGING: [&str; 2] = ["get_loggers", "set_logger_level"];
 
 /// Whether a topic or service belongs to the system, and neither to each node nor to the bridge. Those of actions are
 /// left out too: rosapi does not tell their types.
@@ -43,6 +33,7 @@ pub(super) fn is_of_the_system(path: &str) -> bool {
     let last = path.rsplit('/').next().unwrap_or_default();
     !NOT_OF_THE_SYSTEM.contains(&path)
         && !OF_EVERY_NODE.contains(&last)
+        && !OF_LOGGING.contains(&last)
         && !path.starts_with("/rosapi/")
         && !path.contains("/_action/")
 }

@@ -89,24 +89,18 @@ fn layout(typedef: &Json) -> Option<Interface> {
 /// The type of a value, in the words of either ROS; of a bounded sequence or text without the bound.
 fn scalar(written: &str) -> Option<WireType> {
     let base = written.split([',', '<']).next().unwrap_or_default().trim();
+    let interface_of = |name: &str| Some(WireType::Interface { name: name.to_owned() });
     let primitive = match base {
-        "bool" | "boolean" => Primitive::Bool,
-        "int8" => Primitive::Int8,
-        "uint8" | "byte" | "octet" | "char" => Primitive::Uint8,
-        "int16" => Primitive::Int16,
-        "uint16" => Primitive::Uint16,
-        "int32" => Primitive::Int32,
-        "uint32" => Primitive::Uint32,
-        "int64" => Primitive::Int64,
-        "uint64" => Primitive::Uint64,
-        "float" | "float32" => Primitive::Float32,
-        "double" | "float64" => Primitive::Float64,
+        "boolean" => Primitive::Bool,
+        "octet" => Primitive::Uint8,
+        "float" => Primitive::Float32,
+        "double" => Primitive::Float64,
         "string" => return Some(WireType::String),
         "wstring" => return Some(WireType::WString),
-        "time" => return Some(WireType::Interface { name: "builtin_interfaces/msg/Time".to_owned() }),
-        "duration" => return Some(WireType::Interface { name: "builtin_interfaces/msg/Duration".to_owned() }),
-        name if name.contains('/') => return Some(WireType::Interface { name: interface(name) }),
-        _ => return None,
+        "time" => return interface_of("builtin_interfaces/msg/Time"),
+        "duration" => return interface_of("builtin_interfaces/msg/Duration"),
+        name if name.contains('/') => return interface_of(&interface(name)),
+        name => Primitive::named(name)?,
     };
     Some(WireType::Primitive { primitive })
 }

@@ -12,7 +12,7 @@ use crate::relay::{Delivery, Exchange};
 use crate::simulator::Progress;
 use crate::transport::added::{Added, AddedOnWire, FEWEST, objections};
 use crate::transport::bus::{Bus, Event, Settings};
-use crate::transport::{Capabilities, Incidents, Transport, TransportError};
+use crate::transport::{Capabilities, Incidents, Transport, TransportError, wall_time_since};
 use crate::wire::{Line, Wire, WireTable, lines, service_lines};
 
 /// How long a system may take until it is complete, where nothing else is declared.
@@ -70,7 +70,7 @@ impl Zero {
     /// Simulation time now where it is wall time; else what it was.
     fn wall_clock(self, was: SimTime) -> SimTime {
         match self {
-            Zero::Wall(zero) => SimTime::from_nanos(i64::try_from(zero.elapsed().as_nanos()).unwrap_or(i64::MAX)),
+            Zero::Wall(zero) => wall_time_since(zero),
             Zero::Clock(_) => was,
         }
     }

@@ -27,7 +27,7 @@ use crate::transport::process::fault::{explain, note_restart};
 use crate::transport::process::launched::{health, launch};
 use crate::transport::process::protocol::{LINE_LIMIT, Line, Read, SimulatorMessage, read_line, request};
 use crate::transport::process::session::{Fault, Topics};
-use crate::transport::{Capabilities, Incidents, Transport, TransportError};
+use crate::transport::{Capabilities, Incidents, Transport, TransportError, wall_time_since};
 use crate::wire::WireTable;
 
 /// How many lines are read ahead. The simulator's output is read while a line to it is written, so a simulator that
@@ -241,7 +241,7 @@ impl Connection {
     /// Simulation time by the wall clock, or the latest time that the simulator sent.
     fn time(&self, latest: SimTime) -> SimTime {
         match self.clock {
-            Clock::Wall(start) => SimTime::from_nanos(i64::try_from(start.elapsed().as_nanos()).unwrap_or(i64::MAX)),
+            Clock::Wall(start) => wall_time_since(start),
             Clock::Simulator => latest,
         }
     }
