@@ -34,33 +34,35 @@ pub fn target() -> PathBuf {
     scratch().join("target")
 }
 
-/// The program `sesamec` of this workspace, with the transports that the rest of these tests has, built if it is not up
-/// to date.
-pub fn sesamec() -> &'static Path {
-    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
-    PROGRAM.get_or_init(|| built(&SESAMEC))
+/// The program `sesamec` of this workspace, with the transports that the rest of these tests has.
+pub fn sesamec() -> PathBuf {
+    program("tested-sesamec")
 }
 
-/// The same, optimised: for what is to be measured.
+/// The stand-in for the lab of the gearbox cell.
+pub fn kuka_cell_lab() -> PathBuf {
+    program("tested-kuka_cell_lab")
+}
+
+/// The gearbox cell as a program that speaks SimlogAPI.
+pub fn kuka_cell_simlog() -> PathBuf {
+    program("tested-kuka_cell_simlog")
+}
+
+/// A program of this package. Cargo builds them before its tests, into the folder above theirs.
+fn program(name: &str) -> PathBuf {
+    let test = std::env::current_exe().expect("a test has a program");
+    let folder = test.ancestors().nth(2).expect("cargo puts test programs two folders below its target folder");
+    folder.join(name).with_extension(std::env::consts::EXE_EXTENSION)
+}
+
+/// The same, optimised, built if it is not up to date: for what is to be measured.
 pub fn optimised_sesamec() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
-    PROGRAM.get_or_init(|| built(&[&SESAMEC[..], &["--release"]].concat()))
+    PROGRAM.get_or_init(|| {
+        built(&["--package", "sesame-codegen", "--features", "mqtt,ros1,ros2,rosbridge,simlog", "--release"])
+    })
 }
-
-/// The stand-in for the lab of the gearbox cell, built if it is not up to date.
-pub fn kuka_cell_lab() -> &'static Path {
-    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
-    PROGRAM.get_or_init(|| built(&["--package", "kuka_cell_lab"]))
-}
-
-/// The gearbox cell as a program that speaks SimlogAPI, built if it is not up to date.
-pub fn kuka_cell_simlog() -> &'static Path {
-    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
-    PROGRAM.get_or_init(|| built(&["--package", "kuka_cell_simlog"]))
-}
-
-/// `sesamec`, as cargo is asked for it.
-const SESAMEC: [&str; 4] = ["--package", "sesame-codegen", "--features", "mqtt,ros1,ros2,rosbridge,simlog"];
 
 /// The program that cargo builds when it is asked for this.
 fn built(arguments: &[&str]) -> PathBuf {
