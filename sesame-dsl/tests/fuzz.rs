@@ -22,7 +22,7 @@ use sound::has_a_sound_answer;
 /// Most a text grows to.
 const MAX_BYTES: usize = 12_000;
 /// Longest that a text of [`MAX_BYTES`] may take, on a machine with much else to do; usual is a hundredth of it.
-const MAX_TIME: Duration = Duration::from_secs(20);
+const MAX_TIME: Duration = Duration::from_secs(60);
 /// Memory of the whole process, all kept texts included.
 const MAX_MEMORY_KIB: u64 = 1 << 20;
 

@@ -19,8 +19,8 @@ const DONE: &str = r#"{"done":{}}"#;
 /// Steps in a test.
 const STEPS: u32 = 10;
 
-/// The longest that anything here lives when nobody ends it.
-const LIFE: Duration = Duration::from_secs(120);
+/// The longest that anything here lives when nobody ends it: for longer than any test waits.
+const LIFE: Duration = Duration::from_secs(600);
 
 /// What a mode does.
 enum Act {
@@ -164,20 +164,28 @@ const MODES: &[(&str, Act)] = &[
     ("fails_with_markup", Says(br#"{"failed":"\u001b[2J<script>alert(1)</script>'; drop table tests; --"}"#)),
     ("fails_with_ten_megabytes", Makes(|| quoted("{\"failed\":\"", 10 << 20, "\"}"))),
     // Answers too many.
-    ("answers_twice_at_once", Says(b"{\"done\":{}}\n{\"done\":{}}")),
+    (
+        "answers_twice_at_once",
+        Instead(|hostile| {
+            say(b"{\"done\":{}}\n{\"done\":{}}");
+            hostile.ahead = true;
+        }),
+    ),
     (
         "answers_twice_one_after_the_other",
-        Instead(|_| {
+        Instead(|hostile| {
             say(DONE.as_bytes());
             say(DONE.as_bytes());
+            hostile.ahead = true;
         }),
     ),
     (
         "answers_twice_with_a_pause",
-        Instead(|_| {
+        Instead(|hostile| {
             say(DONE.as_bytes());
             sleep(Duration::from_millis(30));
             say(DONE.as_bytes());
+            hostile.ahead = true;
         }),
     ),
     ("answers_200000_times", Makes(|| vec![DONE; 200_000].join("\n").into_bytes())),
@@ -185,10 +193,7 @@ const MODES: &[(&str, Act)] = &[
     (
         "answers_twice_at_the_end",
         Does(|hostile| {
-            hostile.at_the_end = Some(|_| {
-                say(DONE.as_bytes());
-                say(DONE.as_bytes());
-            });
+            hostile.at_the_end = Some(|_| say(b"{\"done\":{}}\n{\"done\":{}}"));
         }),
     ),
     (
@@ -196,7 +201,8 @@ const MODES: &[(&str, Act)] = &[
         Does(|hostile| {
             hostile.at_the_end = Some(|_| {
                 say(DONE.as_bytes());
-                sleep(Duration::from_millis(400));
+                // The run is over when the runner speaks again.
+                std::io::stdin().lock().fill_buf().ok();
                 say(DONE.as_bytes());
             });
         }),
@@ -398,7 +404,8 @@ const MODES: &[(&str, Act)] = &[
         Does(|hostile| {
             hostile.after_input = Some(|| {
                 let folder = PathBuf::from(std::env::var_os("SESAME_WORKER_FOLDER").unwrap_or_default());
-                sleep(Duration::from_millis(300));
+                // One that is killed at the end of its input does not come to this; a second is what it is given.
+                sleep(Duration::from_millis(100));
                 fs::write(folder.join("bye"), "bye").ok();
             });
         }),
@@ -444,6 +451,11 @@ struct Hostile {
     acted: bool,
     step: u32,
     pause: Duration,
+    /// It has given an answer too many, so that each of its answers comes a request too early.
+    ahead: bool,
+    /// An answer that it says together with the next one. The runner looks only for a moment for what comes after the
+    /// last answer of a run; so that no test depends on how long that is, it is there already.
+    unsaid: Vec<u8>,
     at_the_end: Option<fn(&mut Hostile)>,
     at_reset: Option<fn(&mut Hostile)>,
     after_input: Option<fn()>,
@@ -457,6 +469,8 @@ impl Hostile {
             if told.starts_with("{\"reset\"") {
                 let at_reset = self.at_reset.take();
                 (self.acted, self.step, self.pause, self.at_the_end) = (false, 0, Duration::ZERO, None);
+                self.ahead = false;
+                self.unsaid.clear();
                 match at_reset {
                     Some(act) => act(self),
                     None => say(READY.as_bytes()),
@@ -464,7 +478,8 @@ impl Hostile {
                 continue;
             }
             self.step += 1;
-            say(br#"{"publish":[{"topic":"control","value":-1}]}"#);
+            let publish = br#"{"publish":[{"topic":"control","value":-1}]}"#;
+            say(&[&std::mem::take(&mut self.unsaid)[..], publish].concat());
             let Some(deliver) = order() else { break };
             sleep(self.pause);
             // A message that it published itself is not the number of a mode.
@@ -483,6 +498,7 @@ impl Hostile {
                 }
                 None => match self.at_the_end.filter(|_| self.step == STEPS) {
                     Some(act) => act(self),
+                    None if self.ahead && self.step == STEPS - 1 => self.unsaid = format!("{DONE}\n").into_bytes(),
                     None => say(DONE.as_bytes()),
                 },
             }
@@ -528,7 +544,7 @@ fn live(kind: &str) {
         "hare" => {
             rustix::process::setsid().ok();
             sleep(Duration::from_millis(20));
-            let left = std::env::var("HARE").ok().and_then(|left| left.parse().ok()).unwrap_or(3000u32);
+            let left = std::env::var("HARE").ok().and_then(|left| left.parse().ok()).unwrap_or(12_000u32);
             if left > 0 {
                 child("hare", false).env("HARE", (left - 1).to_string()).spawn().ok();
             }

@@ -115,14 +115,20 @@ class Driver:
         self.step_service = self.node.create_client(Trigger, f"{example.services}/step")
         self.reset_service = self.node.create_client(Trigger, f"{example.services}/reset")
 
-    def spin_until(self, done, seconds: float = 10.0) -> None:
+    def spin_until(self, done, seconds: float = 120.0) -> None:
         """Handles messages until a condition holds."""
+        if not self.spin(done, seconds):
+            counts = {topic: len(messages) for topic, messages in self.received.items()}
+            sys.exit(f"drive.py: nothing more came at {self.now:.2f} s; received {counts}")
+
+    def spin(self, done, seconds: float) -> bool:
+        """Handles messages until a condition holds, which this returns, or for so long."""
         until = time.monotonic() + seconds
         while not done():
             if time.monotonic() > until:
-                counts = {topic: len(messages) for topic, messages in self.received.items()}
-                sys.exit(f"drive.py: nothing more came at {self.now:.2f} s; received {counts}")
+                return False
             self.executor.spin_once(0.1)
+        return True
 
     def call(self, client) -> None:
         """Calls a service and waits for its answer."""
@@ -132,7 +138,7 @@ class Driver:
     def match(self) -> None:
         """Waits until all nodes have found each other."""
         for client in (self.step_service, self.reset_service):
-            if not client.wait_for_service(timeout_sec=20.0):
+            if not client.wait_for_service(timeout_sec=120.0):
                 sys.exit("drive.py: the simulator offers no service")
         node = self.node
         ends = "/undisturbed" if self.relay else ""
@@ -144,8 +150,30 @@ class Driver:
                     return False
             return all(publisher.get_subscription_count() >= 1 for publisher in self.publishers.values())
 
-        self.spin_until(complete, 20.0)
-        time.sleep(0.3)  # the nodes may take a moment longer to find each other than we to find them
+        self.spin_until(complete)
+        # The nodes may take a moment longer to find each other than we to find them. Whoever has not found all others
+        # answers no step, so steps are taken until everybody answers one; the first run begins with a reset.
+        for _ in range(12):
+            self.call(self.reset_service)
+            self.clear()
+            self.call(self.step_service)
+            if self.spin(self.is_answered, 10.0):
+                return
+        sys.exit("drive.py: not all nodes answer a step")
+
+    def clear(self) -> None:
+        """Forgets what has come."""
+        for messages in self.received.values():
+            messages.clear()
+
+    def is_answered(self) -> bool:
+        """Whether each controller has answered the first step, whose states are passed on to them as they come."""
+        received = self.received
+        if self.relay:
+            for topic in self.example.states:
+                while received[topic]:
+                    self.publishers[topic].publish(received[topic].pop(0))
+        return all(received[topic] for topic in self.example.answers)
 
     def run(self, seconds: float, list_topic: str | None = None) -> dict:
         """Runs one test from time zero."""
@@ -154,8 +182,7 @@ class Driver:
         held: list[tuple[float, str, bytes]] = []
         digest = hashlib.sha256()
         measured: dict[str, list[float]] = {topic: [] for topic in self.example.measures}
-        for messages in self.received.values():
-            messages.clear()
+        self.clear()
         steps = round(seconds / self.example.period)
         begin = time.monotonic()
         for number in range(1, steps + 1):

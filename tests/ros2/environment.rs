@@ -1,6 +1,7 @@
-//! The Pythons of the peers, and domains in which tests do not hear each other.
+//! The Pythons of the peers, and domains and ports in which tests do not hear each other.
 
-use std::net::{Ipv4Addr, UdpSocket};
+use std::fmt;
+use std::net::{Ipv4Addr, TcpListener, UdpSocket};
 use std::path::{Path, PathBuf};
 
 /// An environment with a middleware.
@@ -77,6 +78,10 @@ pub(crate) struct Domain {
     _held: Vec<UdpSocket>,
 }
 
+/// Domains of tests. Their ports lie below those that the system gives to whoever asks for any, and no example is in one
+/// of these domains.
+const DOMAINS: std::ops::Range<u16> = 62..100;
+
 impl Domain {
     pub(crate) fn free() -> Self {
         Domain::first_of(1)
@@ -84,12 +89,50 @@ impl Domain {
 
     /// The first of as many domains, as a runner with so many workers needs them.
     pub(crate) fn first_of(count: u16) -> Self {
-        let mut all = 140..180;
-        let free = all.find_map(|number| {
+        let all = DOMAINS.start..=DOMAINS.end - count;
+        let free = from_own_place(all).into_iter().find_map(|number| {
             let ports = (number..number + count).map(|number| 7400 + 250 * number + 249);
             let held = ports.map(|port| UdpSocket::bind((Ipv4Addr::LOCALHOST, port)));
             Some(Domain { number, _held: held.collect::<Result<_, _>>().ok()? })
         });
-        free.expect("forty domains are enough for the tests of one machine")
+        free.expect("so many domains are enough for the tests of one machine")
     }
+}
+
+/// A port for a server that no other test on this machine uses meanwhile.
+#[derive(Debug)]
+pub(crate) struct Port {
+    number: u16,
+    /// The datagrams of the same port, which nobody wants: whoever has them has the port.
+    _held: UdpSocket,
+}
+
+impl Port {
+    /// One that nobody listens on. The ports lie below those that the system gives to whoever asks for any, so nobody
+    /// takes it before the server does, or while the server is being started again.
+    pub(crate) fn free() -> Self {
+        let free = from_own_place(12_000..=14_999).into_iter().find_map(|number| {
+            let held = UdpSocket::bind((Ipv4Addr::LOCALHOST, number)).ok()?;
+            TcpListener::bind((Ipv4Addr::LOCALHOST, number)).is_ok().then_some(Port { number, _held: held })
+        });
+        free.expect("so many ports are enough for the tests of one machine")
+    }
+
+    pub(crate) fn number(&self) -> u16 {
+        self.number
+    }
+}
+
+impl fmt::Display for Port {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.number.fmt(f)
+    }
+}
+
+/// All of these numbers, but each process begins elsewhere: what has just been used may yet have a late message.
+fn from_own_place(all: std::ops::RangeInclusive<u16>) -> Vec<u16> {
+    let mut all: Vec<u16> = all.collect();
+    let own = std::process::id() as usize % all.len();
+    all.rotate_left(own);
+    all
 }

@@ -1,15 +1,22 @@
 //! A program of `peers/` that takes part in a test.
+//!
+//! Peers say what has happened in lines of JSON, and tests wait for what was said: never for time alone.
 
 use std::ffi::OsStr;
-use std::io::{Read, Write};
+use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::Path;
-use std::process::{Child, ChildStdout, Command, Stdio};
+use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 use serde_json::Value;
 use sesame_tests::workspace;
 
 use crate::environment::Domain;
+
+/// How long anything may take that a peer is to say: longer than it ever takes, on a machine that is busy too.
+pub(crate) const LIMIT: Duration = Duration::from_secs(120);
 
 /// Cyclone on this machine only: on the loopback interface, where it finds others without multicast.
 const CYCLONE: &str = "<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"lo\"/></Interfaces></General>\
@@ -20,8 +27,33 @@ const CYCLONE: &str = "<CycloneDDS><Domain><General><Interfaces><NetworkInterfac
 /// A running peer; it is ended when it is dropped.
 pub(crate) struct Peer {
     name: String,
-    child: Child,
-    output: Option<JoinHandle<String>>,
+    child: Mutex<Child>,
+    said: Arc<Said>,
+    listening: Option<JoinHandle<()>>,
+}
+
+/// What a peer has said until now.
+#[derive(Default)]
+struct Said {
+    lines: Mutex<Lines>,
+    more: Condvar,
+}
+
+#[derive(Default)]
+struct Lines {
+    all: Vec<String>,
+    /// Whether it says no more.
+    ended: bool,
+}
+
+impl Lines {
+    /// The latest value that was said under a name.
+    fn latest(&self, key: &str) -> Option<Value> {
+        self.all.iter().rev().find_map(|line| {
+            let mut said: Value = serde_json::from_str(line).ok()?;
+            said.get_mut(key).map(Value::take)
+        })
+    }
 }
 
 impl Peer {
@@ -52,36 +84,83 @@ impl Peer {
             .spawn()
             .unwrap_or_else(|error| panic!("{} does not start: {error}", python.display()));
         let output = child.stdout.take().expect("its output is a pipe");
-        let output = std::thread::spawn(move || whole(output));
-        Peer { name: program.to_owned(), child, output: Some(output) }
+        let said = Arc::<Said>::default();
+        let hears = Arc::clone(&said);
+        let listening = std::thread::spawn(move || listen(output, &hears));
+        Peer { name: program.to_owned(), child: Mutex::new(child), said, listening: Some(listening) }
     }
 
-    /// Tells one that waits for it to begin.
-    pub(crate) fn go(&mut self) {
-        let input = self.child.stdin.as_mut().expect("its input is a pipe");
+    /// Tells one that waits for it to begin, or to go on.
+    pub(crate) fn go(&self) {
+        self.tell("go");
+    }
+
+    /// Tells a publisher to send a probe.
+    pub(crate) fn probe(&self) {
+        self.tell("probe");
+    }
+
+    fn tell(&self, line: &str) {
+        let mut child = lock(&self.child);
+        let input = child.stdin.as_mut().expect("its input is a pipe");
         // One that has given up is noticed by what it says.
-        let _ = input.write_all(b"\n").and_then(|()| input.flush());
+        let _ = writeln!(input, "{line}").and_then(|()| input.flush());
+    }
+
+    /// The latest number that it has said under a name, and zero before.
+    pub(crate) fn told(&self, key: &str) -> u64 {
+        lock(&self.said.lines).latest(key).and_then(|it| it.as_u64()).unwrap_or_default()
+    }
+
+    /// Waits until it has said something under this name.
+    #[track_caller]
+    pub(crate) fn await_said(&self, key: &str) -> Value {
+        let lines = lock(&self.said.lines);
+        let missing = |lines: &mut Lines| lines.latest(key).is_none() && !lines.ended;
+        let waited = self.said.more.wait_timeout_while(lines, LIMIT, missing);
+        let (lines, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        let found = lines.latest(key);
+        found.unwrap_or_else(|| panic!("{} was awaited to say `{key}`, and said {:?}", self.name, lines.all))
+    }
+
+    /// Waits until it is matched with somebody.
+    pub(crate) fn await_match(&self) {
+        self.await_said("matched");
+    }
+
+    /// Waits until its publishers and subscribers are there.
+    pub(crate) fn await_up(&self) {
+        self.await_said("up");
     }
 
     /// Whether it has ended by itself.
-    pub(crate) fn has_ended(&mut self) -> bool {
-        self.child.try_wait().expect("a child can be asked").is_some()
+    pub(crate) fn has_ended(&self) -> bool {
+        lock(&self.child).try_wait().expect("a child can be asked").is_some()
+    }
+
+    /// Closes its input, which those that stay wait for, and waits for its end.
+    fn wait(&mut self) -> (ExitStatus, Vec<String>) {
+        drop(lock(&self.child).stdin.take());
+        if let Some(listening) = self.listening.take() {
+            let _ = listening.join();
+        }
+        let status = lock(&self.child).wait().expect("a child can be awaited");
+        (status, std::mem::take(&mut lock(&self.said.lines).all))
     }
 
     /// Waits for its end: all that it said.
     pub(crate) fn text(mut self) -> String {
-        let status = self.child.wait().expect("a child can be awaited");
+        let (status, said) = self.wait();
         assert!(status.success(), "{}: {status}", self.name);
-        self.output.take().and_then(|output| output.join().ok()).unwrap_or_default()
+        said.join("\n")
     }
 
     /// Waits for its end: its exit code, and the JSON that it said last.
     pub(crate) fn end(mut self) -> (Option<i32>, Value) {
-        let status = self.child.wait().expect("a child can be awaited");
-        let said = self.output.take().and_then(|output| output.join().ok()).unwrap_or_default();
-        let last = said.lines().last().unwrap_or_default();
-        let said = serde_json::from_str(last).unwrap_or_else(|_| panic!("{}: {status}: {said}", self.name));
-        (status.code(), said)
+        let (status, said) = self.wait();
+        let last = said.last().map_or("", String::as_str);
+        let last = serde_json::from_str(last).unwrap_or_else(|_| panic!("{}: {status}: {said:?}", self.name));
+        (status.code(), last)
     }
 
     /// Waits for its end, which is a good one.
@@ -97,15 +176,23 @@ impl Peer {
 impl Drop for Peer {
     fn drop(&mut self) {
         if !self.has_ended() {
-            let _ = self.child.kill();
-            let _ = self.child.wait();
+            let mut child = lock(&self.child);
+            let _ = child.kill();
+            let _ = child.wait();
         }
     }
 }
 
-fn whole(mut output: ChildStdout) -> String {
-    let mut text = String::new();
-    // What came until a reader or writer failed is enough.
-    let _ = output.read_to_string(&mut text);
-    text
+fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
+    of.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Keeps each line. What came until a reader or writer failed is enough.
+fn listen(output: ChildStdout, said: &Said) {
+    for line in BufReader::new(output).lines().map_while(Result::ok) {
+        lock(&said.lines).all.push(line);
+        said.more.notify_all();
+    }
+    lock(&said.lines).ended = true;
+    said.more.notify_all();
 }

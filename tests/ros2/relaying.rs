@@ -1,6 +1,7 @@
 //! A runner between peers, in this process: a space as text, and its system driven by hand or by whole runs.
 
 use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
 use sesame_base::observation::Observation;
 use sesame_base::time::SimTime;
@@ -8,13 +9,14 @@ use sesame_codegen::frontend::{Look, SESAME};
 use sesame_plan::{CampaignPlan, Test};
 use sesame_relay::evaluate::{Custom, Run, evaluate_tapped};
 use sesame_relay::metric::MetricTable;
-use sesame_relay::relay::{Finished, Listener, Relay};
+use sesame_relay::relay::{Exchange as _, Finished, Listener, Relay};
 use sesame_relay::transport::Transport;
 use sesame_relay::transport::added::AddedOnWire;
-use sesame_relay::wire::WireTable;
+use sesame_relay::wire::{Wire, WireTable};
 use sesame_tests::workspace;
 
 use crate::environment::Domain;
+use crate::peer::{LIMIT, Peer};
 
 /// The plan of the only campaign in this text.
 pub(crate) fn plan(text: &str) -> CampaignPlan {
@@ -73,10 +75,85 @@ fn fields(kind: &str) -> &'static str {
     }
 }
 
+/// Who publishes and who hears.
+pub(crate) struct Exchange<'a> {
+    /// The publisher.
+    pub(crate) from: &'a Peer,
+    /// Publishers that nobody hears, which begin at the same time.
+    pub(crate) beside: &'a [&'a Peer],
+    /// The subscribers.
+    pub(crate) to: &'a [&'a Peer],
+    /// After how many messages each subscriber says how many it has heard, if the publisher waits for that: it is told
+    /// to go on when all but so many have arrived. Else it publishes all at once.
+    pub(crate) batch: Option<u64>,
+    /// Whether subscribers are to be told when the first message comes that is no probe.
+    pub(crate) begins: bool,
+}
+
+impl<'a> Exchange<'a> {
+    /// All at once, from one to others.
+    pub(crate) fn new(from: &'a Peer, to: &'a [&'a Peer]) -> Self {
+        Exchange { from, beside: &[], to, batch: None, begins: false }
+    }
+
+    /// Whether all subscribers have heard enough.
+    fn have_ended(&self) -> bool {
+        self.to.iter().all(|peer| peer.has_ended())
+    }
+}
+
+/// What came of it.
+pub(crate) struct Exchanged {
+    pub(crate) finished: Finished,
+    /// How many messages of the run were probes.
+    probes: u64,
+}
+
+impl Exchanged {
+    /// How many messages there were that count.
+    pub(crate) fn messages(&self) -> u64 {
+        self.finished.messages - self.probes
+    }
+
+    /// How many an operation dropped of those that count, if it dropped all probes.
+    pub(crate) fn dropped(&self) -> u64 {
+        self.finished.operations[0].counters.dropped - self.probes
+    }
+}
+
+/// After how long another probe is sent. Only what was lost is sent again, so it may be long.
+const ANOTHER: Duration = Duration::from_secs(1);
+
+/// Sends probes until the latest one has been heard by all.
+#[derive(Default)]
+struct Probing {
+    sent: u64,
+    since: Option<Instant>,
+    begun: Option<Instant>,
+}
+
+impl Probing {
+    fn is_over(&mut self, from: &Peer, to: &[&Peer]) -> bool {
+        if self.sent > 0 && to.iter().all(|peer| peer.told("heard") == self.sent) {
+            return true;
+        }
+        if self.since.is_none_or(|since| since.elapsed() >= ANOTHER) {
+            let begun = self.begun.get_or_insert_with(Instant::now);
+            assert!(begun.elapsed() < LIMIT, "of {} probes none was heard by all", self.sent);
+            from.probe();
+            self.sent += 1;
+            self.since = Some(Instant::now());
+        }
+        false
+    }
+}
+
 /// A system of peers with the runner between them.
 pub(crate) struct System {
     plan: CampaignPlan,
     transport: Box<dyn Transport>,
+    /// What the transport has noted, and nobody has taken.
+    noted: Vec<String>,
 }
 
 impl System {
@@ -91,7 +168,7 @@ impl System {
             _ => sesame_ros2::ros2(folder),
         };
         let transport = connect.transport(&plan);
-        System { plan, transport }
+        System { plan, transport, noted: Vec::new() }
     }
 
     /// A whole run of a test, as campaigns make them, and what the transport noted.
@@ -114,13 +191,80 @@ impl System {
         (run.expect("the test fits the plan"), self.transport.incidents().notes)
     }
 
-    /// A run that lasts until something holds, which is asked every 50 ms. `ready` is called when the
-    /// system is complete.
+    /// A run that lasts until something holds, which is asked every few milliseconds with what was noted. `ready` is
+    /// called when the system is complete.
     pub(crate) fn relay_until(
         &mut self,
         test: &Test,
-        mut ready: impl FnMut(),
-        mut done: impl FnMut() -> bool,
+        ready: impl FnOnce(),
+        mut done: impl FnMut(&[String]) -> bool,
+    ) -> Finished {
+        let mut noted = Vec::new();
+        let finished = self.drive(test, ready, |_, transport| {
+            noted.append(&mut transport.incidents().notes);
+            done(&noted)
+        });
+        self.noted.append(&mut noted);
+        finished
+    }
+
+    /// A run in which a peer publishes what others are to hear. Before anything counts, probes go all the way: who is
+    /// matched on one side may take a moment longer on the other. The run lasts until all subscribers have ended.
+    pub(crate) fn exchange(&mut self, test: &Test, exchange: &Exchange<'_>) -> Exchanged {
+        self.exchange_until(test, exchange, |_| exchange.have_ended())
+    }
+
+    /// The same, until something else holds, which is asked with how many messages that count the runner has seen.
+    pub(crate) fn exchange_until(
+        &mut self,
+        test: &Test,
+        exchange: &Exchange<'_>,
+        mut done: impl FnMut(u64) -> bool,
+    ) -> Exchanged {
+        let Exchange { from, beside, to, batch, begins } = *exchange;
+        let wires = WireTable::new(&self.plan);
+        let paths = self.plan.topics.iter().flat_map(|topic| &topic.paths);
+        let wires: Vec<Wire> = paths.filter_map(|path| wires.find(path)).collect();
+        let (mut probing, mut probes, mut batches, begun) = (Probing::default(), None, 0, Instant::now());
+        let finished = self.drive(
+            test,
+            || {
+                std::iter::once(from)
+                    .chain(beside.iter().copied())
+                    .chain(to.iter().copied())
+                    .for_each(Peer::await_match)
+            },
+            |relay, _| {
+                let seen: u64 = wires.iter().map(|&wire| relay.next_index(wire)).sum();
+                if probes.is_none() {
+                    if !probing.is_over(from, to) {
+                        return false;
+                    }
+                    probes = Some(seen);
+                    for peer in to.iter().filter(|_| begins) {
+                        peer.go();
+                        peer.await_said("begun");
+                    }
+                    beside.iter().for_each(|peer| peer.go());
+                }
+                // So few are on their way that no queue between here and there is too short for them.
+                let heard = to.iter().map(|peer| peer.told("count")).min().unwrap_or_default();
+                while batch.map_or(batches == 0, |batch| heard + batch >= batches * batch) {
+                    from.go();
+                    batches += 1;
+                }
+                assert!(begun.elapsed() < 10 * LIMIT, "{seen} messages, {heard} heard: nothing more comes");
+                done(seen - probes.unwrap_or_default())
+            },
+        );
+        Exchanged { finished, probes: probes.unwrap_or_default() }
+    }
+
+    fn drive(
+        &mut self,
+        test: &Test,
+        ready: impl FnOnce(),
+        mut done: impl FnMut(&Relay<'_>, &mut dyn Transport) -> bool,
     ) -> Finished {
         let wires = WireTable::new(&self.plan);
         let metrics = MetricTable::new(&self.plan, &wires, &[]).expect("the metrics need no hooks");
@@ -128,13 +272,15 @@ impl System {
         relay.begin();
         self.transport.reset(1, &mut relay).unwrap_or_else(|error| panic!("{error}"));
         ready();
-        while !done() {
-            let until = self.transport.now() + SimTime::from_nanos(50_000_000);
+        loop {
+            if done(&relay, &mut *self.transport) {
+                return relay.finish(self.transport.now());
+            }
+            let until = self.transport.now() + SimTime::from_nanos(5_000_000);
             while self.transport.now() < until {
                 self.transport.advance(until, &mut relay).unwrap_or_else(|error| panic!("{error}"));
             }
         }
-        relay.finish(self.transport.now())
     }
 
     /// Begins a run, which is to fail: how.
@@ -160,6 +306,7 @@ impl System {
 
     /// What the transport noted since the last call.
     pub(crate) fn all_notes(&mut self) -> Vec<String> {
-        self.transport.incidents().notes
+        self.noted.append(&mut self.transport.incidents().notes);
+        std::mem::take(&mut self.noted)
     }
 }

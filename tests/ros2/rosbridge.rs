@@ -1,17 +1,15 @@
 //! Nodes of ROS behind a real server of rosbridge: the runner is one of its clients.
 
 use std::io::{BufRead as _, BufReader, Read as _};
-use std::net::{Ipv4Addr, TcpListener};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
 
 use sesame_plan::Test;
 use sesame_tests::workspace;
 
-use crate::environment::{Domain, Vendor};
+use crate::environment::{Domain, Port, Vendor};
 use crate::peer::Peer;
-use crate::relaying::{System, plan, space};
+use crate::relaying::{Exchange, System, plan, space};
 
 pub(crate) const JOINTS: &str = "sensor_msgs/msg/JointState";
 
@@ -21,7 +19,7 @@ pub(crate) struct Server {
 }
 
 impl Server {
-    pub(crate) fn start(pythons: &Pythons, domain: &Domain, port: u16) -> Self {
+    pub(crate) fn start(pythons: &Pythons, domain: &Domain, port: &Port) -> Self {
         let mut child = Command::new(&pythons.bridge)
             .arg(workspace().join("tests/ros2/peers/bridge.py"))
             .arg("--ros")
@@ -70,46 +68,44 @@ impl Pythons {
     }
 }
 
-pub(crate) fn free_port() -> u16 {
-    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).expect("there is a free port");
-    listener.local_addr().expect("it has an address").port()
-}
-
 /// A space with `/peer` behind a bridge.
-fn bridged(domain: &Domain, port: u16, settings: &str, operations: &str, seconds: u32) -> String {
+fn bridged(domain: &Domain, port: &Port, settings: &str, operations: &str, seconds: u32) -> String {
     let text = space(domain, JOINTS, "", operations, seconds);
     let bridge = format!("rosbridge \"ws://127.0.0.1:{port}\" {{ {settings} domain");
     text.replacen("ros2 { domain", &bridge, 1)
 }
 
-/// Runs until a subscriber has so many messages, of which a publisher sends all: what both say.
-fn through(
-    system: &mut System,
-    pythons: &Pythons,
-    domain: &Domain,
-    count: &str,
-    test: &Test,
-) -> [serde_json::Value; 2] {
-    let of_all = ["--type", JOINTS, "--count", count];
-    let listening = [&of_all[..], &["--topic", "/peer", "--content", "--timeout", "20"]].concat();
-    let mut subscriber = Peer::start(&pythons.jazzy, domain, "subscriber.py", &listening);
-    let speaking = [&of_all[..], &["--topic", "/peer/undisturbed", "--rate", "200", "--short", "--hold"]].concat();
-    let publisher = std::cell::RefCell::new(Peer::start(&pythons.jazzy, domain, "publisher.py", &speaking));
-    let ready = || publisher.borrow_mut().go();
-    system.relay_until(test, ready, || subscriber.has_ended());
-    [publisher.into_inner().expect(), subscriber.end().1]
+/// How many messages are on their way through a bridge: its queues are short, and a full one drops what comes.
+pub(crate) const BATCH: u64 = 5;
+
+/// A subscriber of so many messages, which says when it has heard a few.
+fn hearing(pythons: &Pythons, domain: &Domain, count: &str, more: &[&str]) -> Peer {
+    let batch = BATCH.to_string();
+    let arguments = ["--type", JOINTS, "--topic", "/peer", "--count", count, "--tell", &batch];
+    Peer::start(&pythons.jazzy, domain, "subscriber.py", &[&arguments[..], more].concat())
+}
+
+/// A publisher of so many messages.
+fn speaking(pythons: &Pythons, domain: &Domain, count: &str, more: &[&str]) -> Peer {
+    let arguments = ["--type", JOINTS, "--topic", "/peer/undisturbed", "--count", count, "--short", "--hold"];
+    Peer::start(&pythons.jazzy, domain, "publisher.py", &[&arguments[..], more].concat())
 }
 
 #[test]
 fn a_thousand_messages_reach_nodes_through_a_bridge_and_the_relay_however_they_are_written() {
     let Some(pythons) = Pythons::find() else { return };
     let domain = Domain::free();
-    let port = free_port();
-    let _server = Server::start(&pythons, &domain, port);
+    let port = Port::free();
+    let _server = Server::start(&pythons, &domain, &port);
     for settings in ["", "compression cbor"] {
-        let plan = plan(&bridged(&domain, port, settings, "", 60));
+        let plan = plan(&bridged(&domain, &port, settings, "", 60));
         let mut system = System::new(plan);
-        let [said, heard] = through(&mut system, &pythons, &domain, "1000", &Test::default());
+        let subscriber = hearing(&pythons, &domain, "1000", &["--content"]);
+        let publisher = speaking(&pythons, &domain, "1000", &["--batch", &BATCH.to_string()]);
+        let to = [&subscriber];
+        let exchange = Exchange { batch: Some(BATCH), ..Exchange::new(&publisher, &to) };
+        system.exchange(&Test::default(), &exchange);
+        let [(_, said), (_, heard)] = [publisher.end(), subscriber.end()];
         assert_eq!(heard["count"], 1000, "{settings}: {:?}", system.all_notes());
         assert_eq!(said["content"], heard["content"], "{settings}");
         assert_eq!(system.all_notes(), [""; 0]);
@@ -120,9 +116,9 @@ fn a_thousand_messages_reach_nodes_through_a_bridge_and_the_relay_however_they_a
 fn what_a_monitor_says_reaches_nodes_behind_a_bridge() {
     let Some(pythons) = Pythons::find() else { return };
     let domain = Domain::free();
-    let port = free_port();
-    let _server = Server::start(&pythons, &domain, port);
-    let text = bridged(&domain, port, "", "", 60);
+    let port = Port::free();
+    let _server = Server::start(&pythons, &domain, &port);
+    let text = bridged(&domain, &port, "", "", 60);
     let state = "message State = \"std_msgs/msg/String\" { data: text }\ntopic state = \"/state\" : State\n";
     let monitor = "eddi arm publishes state {\n\
                    evidence stamped = peer.header.stamp > 0s\n\
@@ -130,14 +126,16 @@ fn what_a_monitor_says_reaches_nodes_behind_a_bridge() {
                    otherwise rests\n}\n";
     let text = text.replacen("topic peer", &format!("{state}topic peer"), 1);
     let mut system = System::new(plan(&text.replacen("metric disturbed", &format!("{monitor}metric disturbed"), 1)));
-    let listening = ["--type", "std_msgs/msg/String", "--count", "2", "--topic", "/state", "--timeout", "20"];
-    let mut subscriber = Peer::start(&pythons.jazzy, &domain, "subscriber.py", &listening);
-    let speaking =
-        ["--type", JOINTS, "--count", "100", "--topic", "/peer/undisturbed", "--rate", "50", "--short", "--hold"];
-    let publisher = std::cell::RefCell::new(Peer::start(&pythons.jazzy, &domain, "publisher.py", &speaking));
-    let ready = || publisher.borrow_mut().go();
-    system.relay_until(&Test::default(), ready, || subscriber.has_ended());
-    publisher.into_inner().expect();
+    let listening = ["--type", "std_msgs/msg/String", "--count", "2", "--topic", "/state"];
+    let subscriber = Peer::start(&pythons.jazzy, &domain, "subscriber.py", &listening);
+    let publisher = speaking(&pythons, &domain, "1000000", &["--rate", "50"]);
+    // The state at time zero comes after this.
+    let ready = || {
+        subscriber.await_match();
+        publisher.await_match();
+        publisher.go();
+    };
+    system.relay_until(&Test::default(), ready, |_| subscriber.has_ended());
     assert_eq!(subscriber.end().1["count"], 2, "`rests` at time zero, and `moves`: {:?}", system.all_notes());
     assert_eq!(system.all_notes(), [""; 0]);
 }
@@ -146,30 +144,25 @@ fn what_a_monitor_says_reaches_nodes_behind_a_bridge() {
 fn after_a_bridge_restarts_every_topic_is_back() {
     let Some(pythons) = Pythons::find() else { return };
     let domain = Domain::free();
-    let port = free_port();
-    let server = std::cell::RefCell::new(Some(Server::start(&pythons, &domain, port)));
-    let mut system = System::new(plan(&bridged(&domain, port, "", "", 60)));
-    let of_all = ["--type", JOINTS, "--topic"];
-    let listening = [&of_all[..], &["/peer", "--count", "400", "--timeout", "30"]].concat();
-    let mut subscriber = Peer::start(&pythons.jazzy, &domain, "subscriber.py", &listening);
-    let speaking =
-        [&of_all[..], &["/peer/undisturbed", "--count", "2000", "--rate", "100", "--short", "--hold"]].concat();
-    let publisher = std::cell::RefCell::new(Peer::start(&pythons.jazzy, &domain, "publisher.py", &speaking));
-    let begun = std::cell::Cell::new(Instant::now());
+    let port = Port::free();
+    let server = std::cell::RefCell::new(Some(Server::start(&pythons, &domain, &port)));
+    let mut system = System::new(plan(&bridged(&domain, &port, "", "", 60)));
+    let subscriber = hearing(&pythons, &domain, "400", &[]);
+    let publisher = speaking(&pythons, &domain, "1000000", &["--rate", "100"]);
     let ready = || {
-        publisher.borrow_mut().go();
-        begun.set(Instant::now());
+        publisher.await_match();
+        publisher.go();
     };
-    let mut restarted = false;
-    system.relay_until(&Test::default(), ready, || {
-        if !restarted && begun.get().elapsed() > Duration::from_secs(1) {
-            restarted = true;
+    let mut heard_before = None;
+    system.relay_until(&Test::default(), ready, |_| {
+        if heard_before.is_none() && subscriber.told("count") >= 50 {
             server.borrow_mut().take();
-            *server.borrow_mut() = Some(Server::start(&pythons, &domain, port));
+            *server.borrow_mut() = Some(Server::start(&pythons, &domain, &port));
+            heard_before = Some(subscriber.told("count"));
         }
         subscriber.has_ended()
     });
-    assert!(restarted, "the server was to be restarted before all had come");
+    assert!(heard_before.is_some_and(|count| count < 400), "the server was restarted before all had come");
     assert_eq!(subscriber.end().1["count"], 400);
     let notes = system.all_notes();
     let lost = format!("the connection to the bridge at `ws://127.0.0.1:{port}` was lost for ");

@@ -72,7 +72,7 @@ impl Disturbed {
         format!(
             "space iiwa_cell\nsystem {{\n\
              simulator cell = simlog \"http://127.0.0.1:{{port}}\" {{ step 20ms  settle 1ms }}\n\
-             launch \"venv/bin/python\" \"simlog_cell.py\" \"{{port}}\" {{ ready when port \"{{port}}\" within 20s }}\n\
+             launch \"venv/bin/python\" \"simlog_cell.py\" \"{{port}}\" {{ ready when port \"{{port}}\" within 120s }}\n\
              message Joints {{\n  positions: list of real[rad]\n  velocities: list of real[rad/s]\n}}\n\
              message Torques {{ effort: list of real[Nm] }}\n\
              message Distance {{ data: real[m] }}\n\

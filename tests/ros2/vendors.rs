@@ -4,7 +4,7 @@ use sesame_plan::Test;
 
 use crate::environment::{Domain, Vendor};
 use crate::peer::Peer;
-use crate::relaying::{System, plan, space};
+use crate::relaying::{Exchange, System, plan, space};
 
 /// The vendors with the program that plays a part.
 const VENDORS: [Vendor; 3] = [Vendor::Kilted, Vendor::Jazzy, Vendor::Cyclone];
@@ -19,7 +19,8 @@ fn start(vendor: Vendor, part: &str, domain: &Domain, arguments: &[&str]) -> Opt
     let mut all = Vec::new();
     all.extend((vendor == Vendor::Cyclone).then_some(part));
     all.extend(arguments);
-    all.extend((vendor != Vendor::Cyclone && part == "subscribe").then_some("--content"));
+    // Cyclone's does both without being told.
+    all.extend((vendor != Vendor::Cyclone).then_some(if part == "subscribe" { "--content" } else { "--hold" }));
     Some(Peer::start(&python, domain, program, &all))
 }
 
@@ -27,31 +28,26 @@ fn start(vendor: Vendor, part: &str, domain: &Domain, arguments: &[&str]) -> Opt
 fn relayed(publisher: Vendor, subscribers: &[Vendor], kind: &str, count: u32, rate: u32) {
     let domain = Domain::free();
     let (count, rate) = (count.to_string(), rate.to_string());
-    let arguments = ["--type", kind, "--count", &count, "--timeout", "60", "--depth", "10000"];
+    let arguments = ["--type", kind, "--count", &count, "--depth", "10000"];
     let mut hearing = Vec::new();
     for vendor in subscribers {
         let Some(peer) = start(*vendor, "subscribe", &domain, &arguments) else { return };
         hearing.push((*vendor, peer));
     }
-    let speaking =
-        [&arguments[..], &["--topic", "/peer/undisturbed", "--rate", &rate, "--hold", "--linger", "2"]].concat();
-    let Some(mut speaking) = start(publisher, "publish", &domain, &speaking) else { return };
+    let speaking = [&arguments[..], &["--topic", "/peer/undisturbed", "--rate", &rate]].concat();
+    let Some(speaking) = start(publisher, "publish", &domain, &speaking) else { return };
     let named = |at: usize| format!("node s{at} {{ subscribes peer }}");
     let nodes: Vec<String> = (0..hearing.len()).map(named).collect();
     let mut system = System::new(plan(&space(&domain, kind, &nodes.join("\n"), "", 1000)));
-    let speaker = std::cell::RefCell::new(&mut speaking);
-    let relayed = system.relay_until(
-        &Test::default(),
-        || speaker.borrow_mut().go(),
-        || speaker.borrow_mut().has_ended() && hearing.iter_mut().all(|(_, peer)| peer.has_ended()),
-    );
+    let to: Vec<&Peer> = hearing.iter().map(|(_, peer)| peer).collect();
+    let relayed = system.exchange(&Test::default(), &Exchange::new(&speaking, &to));
     let sent = speaking.expect();
     for (vendor, peer) in hearing {
         let (code, heard) = peer.end();
         let heard = (code, &heard["count"], &heard["content"]);
         assert_eq!(heard, (Some(0), &sent["count"], &sent["content"]), "{kind} from {publisher:?} to {vendor:?}");
     }
-    assert_eq!(relayed.messages.to_string(), count);
+    assert_eq!(relayed.messages().to_string(), count);
     assert_eq!(system.notes(), [""; 0], "{kind} from {publisher:?}");
 }
 
@@ -88,8 +84,7 @@ fn relayed_of_many_types(vendor: Vendor, types: u32, count: u32) {
     let definitions = tempfile::tempdir().expect("there is room for a folder");
     let folder = definitions.path().to_str().expect("it has a name");
     let share = if vendor == Vendor::Cyclone { definitions.path().to_path_buf() } else { Vendor::share(&python) };
-    let timeout = (60 + types * count / 100).to_string();
-    let options = ["--types", &types.to_string(), "--count", &count.to_string(), "--timeout", &timeout];
+    let options = ["--types", &types.to_string(), "--count", &count.to_string()];
     let options =
         if vendor == Vendor::Cyclone { [&options[..], &["--folder", folder]].concat() } else { options.into() };
     let start = |part: &str| Peer::start(&python, &domain, "any_types.py", &[&[part], &options[..]].concat());
@@ -112,21 +107,17 @@ fn relayed_of_many_types(vendor: Vendor, types: u32, count: u32) {
         operations = each(&|at, _| format!("operation hole{at} on t{at} = blackhole\n")),
         names = each(&|at, _| format!("{}hole{at}", if at == 0 { "" } else { ", " })),
     );
-    let mut hearing = start("subscribe");
-    let mut speaking = start("publish");
+    let (hearing, speaking) = (start("subscribe"), start("publish"));
     let mut system = System::new(plan(&text));
-    let speaker = std::cell::RefCell::new(&mut speaking);
-    let relayed = system.relay_until(
-        &Test::default(),
-        || speaker.borrow_mut().go(),
-        || speaker.borrow_mut().has_ended() && hearing.has_ended(),
-    );
+    let to = [&hearing];
+    let exchange = Exchange { begins: true, ..Exchange::new(&speaking, &to) };
+    let relayed = system.exchange(&Test::default(), &exchange);
     let (sent, heard) = (speaking.expect(), hearing.expect());
     for (at, kind) in kinds.iter().enumerate() {
         assert_eq!(heard["digests"][at], sent["digests"][at], "{kind} through {vendor:?}");
     }
     assert_eq!(heard["count"], sent["count"]);
-    assert_eq!(Some(relayed.messages), sent["count"].as_u64());
+    assert_eq!(Some(relayed.messages()), sent["count"].as_u64());
     assert_eq!(system.notes(), [""; 0]);
 }
 

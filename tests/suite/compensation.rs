@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::PathBuf;
 
+use sesame_patience as patience;
 use sesame_results::analysis::gap::compensated_runs;
 use sesame_results::record::Repository;
 use sesame_tests::{Done, command, done, fresh_folder, kuka_cell_lab, sesamec, workspace};
@@ -150,10 +151,11 @@ fn noise_is_fitted_by_how_much_runs_differ_and_varied_from_run_to_run() {
     assert!(!tried.exists(), "a fit that is complete leaves nothing behind");
     let mut child = command(sesamec()).args(&asked).current_dir(&study.folder).spawn().unwrap();
     let lines = || fs::read_to_string(&tried).map_or(0, |text| text.lines().count());
-    while lines() < 4 {
+    patience::until("four simulations were tried", || {
         assert!(child.try_wait().unwrap().is_none(), "it ended before it was killed");
-        std::thread::sleep(std::time::Duration::from_millis(20));
-    }
+        lines() >= 4
+    });
+    println!("{} simulations were tried", lines());
     child.kill().unwrap();
     child.wait().unwrap();
     let again = study.sesamec(&[&asked[..], &["--format", "json"]].concat()).expect(0);

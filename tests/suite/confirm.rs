@@ -5,13 +5,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 use std::process::{Child, Stdio};
-use std::thread::sleep;
-use std::time::{Duration, Instant};
 
 use sesame_base::observation::Outcome;
+use sesame_patience as patience;
 use sesame_results::record::{Repetition, Repository, TestRow, Verdict};
 use sesame_results::report::summary;
 use sesame_tests::{Done, Project, Runner, command, done, sesamec, workspace};
+
+use crate::interruption::no_worker_is_left;
 
 /// The runner of a campaign in gusts.
 fn gusty(name: &str, campaign: &str) -> Runner {
@@ -192,10 +193,11 @@ fn violations_off_the_front_are_confirmed_where_that_is_asked_for() {
     assert!(none.err.contains("no test that violates a requirement was run only once"), "{}", none.err);
 }
 
-/// A campaign in the background.
-fn start(runner: &Runner, results: &str, runs: &Path) -> Child {
+/// A campaign in the background, which does not come further than this number of runs.
+fn start(runner: &Runner, results: &str, runs: &Path, most: usize) -> Child {
     let mut command = runner.command(&["--results", results, "--workers", "2"]);
-    command.env("PAUSE_US", "300").env("RUNS", runs).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command.env("PAUSE_US", "300").env("RUNS", runs).env("MOST_RUNS", most.to_string());
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
     command.spawn().unwrap()
 }
 
@@ -215,20 +217,20 @@ fn repetitions_survive_a_kill_and_come_out_the_same_with_any_number_of_workers()
     for (at, least) in [1, repetitions / 3, 2 * repetitions / 3].into_iter().enumerate() {
         let name = format!("killed{at}");
         let (folder, runs) = (runner.folder.join(&name).join("3"), runner.folder.join(format!("{name}.runs")));
-        let mut child = start(&runner, &name, &runs);
-        let patience = Instant::now();
+        // Even if all tests come first, so many repetitions are recorded, and two runs are not.
+        let mut child = start(&runner, &name, &runs, 62 + least + 2);
         let recorded = || {
             Repository::open(&folder)
                 .and_then(|repository| repository.repetitions())
                 .map_or(0, |repetitions| repetitions.values().map(Vec::len).sum::<usize>())
         };
-        while recorded() < least {
-            assert!(patience.elapsed() < Duration::from_secs(60), "no {least} repetitions after a minute");
+        patience::until(format_args!("{least} repetitions are recorded"), || {
             assert!(child.try_wait().unwrap().is_none(), "it ended before it was killed");
-            sleep(Duration::from_millis(2));
-        }
+            recorded() >= least
+        });
         child.kill().unwrap();
         child.wait().unwrap();
+        no_worker_is_left(&runner);
         assert!(recorded() < repetitions, "killed in the middle");
         let mut resume = runner.command(&["resume", &format!("{name}/3"), "--workers", "2"]);
         let resumed = Done::of(&resume.env("RUNS", &runs).output().unwrap()).expect(0);

@@ -3,16 +3,17 @@
 use std::fs;
 use std::os::unix::process::CommandExt as _;
 use std::process::Stdio;
-use std::thread::sleep;
-use std::time::{Duration, Instant};
 
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 
 use sesame_base::observation::Counters;
+use sesame_patience as patience;
 use sesame_plan::{Activation, Choice};
 use sesame_results::record::{Repository, TestRecord};
 use sesame_tests::{Project, Runner, workspace};
+
+use crate::interruption::no_worker_is_left;
 
 const SPACE: &str = r#"
 space calibrated
@@ -187,15 +188,12 @@ fn files_changed_when_all_was_killed_are_put_back_by_the_next_start() {
     let calibration = project.folder.join("calibration.txt");
     let mut command = runner.command(&["repeat", "stuck", "1", "--into", "results"]);
     let mut running = command.process_group(0).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-    let patience = Instant::now();
-    while fs::read_to_string(&calibration).unwrap() != "91\n" {
-        assert!(patience.elapsed() < Duration::from_secs(60), "the file is not changed after a minute");
-        sleep(Duration::from_millis(5));
-    }
+    patience::until("the file is changed", || fs::read_to_string(&calibration).unwrap() == "91\n");
     let refused = runner.run(&["known", "moved", "--results", "meanwhile"]).expect(1);
     assert!(refused.err.contains("another runner of this space may change files"), "{}", refused.err);
     kill(Pid::from_raw(i32::try_from(running.id()).unwrap()), Signal::SIGKILL).unwrap();
     running.wait().unwrap();
+    no_worker_is_left(&runner);
     assert_eq!(fs::read_to_string(&calibration).unwrap(), "91\n", "nobody was left to put it back");
 
     let said = runner.run(&["known", "moved", "--results", "next"]).expect(0);
@@ -205,7 +203,7 @@ fn files_changed_when_all_was_killed_are_put_back_by_the_next_start() {
     assert!(!again.err.contains("restored"), "{}", again.err);
 
     // A worker that is stopped because its test takes too long leaves nothing either.
-    runner.run(&["repeat", "stuck", "1", "--into", "slow", "--timeout", "1"]).expect(0);
+    runner.run(&["repeat", "stuck", "1", "--into", "slow", "--timeout", "2", "--reference-timeout", "120"]).expect(0);
     assert_eq!(fs::read_to_string(&calibration).unwrap(), "1\n");
 
     fs::remove_file(project.folder.join("spare.txt")).unwrap();

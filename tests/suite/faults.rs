@@ -33,7 +33,7 @@ pub(crate) fn recording(name: &str, campaign: &str, clause: &str) -> Runner {
 #[test]
 fn every_fault_is_the_outcome_of_its_test_and_the_campaign_goes_on() {
     let runner = faulty("breaking", "all_faults");
-    let said = runner.run(&["--results", "all", "--timeout", "1", "--fail-on", "nothing"]).expect(0);
+    let said = runner.run(&["--results", "all", "--timeout", "2", "--fail-on", "nothing"]).expect(0);
     let repository = Repository::open(&runner.folder.join("all/3")).unwrap();
     let plan = repository.plan().clone();
     let mut by_fault: BTreeMap<String, Vec<(u32, Outcome)>> = BTreeMap::new();
@@ -55,7 +55,7 @@ fn every_fault_is_the_outcome_of_its_test_and_the_campaign_goes_on() {
         ("do_error", ("crash", "a joint broke at ")),
         ("do_hook_panic", ("crash", "the hook was given a 1")),
         ("do_abort", ("crash", "the worker process ended: signal: 6 (SIGABRT)")),
-        ("do_hang", ("timeout", "stopped after 1 s")),
+        ("do_hang", ("timeout", "stopped after 2 s")),
     ]);
     assert_eq!(by_fault.keys().collect::<Vec<_>>(), expected.keys().collect::<Vec<_>>(), "each fault occurs");
     for (fault, tests) in &by_fault {
@@ -83,7 +83,7 @@ fn every_fault_is_the_outcome_of_its_test_and_the_campaign_goes_on() {
     assert!(shown.contains("the last lines that the worker printed:\nabout to abort"), "{shown}");
 
     // Nothing of this depends on workers, on what a worker had printed before, or on the clock.
-    let one = runner.run(&["--results", "one", "--timeout", "1.5", "--workers", "1", "--fail-on", "nothing"]).expect(0);
+    let one = runner.run(&["--results", "one", "--timeout", "3", "--workers", "1", "--fail-on", "nothing"]).expect(0);
     assert_eq!(one.digest(), said.digest());
 }
 
@@ -131,7 +131,7 @@ fn a_run_that_the_simulator_ends_early_is_complete_at_its_own_end() {
 fn a_simulator_or_hook_that_reads_standard_input_finds_it_empty() {
     let runner = faulty("curious", "harmless");
     let whole = runner.run(&["--results", "whole", "--evaluations", "6"]).expect(0).digest();
-    let mut curious = runner.command(&["--results", "curious", "--evaluations", "6", "--timeout", "20"]);
+    let mut curious = runner.command(&["--results", "curious", "--evaluations", "6", "--timeout", "120"]);
     let curious = sesame_tests::done(curious.env("FAULT", "reads input")).expect(0);
     assert_eq!(curious.digest(), whole);
 }

@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use std::{fs, thread};
 
 use sesame_base::observation::Outcome;
@@ -152,8 +152,9 @@ const LARGE: &[(&str, Expected)] = &[
 /// Ends the runner itself, so it is in none of the others.
 const KILLS_THE_RUNNER: &str = "kills_the_runner";
 
-/// How long a test may take, in seconds.
-const LIMIT: &str = "3";
+/// How long a test may take, in seconds: little where it takes for ever, and more than enough where it comes to its end.
+const LITTLE: &str = "3";
+const ENOUGH: &str = "120";
 
 /// What marks a process that a test of this file has started, and all below it.
 const MARK: &str = "SESAME_HOSTILE_MARK";
@@ -214,11 +215,12 @@ struct Ran {
 }
 
 /// Runs these modes as known tests, each once; afterwards no process may be left.
-fn run(results: &str, modes: &[&str], workers: &str) -> Ran {
+fn run(results: &str, modes: &[&str], workers: &str, limit: &str) -> Ran {
     let runner = runner();
     let folder = runner.folder.join(results);
     fs::remove_dir_all(&folder).ok();
-    let arguments = [&["known", "--results", results, "--workers", workers, "--timeout", LIMIT], modes].concat();
+    let limits = ["--timeout", limit, "--reference-timeout", ENOUGH];
+    let arguments = [&["known", "--results", results, "--workers", workers], &limits[..], modes].concat();
     let mark = format!("{results}-{}", std::process::id());
     let mut command = runner.command(&arguments);
     command.env(MARK, &mark);
@@ -297,15 +299,8 @@ fn marked(mark: &str) -> Vec<(u32, String)> {
 /// Insists that no process with this mark lives; a runner that was killed cannot wait for the last of them.
 #[track_caller]
 fn nothing_is_left(mark: &str) {
-    let patience = Instant::now();
-    loop {
-        let left = marked(mark);
-        if left.is_empty() {
-            return;
-        }
-        assert!(patience.elapsed() < Duration::from_secs(5), "left behind: {left:#?}");
-        thread::sleep(Duration::from_millis(20));
-    }
+    let gone = sesame_patience::comes(|| marked(mark).is_empty());
+    assert!(gone, "left behind: {:#?}", marked(mark));
 }
 
 /// Whether the system shows what these tests look at. Elsewhere nobody could say what is left.
@@ -347,14 +342,12 @@ fn each_kind_of_misbehaviour_is_the_outcome_of_its_own_test_and_leaves_no_proces
     if !shown_here() {
         return;
     }
-    let ran = run("small", &names(SMALL), "2");
-    came_out_as_expected(&ran, SMALL, FEW);
-    let logged: u64 = (1..=2)
-        .filter_map(|worker| {
-            fs::metadata(runner().folder.join(format!("small/known/workers/{worker}/output.log"))).ok()
-        })
-        .map(|file| file.len())
-        .sum();
+    let (stuck, small): (Vec<_>, Vec<_>) = SMALL.iter().copied().partition(|(_, it)| matches!(it, Timeout));
+    came_out_as_expected(&run("small", &names(&small), "2", ENOUGH), &small, FEW);
+    came_out_as_expected(&run("stuck", &names(&stuck), "2", LITTLE), &stuck, FEW);
+    let log = |run, worker| runner().folder.join(format!("{run}/known/workers/{worker}/output.log"));
+    let logs = ["small", "stuck"].into_iter().flat_map(|run| [log(run, 1), log(run, 2)]);
+    let logged: u64 = logs.filter_map(|log| fs::metadata(log).ok()).map(|file| file.len()).sum();
     assert!((2 << 20..4 << 20).contains(&logged), "two floods of standard error are logged, but not whole: {logged}");
 }
 
@@ -363,7 +356,7 @@ fn what_a_simulator_sends_takes_no_more_of_its_workers_memory_than_is_bounded() 
     if !shown_here() {
         return;
     }
-    came_out_as_expected(&run("large", &names(LARGE), "2"), LARGE, MANY);
+    came_out_as_expected(&run("large", &names(LARGE), "2", ENOUGH), LARGE, MANY);
 }
 
 /// Which test a worker runs after which depends on the number of workers; nothing else may.
@@ -384,7 +377,7 @@ fn an_answer_too_many_is_blamed_on_its_own_test_with_any_number_of_workers() {
     assert!(modes.len() >= 15, "{modes:?}");
     let digests: BTreeSet<String> = ["1", "2", "3"]
         .into_iter()
-        .map(|workers| run(&format!("answers{workers}"), &modes, workers).said.digest())
+        .map(|workers| run(&format!("answers{workers}"), &modes, workers, ENOUGH).said.digest())
         .collect();
     assert_eq!(digests.len(), 1);
 }
@@ -396,7 +389,7 @@ fn a_simulator_has_a_second_to_end_by_itself_at_the_end_of_a_campaign_and_after_
     }
     for after in ["publishes_nothing", "stops_its_worker"] {
         let results = format!("bye_{after}");
-        run(&results, &["says_bye_after_the_end_of_its_input", after], "1");
+        run(&results, &["says_bye_after_the_end_of_its_input", after], "1", LITTLE);
         let bye = runner().folder.join(results).join("known/workers/1/bye");
         assert_eq!(fs::read_to_string(&bye).unwrap_or_default(), "bye", "{after}");
     }

@@ -2,6 +2,7 @@
 
 use std::fs;
 
+use sesame_patience as patience;
 use sesame_tests::{Done, Project, command, done, fresh_folder, sesamec, workspace};
 
 /// A copy of the example with a simulator in Python, with fewer tests.
@@ -88,19 +89,29 @@ fn an_interpreted_campaign_that_is_stopped_is_resumed_by_the_command_that_it_pro
     use std::process::Stdio;
 
     let project = two_robots("interpreted_stopped");
+    // After the first few runs its simulator stands still for as long as a file is there, and says so.
+    let still = "def main():\n    import os, time\n    runs = 0\n";
+    let reset = "        if \"reset\" in order:\n            runs += 1\n            \
+                 while runs > 3 and os.path.exists(\"still\"):\n                \
+                 open(\"stands\", \"w\")\n                time.sleep(0.005)\n";
+    let simulator = project.folder.join("sim.py");
+    let text = fs::read_to_string(&simulator).unwrap();
+    let text = text.replacen("def main():\n", still, 1).replacen("        if \"reset\" in order:\n", reset, 1);
+    assert!(text.contains("import os, time") && text.contains("stands"), "{text}");
+    fs::write(&simulator, text).unwrap();
     let whole = without_cargo(&project, &["run", "two_robots.sesame", "-c", "crossing"]).expect(0);
     let mut stopped = command(sesamec());
     stopped.args(["run", "two_robots.sesame", "-c", "crossing"]).current_dir(&project.folder);
+    fs::write(project.folder.join("still"), "").unwrap();
     let mut stopped = stopped.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    // Until the first worker has been started, that is, the first test has begun.
-    let workers = project.runners.join("crossing/results/42-2/workers/1");
-    while !workers.exists() {
-        std::thread::sleep(std::time::Duration::from_millis(5));
-    }
-    std::thread::sleep(std::time::Duration::from_millis(500));
+    patience::until("a test is in progress", || {
+        assert!(stopped.try_wait().unwrap().is_none(), "it ended before it could be stopped");
+        project.folder.join("stands").exists()
+    });
     interrupt(stopped.id());
     let said: Vec<String> = BufReader::new(stopped.stderr.take().unwrap()).lines().map(Result::unwrap).collect();
     assert_eq!(stopped.wait().unwrap().code(), Some(130), "{said:?}");
+    fs::remove_file(project.folder.join("still")).unwrap();
     let said = said.join("\n");
     let resumed = without_cargo(&project, &proposed(&said)).expect(0);
     assert_eq!(resumed.digest(), whole.digest());

@@ -14,6 +14,7 @@ use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestRunner};
 
 use sesame_base::observation::Outcome;
+use sesame_patience as patience;
 use sesame_results::record::{RecordError, Repository};
 use sesame_tests::{Done, Runner};
 
@@ -45,17 +46,62 @@ impl Running {
 
     /// Waits until so many tests are recorded.
     pub(crate) fn until_recorded(&mut self, tests: usize) {
-        let patience = Instant::now();
-        while recorded(&self.folder) < tests {
-            assert!(patience.elapsed() < Duration::from_secs(60), "no {tests} tests after a minute");
+        patience::until(format_args!("{tests} tests are recorded"), || {
             assert!(self.process.try_wait().unwrap().is_none(), "it ended before {tests} tests were recorded");
-            sleep(Duration::from_millis(5));
-        }
+            recorded(&self.folder) >= tests
+        });
     }
 
     pub(crate) fn ended(self) -> (std::process::ExitStatus, Done) {
         let output = self.process.wait_with_output().unwrap();
         (output.status, Done::of(&output))
+    }
+}
+
+/// How far a run is on its way, in the tests that it has recorded: wall time tells it only on a machine that is always
+/// equally busy.
+pub(crate) struct Clock {
+    /// How many tests are recorded in the end.
+    tests: usize,
+    /// How long it took until the first one was, from one to the next, and from the last one to the end of the run.
+    first: Duration,
+    next: Duration,
+    last: Duration,
+}
+
+impl Clock {
+    /// Watches an unbroken run to its end.
+    pub(crate) fn of(process: &mut Child, recorded: impl Fn() -> usize) -> Clock {
+        let started = Instant::now();
+        let (mut first, mut latest, mut tests) = (None, Duration::ZERO, 0);
+        while process.try_wait().unwrap().is_none() {
+            let now = recorded();
+            if now > tests {
+                (tests, latest) = (now, started.elapsed());
+                first.get_or_insert(latest);
+            }
+            sleep(Duration::from_millis(2));
+        }
+        let (whole, tests) = (started.elapsed(), recorded());
+        let first = first.unwrap_or(whole);
+        let next = latest.saturating_sub(first) / u32::try_from(tests.max(1)).unwrap();
+        Clock { tests, first, next, last: whole.saturating_sub(latest) }
+    }
+
+    /// Waits until a run has come this share of its way, or has ended.
+    pub(crate) fn wait(&self, process: &mut Child, moment: f64, recorded: impl Fn() -> usize) {
+        let way = moment * (self.tests + 1) as f64;
+        let before = way.floor() as usize;
+        patience::until(format_args!("{before} tests are recorded"), || {
+            recorded() >= before || process.try_wait().unwrap().is_some()
+        });
+        // And somewhere on the way to the next one. It does not matter where that is: every outcome is right.
+        let step = match before {
+            0 => self.first,
+            _ if before >= self.tests => self.last,
+            _ => self.next,
+        };
+        sleep(step.mul_f64(way.fract()));
     }
 }
 
@@ -88,14 +134,11 @@ fn processes() -> Vec<(i32, String)> {
 /// Insists that all processes of a runner's program are gone, which may take workers a moment. One that was only just
 /// being started has its supervisor's command line yet, and its lock.
 #[track_caller]
-fn no_worker_is_left(runner: &Runner) {
+pub(crate) fn no_worker_is_left(runner: &Runner) {
     let program = format!("{} ", runner.program.display());
     let left = || processes().into_iter().filter(|(_, words)| words.starts_with(&program)).collect::<Vec<_>>();
-    let patience = Instant::now();
-    while !left().is_empty() {
-        assert!(patience.elapsed() < Duration::from_secs(20), "left behind: {:?}", left());
-        sleep(Duration::from_millis(10));
-    }
+    let gone = patience::comes(|| left().is_empty());
+    assert!(gone, "left behind: {:?}", left());
 }
 
 fn uninterrupted(runner: &Runner) -> String {
@@ -138,9 +181,13 @@ fn a_run_in_progress_is_not_resumed_by_another_process_but_can_be_read() {
     let runner = faulty("busy", "harmless");
     let mut running = Running::start(&runner, "busy", "1");
     running.until_recorded(3);
+    // It is in progress until its worker goes on, however long the others take.
+    let [worker] = workers(&runner)[..] else { panic!("there is one worker") };
+    kill(worker, Signal::SIGSTOP).unwrap();
     let refused = runner.run(&["resume", "busy/3"]).expect(1);
     assert!(refused.err.contains(&format!("process {} is writing", running.pid())), "{}", refused.err);
     assert!(runner.run(&["list", "--results", "busy/3"]).expect(0).out.contains("T1"));
+    kill(worker, Signal::SIGCONT).unwrap();
     let (status, _) = running.ended();
     assert!(status.success());
 }
@@ -165,12 +212,11 @@ enum Victim {
     Worker,
 }
 
-/// Kills the supervisor or a worker after this share of what a run takes, and resumes where there is something to
-/// resume.
-fn killed_at(runner: &Runner, victim: Victim, moment: f64, whole: &str, takes: Duration) -> Progress {
+/// Kills the supervisor or a worker after this share of a run's way, and resumes where there is something to resume.
+fn killed_at(runner: &Runner, victim: Victim, moment: f64, whole: &str, clock: &Clock) -> Progress {
     let results = format!("killed{moment:.6}");
-    let running = Running::start(runner, &results, "2");
-    sleep(takes.mul_f64(moment));
+    let mut running = Running::start(runner, &results, "2");
+    clock.wait(&mut running.process, moment, || recorded(&running.folder));
     let tests = match victim {
         Victim::Supervisor => {
             kill(running.pid(), Signal::SIGKILL).unwrap();
@@ -231,19 +277,19 @@ fn killed_at(runner: &Runner, victim: Victim, moment: f64, whole: &str, takes: D
 fn killed_at_random_moments(name: &str, moments: u32) {
     let runner = faulty(name, "harmless");
     let whole = uninterrupted(&runner);
-    let started = Instant::now();
-    let (status, said) = Running::start(&runner, "slow", "2").ended();
+    let mut slow = Running::start(&runner, "slow", "2");
+    let clock = Clock::of(&mut slow.process, || recorded(&slow.folder));
+    let (status, said) = slow.ended();
     assert!(status.success(), "{}", said.err);
     assert_eq!(said.digest(), whole, "wall time decides nothing");
-    let takes = started.elapsed();
     let config =
         ProptestConfig { cases: moments, failure_persistence: None, rng_seed: RngSeed::Fixed(1), ..Default::default() };
     let kills = RefCell::new(Vec::new());
     TestRunner::new(config)
         .run(&(0.0..1.0f64), |moment| {
             let victim = if kills.borrow().len() % 2 == 0 { Victim::Supervisor } else { Victim::Worker };
-            let progress = killed_at(&runner, victim, moment, &whole, takes);
-            eprintln!("{victim:?} killed after {:.0} % of {takes:.1?}: {progress:?}", moment * 100.0);
+            let progress = killed_at(&runner, victim, moment, &whole, &clock);
+            eprintln!("{victim:?} killed after {:.0} % of the way: {progress:?}", moment * 100.0);
             kills.borrow_mut().push((victim, progress));
             Ok(())
         })

@@ -8,7 +8,7 @@ use std::os::unix::process::CommandExt as _;
 use std::path::Path;
 use std::process::{Child, Stdio};
 use std::thread::sleep;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use nix::sys::signal::{Signal, kill, killpg};
 use nix::unistd::Pid;
@@ -16,8 +16,11 @@ use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestRunner};
 
 use sesame_base::observation::Outcome;
+use sesame_patience as patience;
 use sesame_results::record::{Repository, TestRow, Verdict};
 use sesame_tests::{Done, Project, Runner, workspace};
+
+use crate::interruption::Clock;
 
 /// The runner of a campaign on the simulator that starts others; `None`, with the reason, without a Python.
 fn breeding(name: &str, campaign: &str) -> Option<Runner> {
@@ -77,19 +80,12 @@ fn with_role(runner: &Runner, role: Role) -> Vec<Pid> {
 /// Insists that nothing of a project's lives, after what workers and simulators are given to end.
 #[track_caller]
 fn nothing_is_left(runner: &Runner, why: &str) {
-    let patience = Instant::now();
-    loop {
+    if !patience::comes(|| processes(runner).is_empty()) {
         let left = processes(runner);
-        if left.is_empty() {
-            return;
+        for (_, pid) in &left {
+            kill(*pid, Signal::SIGKILL).ok();
         }
-        if patience.elapsed() > Duration::from_secs(10) {
-            for (_, pid) in &left {
-                kill(*pid, Signal::SIGKILL).ok();
-            }
-            panic!("{why}: left behind: {left:?}");
-        }
-        sleep(Duration::from_millis(10));
+        panic!("{why}: left behind: {left:?}");
     }
 }
 
@@ -110,13 +106,23 @@ fn recorded(folder: &Path) -> Vec<TestRow> {
 
 /// Waits until so many tests are recorded and a simulator is there.
 fn until_recorded(runner: &Runner, process: &mut Child, results: &str, tests: usize) {
-    let patience = Instant::now();
     let folder = runner.folder.join(results).join("3");
-    while recorded(&folder).len() < tests || with_role(runner, Role::Simulator).is_empty() {
-        assert!(patience.elapsed() < Duration::from_secs(60), "no {tests} tests after a minute");
+    patience::until(format_args!("{tests} tests are recorded"), || {
         assert!(process.try_wait().unwrap().is_none(), "it ended before {tests} tests were recorded");
-        sleep(Duration::from_millis(5));
-    }
+        recorded(&folder).len() >= tests && !with_role(runner, Role::Simulator).is_empty()
+    });
+}
+
+/// Whether both simulators have been ready for a test.
+fn both_are_ready(runner: &Runner, results: &str) -> bool {
+    let workers = runner.folder.join(results).join("3/workers");
+    ["1", "2"].iter().all(|worker| workers.join(worker).join("ready").exists())
+}
+
+/// Lets simulators that wait go on, or those to come wait.
+fn go_on(runner: &Runner, go_on: bool) {
+    let on = runner.folder.join("on");
+    if go_on { fs::write(on, "").unwrap() } else { fs::remove_file(on).unwrap_or_default() }
 }
 
 /// How many simulators noted this in the folders of a run's workers.
@@ -135,11 +141,13 @@ fn nothing_that_a_simulator_started_is_left_however_its_campaign_ends() {
 
     for victim in [Role::Supervisor, Role::Worker, Role::Simulator] {
         let results = format!("{victim:?}");
-        let mut process = start(&runner, &["--results", &results, "--workers", "2"], "");
+        go_on(&runner, false);
+        let mut process = start(&runner, &["--results", &results, "--workers", "2"], "waits");
         until_recorded(&runner, &mut process, &results, 3);
         let there: BTreeSet<Role> = processes(&runner).into_iter().map(|(role, _)| role).collect();
         assert_eq!(there, BTreeSet::from(all), "there is something to leave behind");
         kill(with_role(&runner, victim)[0], Signal::SIGKILL).unwrap();
+        go_on(&runner, true);
         let said = Done::of(&process.wait_with_output().unwrap());
         nothing_is_left(&runner, &format!("{victim:?} killed"));
         let said = match victim {
@@ -151,13 +159,16 @@ fn nothing_that_a_simulator_started_is_left_however_its_campaign_ends() {
     }
 
     // To all of the group, as a terminal does.
-    let mut process = start(&runner, &["--results", "stopped", "--workers", "2"], "");
+    go_on(&runner, false);
+    let mut process = start(&runner, &["--results", "stopped", "--workers", "2"], "waits");
     until_recorded(&runner, &mut process, "stopped", 3);
     killpg(pid(&process), Signal::SIGINT).unwrap();
     Done::of(&process.wait_with_output().unwrap()).expect(130);
     nothing_is_left(&runner, "stopped");
 
-    let hang = ["--results", "hang", "--workers", "2", "--timeout", "4", "--evaluations", "3", "--fail-on", "nothing"];
+    // What does not hang has as long as it takes.
+    let hang = ["--results", "hang", "--workers", "2", "--timeout", "4", "--reference-timeout", "120"];
+    let hang = [&hang[..], &["--evaluations", "3", "--fail-on", "nothing"]].concat();
     let said = Done::of(&start(&runner, &hang, "hang").wait_with_output().unwrap()).expect(0);
     let timeouts = recorded(&runner.folder.join("hang/3")).into_iter();
     assert!(timeouts.filter(|row| matches!(row.outcome, Outcome::Timeout { .. })).count() >= 2, "{}", said.out);
@@ -166,7 +177,7 @@ fn nothing_that_a_simulator_started_is_left_however_its_campaign_ends() {
     // In the middle of a test that hangs, with nobody left to stop it.
     let mut process = start(&runner, &["--results", "alone", "--workers", "1", "--timeout", "600"], "hang");
     until_recorded(&runner, &mut process, "alone", 1);
-    sleep(Duration::from_secs(1));
+    patience::until("a test hangs", || noted(&runner, "alone", "hangs") > 0);
     kill(pid(&process), Signal::SIGKILL).unwrap();
     process.wait().unwrap();
     nothing_is_left(&runner, "killed while a test hangs");
@@ -175,22 +186,24 @@ fn nothing_that_a_simulator_started_is_left_however_its_campaign_ends() {
 #[test]
 fn simulators_have_time_to_end_once_their_input_is_closed() {
     let Some(runner) = breeding("given_time", "quiet") else { return };
-    runner.run(&["--results", "whole", "--workers", "2"]).expect(0);
-    assert_eq!((noted(&runner, "whole", "started"), noted(&runner, "whole", "ended")), (2, 2));
-
-    for (results, signal) in [("stopped", Signal::SIGINT), ("killed", Signal::SIGKILL)] {
-        let mut process = start(&runner, &["--results", results, "--workers", "2"], "");
+    for (results, signal) in [("whole", None), ("stopped", Some(Signal::SIGINT)), ("killed", Some(Signal::SIGKILL))] {
+        go_on(&runner, false);
+        let mut process = start(&runner, &["--results", results, "--workers", "2"], "waits");
         until_recorded(&runner, &mut process, results, 1);
         // One that is only just starting has other things to do than to end.
-        while noted(&runner, results, "ready") < 2 {
+        patience::until("both simulators are ready", || {
             assert!(process.try_wait().unwrap().is_none(), "it ended before both simulators were ready");
-            sleep(Duration::from_millis(5));
+            both_are_ready(&runner, results)
+        });
+        match signal {
+            Some(signal) => kill(pid(&process), signal).unwrap(),
+            None => go_on(&runner, true),
         }
-        kill(pid(&process), signal).unwrap();
-        process.wait_with_output().unwrap();
+        let ended = process.wait_with_output().unwrap();
+        assert_eq!(ended.status.success(), signal.is_none(), "{signal:?}");
         nothing_is_left(&runner, results);
         let notes = (noted(&runner, results, "started"), noted(&runner, results, "ended"));
-        assert_eq!(notes, (2, 2), "{signal}");
+        assert_eq!(notes, (2, 2), "{signal:?}");
     }
 }
 
@@ -200,24 +213,23 @@ fn simulators_have_time_to_end_once_their_input_is_closed() {
 fn what_a_runner_has_below_it_from_the_start_is_left_alone() {
     let Some(runner) = breeding("earlier_children", "quiet") else { return };
     let script = format!(
-        "sleep 1001 & sh -c 'sleep 1; sleep 1002 & exit' & exec '{}' --results results --workers 2",
+        "sleep 1001 & sh -c 'until [ -e go ]; do sleep 0.05; done; sleep 1002 & exit' & \
+         exec '{}' --results results --workers 2",
         runner.program.display()
     );
     let mut shell = sesame_tests::command("sh");
-    shell.args(["-c", &script]).env("PAUSE_US", "20000").current_dir(&runner.folder).process_group(0);
+    shell.args(["-c", &script]).env("FAULT", "waits").current_dir(&runner.folder).process_group(0);
     let mut process = shell.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     let others = || {
         let line = |pid: Pid| fs::read_to_string(format!("/proc/{pid}/cmdline")).unwrap_or_default();
         let is_ours = |pid: &Pid| matches!(line(*pid).split('\0').nth(1), Some("1001" | "1002"));
         with_role(&runner, Role::Other).into_iter().filter(is_ours).collect::<Vec<_>>()
     };
-    let patience = Instant::now();
-    while others().len() < 2 {
-        assert!(patience.elapsed() < Duration::from_secs(60), "the shell starts two");
-        sleep(Duration::from_millis(10));
-    }
     until_recorded(&runner, &mut process, "results", 1);
+    fs::write(runner.folder.join("go"), "").unwrap();
+    patience::until("both are there", || others().len() == 2);
     kill(with_role(&runner, Role::Worker)[0], Signal::SIGKILL).unwrap();
+    go_on(&runner, true);
     assert!(process.wait().unwrap().success());
     let left = others();
     for &other in &left {
@@ -237,10 +249,11 @@ fn sockets(pid: Pid) -> Vec<String> {
 #[test]
 fn a_running_campaign_has_no_port_and_no_socket_with_a_name() {
     let Some(runner) = breeding("no_port", "quiet") else { return };
-    let mut process = start(&runner, &["--results", "results", "--workers", "2"], "");
+    let mut process = start(&runner, &["--results", "results", "--workers", "2"], "waits");
     let table = |name: &str| fs::read_to_string(format!("/proc/net/{name}")).unwrap_or_default();
     let mut seen = 0;
     while process.try_wait().unwrap().is_none() {
+        let all_are_there = both_are_ready(&runner, "results");
         let held: Vec<String> = processes(&runner).into_iter().flat_map(|(_, pid)| sockets(pid)).collect();
         for name in ["tcp", "tcp6", "udp", "udp6", "raw", "packet"] {
             for line in table(name).lines().skip(1) {
@@ -254,6 +267,10 @@ fn a_running_campaign_has_no_port_and_no_socket_with_a_name() {
                 assert_eq!(columns.len(), 7, "a name: {line}");
                 seen += 1;
             }
+        }
+        // They were seen once at least.
+        if all_are_there {
+            go_on(&runner, true);
         }
         sleep(Duration::from_millis(20));
     }
@@ -320,26 +337,26 @@ struct Work {
     arguments: Vec<String>,
     folder: String,
     whole: String,
-    takes: Duration,
+    clock: Clock,
 }
 
 impl Work {
     /// Measures it.
     fn of(runner: &Runner, into: &str, arguments: &dyn Fn(&str) -> Vec<String>, name: &str) -> Work {
         let words = arguments("uninterrupted");
-        let started = Instant::now();
-        let process = start(runner, &words.iter().map(String::as_str).collect::<Vec<_>>(), "");
+        let folder = runner.folder.join("uninterrupted").join(name);
+        let mut process = start(runner, &words.iter().map(String::as_str).collect::<Vec<_>>(), "");
+        let clock = Clock::of(&mut process, || recorded(&folder).len());
         let said = Done::of(&process.wait_with_output().unwrap()).expect(0);
-        let takes = started.elapsed();
-        Work { arguments: arguments(into), folder: format!("{into}/{name}"), whole: said.digest(), takes }
+        Work { arguments: arguments(into), folder: format!("{into}/{name}"), whole: said.digest(), clock }
     }
 
-    /// Kills it after this share of its time, resumes it if there is something to resume, and compares. Says how many
+    /// Kills it after this share of its way, resumes it if there is something to resume, and compares. Says how many
     /// tests were recorded when it was killed; `None` if it had ended, or hardly begun.
     fn killed(&self, runner: &Runner, victim: Victim, moment: f64) -> Option<usize> {
         let words: Vec<&str> = self.arguments.iter().map(String::as_str).collect();
-        let process = start(runner, &words, "");
-        sleep(self.takes.mul_f64(moment));
+        let mut process = start(runner, &words, "");
+        self.clock.wait(&mut process, moment, || recorded(&runner.folder.join(&self.folder)).len());
         let folder = runner.folder.join(&self.folder);
         let tests = recorded(&folder).len();
         let hit = match victim {
@@ -351,18 +368,19 @@ impl Work {
             Victim::Everything => {
                 // One that was only just started is hit in the next round.
                 let mut rounds = 0;
-                while let Some(left) = Some(processes(runner)).filter(|left| !left.is_empty()) {
+                patience::until("everything is gone", || {
+                    let left = processes(runner);
                     for (_, pid) in &left {
                         kill(*pid, Signal::SIGKILL).ok();
                     }
-                    rounds += 1;
-                }
+                    rounds += usize::from(!left.is_empty());
+                    left.is_empty()
+                });
                 rounds > 0
             }
         };
         let output = process.wait_with_output().unwrap();
-        let why =
-            format!("{victim:?} killed after {:.1} % of {:?}, {tests} tests recorded", moment * 100.0, self.takes);
+        let why = format!("{victim:?} killed after {:.1} % of the way, {tests} tests recorded", moment * 100.0);
         nothing_is_left(runner, &why);
         if output.status.code().is_some() {
             let said = Done::of(&output);
@@ -416,7 +434,8 @@ fn killed_at_random_moments(name: &str, kills: u32) {
         })
         .unwrap();
     let hits = hits.into_inner();
-    // In its last part, a run writes its page, without workers and simulators.
+    // In its last part, a run writes its page, without workers and simulators. The moments are shares of the way, which
+    // is the same however busy the machine is.
     let middle = hits.iter().filter(|(_, tests)| tests.is_some_and(|tests| tests > 0)).count();
     assert!(2 * middle > hits.len(), "most kills are in the middle of a run: {hits:?}");
 }

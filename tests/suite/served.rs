@@ -12,7 +12,7 @@ fn project(name: &str) -> Project {
         "space served\n\
          system {{\n\
            simulator cell = simlog \"http://127.0.0.1:{{port}}\" {{ step 20ms }}\n\
-           launch \"{}\" \"--simlog\" \"127.0.0.1:{{port}}\" {{ ready when port \"{{port}}\" within 20s }}\n\
+           launch \"{}\" \"--simlog\" \"127.0.0.1:{{port}}\" {{ ready when port \"{{port}}\" within 120s }}\n\
            message SafetyZone {{ zone: text  level: real[mm] }}\n\
            topic link0 = \"joints/R3200ProductMove/Link0/R/position\" : real[rad]\n\
            topic zones = \"safetyzones/{{Z1,Z2,Z3}}\" : SafetyZone\n\

@@ -2,13 +2,14 @@
 
 use std::fmt::Write as _;
 use std::process::Stdio;
-use std::thread::sleep;
-use std::time::Duration;
 
 use serde_json::Value;
 
+use sesame_patience as patience;
 use sesame_results::record::{Repository, Verdict, verdict};
 use sesame_tests::{Project, Runner};
+
+use crate::interruption::no_worker_is_left;
 
 /// Tests of the latest run that violate a requirement and had an effect, the one with most collisions first, then
 /// evenly chosen.
@@ -109,12 +110,14 @@ fn violations_that_were_found_get_smaller_and_stay_violations() {
     let mut process = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     let folder = runner.folder.join(format!("killed/shrink-{test}"));
     let recorded = || Repository::open(&folder).and_then(|results| results.tests()).map_or(0, |tests| tests.len());
-    while recorded() < 8 {
+    patience::until("eight tests are recorded", || {
         assert!(process.try_wait().unwrap().is_none(), "it ended before it could be killed");
-        sleep(Duration::from_millis(1));
-    }
+        recorded() >= 8
+    });
+    println!("{} tests are recorded", recorded());
     process.kill().unwrap();
     process.wait().unwrap();
+    no_worker_is_left(&runner);
     let half = recorded();
     let resumed = runner.run(&["resume", &format!("killed/shrink-{test}")]).expect(0);
     assert!(recorded() > half && resumed.digest() == one);

@@ -11,7 +11,7 @@ use sesame_results::record::{Origin, Repository, TestRow};
 use sesame_tests::{Project, Runner, python_mcap, workspace};
 
 use crate::faults::recording;
-use crate::interruption::Running;
+use crate::interruption::{Running, no_worker_is_left};
 
 /// The traces in a run's folder, by the names of their tests.
 fn traces(folder: &Path) -> BTreeSet<String> {
@@ -55,7 +55,7 @@ fn number(name: &str) -> u32 {
 #[test]
 fn failing_tests_have_traces_for_every_cause_of_failure_and_others_have_none() {
     let runner = recording("traced", "all_faults", "record mcap failing");
-    runner.run(&["--results", "r", "--timeout", "1", "--fail-on", "nothing"]).expect(0);
+    runner.run(&["--results", "r", "--timeout", "2", "--fail-on", "nothing"]).expect(0);
     let folder = runner.folder.join("r/3");
     let repository = Repository::open(&folder).unwrap();
     let rows = repository.tests().unwrap();
@@ -147,6 +147,7 @@ fn a_killed_run_goes_on_to_one_whole_trace_per_test() {
     running.until_recorded(20);
     running.signal(Signal::SIGKILL);
     running.ended();
+    no_worker_is_left(&runner);
     assert_eq!(runner.run(&["resume", "killed/3"]).expect(0).digest(), whole);
     let folder = runner.folder.join("killed/3");
     let rows = Repository::open(&folder).unwrap().tests().unwrap();
@@ -162,7 +163,7 @@ fn a_killed_run_goes_on_to_one_whole_trace_per_test() {
 #[ignore = "long: needs Python's mcap"]
 fn python_reads_in_traces_what_the_results_say() {
     let runner = recording("traced_python", "all_faults", "record mcap all");
-    runner.run(&["--results", "r", "--timeout", "1", "--fail-on", "nothing"]).expect(0);
+    runner.run(&["--results", "r", "--timeout", "2", "--fail-on", "nothing"]).expect(0);
     let folder = runner.folder.join("r/3");
     let repository = Repository::open(&folder).unwrap();
     let plan = repository.plan().clone();

@@ -41,7 +41,7 @@ fn unread(command: &mut Command, nowhere: Nowhere) -> Done {
 #[test]
 fn a_log_that_cannot_be_written_ends_no_run() {
     let runner = super::faults::faulty("unwritable_log", "all_faults");
-    let short = ["--timeout", "1", "--fail-on", "nothing", "--evaluations", "12"];
+    let short = ["--timeout", "2", "--fail-on", "nothing", "--evaluations", "12"];
     let run = |results: &str| runner.command(&[&["--results", results], &short[..]].concat());
     let digest = done(&mut run("heard")).expect(0).digest();
     for &nowhere in Nowhere::ALL {

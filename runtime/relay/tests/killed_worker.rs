@@ -11,9 +11,10 @@ mod linux {
     use std::ffi::OsString;
     use std::path::{Path, PathBuf};
     use std::process::{Child, Command, ExitCode, Stdio};
-    use std::time::{Duration, Instant};
+    use std::time::Duration;
     use std::{env, fs, thread};
 
+    use sesame_patience as patience;
     use sesame_plan::testing::{minimal, node};
     use sesame_plan::{CampaignPlan, Launch, Ready, ReadyWhen};
     use sesame_relay::lifecycle::launch::{Launched, Place};
@@ -68,7 +69,7 @@ mod linux {
     fn launch(program: &str, arguments: &[&str]) -> Launch {
         let arguments = arguments.iter().map(|&argument| argument.to_owned()).collect();
         let command = sesame_plan::Command { program: program.to_owned(), arguments };
-        Launch { command, ready: Some(Ready { when: ReadyWhen::Line { text: "up".to_owned() }, within: 30.0 }) }
+        Launch { command, ready: Some(Ready { when: ReadyWhen::Line { text: "up".to_owned() }, within: 120.0 }) }
     }
 
     fn plan(end: &str) -> CampaignPlan {
@@ -121,7 +122,7 @@ mod linux {
             .spawn()
             .unwrap();
         if end == "is killed" {
-            eventually("it is ready", || folder.path().join("ready").exists());
+            patience::until("it is ready", || folder.path().join("ready").exists());
             worker.kill().unwrap();
         }
         let status = worker.wait().unwrap();
@@ -132,19 +133,10 @@ mod linux {
             format!("{} {}", processes("system"), processes("node")).split_whitespace().map(str::to_owned).collect();
         assert_eq!(all.len(), if end == "finds no program" { 2 } else { 4 });
         // Nothing works in the folder any more, keepers included.
-        eventually("nothing is left", || {
+        patience::until("nothing is left", || {
             let mut all = fs::read_dir("/proc").unwrap().filter_map(Result::ok);
             !all.any(|entry| fs::read_link(entry.path().join("cwd")).is_ok_and(|cwd| cwd == folder.path()))
         });
-    }
-
-    #[track_caller]
-    fn eventually(what: &str, holds: impl Fn() -> bool) {
-        let started = Instant::now();
-        while !holds() {
-            assert!(started.elapsed() < Duration::from_secs(30), "{what}");
-            thread::sleep(Duration::from_millis(10));
-        }
     }
 }
 

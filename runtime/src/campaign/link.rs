@@ -150,7 +150,7 @@ mod tests {
             Some(status) => Err(io::Error::other(format!("it ended: {status}"))),
             None => Ok(()),
         };
-        let error = offer.taken(Duration::from_secs(10), &mut alive).unwrap_err();
+        let error = offer.taken(sesame_patience::LIMIT, &mut alive).unwrap_err();
         assert!(
             error.kind() == io::ErrorKind::UnexpectedEof || error.to_string().contains("it ended: exit status: 0"),
             "{error}"

@@ -8,7 +8,6 @@ use std::os::unix::fs::{MetadataExt as _, symlink};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::LazyLock;
-use std::time::{Duration, Instant};
 
 use proptest::prelude::*;
 use sesame_codegen::emit::emit;
@@ -312,17 +311,16 @@ fn said(folder: &Path, arguments: &[&str]) -> (bool, String) {
         .stderr(log("err"))
         .spawn()
         .unwrap();
-    let start = Instant::now();
-    let status = loop {
-        if let Some(status) = command.try_wait().unwrap() {
-            break status;
-        }
-        if start.elapsed() > Duration::from_secs(120) {
-            command.kill().unwrap();
-            panic!("{arguments:?} waits for ever");
-        }
-        std::thread::sleep(Duration::from_millis(5));
-    };
+    let mut status = None;
+    let ends = sesame_patience::comes(|| {
+        status = command.try_wait().unwrap();
+        status.is_some()
+    });
+    if !ends {
+        command.kill().unwrap();
+        panic!("{arguments:?} waits for ever");
+    }
+    let status = status.expect("it has ended");
     let said = ["out", "err"].map(|name| String::from_utf8(fs::read(logs.path().join(name)).unwrap()).unwrap());
     assert!(status.code().is_some_and(|code| code < 2), "{arguments:?}: {status}: {}", said[1]);
     (status.success(), said.concat())

@@ -15,7 +15,7 @@ use sesame_results::record::Repository;
 const WHOLE: &str = include_str!("../originals/arm.model");
 
 /// Longest that an import may take, on a machine with much else to do; usual is a hundredth of it.
-const MAX_TIME: Duration = Duration::from_secs(20);
+const MAX_TIME: Duration = Duration::from_secs(60);
 
 /// What stands in the place of a value.
 const VALUES: &[&str] = &[
@@ -316,18 +316,22 @@ fn an_import_that_is_killed_leaves_nothing_half_imported() {
     let begun = Instant::now();
     let whole = folder.path().join("whole");
     assert!(import(&whole).status().unwrap().success());
-    let (all, takes) = (names(&whole).len(), begun.elapsed());
-    let mut killed = 0;
-    for moment in 0..6 {
+    let (all, mut takes) = (names(&whole).len(), begun.elapsed());
+    let (mut killed, mut tries) = (0, 0);
+    while killed < 6 {
         let out = folder.path().join("out");
-        let there = moment % 2 == 0;
+        let there = tries % 2 == 0;
         if there {
             fs::create_dir(&out).unwrap();
         }
         let mut import = import(&out).spawn().unwrap();
-        std::thread::sleep(takes * moment / 7);
+        std::thread::sleep(takes * killed / 7);
         import.kill().unwrap();
-        if !import.wait().unwrap().success() {
+        tries += 1;
+        if import.wait().unwrap().success() {
+            // The kill came too late: the machine was busier when the time was taken. The next one comes earlier.
+            takes /= 2;
+        } else {
             killed += 1;
         }
         // All of it, or nothing that could be taken for a space or for results.
@@ -342,7 +346,7 @@ fn an_import_that_is_killed_leaves_nothing_half_imported() {
         }
         fs::remove_dir_all(&out).unwrap();
     }
-    assert!(killed >= 3, "{killed} of 6 were killed before they were done");
+    println!("{killed} of {tries} were killed before they were done");
     let left: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
     assert_eq!(left.len(), 2, "{left:?}");
 }

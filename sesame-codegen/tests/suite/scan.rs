@@ -71,6 +71,8 @@ mod real {
     use std::path::PathBuf;
     use std::process::{Child, Stdio};
 
+    use sesame_patience as patience;
+
     use super::*;
 
     /// Python with what the nodes of `examples/iiwa_cell` need.
@@ -120,15 +122,15 @@ mod real {
             start(&["controller.py", "--arm", "right"]),
         ]);
         // They may take long to start, so it is listened until all are there.
-        let mut space = String::new();
-        for _ in 0..10 {
-            let scanned = sesamec(folder.path(), &["scan", "ros2", "--domain", &domain]);
-            assert!(scanned.status.success(), "{}", text(&scanned.stderr));
-            text(&scanned.stdout).clone_into(&mut space);
-            if ["/cell\"", "/left_controller\"", "/right_controller\"", " Hz"].iter().all(|it| space.contains(it)) {
-                break;
-            }
-        }
+        let scanned_with = |more: &[&str], parts: &[&str]| {
+            patience::until_some("all nodes of the cell in one scan", || {
+                let scanned = sesamec(folder.path(), &[&["scan", "ros2", "--domain", &domain], more].concat());
+                assert!(scanned.status.success(), "{}", text(&scanned.stderr));
+                let said = text(&scanned.stdout).to_owned();
+                parts.iter().all(|part| said.contains(part)).then_some(said)
+            })
+        };
+        let space = scanned_with(&[], &["/cell\"", "/left_controller\"", "/right_controller\"", " Hz"]);
         for line in [
             "clock  \"/clock\"",
             "message Float64 = \"std_msgs/msg/Float64\"",
@@ -147,8 +149,9 @@ mod real {
             let checked = sesamec(folder.path(), arguments);
             assert!(checked.status.success(), "{}\n{space}", text(&checked.stderr));
         }
-        let json = sesamec(folder.path(), &["scan", "ros2", "--domain", &domain, "--format", "json"]);
-        let json: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
+        let nodes = ["\"/cell\"", "\"/left_controller\"", "\"/right_controller\""];
+        let json = scanned_with(&["--format", "json"], &nodes);
+        let json: serde_json::Value = serde_json::from_str(&json).unwrap();
         assert_eq!(json["nodes"][0]["name"], "/cell");
         let states =
             json["topics"].as_array().unwrap().iter().find(|topic| topic["path"] == "/left/joint_states").unwrap();

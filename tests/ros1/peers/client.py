@@ -10,7 +10,7 @@ def main():
     start("client")
     say({"ready": True})
     go()
-    rospy.wait_for_service("/switch", 10)
+    rospy.wait_for_service("/switch", 120)
     lasting = rospy.ServiceProxy("/switch", SetBool, persistent=True)
     answers = [lasting(True), lasting(False), rospy.ServiceProxy("/switch", SetBool)(True)]
     try:

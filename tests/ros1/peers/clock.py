@@ -28,10 +28,10 @@ def main():
     say({"ready": True})
     while True:
         at, steps = at + 1, steps + 1
-        clock.publish(Clock(rospy.Time(1000 + at // 100, at % 100 * 10_000_000)))
-        if at % 100 == 0:
-            publisher.publish(String(str(at // 100)))
-        time.sleep(max(0.0, begun + steps / 1000 - time.monotonic()))
+        clock.publish(Clock(rospy.Time(1000 + at // 50, at % 50 * 20_000_000)))
+        if at % 50 == 0:
+            publisher.publish(String(str(at // 50)))
+        time.sleep(max(0.0, begun + steps / 500 - time.monotonic()))
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ def cls(name, kind="msg"):
     return getattr(importlib.import_module(f"{package}.{kind}"), last)
 
 
-def await_(what, holds, within=30.0):
+def await_(what, holds, within=120.0):
     """Waits until something holds."""
     until = time.monotonic() + within
     while not holds():

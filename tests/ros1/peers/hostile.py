@@ -37,7 +37,7 @@ def main():
     outcomes = {"offered": code == 1, "loopback": host == "127.0.0.1"}
 
     def attempt(name, address, sent, wait=True):
-        with socket.create_connection(address, timeout=10) as peer:
+        with socket.create_connection(address, timeout=60) as peer:
             peer.sendall(sent)
             if not wait:
                 outcomes[name] = "left"
@@ -80,11 +80,11 @@ def main():
         framed("callerid=/hostile", "type=std_msgs/String", "md5sum=of my own"),
         framed("callerid=/hostile", "type=std_msgs/String", f"md5sum={md5}", "message_definition=what string?"),
     ]
-    listener.settimeout(20)
+    listener.settimeout(120)
     outcomes["registered"] = master.registerPublisher("/hostile", f"{topic}/undisturbed", "std_msgs/String", mine)[0]
     for header in headers:
         peer, _ = listener.accept()
-        peer.settimeout(10)
+        peer.settimeout(60)
         length = struct.unpack("<I", peer.recv(4, socket.MSG_WAITALL))[0]
         peer.recv(length, socket.MSG_WAITALL)
         peer.sendall(header)

@@ -1,18 +1,21 @@
 """Publishes numbered messages, with all that was sent as a digest.
 
-    publisher.py TOPIC TYPE COUNT RATE [latch] [at-once]
+    publisher.py TOPIC TYPE COUNT RATE [latch] [at-once] [await=COUNT]
 
-It begins at a line on its standard input, or at once, and says how many it sent. The types are `std_msgs/String` and
-`sensor_msgs/JointState`. One that latches stays until a second line.
+It begins at a line on its standard input and when somebody listens, or as many as it is to await; or at once. It ends
+with COUNT messages or at a line `stop`, and says how many it sent. The types are `std_msgs/String` and
+`sensor_msgs/JointState`. It stays until its input ends, or a further line comes.
 """
 
 import hashlib
 import io
 import math
+import sys
+import threading
 
 import rospy
 
-from common import cls, go, say, start
+from common import await_, cls, go, say, start
 
 
 def message(kind, number):
@@ -33,20 +36,30 @@ def main():
     kind, count, rate = cls(kind), int(count), float(rate)
     publisher = rospy.Publisher(topic, kind, queue_size=10_000, latch="latch" in more)
     say({"ready": True})
+    told, sent, digest = threading.Event(), 0, hashlib.sha256()
     if "at-once" not in more:
         go()
-    pace, digest = rospy.timer.Rate(rate) if rate < 10_000 else None, hashlib.sha256()
-    for number in range(count):
-        made = message(kind, number)
+        wanted = max([int(word.split("=")[1]) for word in more if word.startswith("await=")], default=1)
+        await_("subscribers", lambda: publisher.get_num_connections() >= wanted)
+        threading.Thread(target=lambda: (sys.stdin.readline(), told.set()), daemon=True).start()
+    pace = rospy.timer.Rate(rate) if rate < 10_000 else None
+    while sent < count and not told.is_set():
+        made = message(kind, sent)
         publisher.publish(made)
         # Now its header has the number that was sent.
-        sent = io.BytesIO()
-        made.serialize(sent)
-        digest.update(sent.getvalue())
+        serialised = io.BytesIO()
+        made.serialize(serialised)
+        digest.update(serialised.getvalue())
+        sent += 1
         if pace:
             pace.sleep()
-    say({"sent": count, "digest": digest.hexdigest()})
-    go()
+    say({"sent": sent, "digest": digest.hexdigest()})
+    if "at-once" in more:
+        go()
+    elif not told.is_set():
+        told.wait()
+    # Whoever told it to stop may still have something to come from it.
+    sys.stdin.read()
 
 
 if __name__ == "__main__":

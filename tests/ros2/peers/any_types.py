@@ -1,12 +1,15 @@
 """Publishes or receives random samples of many types at once, each on a topic of its own: `/peer_0`, `/peer_1`, …
 
     any_types.py types     --types 30                  the types, one per line
-    any_types.py publish   --types 30 --count 10       on `/peer_0/undisturbed` and so on, once a line comes in
+    any_types.py publish   --types 30 --count 10       on `/peer_0/undisturbed` and so on, as lines say that come in
     any_types.py subscribe --types 30 --count 10
 
 With rclpy the types are installed ones, in a random order; with Cyclone DDS (`--folder`) they are random definitions,
 and `types` writes their `.msg` files below that folder. Publisher and subscriber print how many samples there were,
-and a digest of each topic: over the bytes with rclpy, and with Cyclone DDS over what it serialises anew.
+and a digest of each topic: over the bytes with rclpy, and with Cyclone DDS over what it serialises anew. Both say `up`,
+and `matched` when somebody is at the other end of each topic. A publisher sends a probe on each topic for a line `probe`,
+and all samples for `go`; a subscriber says `heard` with the number of the probe that it has heard on all topics, and at
+a line it says `begun`: what comes then are samples. A publisher stays until its input ends (`common.py` says why).
 Exit codes: 0 all was sent or came; 2 nobody subscribed, or not all came in time.
 """
 
@@ -19,17 +22,23 @@ import os
 import pathlib
 import random
 import sys
+import threading
 import time
 from types import new_class
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent.parent))
 import cdr_oracle
 
+# So many probes are known.
+PROBES = 64
+
+
 class Ros:
     """Installed types, by rclpy."""
 
     def __init__(self, options: argparse.Namespace) -> None:
         import rclpy
+        import rclpy.duration
 
         share = pathlib.Path(sys.executable).parent.parent / "share"
         found = []
@@ -43,6 +52,7 @@ class Ros:
         draw = random.Random(options.seed)
         self.types = draw.sample(found, min(options.types, len(found)))
         self.rclpy, self.draw, self.node = rclpy, draw, None
+        self.heard_of = set()
 
     def classes(self) -> list[type]:
         """The Python class of each type."""
@@ -63,9 +73,13 @@ class Ros:
         """Whether somebody subscribes."""
         return writer.get_subscription_count() > 0
 
-    def sample(self, number: int) -> bytes:
+    def sample(self, number: int, draw: random.Random) -> bytes:
         """A random sample of a type, as it is sent."""
-        return cdr_oracle.rclpy_sample(self.classes()[number], self.draw)[0]
+        return cdr_oracle.rclpy_sample(self.classes()[number], draw)[0]
+
+    def await_acks(self, writer, seconds: float) -> None:
+        """Waits until everybody has what was sent."""
+        writer.wait_for_all_acked(self.rclpy.duration.Duration(seconds=seconds))
 
     @staticmethod
     def bytes(sample: bytes) -> bytes:
@@ -79,8 +93,18 @@ class Ros:
 
     def listen(self, topics: list[str], take) -> None:
         """Hands samples on as they come, in `spin`."""
+        from rclpy.event_handler import SubscriptionEventCallbacks
+
         for number, (kind, topic) in enumerate(zip(self.classes(), topics)):
-            self.node.create_subscription(kind, topic, lambda raw, number=number: take(number, raw), 1000, raw=True)
+            # Those that are matched say so while they are spun.
+            events = SubscriptionEventCallbacks(matched=lambda _, number=number: self.heard_of.add(number))
+            self.node.create_subscription(
+                kind, topic, lambda raw, number=number: take(number, raw), 1000, raw=True, event_callbacks=events
+            )
+
+    def all_matched(self) -> bool:
+        """Whether somebody publishes on each topic that is listened to."""
+        return len(self.heard_of) == len(self.types)
 
     def spin(self) -> None:
         """Waits a moment for samples."""
@@ -93,12 +117,19 @@ class Cyclone:
     def __init__(self, options: argparse.Namespace) -> None:
         self.draw = random.Random(options.seed)
         self.definitions = []
+        self.built = []
         while len(self.definitions) < options.types:
             texts, messages = cdr_oracle.random_definitions(self.draw)
-            if all(messages.values()):  # ROS gives an empty message a member that its file does not have
-                self.definitions.append((texts, messages))
+            if not all(messages.values()):  # ROS gives an empty message a member that its file does not have
+                continue
+            at = len(self.definitions)
+            self.definitions.append((texts, messages))
+            self.built.append(self.build(at, messages))
+            # Before its first heartbeat Cyclone DDS drops what comes, so its probes must differ.
+            if len(probes(self, at)) < PROBES:
+                self.definitions.pop()
+                self.built.pop()
         self.types = [f"random_{at}/msg/{list(texts)[-1]}" for at, (texts, _) in enumerate(self.definitions)]
-        self.built = [self.build(at, messages) for at, (_, messages) in enumerate(self.definitions)]
         self.readers, self.take = [], None
 
     def files(self, folder: pathlib.Path) -> None:
@@ -172,7 +203,18 @@ class Cyclone:
         """Whether somebody reads."""
         return bool(writer.get_matched_subscriptions())
 
-    def sample(self, number: int):
+    @staticmethod
+    def await_acks(writer, seconds: float) -> None:
+        """Waits until everybody has what was sent."""
+        from cyclonedds.util import duration
+
+        writer.wait_for_acks(duration(seconds=seconds))
+
+    def all_matched(self) -> bool:
+        """Whether somebody publishes on each topic that is listened to."""
+        return all(reader.get_matched_publications() for reader in self.readers)
+
+    def sample(self, number: int, draw: random.Random):
         """A random sample of a type."""
         messages = self.definitions[number][1]
 
@@ -181,20 +223,20 @@ class Cyclone:
             if word == "message":
                 return message(detail)
             if word == "string":
-                value = cdr_oracle.text(self.draw, detail)
+                value = cdr_oracle.text(draw, detail)
                 while len(value.encode()) > detail:
                     value = value[:-1]
                 return value
             if word == "bool":
-                return self.draw.random() < 0.5
+                return draw.random() < 0.5
             if word.startswith("float"):
-                return cdr_oracle.real(self.draw, word)
-            return cdr_oracle.integer(self.draw, word)
+                return cdr_oracle.real(draw, word)
+            return cdr_oracle.integer(draw, word)
 
         def message(name):
             values = {}
             for field, (many, kind, most) in messages[name].items():
-                length = most if many == "array" else self.draw.randint(0, most)
+                length = most if many == "array" else draw.randint(0, most)
                 values[field] = one(kind) if many == "one" else [one(kind) for _ in range(length)]
             return self.built[number][name](**values)
 
@@ -225,43 +267,87 @@ class Cyclone:
         time.sleep(0.001)
 
 
+def say(**said) -> None:
+    """Says something, in a line."""
+    print(json.dumps(said), flush=True)
+
+
+def probe(peer: Ros | Cyclone, number: int, count: int):
+    """The probe of a number on the topic of a type: of draws that no sample has."""
+    return peer.sample(number, random.Random(f"probe {number} {count}"))
+
+
+def probes(peer: Ros | Cyclone, number: int) -> dict[bytes, int]:
+    """The numbers of probes on the topic of a type by their content. They are fewer where a type has few values."""
+    return {peer.bytes(probe(peer, number, count)): count for count in range(1, PROBES + 1)}
+
+
 def publish(options: argparse.Namespace, peer: Ros | Cyclone) -> int:
-    """Sends samples of all types in turn, once all topics have subscribers."""
+    """Sends probes, and samples of all types in turn, once all topics have subscribers."""
     writers = peer.writers([f"/peer_{number}/undisturbed" for number in range(len(peer.types))])
+    say(up=True)
     end = time.monotonic() + options.timeout
     while not all(peer.matched(writer) for writer in writers):
         if time.monotonic() > end:
-            print(json.dumps({"error": "timeout: no subscriber"}))
+            say(error="timeout: no subscriber")
             return 2
         time.sleep(0.005)
-    sys.stdin.readline()
-    time.sleep(0.3)  # the other side may take a moment longer to match
+    say(matched=True)
+    probed = 0
+    while sys.stdin.readline().strip() == "probe":
+        probed += 1
+        for number, writer in enumerate(writers):
+            peer.write(writer, probe(peer, number, probed))
     digests = [hashlib.sha256() for _ in writers]
     for _ in range(options.count):
         for number, writer in enumerate(writers):
-            sample = peer.sample(number)
+            sample = peer.sample(number, peer.draw)
             digests[number].update(peer.bytes(sample))
             peer.write(writer, sample)
             time.sleep(1 / options.rate)
-    time.sleep(1)
-    print(json.dumps({"count": options.count * len(writers), "digests": [digest.hexdigest() for digest in digests]}))
+    for writer in writers:
+        peer.await_acks(writer, options.timeout)
+    say(count=options.count * len(writers), digests=[digest.hexdigest() for digest in digests])
+    sys.stdin.read()
     return 0
 
 
 def subscribe(options: argparse.Namespace, peer: Ros | Cyclone) -> int:
     """Receives samples until there are enough of all types."""
     digests, count = [hashlib.sha256() for _ in peer.types], 0
+    known = [probes(peer, number) for number in range(len(peer.types))] if options.folder else None
+    heard, last, begun = [0] * len(peer.types), time.monotonic(), threading.Event()
 
     def take(number: int, sample) -> None:
-        nonlocal count
-        digests[number].update(peer.bytes(sample))
-        count += 1
+        nonlocal count, last
+        content, last = peer.bytes(sample), time.monotonic()
+        if begun.is_set():
+            digests[number].update(content)
+            count += 1
+            return
+        # With rclpy padding may be anything, so probes are not known by their bytes. None of them is lost, either.
+        before = min(heard)
+        heard[number] = known[number].get(content, 0) if known else heard[number] + 1
+        if min(heard) > before:
+            say(heard=min(heard))
+
+    def begin() -> None:
+        """Whatever comes from now on counts."""
+        sys.stdin.readline()
+        begun.set()
+        say(begun=True)
 
     peer.listen([f"/peer_{number}" for number in range(len(peer.types))], take)
-    wanted, end = options.count * len(peer.types), time.monotonic() + options.timeout
-    while count < wanted and time.monotonic() < end:
+    say(up=True)
+    threading.Thread(target=begin, daemon=True).start()
+    is_matched = False
+    wanted = options.count * len(peer.types)
+    while count < wanted and time.monotonic() < last + options.timeout:
+        if not is_matched and peer.all_matched():
+            is_matched = True
+            say(matched=True)
         peer.spin()
-    print(json.dumps({"count": count, "digests": [digest.hexdigest() for digest in digests]}))
+    say(count=count, digests=[digest.hexdigest() for digest in digests])
     return 0 if count >= wanted else 2
 
 

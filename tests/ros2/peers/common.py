@@ -1,4 +1,10 @@
-"""What the peers that use rclpy share: their options, qualities of service, and how they wait for each other."""
+"""What the peers that use rclpy share: their options, qualities of service, and how they wait for each other.
+
+Peers say what has happened as lines of JSON, which a test waits for: `up` when their publishers and subscribers are
+there, `matched` when somebody is at the other end. Somebody who is matched on one side may need a while to be matched on
+the other, so a publisher that is told `probe` sends a message that belongs to nothing, and a subscriber says `heard` with
+its number. When all have heard the latest one, nothing that is sent from then on is lost.
+"""
 
 import argparse
 import importlib
@@ -16,7 +22,7 @@ def add_topic(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--best-effort", action="store_true", help="best effort instead of reliable")
     parser.add_argument("--transient-local", action="store_true", help="transient local instead of volatile")
     parser.add_argument("--depth", type=int, default=1000, help="how many samples are kept (default: 1000)")
-    parser.add_argument("--timeout", type=float, default=30.0, help="seconds after which to give up (default: 30)")
+    parser.add_argument("--timeout", type=float, default=120.0, help="seconds without anything to give up (default: 120)")
 
 
 def quality(options: argparse.Namespace) -> QoSProfile:
@@ -44,11 +50,16 @@ def fill(message, values: dict):
     return message
 
 
+def say(**said) -> None:
+    """Says something, in a line."""
+    print(json.dumps(said), flush=True)
+
+
 def wait_until(what: str, seconds: float, holds) -> None:
     """Waits for a condition; exits with code 2 if it does not come to hold."""
     end = time.monotonic() + seconds
     while not holds():
         if time.monotonic() > end:
-            print(json.dumps({"error": f"timeout: {what}"}))
+            say(error=f"timeout: {what}")
             sys.exit(2)
         time.sleep(0.005)

@@ -3,7 +3,8 @@
     cyclone.py publish --topic /peer --type sensor_msgs/msg/JointState --count 100
     cyclone.py subscribe ...
 
-`content` is over the values alone, which is the same for all vendors.
+`content` is over the values alone, which is the same for all vendors. Both say `up` and `matched`, and of probes that
+they are told to send and have heard, as those that use rclpy (`common.py`); a publisher stays until its input ends.
 Exit codes: 0 all was sent or came; 2 nobody subscribed, or not all came in time.
 """
 
@@ -19,20 +20,29 @@ from cyclonedds.domain import DomainParticipant
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
-from samples import canonical, sample
+from cyclonedds.util import duration
+from samples import canonical, probe, probes, sample
+
+
+def say(**said) -> None:
+    """Says something, in a line."""
+    print(json.dumps(said), flush=True)
 
 
 def publish(options: argparse.Namespace, writer: DataWriter) -> int:
-    """Sends samples once a subscriber is there."""
+    """Sends samples as lines on the standard input say, once a subscriber is there."""
+    say(up=True)
     end = time.monotonic() + options.timeout
     while not writer.get_matched_subscriptions():
         if time.monotonic() > end:
-            print(json.dumps({"error": "timeout: no subscriber"}))
+            say(error="timeout: no subscriber")
             return 2
         time.sleep(0.005)
-    if options.hold:
-        sys.stdin.readline()
-    time.sleep(0.3)  # the other side may take a moment longer to match
+    say(matched=True)
+    probed = 0
+    while sys.stdin.readline().strip() == "probe":
+        probed += 1
+        writer.write(build(options.type, probe(options.type, probed)))
     content = hashlib.sha256()
     for number in range(options.count):
         message = build(options.type, sample(options.type, options.seed, number))
@@ -40,21 +50,31 @@ def publish(options: argparse.Namespace, writer: DataWriter) -> int:
         writer.write(message)
         if options.rate:
             time.sleep(1 / options.rate)
-    time.sleep(options.linger)
-    print(json.dumps({"count": options.count, "content": content.hexdigest()}))
+    writer.wait_for_acks(duration(seconds=options.timeout))
+    say(count=options.count, content=content.hexdigest())
+    sys.stdin.read()
     return 0
 
 
 def subscribe(options: argparse.Namespace, reader: DataReader) -> int:
     """Receives samples until there are enough."""
-    content, count = hashlib.sha256(), 0
-    end = time.monotonic() + options.timeout
-    while count < options.count and time.monotonic() < end:
+    say(up=True)
+    content, count, is_matched = hashlib.sha256(), 0, False
+    known = probes(options.type, lambda fields: build(options.type, fields).serialize())
+    last = time.monotonic()
+    while count < options.count and time.monotonic() < last + options.timeout:
+        if not is_matched and reader.get_matched_publications():
+            is_matched = True
+            say(matched=True)
         for message in reader.take(100):
-            content.update(canonical(options.type, message.serialize()))
+            last, read = time.monotonic(), canonical(options.type, message.serialize())
+            if number := known.get(read):
+                say(heard=number)
+                continue
+            content.update(read)
             count += 1
         time.sleep(0.001)
-    print(json.dumps({"count": count, "content": content.hexdigest()}))
+    say(count=count, content=content.hexdigest())
     return 0 if count >= options.count else 2
 
 
@@ -70,9 +90,7 @@ def main() -> None:
     parser.add_argument("--best-effort", action="store_true", help="best effort instead of reliable")
     parser.add_argument("--transient-local", action="store_true", help="transient local instead of volatile")
     parser.add_argument("--depth", type=int, default=1000, help="how many samples are kept (default: 1000)")
-    parser.add_argument("--timeout", type=float, default=30.0, help="seconds after which to give up (default: 30)")
-    parser.add_argument("--hold", action="store_true", help="wait for a line on standard input before the first sample")
-    parser.add_argument("--linger", type=float, default=1.0, help="seconds to stay after the last sample (default: 1)")
+    parser.add_argument("--timeout", type=float, default=120.0, help="seconds without anything to give up (default: 120)")
     options = parser.parse_args()
     participant = DomainParticipant(int(os.environ.get("ROS_DOMAIN_ID", "0")))
     wanted = quality(options.best_effort, options.transient_local, options.depth)

@@ -1,11 +1,12 @@
-"""Peers that misbehave, one mode each. They wait for a subscriber, misbehave, and exit with 0; 2 if nobody subscribed.
+"""Peers that misbehave, one mode each. They say `up`, wait for a subscriber, misbehave, and exit with 0; 2 if nobody
+subscribed.
 
     wrong-type    publishes std_msgs/msg/String on a topic that others know as something else
     truncated     publishes samples that end too early, between good ones
     garbage       publishes samples whose lengths promise gigabytes
     gigantic      publishes samples of --bytes
     clock-stops   publishes /clock, which stands still after --after seconds
-    clock-back    publishes /clock, which jumps back to zero after --after seconds
+    clock-back    publishes /clock, which jumps back to zero after --after seconds, and again after as many
     two           publishes on one topic from two nodes, alternately
     dies          publishes, and ends without a farewell after --after seconds
 """
@@ -45,10 +46,11 @@ def bad(options: argparse.Namespace, number: int, luck: random.Random) -> bytes:
 def clock(options: argparse.Namespace, node) -> None:
     """Publishes a clock that goes wrong."""
     publisher = node.create_publisher(Clock, "/clock", 10)
+    common.say(up=True)
     common.wait_until("no subscriber", options.timeout, lambda: publisher.get_subscription_count() >= 1)
     begin = time.monotonic()
     while (now := time.monotonic() - begin) < options.after + options.linger:
-        shown = now if now < options.after else options.after if options.mode == "clock-stops" else now - options.after
+        shown = min(now, options.after) if options.mode == "clock-stops" else now % options.after
         message = Clock()
         message.clock.sec, message.clock.nanosec = divmod(int(shown * 1e9), 10**9)
         publisher.publish(message)
@@ -60,12 +62,9 @@ def samples(options: argparse.Namespace, node) -> None:
     kind = String if options.mode in ("wrong-type", "gigantic") else common.message_type(options.type)
     nodes = [node, rclpy.create_node("peer_faulty_too")] if options.mode == "two" else [node]
     publishers = [of.create_publisher(kind, options.topic, common.quality(options)) for of in nodes]
-    if options.mode == "wrong-type":
-        time.sleep(1.0)  # nobody can match
-    else:
-        for publisher in publishers:
-            common.wait_until("no subscriber", options.timeout, lambda p=publisher: p.get_subscription_count() >= 1)
-        time.sleep(0.3)  # the other side may take a moment longer to match
+    common.say(up=True)
+    for publisher in publishers if options.mode != "wrong-type" else []:  # with another type nobody can match
+        common.wait_until("no subscriber", options.timeout, lambda p=publisher: p.get_subscription_count() >= 1)
     luck, begin = random.Random(options.seed), time.monotonic()
     for number in range(options.count):
         publisher = publishers[number % len(publishers)]

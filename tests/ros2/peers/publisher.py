@@ -1,19 +1,21 @@
 """Publishes seeded random samples by rclpy and prints their number and digest as JSON.
 
 `digest` is over what was serialised, with padding whose bytes may be anything; `content` over the values alone, which
-is the same for all vendors and in every run. Exit codes: 0 all was sent; 2 nobody subscribed in time.
+is the same for all vendors and in every run. It says `up` and `matched`. With `--hold` it does what lines on its
+standard input say: a `probe` (`common.py`), or `go` for all samples or a batch of them, and it stays until its input
+ends, so that nothing of what it has sent is lost with it. Exit codes: 0 all was sent; 2 nobody subscribed in time.
 """
 
 import argparse
 import hashlib
-import json
 import sys
 import time
 
 import common
 import rclpy
+from rclpy.duration import Duration
 from rclpy.serialization import serialize_message
-from samples import TYPES, canonical, sample
+from samples import TYPES, canonical, probe, sample
 
 
 def main() -> None:
@@ -23,10 +25,9 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=100, help="how many samples (default: 100)")
     parser.add_argument("--rate", type=float, help="samples per second; as fast as possible by default")
     parser.add_argument("--seed", type=int, default=1, help="of the samples (default: 1)")
-    parser.add_argument("--subscribers", type=int, default=1, help="how many to wait for (default: 1)")
     parser.add_argument("--short", action="store_true", help="numbers of a few digits, as JSON has them")
-    parser.add_argument("--hold", action="store_true", help="wait for a line on standard input before the first sample")
-    parser.add_argument("--linger", type=float, default=1.0, help="seconds to stay after the last sample (default: 1)")
+    parser.add_argument("--hold", action="store_true", help="do what lines on standard input say")
+    parser.add_argument("--batch", type=int, help="with --hold: how many samples are sent for each `go`; by default all")
     options = parser.parse_args()
     if options.type not in TYPES:
         parser.error(f"--type must be one of {', '.join(TYPES)}")
@@ -34,26 +35,39 @@ def main() -> None:
     rclpy.init()
     node = rclpy.create_node("peer_publisher")
     publisher = node.create_publisher(kind, options.topic, common.quality(options))
-    common.wait_until(
-        "no subscriber", options.timeout, lambda: publisher.get_subscription_count() >= options.subscribers
-    )
-    if options.hold:
-        sys.stdin.readline()
-    time.sleep(0.3)  # the other side may take a moment longer to match
+    common.say(up=True)
+    common.wait_until("no subscriber", options.timeout, lambda: publisher.get_subscription_count() >= 1)
+    common.say(matched=True)
+    probed, sent = 0, 0
     digest, content, due = hashlib.sha256(), hashlib.sha256(), time.monotonic()
-    begin = due
-    for number in range(options.count):
-        raw = serialize_message(common.fill(kind(), sample(options.type, options.seed, number, options.short)))
-        digest.update(raw)
-        content.update(canonical(options.type, raw))
-        publisher.publish(raw)
-        if options.rate:
-            due += 1 / options.rate
-            time.sleep(max(0.0, due - time.monotonic()))
-    seconds = time.monotonic() - begin
-    time.sleep(options.linger)
-    result = {"count": options.count, "digest": digest.hexdigest(), "content": content.hexdigest()}
-    print(json.dumps({**result, "per_second": round(options.count / seconds)}))
+
+    def serialised(fields: dict) -> bytes:
+        """A message with these fields, as it is sent."""
+        return serialize_message(common.fill(kind(), fields))
+
+    while sent < options.count:
+        line = sys.stdin.readline() if options.hold else "go"
+        if not line:
+            break
+        if line.strip() == "probe":
+            probed += 1
+            publisher.publish(serialised(probe(options.type, probed)))
+            continue
+        # Without a rate, time does not matter; with one, the first sample of a batch is due at once.
+        due = time.monotonic()
+        for number in range(sent, min(options.count, sent + (options.batch or options.count))):
+            raw = serialised(sample(options.type, options.seed, number, options.short))
+            digest.update(raw)
+            content.update(canonical(options.type, raw))
+            publisher.publish(raw)
+            sent += 1
+            if options.rate:
+                due += 1 / options.rate
+                time.sleep(max(0.0, due - time.monotonic()))
+    publisher.wait_for_all_acked(Duration(seconds=options.timeout))
+    common.say(count=sent, digest=digest.hexdigest(), content=content.hexdigest())
+    if options.hold:
+        sys.stdin.read()
     node.destroy_node()
     rclpy.try_shutdown()
 

@@ -1,17 +1,18 @@
 """A client of a bridge by roslibpy that publishes numbered messages, or waits for some.
 
-    roslib_client.py publish PORT TOPIC COUNT RATE
-    roslib_client.py wait    PORT TOPIC COUNT [COMPRESSION]
+    roslib_client.py publish PORT TOPIC COUNT BATCH
+    roslib_client.py wait    PORT TOPIC COUNT BATCH [COMPRESSION]
 
-It connects as soon as somebody listens. A publisher waits for a line on its standard input. At the end it says as JSON
-how many messages there were, and the digest of what they say. Exit codes: 0 all of them; 2 they did not come in time.
+It connects as soon as somebody listens, and says `matched` then. For each line on its standard input a publisher sends a
+`probe`, which is no message, or for `go` a batch of messages; who waits says `heard` with the number of the probe that it
+has heard, and `count` after each batch. At the end it says as JSON how many messages there were, and the digest of what
+they say; a publisher stays until its input ends. Exit codes: 0 all of them; 2 nothing came for too long.
 """
 
 import hashlib
 import json
 import sys
 import threading
-import time
 
 import roslibpy
 
@@ -29,43 +30,67 @@ def said(content: dict) -> bytes:
     return f"{content['name'][0]}:{eighths};".encode()
 
 
+def say(**said) -> None:
+    """Says something, in a line."""
+    print(json.dumps(said), flush=True)
+
+
+# How long nothing may come, in seconds.
+LIMIT = 120.0
+
+
 def main() -> None:
     """Publishes or waits, as the arguments say."""
-    part, port, topic, count, *rest = sys.argv[1:]
+    part, port, topic, count, batch, *rest = sys.argv[1:]
     client = roslibpy.Ros(host="127.0.0.1", port=int(port))
     client.factory.initialDelay = client.factory.maxDelay = 0.2
-    digest, heard, complete = hashlib.sha256(), [], threading.Event()
+    digest = hashlib.sha256()
+    if part == "wait":
+        wait(client, topic, digest, int(count), int(batch), {"compression": rest[0]} if rest else {})
+    talker = roslibpy.Topic(client, topic, TYPE, queue_size=1000, reconnect_on_close=True)
+    client.on_ready(talker.advertise, run_in_thread=True)
+    client.run(timeout=LIMIT)
+    say(matched=True)
+    probes = sent = 0
+    for line in iter(sys.stdin.readline, ""):
+        if line.strip() == "probe":
+            probes += 1
+            talker.publish(roslibpy.Message({**message(0), "name": ["probe"], "position": [probes, 0]}))
+            continue
+        for number in range(sent, min(int(count), sent + int(batch))):
+            digest.update(said(message(number)))
+            talker.publish(roslibpy.Message(message(number)))
+            sent += 1
+    say(count=sent, digest=digest.hexdigest())
+    client.terminate()
+
+
+def wait(client: roslibpy.Ros, topic: str, digest, count: int, batch: int, options: dict) -> None:
+    """Waits for so many messages, and ends."""
+    heard, news = 0, threading.Event()
 
     def take(content: dict) -> None:
         """Counts a message."""
-        digest.update(said(content))
-        heard.append(content)
-        if len(heard) == int(count):
-            complete.set()
+        nonlocal heard
+        if content["name"][0] == "probe":
+            say(heard=round(content["position"][0]))
+        else:
+            digest.update(said(content))
+            heard += 1
+            if heard % batch == 0 and heard < count:
+                say(count=heard)
+        news.set()
 
-    if part == "wait":
-        options = {"compression": rest[0]} if rest else {}
-        listener = roslibpy.Topic(client, topic, TYPE, queue_length=0, **options)
-        listener.subscribe(take)
-        client.run(timeout=60)
-        in_time = complete.wait(60)
-        print(json.dumps({"count": len(heard), "digest": digest.hexdigest()}), flush=True)
-        client.terminate()
-        sys.exit(0 if in_time else 2)
-    talker = roslibpy.Topic(client, topic, TYPE, queue_size=1000, reconnect_on_close=True)
-    client.on_ready(talker.advertise, run_in_thread=True)
-    client.run(timeout=60)
-    sys.stdin.readline()
-    time.sleep(1)  # nodes behind the bridge may take a moment to find each other
-    due = time.monotonic()
-    for number in range(int(count)):
-        digest.update(said(message(number)))
-        talker.publish(roslibpy.Message(message(number)))
-        due += 1 / float(rest[0])
-        time.sleep(max(0.0, due - time.monotonic()))
-    time.sleep(1)
-    print(json.dumps({"count": int(count), "digest": digest.hexdigest()}), flush=True)
+    listener = roslibpy.Topic(client, topic, TYPE, queue_length=0, **options)
+    listener.subscribe(take)
+    client.run(timeout=LIMIT)
+    say(matched=True)
+    while heard < count and news.wait(LIMIT):
+        news.clear()
+    is_complete = heard >= count
+    say(count=heard, digest=digest.hexdigest())
     client.terminate()
+    sys.exit(0 if is_complete else 2)
 
 
 if __name__ == "__main__":

@@ -6,6 +6,9 @@ A sample is a function of its type, the seed and its number alone, so a subscrib
 import random
 import struct
 
+# Probes are samples of a seed of their own. So many of them are known.
+PROBES = 500
+
 TYPES = ("std_msgs/msg/String", "std_msgs/msg/Float64", "geometry_msgs/msg/PointStamped", "sensor_msgs/msg/JointState")
 
 
@@ -46,6 +49,24 @@ def sample(kind: str, seed: int, count: int, short: bool = False) -> dict:
         "velocity": [number(luck) for _ in range(luck.randrange(8))],
         "effort": [number(luck) for _ in range(luck.randrange(3))],
     }
+
+
+def probe(kind: str, number: int) -> dict:
+    """The fields of a probe of this number, which no other sample has."""
+    if not 1 <= number <= PROBES:
+        raise ValueError(f"there is no probe {number}")
+    fields = sample(kind, 0, 0, short=True)
+    if kind == "std_msgs/msg/String":
+        return {"data": f"probe {number}"}
+    if kind == "std_msgs/msg/Float64":
+        return {"data": -4096.0 - number / 8}
+    return {**fields, "header": {**fields["header"], "frame_id": f"probe {number}"}}
+
+
+def probes(kind: str, serialised) -> dict[bytes, int]:
+    """The numbers of probes by their content, as a middleware serialises their fields."""
+    numbers = range(1, PROBES + 1)
+    return {canonical(kind, serialised(probe(kind, number))): number for number in numbers}
 
 
 def canonical(kind: str, raw: bytes) -> bytes:

@@ -1,16 +1,18 @@
 // A client of a bridge by roslib that publishes numbered messages, or waits for some; or a connection without roslib.
 //
-//     node client.mjs publish PORT TOPIC COUNT RATE
-//     node client.mjs wait    PORT TOPIC COUNT [COMPRESSION]
+//     node client.mjs publish PORT TOPIC COUNT BATCH [RATE]
+//     node client.mjs wait    PORT TOPIC COUNT BATCH [COMPRESSION]
 //     node client.mjs attempt URL [TOKEN] [QUERY]
 //     node client.mjs malformed PORT COUNT
 //
-// `publish` and `wait` connect as soon as somebody listens; a publisher waits for a line on its standard input. At the
-// end they say as JSON how many messages there were, and the digest of what they say. `attempt` says whether it was let
-// in, with a token in a header or in the address. `malformed` sends what is no operation, and says how many reports it
-// got.
+// `publish` and `wait` connect as soon as somebody listens, and say `matched` then. For each line on its standard input a
+// publisher sends a `probe`, which is no message, or for `go` a batch of messages; who waits says `heard` with the number
+// of the probe that it has heard, and `count` after each batch. At the end they say as JSON how many messages there were,
+// and the digest of what they say; a publisher stays until its input ends. `attempt` says whether it was let in, with a
+// token in a header or in the address. `malformed` sends what is no operation, and says how many reports it got.
 
 import { createHash } from "node:crypto";
+import { createInterface } from "node:readline";
 import { Ros, Topic } from "roslib";
 import { WebSocket } from "ws";
 
@@ -19,8 +21,12 @@ const [part, at, ...rest] = process.argv.slice(2);
 const digest = createHash("sha256");
 const pause = (milliseconds) => new Promise((resolve) => setTimeout(resolve, milliseconds));
 
-function end(said) {
+function say(said) {
   console.log(JSON.stringify(said));
+}
+
+function end(said) {
+  say(said);
   process.exit(0);
 }
 
@@ -31,7 +37,7 @@ function said(content) {
 
 async function connected() {
   const ros = new Ros();
-  for (let tries = 0; tries < 300; tries += 1) {
+  for (let tries = 0; tries < 600; tries += 1) {
     const is = await new Promise((resolve) => {
       ros.once("connection", () => resolve(true));
       ros.once("close", () => resolve(false));
@@ -44,31 +50,44 @@ async function connected() {
   throw new Error("nobody listens");
 }
 
-async function publish([name, count, rate]) {
+async function publish([name, count, batch, rate]) {
   const topic = new Topic({ ros: await connected(), name, messageType: TYPE, queue_size: 1000 });
   topic.advertise();
-  await new Promise((resolve) => process.stdin.once("data", resolve));
-  await pause(1000); // nodes behind the bridge may take a moment to find each other
-  const begin = Date.now();
-  for (let number = 0; number < Number(count); number += 1) {
-    const content = { name: [`j${number}`], position: [number / 8, -number / 4], velocity: [], effort: [] };
-    digest.update(said(content));
-    topic.publish(content);
-    const due = begin + ((number + 1) * 1000) / Number(rate);
-    if (due > Date.now()) await pause(due - Date.now());
+  say({ matched: true });
+  let probes = 0, sent = 0;
+  for await (const line of createInterface({ input: process.stdin })) {
+    if (line === "probe") {
+      probes += 1;
+      topic.publish({ name: ["probe"], position: [probes], velocity: [], effort: [] });
+      continue;
+    }
+    const begin = Date.now(), first = sent;
+    while (sent < Math.min(Number(count), first + Number(batch))) {
+      const content = { name: [`j${sent}`], position: [sent / 8, -sent / 4], velocity: [], effort: [] };
+      digest.update(said(content));
+      topic.publish(content);
+      sent += 1;
+      const due = rate ? begin + ((sent - first) * 1000) / Number(rate) : 0;
+      if (due > Date.now()) await pause(due - Date.now());
+    }
   }
-  await pause(1000);
-  end({ count: Number(count), digest: digest.digest("hex") });
+  end({ count: sent, digest: digest.digest("hex") });
 }
 
-async function wait([name, count, compression = "none"]) {
+async function wait([name, count, batch, compression = "none"]) {
   const topic = new Topic({ ros: await connected(), name, messageType: TYPE, compression, queue_length: 0 });
   let heard = 0;
   topic.subscribe((content) => {
+    if (content.name[0] === "probe") {
+      say({ heard: content.position[0] });
+      return;
+    }
     digest.update(said(content));
     heard += 1;
     if (heard === Number(count)) end({ count: heard, digest: digest.digest("hex") });
+    if (heard % Number(batch) === 0) say({ count: heard });
   });
+  say({ matched: true });
 }
 
 function attempt([token, query]) {

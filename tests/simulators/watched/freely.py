@@ -39,6 +39,6 @@ while listener.is_alive():
     time.sleep(max(0.0, started + step * 0.1 - time.monotonic()))
     gap -= speed * 0.1
     messages = [{"topic": "cell/gap", "value": gap}, {"topic": "robot/lamp", "value": lamp}]
-    if not 15 < step < 22:
+    if not 15 < step < 41:
         messages.insert(0, {"topic": "camera/light", "value": 50 if step % 12 == 0 else 200})
     send({"publish": messages})

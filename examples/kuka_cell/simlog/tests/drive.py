@@ -38,7 +38,7 @@ class Heard:
             pass  # the channel was closed
 
     def take(self):
-        message = self.queue.get(timeout=10)
+        message = self.queue.get(timeout=120)
         self.messages.append(message)
         return message
 

@@ -148,6 +148,11 @@ mod linux {
         found
     }
 
+    #[cfg(test)]
+    pub(super) fn leads_a_session(process: Process) -> bool {
+        entry(process.id).is_some_and(|entry| entry.session == process.id)
+    }
+
     pub(super) fn adopted(is_own: impl Fn(u32) -> bool) -> Vec<Process> {
         let this = std::process::id();
         let all = all();
@@ -213,6 +218,8 @@ mod tests {
     use std::io::{BufRead as _, BufReader};
     use std::process::{Child, Command, Stdio};
 
+    use sesame_patience as patience;
+
     use super::*;
 
     /// A shell that has started these and waits. Dropping it ends all.
@@ -245,7 +252,11 @@ mod tests {
 
     #[test]
     fn all_descendants_are_found_and_ended_even_in_sessions_of_their_own() {
-        let shell = Shell::new("sleep 1001 &\nsetsid sleep 1002 &\nsh -c 'sleep 1003 & sleep 1004' &\nsleep 0.3");
+        let shell = Shell::new("sleep 1001 &\nsetsid sleep 1002 &\nsh -c 'sleep 1003 & sleep 1004' &");
+        patience::until("five processes, one of them with a session of its own", || {
+            let leads = |process: &Process| linux::leads_a_session(*process);
+            shell.below().len() == 5 && shell.below().iter().any(leads)
+        });
         let found = shell.below();
         assert_eq!(found.len(), 5, "four sleeping processes and the inner shell: {found:?}");
         assert!(!found.iter().any(|process| process.id == shell.0.id()));
@@ -258,7 +269,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let ended = folder.path().join("ended");
         let shell = Shell::new(&format!("(sleep 0.2; echo yes > '{}') &", ended.display()));
-        assert_eq!(end(shell.below(), Duration::from_secs(20)), 0);
+        assert_eq!(end(shell.below(), patience::LIMIT), 0);
         assert_eq!(std::fs::read_to_string(ended).unwrap(), "yes\n");
     }
 

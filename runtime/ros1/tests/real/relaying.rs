@@ -1,15 +1,14 @@
 //! Messages through the runner: nothing is lost, and nothing is changed that nobody changes.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use nix::sys::signal::Signal;
 use sesame_plan::testing::{at, evidence_above, field, guarantee, message, monitor, node, operation, test_of, use_of};
 use sesame_plan::{
-    Channel, Choice, Clock, Gate, MessageId, Node, NodeId, Operation, OperationKind, Test, TextTest, TopicId, Type,
+    CampaignPlan, Channel, Choice, Clock, Gate, MessageId, Node, NodeId, Operation, OperationKind, Test, TextTest, TopicId, Type,
 };
 
 use crate::core::{Core, Program};
-use crate::system::{System, peers, plan, remapped, ros1};
+use crate::system::{Seen, System, peers, plan, remapped, ros1};
 
 const STRING: &str = "std_msgs/msg/String";
 const JOINTS: &str = "sensor_msgs/msg/JointState";
@@ -25,7 +24,7 @@ fn relay(interface: &str, ty: &str, count: u64, rate: u32) -> Option<(Core, Syst
     let (count_text, rate) = (count.to_string(), rate.to_string());
     let remapped = remapped(&plan, 0);
     let mut publisher = core.ready_peer("publisher.py", &["/peer", ty, &count_text, &rate, &remapped[0]]);
-    let mut subscriber = core.ready_peer("subscriber.py", &["/peer", ty, &count_text, "20"]);
+    let mut subscriber = core.ready_peer("subscriber.py", &["/peer", ty, &count_text, "120"]);
     let mut system = System::new(plan);
     let mut said = None;
     let finished = system.run(
@@ -45,11 +44,17 @@ fn relay(interface: &str, ty: &str, count: u64, rate: u32) -> Option<(Core, Syst
     assert_eq!(said["callerid"], "/sesame_relay_1");
     assert_eq!(said["type"], ty);
     assert_eq!(finished.unwrap().messages, count);
-    assert_eq!(system.incidents().notes, [""; 0]);
+    assert_eq!(system.notes(), [""; 0]);
     Some((core, system))
 }
 
 #[test]
+fn six_thousand_joint_states_arrive_byte_for_byte() {
+    relay(JOINTS, "sensor_msgs/JointState", 6_000, 2_000);
+}
+
+#[test]
+#[ignore = "long: how old messages are when they come, with nothing beside them"]
 fn thirty_seconds_of_joint_states_at_200_hz_arrive_byte_for_byte() {
     relay(JOINTS, "sensor_msgs/JointState", 6_000, 200);
 }
@@ -59,87 +64,98 @@ fn many_messages_at_once_arrive_byte_for_byte() {
     relay(STRING, "std_msgs/String", 5_000, 2_000);
 }
 
-#[test]
-fn tools_of_ros_count_what_passes_as_the_runner_does() {
-    let Some(core) = Core::start() else { return };
-    let plan = peers(&core.uri(), JOINTS);
+/// As many subscribers as these, by their names: the run begins when all of them are connected to the runner.
+fn heard_by(mut plan: CampaignPlan, names: &[&str]) -> CampaignPlan {
+    let subscriber = plan.nodes.pop().unwrap();
+    plan.nodes.extend(names.iter().map(|name| Node { name: (*name).to_owned(), ..subscriber.clone() }));
+    plan
+}
+
+/// How many messages `rosbag record` queues. On a busy machine it may be given so many at once, and drops what is beyond.
+const FEW: u64 = 100;
+
+/// What `rostopic hz` says of so many messages at 200 Hz of which the runner, a subscriber and a bag have each one.
+fn counted_by_tools(count: u64) -> Option<Vec<f64>> {
+    let count_text = count.to_string();
+    let core = Core::start()?;
+    let plan = heard_by(peers(&core.uri(), JOINTS), &["subscriber", "recorder", "meter"]);
     let remapped = remapped(&plan, 0);
     let ty = "sensor_msgs/JointState";
-    let mut publisher = core.ready_peer("publisher.py", &["/peer", ty, "1000", "200", &remapped[0]]);
-    let bag = core.home.path().join("peer.bag");
-    let record = core.tool("rosbag", &["record", "-O", &bag.display().to_string(), "/peer", "/peer/undisturbed"]);
+    // It is heard by the runner and the recorder.
+    let mut publisher = core.ready_peer("publisher.py", &["/peer", ty, &count_text, "200", "await=2", &remapped[0]]);
+    let bag = core.home.path().join("peer.bag").display().to_string();
+    // It ends with its last message.
+    let record = core.tool("rosbag", &["record", "-l", &count_text, "-O", &bag, "/peer", "/peer/undisturbed"]);
     let mut hz = core.tool("rostopic", &["hz", "/peer"]);
-    // The recorder and the tool are subscribers that the plan does not know.
-    let mut subscriber = core.ready_peer("subscriber.py", &["/peer", ty, "1000", "20"]);
+    let mut subscriber = core.ready_peer("subscriber.py", &["/peer", ty, &count_text, "120"]);
     let mut system = System::new(plan);
-    let mut said = None;
-    let begun = Instant::now();
-    let mut gone = false;
+    let (mut said, mut rates) = (None, Vec::new());
     let finished = system.run(
         &nothing(),
-        || {},
+        || publisher.go(),
         || {
-            // They come a while after the others.
-            if !gone && begun.elapsed() > Duration::from_secs(5) {
-                publisher.go();
-                gone = true;
-            }
             said = said.take().or_else(|| subscriber.said_already());
-            said.is_some()
+            let rate = hz.line_already().and_then(|line| line.strip_prefix("average rate: ")?.parse::<f64>().ok());
+            rates.extend(rate);
+            said.is_some() && !rates.is_empty()
         },
     );
-    assert_eq!(finished.unwrap().messages, 1000);
-    assert_eq!(said.unwrap()["received"], 1000);
-    let rates: Vec<String> = (0..8).map(|_| hz.line()).filter(|line| line.starts_with("average rate")).collect();
-    let rate = |line: &String| line.rsplit(' ').next().unwrap().parse::<f64>().unwrap();
-    assert!(rates.iter().map(rate).all(|rate| (190.0..210.0).contains(&rate)), "{rates:?}");
-    assert!(!rates.is_empty());
-    record.end(Signal::SIGINT);
-    assert_eq!(counted(&core, &bag.display().to_string()), ["1000", "1000"]);
+    assert_eq!(finished.unwrap().messages, count);
+    assert_eq!(said.unwrap()["received"], count);
+    record.ended();
+    assert_eq!(counted(&core, &bag), [count_text.as_str(), &count_text]);
+    Some(rates)
+}
+
+#[test]
+fn tools_of_ros_count_what_passes_as_the_runner_does() {
+    counted_by_tools(FEW);
+}
+
+#[test]
+#[ignore = "long: a rate, and messages for which tools have no queue, with nothing beside them"]
+fn tools_of_ros_measure_the_rate_at_which_a_thousand_messages_pass() {
+    let Some(rates) = counted_by_tools(1_000) else { return };
+    assert!(rates.iter().all(|rate| (190.0..210.0).contains(rate)), "{rates:?}");
 }
 
 #[test]
 fn nodes_of_roscpp_are_relayed_too() {
-    let Some(core) = Core::start() else { return };
-    let ty = "sensor_msgs/JointState";
-    let [bag, copy] = ["peer.bag", "copy.bag"].map(|name| core.home.path().join(name).display().to_string());
-    // `rosbag record` and `rosbag play` are written with roscpp.
-    let mut publisher = core.ready_peer("publisher.py", &["/peer", ty, "500", "200"]);
-    let record = core.tool("rosbag", &["record", "-O", &bag, "/peer"]);
-    await_subscriber(&core);
-    publisher.go();
-    publisher.said();
-    std::thread::sleep(Duration::from_millis(500));
-    record.end(Signal::SIGINT);
-    drop(publisher);
-    let mut plan = peers(&core.uri(), JOINTS);
-    let remapped = remapped(&plan, 0);
-    // It publishes as soon as somebody listens; the recorder comes after it is offered.
-    plan.nodes.clear();
-    let record = core.tool("rosbag", &["record", "-O", &copy, "/peer"]);
-    let play = ["play", "-q", "--wait-for-subscribers", "-d", "6", &bag, &remapped[0]];
-    let _play = core.tool("rosbag", &play);
-    let mut system = System::new(plan);
-    let begun = Instant::now();
-    let finished = system.run(&nothing(), || {}, || begun.elapsed() > Duration::from_secs(12)).unwrap();
-    assert_eq!(finished.messages, 500);
-    record.end(Signal::SIGINT);
-    assert_eq!(counted(&core, &copy), ["500"]);
+    played(FEW);
 }
 
-/// Waits until a program listens to `/peer`.
-fn await_subscriber(core: &Core) {
-    let limit = Instant::now() + Duration::from_secs(20);
-    loop {
-        let facts = sesame_ros1::scan::scan(&core.uri(), Duration::ZERO, Duration::ZERO).unwrap().facts;
-        if facts.topics.iter().any(|topic| topic.path == "/peer" && !topic.subscribers.is_empty()) {
-            // It is registered, and connects next.
-            std::thread::sleep(Duration::from_secs(1));
-            return;
-        }
-        assert!(Instant::now() < limit, "nobody listens");
-        std::thread::sleep(Duration::from_millis(50));
-    }
+#[test]
+#[ignore = "long: messages for which tools have no queue, with nothing beside them"]
+fn five_hundred_messages_of_nodes_of_roscpp_are_relayed() {
+    played(500);
+}
+
+/// So many messages of a bag pass from a player to a recorder.
+fn played(count: u64) {
+    let Some(core) = Core::start() else { return };
+    let count_text = count.to_string();
+    let ty = "sensor_msgs/JointState";
+    let [bag, copy] = ["peer.bag", "copy.bag"].map(|name| core.home.path().join(name).display().to_string());
+    // `rosbag record` and `rosbag play` are written with roscpp. A recorder ends with its last message.
+    let record = |bag: &str| core.tool("rosbag", &["record", "-l", &count_text, "-O", bag, "/peer"]);
+    let mut publisher = core.ready_peer("publisher.py", &["/peer", ty, &count_text, "200"]);
+    let recorded = record(&bag);
+    publisher.go();
+    publisher.said();
+    recorded.ended();
+    drop(publisher);
+    let plan = heard_by(peers(&core.uri(), JOINTS), &["recorder"]);
+    let remapped = remapped(&plan, 0);
+    let recorded = record(&copy);
+    let play = ["play", "-q", "--pause", "--queue", "1000", &bag, &remapped[0], "__name:=play"];
+    let _play = core.tool("rosbag", &play);
+    let mut system = System::new(plan);
+    // Everybody is connected, so it may go on.
+    let go_on = || core.tool("rosservice", &["call", "/play/pause_playback", "data: false"]).ended();
+    let finished = system.run_seeing(&nothing(), go_on, |seen| seen.messages >= count).unwrap();
+    assert_eq!(finished.messages, count);
+    recorded.ended();
+    assert_eq!(counted(&core, &copy), [count_text]);
 }
 
 /// How many messages of each topic a bag has.
@@ -149,51 +165,81 @@ fn counted(core: &Core, bag: &str) -> Vec<String> {
     lines.filter_map(|line| Some(line.trim().strip_prefix("messages: ")?.to_owned())).collect()
 }
 
-#[test]
-fn what_an_operation_changes_is_all_that_changes() {
-    let Some(core) = Core::start() else { return };
+/// When messages are lost, in seconds.
+const LOST: [f64; 2] = [0.5, 1.5];
+
+/// Messages at 200 Hz, of which an operation drops some: how many. Those that come are all others.
+fn dropped() -> Option<u64> {
+    let core = Core::start()?;
     let mut plan = peers(&core.uri(), STRING);
     plan.operations = vec![operation(0, OperationKind::Blackhole)];
     let remapped = remapped(&plan, 0);
-    let mut publisher = core.ready_peer("publisher.py", &["/peer", "std_msgs/String", "400", "200", &remapped[0]]);
-    let mut subscriber = core.ready_peer("subscriber.py", &["/peer", "std_msgs/String", "400", "3"]);
+    let mut publisher = core.ready_peer("publisher.py", &["/peer", "std_msgs/String", "1000000", "200", &remapped[0]]);
+    let mut subscriber = core.ready_peer("subscriber.py", &["/peer", "std_msgs/String", "1000000", "120"]);
     let mut system = System::new(plan);
-    let test = test_of(vec![use_of(0, 0.5, 1.0, Vec::new(), 1)]);
-    let mut said = None;
-    let finished = system.run(
+    let test = test_of(vec![use_of(0, LOST[0], LOST[1], Vec::new(), 1)]);
+    let (mut sent, mut begun, mut told, mut said) = (None, false, false, None);
+    let finished = system.run_seeing(
         &test,
-        || publisher.go(),
-        || {
-            said = said.take().or_else(|| subscriber.said_already());
+        || {},
+        |seen: &Seen<'_>| {
+            if !begun {
+                begun = true;
+                publisher.go();
+            }
+            if seen.now.seconds() > LOST[1] + 0.5 && !told {
+                told = true;
+                publisher.stop_publishing();
+            }
+            sent = sent.take().or_else(|| publisher.said_already());
+            let all = sent.as_ref().and_then(|sent| sent["sent"].as_u64());
+            if all == Some(seen.messages) && said.is_none() {
+                subscriber.end_after(seen.messages - 1);
+                said = Some(subscriber.said());
+            }
             said.is_some()
         },
     );
-    let received = said.unwrap()["received"].as_u64().unwrap();
-    assert!((290..=310).contains(&received), "half a second of 200 Hz is missing: {received}");
-    assert_eq!(finished.unwrap().messages, 400);
+    let (sent, said, finished) = (sent.unwrap(), said.unwrap(), finished.unwrap());
+    let dropped = finished.operations[0].counters.dropped;
+    assert_eq!(sent["sent"], finished.messages);
+    assert_eq!(said["received"], finished.messages - dropped, "{said}");
+    // They are numbers after each other.
+    let [gap] = &said["gaps"].as_array().unwrap()[..] else { panic!("what is missing is in one place: {said}") };
+    assert_eq!(gap[1], dropped);
+    Some(dropped)
+}
+
+#[test]
+fn what_an_operation_changes_is_all_that_changes() {
+    assert_ne!(dropped(), Some(0), "messages come all the time");
+}
+
+#[test]
+#[ignore = "long: a rate, with nothing beside it"]
+fn an_operation_acts_for_as_long_as_it_is_to() {
+    let Some(dropped) = dropped() else { return };
+    assert!((190..=210).contains(&dropped), "a second of 200 Hz is missing: {dropped}");
 }
 
 #[test]
 fn a_header_is_changed_in_its_place() {
     let Some(core) = Core::start() else { return };
-    let mut plan = peers(&core.uri(), JOINTS);
+    let mut plan = heard_by(peers(&core.uri(), JOINTS), &["subscriber", "tool"]);
     plan.operations = vec![at(&["header", "stamp"], operation(0, OperationKind::ClockSkew))];
     let remapped = remapped(&plan, 0);
     let ty = "sensor_msgs/JointState";
     let mut publisher = core.ready_peer("publisher.py", &["/peer", ty, "1", "10", &remapped[0]]);
     let mut echo = core.tool("rostopic", &["echo", "-p", "-n", "1", "/peer"]);
-    let mut subscriber = core.ready_peer("subscriber.py", &["/peer", ty, "1", "20"]);
+    let mut subscriber = core.ready_peer("subscriber.py", &["/peer", ty, "1", "120"]);
     let mut system = System::new(plan);
     let test = test_of(vec![use_of(0, 0.0, 1_000.0, vec![Choice::Value { value: 5.0 }], 1)]);
-    let (mut said, begun, mut gone) = (None, Instant::now(), false);
+    let mut said = None;
+    let before = now();
     let finished = system.run(
         &test,
-        || {},
+        || publisher.go(),
         || {
-            if !gone && begun.elapsed() > Duration::from_secs(4) {
-                publisher.go();
-                gone = true;
-            }
             said = said.take().or_else(|| subscriber.said_already());
             said.is_some()
         },
@@ -211,9 +257,14 @@ fn a_header_is_changed_in_its_place() {
     assert_eq!(value("field.name6"), "joint_6");
     // It is the time of the stamp that `rostopic` shows.
     assert_eq!(received, stamp);
+    let sent = stamp - 5_000_000_000;
+    assert!((before..now()).contains(&sent), "five seconds ahead of when it was sent: {sent}");
+}
+
+/// The time of the system, in nanoseconds.
+fn now() -> i64 {
     let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap().as_nanos();
-    let ahead = stamp - i64::try_from(now).unwrap();
-    assert!((0..5_000_000_000).contains(&ahead), "five seconds ahead of when it was sent: {ahead}");
+    i64::try_from(now).unwrap()
 }
 
 #[test]
@@ -226,15 +277,17 @@ fn latched_messages_are_there_for_those_who_come_later() {
     let mut publisher = core.ready_peer("publisher.py", &latched);
     assert_eq!(publisher.said()["sent"], 3);
     let mut system = System::new(plan);
-    let (mut subscriber, mut said, begun) = (None, None, Instant::now());
+    let listen = || core.peer("subscriber.py", &["/peer", "std_msgs/String", "1", "120"]);
+    let said_by = |peer: &mut Program| peer.said_already().filter(|it| it["received"].is_u64());
+    // What one has heard has passed, and the other comes after that.
+    let (mut early, mut late, mut heard, mut said) = (listen(), None, None, None);
     let finished = system.run(
         &nothing(),
         || {},
         || {
-            if begun.elapsed() > Duration::from_secs(1) {
-                let late = subscriber
-                    .get_or_insert_with(|| core.peer("subscriber.py", &["/peer", "std_msgs/String", "1", "20"]));
-                said = late.said_already().filter(|it| it["received"].is_u64()).or(said.take());
+            heard = heard.take().or_else(|| said_by(&mut early));
+            if heard.is_some() {
+                said = said_by(late.get_or_insert_with(listen));
             }
             said.is_some()
         },
@@ -244,28 +297,42 @@ fn latched_messages_are_there_for_those_who_come_later() {
     assert_eq!((&said["received"], &said["latching"]), (&1.into(), &"1".into()), "{said}");
 }
 
-#[test]
-fn time_is_that_of_the_clock() {
-    let Some(core) = Core::start() else { return };
+/// Twenty messages, one in each second of a clock that goes ten times as fast as the wall's: how long that took by the
+/// clock and by the wall, in seconds.
+fn by_a_clock() -> Option<[f64; 2]> {
+    let core = Core::start()?;
     let mut plan = peers(&core.uri(), STRING);
     ros1(&mut plan).clock = Clock::Topic { path: "/clock".to_owned() };
     let remapped = remapped(&plan, 0);
     let _clock = core.ready_peer("clock.py", &["/peer", &remapped[0]]);
-    let mut subscriber = core.ready_peer("subscriber.py", &["/peer", "std_msgs/String", "20", "20"]);
+    let mut subscriber = core.ready_peer("subscriber.py", &["/peer", "std_msgs/String", "20", "120"]);
     let mut system = System::new(plan);
-    let (mut said, mut begun) = (None, None);
-    let finished = system.run(
+    let (mut said, mut begun, mut sim) = (None, None, 0.0);
+    let finished = system.run_seeing(
         &nothing(),
         || begun = Some(Instant::now()),
-        || {
+        |seen| {
+            sim = seen.now.seconds();
             said = said.take().or_else(|| subscriber.said_already());
             said.is_some()
         },
     );
     let (messages, wall) = (finished.unwrap().messages, begun.unwrap().elapsed().as_secs_f64());
-    let sim = system.now().nanos() as f64 / 1e9;
     assert!(messages as f64 >= sim - 2.0 && messages as f64 <= sim + 2.0, "one in each second: {messages} in {sim} s");
+    Some([sim, wall])
+}
+
+#[test]
+fn time_is_that_of_the_clock() {
+    let Some([sim, wall]) = by_a_clock() else { return };
     // A busy machine may hold the clock back, but never makes it faster.
+    assert!(sim <= 10.5 * wall, "{sim} s in {wall} s");
+}
+
+#[test]
+#[ignore = "long: how fast a clock goes, with nothing beside it"]
+fn time_goes_as_fast_as_that_of_the_clock() {
+    let Some([sim, wall]) = by_a_clock() else { return };
     assert!((3.0 * wall..=10.5 * wall).contains(&sim), "{sim} s in {wall} s");
 }
 
@@ -280,12 +347,22 @@ fn a_system_that_is_reset_starts_again_at_zero() {
     let _clock = core.ready_peer("clock.py", &["/peer", &remapped[0]]);
     let mut system = System::new(plan);
     for _ in 0..5 {
-        let begun = Instant::now();
-        system.run(&nothing(), || {}, || begun.elapsed() > Duration::from_secs(1)).unwrap();
-        let seconds = system.now().nanos() as f64 / 1e9;
-        assert!((1.0..=15.0).contains(&seconds), "a second at ten times its speed: {seconds}");
+        let mut times = Vec::new();
+        system
+            .run_seeing(
+                &nothing(),
+                || {},
+                |seen| {
+                    times.push(seen.now.seconds());
+                    seen.now.seconds() >= 5.0
+                },
+            )
+            .unwrap();
+        assert_eq!(times[0], 0.0);
+        // It is asked every 20 ms of the clock.
+        assert!(times.is_sorted() && times[1] <= 0.02, "{times:?}");
     }
-    assert_eq!(system.incidents().notes, [""; 0]);
+    assert_eq!(system.notes(), [""; 0]);
 }
 
 #[test]
@@ -314,7 +391,7 @@ fn nodes_that_operations_tell_apart_have_ways_of_their_own() {
     };
     let (mut left, mut right) = (publish("left", &rules[0][0], "300"), publish("right", &rules[1][0], "200"));
     let take = |name: &str, rule: &str, count: &str| {
-        core.ready_peer("subscriber.py", &["/peer", "std_msgs/String", count, "4", rule, &format!("__name:={name}")])
+        core.ready_peer("subscriber.py", &["/peer", "std_msgs/String", count, "120", rule, &format!("__name:={name}")])
     };
     let (mut near, mut far) = (take("near", &rules[2][0], "500"), take("far", "__log:=far.log", "500"));
     let mut system = System::new(plan);
@@ -324,8 +401,12 @@ fn nodes_that_operations_tell_apart_have_ways_of_their_own() {
         &test,
         || [&mut left, &mut right].into_iter().for_each(Program::go),
         || {
-            said[0] = said[0].take().or_else(|| near.said_already());
             said[1] = said[1].take().or_else(|| far.said_already());
+            // All have passed. The last one for the near one is its last.
+            if said[1].is_some() {
+                near.end_after(199);
+                said[0] = Some(near.said());
+            }
             said.iter().all(Option::is_some)
         },
     );
@@ -354,7 +435,7 @@ fn a_state_reaches_its_subscribers_although_no_publisher_says_of_which_type_it_i
     plan.monitors = vec![monitor("arm", 1, vec![third], vec![guarantee("moves", 1, Gate::Evidence(0))])];
     plan.validate().expect("the plan is sound");
     let mut publisher = core.ready_peer("publisher.py", &["/count", "std_msgs/String", "4", "20"]);
-    let mut subscriber = core.ready_peer("subscriber.py", &["/state", "std_msgs/String", "2", "20"]);
+    let mut subscriber = core.ready_peer("subscriber.py", &["/state", "std_msgs/String", "2", "120"]);
     let (mut system, mut said) = (System::new(plan), None);
     let finished = system.run(
         &nothing(),
@@ -368,5 +449,5 @@ fn a_state_reaches_its_subscribers_although_no_publisher_says_of_which_type_it_i
     assert_eq!(said["received"], 2, "`unsafe` at time zero, and `moves`: {said}");
     assert_eq!(said["md5sum"], "992ce8a1687cec8c8bd883ec73ca41d1", "that of the real definition");
     assert_eq!(finished.messages, 6, "four numbers and two states");
-    assert_eq!(system.incidents().notes, [""; 0]);
+    assert_eq!(system.notes(), [""; 0]);
 }

@@ -47,6 +47,6 @@ fn clients_call_servers_through_the_runner() {
     let asked: Vec<_> = (0..5).map(|_| server.said()).collect();
     assert_eq!(asked[0]["reset"], true, "before the run: {asked:?}");
     assert_eq!(asked[4]["ask"], true, "{asked:?}");
-    let notes = system.incidents().notes;
+    let notes = system.notes();
     assert!(notes.len() == 1 && notes[0].contains("the server of `/ask/undisturbed` says:"), "{notes:?}");
 }

@@ -1,5 +1,7 @@
 //! A runner between nodes, in this process: its plan, and its system driven by hand.
 
+use std::time::Instant;
+
 use sesame_base::time::SimTime;
 use sesame_plan::testing::{minimal, node, topic};
 use sesame_plan::{
@@ -7,9 +9,11 @@ use sesame_plan::{
     Type, WireType, Wiring,
 };
 use sesame_relay::metric::MetricTable;
-use sesame_relay::relay::{Finished, Relay};
-use sesame_relay::transport::{Incidents, TransportError};
+use sesame_relay::relay::{Exchange as _, Finished, Relay};
+use sesame_relay::transport::TransportError;
 use sesame_relay::wire::WireTable;
+
+use crate::core::LIMIT;
 
 /// A layout by names and types of fields. A type with `/` in it is an interface.
 fn interface(name: &str, fields: &[(&str, &str)]) -> Interface {
@@ -97,12 +101,24 @@ pub(crate) fn remapped(plan: &CampaignPlan, node: u32) -> Vec<String> {
 pub(crate) struct System {
     plan: CampaignPlan,
     transport: Box<dyn sesame_relay::transport::Transport>,
+    /// What the transport has noted, and nobody has taken.
+    noted: Vec<String>,
+}
+
+/// What the runner has seen in a run until now.
+#[derive(Debug)]
+pub(crate) struct Seen<'a> {
+    /// How many messages there were on the first topic.
+    pub(crate) messages: u64,
+    pub(crate) now: SimTime,
+    /// What was noted, before the run too.
+    pub(crate) notes: &'a [String],
 }
 
 impl System {
     pub(crate) fn new(plan: CampaignPlan) -> Self {
         let folder = std::env::temp_dir();
-        System { transport: sesame_ros1::ros1(folder).transport(&plan), plan }
+        System { transport: sesame_ros1::ros1(folder).transport(&plan), plan, noted: Vec::new() }
     }
 
     /// A run that lasts until something holds, which is asked every 20 ms. `ready` is called when the system is
@@ -113,13 +129,30 @@ impl System {
         ready: impl FnOnce(),
         mut done: impl FnMut() -> bool,
     ) -> Result<Finished, TransportError> {
+        self.run_seeing(test, ready, |_| done())
+    }
+
+    /// The same; what holds may depend on what the runner has seen.
+    pub(crate) fn run_seeing(
+        &mut self,
+        test: &Test,
+        ready: impl FnOnce(),
+        mut done: impl FnMut(&Seen<'_>) -> bool,
+    ) -> Result<Finished, TransportError> {
         let wires = WireTable::new(&self.plan);
         let metrics = MetricTable::new(&self.plan, &wires, &[]).unwrap();
         let mut relay = Relay::new(&self.plan, &wires, test, metrics.start(), &[]).unwrap();
         relay.begin();
         self.transport.reset(1, &mut relay)?;
         ready();
-        while !done() {
+        let (topic, begun) = (wires.find(&self.plan.topics[0].paths[0]).unwrap(), Instant::now());
+        loop {
+            self.noted.append(&mut self.transport.incidents().notes);
+            let seen = Seen { messages: relay.next_index(topic), now: self.transport.now(), notes: &self.noted };
+            if done(&seen) {
+                break;
+            }
+            assert!(begun.elapsed() < 3 * LIMIT, "nothing comes of {seen:?}");
             let until = self.transport.now() + SimTime::from_nanos(20_000_000);
             while self.transport.now() < until {
                 self.transport.advance(until, &mut relay)?;
@@ -128,12 +161,9 @@ impl System {
         Ok(relay.finish(self.transport.now()))
     }
 
-    pub(crate) fn now(&self) -> SimTime {
-        self.transport.now()
-    }
-
     /// What the transport noted since the last call.
-    pub(crate) fn incidents(&mut self) -> Incidents {
-        self.transport.incidents()
+    pub(crate) fn notes(&mut self) -> Vec<String> {
+        self.noted.append(&mut self.transport.incidents().notes);
+        std::mem::take(&mut self.noted)
     }
 }

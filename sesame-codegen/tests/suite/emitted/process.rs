@@ -4,6 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use sesame_patience as patience;
+
 /// Whether there is a Python here. In the pipeline there must be.
 fn python() -> bool {
     let found = Command::new("python3").arg("--version").output().is_ok_and(|output| output.status.success());
@@ -108,10 +110,10 @@ fn no_simulator_outlives_its_worker(folder: &Path, program: &Path) {
         let text = fs::read_to_string(results.join("42/workers/1").join(name)).unwrap_or_default();
         text.lines().map(|line| line.parse().expect("it is a process")).collect()
     };
-    while noted("caught").is_empty() {
+    patience::until("a simulator is caught", || {
         assert!(supervisor.try_wait().unwrap().is_none(), "nothing was lost in any test");
-        std::thread::sleep(std::time::Duration::from_millis(5));
-    }
+        !noted("caught").is_empty()
+    });
     supervisor.kill().unwrap();
     supervisor.wait().unwrap();
     let lives = |process: &u32| {
@@ -119,8 +121,5 @@ fn no_simulator_outlives_its_worker(folder: &Path, program: &Path) {
         !state.is_empty() && !state.contains(") Z ")
     };
     assert!(!noted("started").is_empty());
-    // A simulator that is left over would stay for good, and this test with it.
-    while noted("started").iter().any(lives) {
-        std::thread::sleep(std::time::Duration::from_millis(5));
-    }
+    patience::until("no simulator is left", || !noted("started").iter().any(lives));
 }

@@ -18,10 +18,16 @@ pub struct Gusty {
 impl Simulator for Gusty {
     fn start(setup: &Setup, bus: &mut Bus<'_>) -> Result<Self, SimulatorError> {
         // So that a test can count the runs.
-        if let Ok(file) = std::env::var("RUNS") {
+        if let Ok(path) = std::env::var("RUNS") {
             use std::io::Write as _;
-            let file = std::fs::OpenOptions::new().create(true).append(true).open(file);
+            let file = std::fs::OpenOptions::new().create(true).append(true).open(&path);
             file.and_then(|mut file| file.write_all(b"run\n")).expect("runs can be counted");
+            // And kill before there are more than so many: until then, this one is not over.
+            let most = std::env::var("MOST_RUNS").map_or(usize::MAX, |most| most.parse().expect("a number of runs"));
+            let runs = || std::fs::read(&path).map_or(0, |text| text.len() / "run\n".len());
+            while runs() > most {
+                std::thread::sleep(std::time::Duration::from_millis(20));
+            }
         }
         let mut stream = Stream::derive(setup.seed, "gust", &[]);
         let (push, harm) = (bus.open("gusty/push"), bus.open("gusty/harm"));

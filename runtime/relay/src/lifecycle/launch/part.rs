@@ -141,6 +141,15 @@ impl Started {
         }
     }
 
+    /// The last lines that it has written, while it runs.
+    #[cfg(test)]
+    pub(super) fn last_lines(&self) -> String {
+        match &self.state {
+            State::On { running, .. } => running.last_lines_so_far(),
+            State::Off => String::new(),
+        }
+    }
+
     /// Waits for its end, and ends it if it takes too long.
     pub(super) fn end(&mut self) {
         self.state = State::Off;

@@ -2,8 +2,9 @@
 
 use std::fs;
 use std::path::Path;
-use std::time::Instant;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use sesame_patience as patience;
 use sesame_plan::Ready;
 use sesame_plan::testing::{minimal, node};
 
@@ -22,6 +23,18 @@ fn python() -> bool {
 
 fn command(program: &str, arguments: &[&str]) -> Command {
     Command { program: program.to_owned(), arguments: arguments.iter().map(|&text| text.to_owned()).collect() }
+}
+
+/// How long a program may take to be ready that will be, in seconds.
+const SOON: f64 = 120.0;
+
+/// What waits in a program until a file is there.
+const AWAIT: &str = "import os, time\ndef wait_for(file):\n    while not os.path.exists(file): time.sleep(0.005)\n";
+
+/// Held by tests whose systems have a command that ends them: telling the worker to end is telling all of its systems.
+fn alone() -> MutexGuard<'static, ()> {
+    static ALONE: Mutex<()> = Mutex::new(());
+    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A program in Python, and when it is ready.
@@ -74,11 +87,13 @@ impl System {
     /// Waits until a file has this content.
     #[track_caller]
     fn becomes(&self, name: &str, content: &str) {
-        let started = Instant::now();
-        while self.file(name) != content {
-            assert!(started.elapsed() < Duration::from_secs(20), "{name}: {:?}", self.file(name));
-            thread::sleep(PAUSE);
-        }
+        let becomes = patience::comes(|| self.file(name) == content);
+        assert!(becomes, "{name}: {:?}", self.file(name));
+    }
+
+    /// Lets a program go on that waits for this file.
+    fn let_go(&self, file: &str) {
+        fs::write(self.folder.path().join(file), "").unwrap();
     }
 
     fn started(&mut self) -> Result<(), TransportError> {
@@ -113,7 +128,7 @@ fn a_program_gets_what_its_worker_has_of_its_own_and_an_empty_input() {
                    open('said', 'w').write(' '.join(said)); print('done')\n\
                    import time; time.sleep(1000)";
     let arguments = ["{worker}", "d{domain}", "{folder}/x", "{seed}", "{ros-args}", "{port}"];
-    let mut system = system(Some(launch_with(program, &arguments, Some((line("done"), 20.0)))), Vec::new(), None);
+    let mut system = system(Some(launch_with(program, &arguments, Some((line("done"), SOON)))), Vec::new(), None);
     system.started().unwrap();
     let folder = system.folder.path().canonicalize().unwrap().display().to_string();
     let given = system.folder.path().display().to_string();
@@ -126,41 +141,50 @@ fn the_system_is_ready_before_nodes_are_launched_and_each_readiness_is_awaited()
     if !python() {
         return;
     }
-    let order = |name: &str, then: &str| format!("import time, sys\nopen('order', 'a').write('{name}')\n{then}");
+    let order = |name: &str, then: &str| format!("{AWAIT}import sys\nopen('order', 'a').write('{name}')\n{then}");
     let whole = order(
         "s",
-        "time.sleep(0.3)\nopen('order', 'a').write('S')\nprint('the system is up', file=sys.stderr)\ntime.sleep(1000)",
+        "wait_for('up')\nopen('order', 'a').write('S')\nprint('the system is up', file=sys.stderr)\ntime.sleep(1000)",
     );
     let port = order(
         "p",
-        "import socket\ntime.sleep(0.3)\nserver = socket.create_server(('127.0.0.1', int(sys.argv[1])))\n\
-         open('order', 'a').write('P')\ntime.sleep(1000)",
+        "import socket\nwait_for('listen')\nopen('order', 'a').write('P')\n\
+         server = socket.create_server(('127.0.0.1', int(sys.argv[1])))\ntime.sleep(1000)",
     );
     let when = ReadyWhen::Port { port: "{port}".to_owned() };
     let asked = order("t", "time.sleep(1000)");
     let mut system = system(
-        Some(launch(&whole, Some((line("system is up"), 20.0)))),
+        Some(launch(&whole, Some((line("system is up"), SOON)))),
         vec![
-            launch_with(&port, &["{port}"], Some((when, 20.0))),
-            launch(&asked, Some((ReadyWhen::Topic { topic: TopicId(0) }, 20.0))),
-            launch(&asked, Some((ReadyWhen::Clock, 20.0))),
+            launch_with(&port, &["{port}"], Some((when, SOON))),
+            launch(&asked, Some((ReadyWhen::Topic { topic: TopicId(0) }, SOON))),
+            launch(&asked, Some((ReadyWhen::Clock, SOON))),
         ],
         None,
     );
     system.launched.start(1).unwrap();
+    system.becomes("order", "s");
+    assert!(!system.launched.poll_ready(&mut |_| true).unwrap());
+    assert_eq!((system.launched.begun, system.file("order").as_str()), (1, "s"), "no node before the system is ready");
+
+    system.let_go("up");
     let mut probes = Vec::new();
-    let mut rounds = 0;
-    system
-        .launched
-        .await_ready(&mut |probe| {
+    patience::until("the nodes are launched", || {
+        let mut asked = |probe| {
             probes.push(probe);
-            rounds += 1;
-            rounds > 10
-        })
-        .unwrap();
+            false
+        };
+        assert!(!system.launched.poll_ready(&mut asked).unwrap(), "no node is ready");
+        system.launched.begun == 4
+    });
     assert!(probes.contains(&Probe::Topic(TopicId(0))) && probes.contains(&Probe::Clock));
-    let order = system.file("order");
-    assert!(order.starts_with("sS") && order.contains('P'), "{order}");
+    patience::until("all nodes run", || system.file("order").len() == 5);
+    assert!(system.file("order").starts_with("sS"), "{}", system.file("order"));
+    assert!(!system.launched.poll_ready(&mut |_| true).unwrap(), "nobody listens at the port");
+
+    system.let_go("listen");
+    system.launched.await_ready(&mut |_| false).unwrap();
+    assert!(system.file("order").ends_with('P'), "{}", system.file("order"));
     system.launched.check().unwrap();
 }
 
@@ -169,23 +193,27 @@ fn a_failed_launch_says_which_program_what_was_awaited_for_how_long_and_its_last
     if !python() {
         return;
     }
-    let failed = |launch: Launch| {
+    let failed = |says: &str, launch: Launch| {
         let mut system = system(None, vec![launch], None);
-        let error = system.started().unwrap_err();
+        let error = system.launched.start(5).and_then(|()| {
+            // What it says is heard before its time is over, whatever else the machine does.
+            patience::until("it speaks", || system.launched.parts[0].1.last_lines().contains(says));
+            system.launched.await_ready(&mut |_| false)
+        });
+        let error = error.unwrap_err();
         assert!(!system.launched.is_started(), "it is ended");
         assert_eq!(error.fault(), crate::transport::Fault::LaunchFailed);
         error.to_string().replace(&*system.folder.path().to_string_lossy(), "FOLDER")
     };
     let ready = |when| Some((when, 0.5));
     let said = [
-        // Time enough for it to say something, whatever else the machine does.
-        failed(launch("import time; print('loading'); time.sleep(1000)", Some((line("ready"), 5.0)))),
-        failed(launch("import time; time.sleep(1000)", ready(ReadyWhen::Port { port: "{port}".to_owned() }))),
-        failed(launch("import time; time.sleep(1000)", ready(ReadyWhen::Port { port: "x{worker}".to_owned() }))),
-        failed(launch("import time; time.sleep(1000)", ready(ReadyWhen::Clock))),
-        failed(launch("import sys; print('no map'); sys.exit(3)", Some((line("ready"), 20.0)))),
-        failed(launch("import os; os.kill(os.getpid(), 11)", Some((line("ready"), 20.0)))),
-        failed(Launch { command: command("no_such_program", &["{port}"]), ready: None }),
+        failed("loading", launch("import time; print('loading'); time.sleep(1000)", ready(line("ready")))),
+        failed("", launch("import time; time.sleep(1000)", ready(ReadyWhen::Port { port: "{port}".to_owned() }))),
+        failed("", launch("import time; time.sleep(1000)", ready(ReadyWhen::Port { port: "x{worker}".to_owned() }))),
+        failed("", launch("import time; time.sleep(1000)", ready(ReadyWhen::Clock))),
+        failed("", launch("import sys; print('no map'); sys.exit(3)", Some((line("ready"), SOON)))),
+        failed("", launch("import os; os.kill(os.getpid(), 11)", Some((line("ready"), SOON)))),
+        failed("", Launch { command: command("no_such_program", &["{port}"]), ready: None }),
     ];
     insta::assert_snapshot!(said.join("\n"));
 }
@@ -195,17 +223,15 @@ fn a_launched_program_that_ends_later_is_named_with_its_last_lines_and_is_the_sy
     if !python() {
         return;
     }
-    let program =
-        "import sys, time\nprint('up'); time.sleep(0.2); print('out of memory', file=sys.stderr); sys.exit(9)";
-    let mut system = system(None, vec![launch(program, Some((line("up"), 20.0)))], None);
+    let program = format!(
+        "{AWAIT}import sys\nprint('up'); wait_for('end'); print('out of memory', file=sys.stderr); sys.exit(9)"
+    );
+    let mut system = system(None, vec![launch(&program, Some((line("up"), SOON)))], None);
     system.started().unwrap();
     let alarm = system.launched.alarm().unwrap();
-    let error = loop {
-        if let Err(error) = system.launched.check() {
-            break error;
-        }
-        thread::sleep(PAUSE);
-    };
+    system.launched.check().unwrap();
+    system.let_go("end");
+    let error = patience::until_some("the end of the program", || system.launched.check().err());
     assert_eq!(error.fault(), crate::transport::Fault::Crash);
     let error = error.to_string();
     assert!(error.starts_with("the program `python3 -u -c "), "{error}");
@@ -224,33 +250,26 @@ fn a_node_is_paused_resumed_killed_and_started_again_with_all_its_processes() {
         "parent",
         "child = os.fork()\n\
          if child == 0: os.setsid(); open('child', 'w').write(str(os.getpid()))\n\
-         else: open('starts', 'a').write('x'); print('up')\n\
+         else:\n\
+         \x20   signal.signal(signal.SIGTERM, lambda *_: (open('asked', 'a').write('x'), sys.exit(0)))\n\
+         \x20   open('starts', 'a').write('x'); print('up')\n\
          time.sleep(1000)",
     );
-    let mut system = system(None, vec![launch(&program, Some((line("up"), 20.0)))], None);
+    let mut system = system(None, vec![launch(&program, Some((line("up"), SOON)))], None);
     assert!(!system.launched.pause(NodeId(0)), "it does not run yet");
     system.started().unwrap();
-    while system.file("child").is_empty() {
-        thread::sleep(PAUSE);
-    }
+    patience::until("the child runs", || !system.file("child").is_empty());
     let (parent, child) = (system.file("parent"), system.file("child"));
-    let eventually = |holds: &dyn Fn() -> bool| {
-        let started = Instant::now();
-        while !holds() {
-            assert!(started.elapsed() < Duration::from_secs(20));
-            thread::sleep(PAUSE);
-        }
-    };
     assert!(system.launched.pause(NodeId(0)));
-    eventually(&|| is_stopped(&parent) && is_stopped(&child));
+    patience::until("both are stopped", || is_stopped(&parent) && is_stopped(&child));
     system.launched.check().unwrap();
     assert!(system.launched.resume(NodeId(0)));
     assert!(!system.launched.resume(NodeId(0)), "it is not paused any more");
-    eventually(&|| !is_stopped(&parent) && !is_stopped(&child));
+    patience::until("both go on", || !is_stopped(&parent) && !is_stopped(&child));
 
     assert!(system.launched.kill(NodeId(0)));
     assert!(!system.launched.kill(NodeId(0)));
-    eventually(&|| !is_alive(&parent) && !is_alive(&child));
+    patience::until("both are gone", || !is_alive(&parent) && !is_alive(&child));
     system.launched.check().unwrap();
     assert!(!system.launched.alarm().unwrap().load(std::sync::atomic::Ordering::Relaxed), "it was to end");
 
@@ -260,11 +279,18 @@ fn a_node_is_paused_resumed_killed_and_started_again_with_all_its_processes() {
     assert!(system.launched.restart(NodeId(0)).unwrap(), "also while it runs");
     assert!(!system.launched.restart(NodeId(1)).unwrap(), "the plan does not launch it");
     system.launched.await_ready(&mut |_| false).unwrap();
+    // Those of the earlier starts are gone.
+    patience::until("its child runs", || !system.file("child").is_empty() && is_alive(&system.file("child")));
     assert!(system.launched.pause(NodeId(0)));
     let parent = system.file("parent");
-    let started = Instant::now();
+    patience::until("it is stopped", || is_stopped(&parent));
+    assert_eq!(system.file("asked"), "");
     system.launched.end();
-    assert!(!is_alive(&parent) && started.elapsed() < Duration::from_secs(2), "a paused node is resumed to end");
+    assert!(!is_alive(&parent));
+    assert_eq!(system.file("asked"), "x", "a paused node is resumed to end by itself");
+    // What left its group is ended by a keeper, and there is none here.
+    let child = system.file("child").parse().ok().and_then(rustix::process::Pid::from_raw);
+    rustix::process::kill_process(child.unwrap(), rustix::process::Signal::KILL).unwrap();
 }
 
 #[test]
@@ -277,7 +303,8 @@ fn the_end_runs_terminate_then_asks_each_program_and_kills_what_does_not_listen(
         "signal.signal(signal.SIGTERM, lambda *_: (open('order', 'a').write('t'), sys.exit(0)))\nprint('up')\ntime.sleep(1000)",
     );
     let deaf = numbered("deaf", "signal.signal(signal.SIGTERM, signal.SIG_IGN)\nprint('up')\ntime.sleep(1000)");
-    let up = || Some((line("up"), 20.0));
+    let _alone = alone();
+    let up = || Some((line("up"), SOON));
     let end = command("python3", &["-c", "open('order', 'a').write('T'); print('gone already'); exit(4)"]);
     let mut system = system(Some(launch(&polite, up())), vec![launch(&deaf, up())], Some(end));
     system.started().unwrap();
@@ -296,6 +323,7 @@ fn terminate_is_run_when_the_worker_is_told_to_end() {
     if !python() {
         return;
     }
+    let _alone = alone();
     let end = command("python3", &["-c", "open('order', 'a').write('T')"]);
     let mut system = system(Some(launch("import time; time.sleep(1000)", None)), Vec::new(), Some(end));
     system.started().unwrap();

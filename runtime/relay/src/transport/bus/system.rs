@@ -253,9 +253,6 @@ impl System {
         let mut latest: Option<(i64, Instant)> = None;
         while Instant::now() < limit {
             let left = latest.map_or(WATCH, |(_, settled)| settled.saturating_duration_since(Instant::now()));
-            if let Some((nanos, _)) = latest.filter(|_| left.is_zero()) {
-                return Ok(nanos);
-            }
             match self.bus.receive(left)? {
                 Some(Event::Clock(nanos)) => {
                     let went_back = self.shown.replace(nanos).is_some_and(|shown| nanos < shown);
@@ -265,10 +262,16 @@ impl System {
                     latest = Some((nanos, latest.map_or_else(|| Instant::now() + WATCH, |(_, settled)| settled)));
                 }
                 Some(event) => self.pass_on(event, &mut heard)?,
-                None => self.launched.check()?,
+                None => {
+                    self.launched.check()?;
+                    // What came in the meantime was looked at, even if this process had to wait for its turn.
+                    if let Some((nanos, _)) = latest.filter(|_| left.is_zero()) {
+                        return Ok(nanos);
+                    }
+                }
             }
         }
-        Err(no_tick())
+        latest.map(|(nanos, _)| nanos).ok_or_else(no_tick)
     }
 
     /// Waits for what comes next: a message, a tick of the clock, or the moment at which the relay has something to do.

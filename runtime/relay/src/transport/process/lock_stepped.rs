@@ -36,6 +36,8 @@ pub(super) struct LockStepped {
     pub(super) plan: CampaignPlan,
     now: SimTime,
     step: SimTime,
+    /// The least and the most that the end of a run waits for a surplus answer. Tests have limits of their own.
+    pub(super) surplus: (Duration, Duration),
     incidents: Incidents,
 }
 
@@ -57,6 +59,7 @@ impl LockStepped {
             plan: plan.clone(),
             now: SimTime::ZERO,
             step,
+            surplus: (SHORTEST_WAIT, LONGEST_WAIT),
             incidents: Incidents::default(),
         }
     }
@@ -114,7 +117,8 @@ impl LockStepped {
         // If every answer of a run comes one request too early, the surplus one is sent only after the last step's
         // computation.
         let step = stepping.elapsed() / (*steps).max(1);
-        if !waiting::for_a_while(session.input(), (2 * step).clamp(SHORTEST_WAIT, LONGEST_WAIT)) {
+        let (least, most) = self.surplus;
+        if !waiting::for_a_while(session.input(), (2 * step).clamp(least, most)) {
             return Ok(());
         }
         let error = session.surplus_answer();
