@@ -11,7 +11,7 @@
 //! A [`Tree`] is read from what `{:?}` prints, which every model and plan has, or from JSON, whose names belong to what a
 //! test of a file format is about.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// How many characters a line holds at most, where it can be divided.
 const WIDTH: usize = 120;
@@ -83,35 +83,39 @@ impl Tree {
 
     /// Each struct in it, this one included, with what its type is known by.
     pub fn each_struct<'a>(&'a self, found: &mut impl FnMut(&str, &'a Tree)) {
-        self.each_struct_at("", found);
+        self.visit("", &mut |key, part| {
+            found(key, part);
+            true
+        });
     }
 
-    fn each_struct_at<'a>(&'a self, place: &str, found: &mut impl FnMut(&str, &'a Tree)) {
+    /// The same, without the parts of a struct for which the function says so.
+    fn visit<'a>(&'a self, place: &str, found: &mut impl FnMut(&str, &'a Tree) -> bool) {
         match self {
             Tree::Scalar(_) => {}
             Tree::Struct { kind, head, fields } => {
                 let key = key(kind, head, fields, place);
-                found(&key, self);
-                for (name, value) in fields {
-                    value.each_struct_at(&format!("{key}.{name}"), found);
+                if found(&key, self) {
+                    for (name, value) in fields {
+                        value.visit(&format!("{key}.{name}"), found);
+                    }
                 }
             }
-            Tree::Tuple(_, of) | Tree::List(of) => of.iter().for_each(|part| part.each_struct_at(place, found)),
+            Tree::Tuple(_, of) | Tree::List(of) => of.iter().for_each(|part| part.visit(place, found)),
             Tree::Map(of) => of.iter().for_each(|(key, value)| {
-                key.each_struct_at(place, found);
-                value.each_struct_at(place, found);
+                key.visit(place, found);
+                value.visit(place, found);
             }),
         }
     }
 
-    /// Whether it is a value that a field has which says nothing.
-    fn is_empty(&self) -> bool {
+    /// The value that says nothing, of a field that also has this one; as far as this one shows it.
+    fn empty(&self) -> Option<Tree> {
         match self {
-            Tree::Scalar(text) => ["None", "null", "false", "\"\""].contains(&text.as_str()),
-            Tree::List(of) => of.is_empty(),
-            Tree::Map(of) => of.is_empty(),
-            Tree::Struct { kind, head, fields } => kind.is_empty() && head.is_empty() && fields.is_empty(),
-            Tree::Tuple(..) => false,
+            Tree::Scalar(text) => ["None", "null", "false", "\"\""].contains(&text.as_str()).then(|| self.clone()),
+            Tree::Tuple(name, _) => (name == "Some").then(|| Tree::Scalar("None".to_owned())),
+            Tree::List(_) => Some(Tree::List(Vec::new())),
+            Tree::Struct { .. } | Tree::Map(_) => None,
         }
     }
 }
@@ -152,7 +156,8 @@ impl Base {
     ///
     /// Where all values of a field are the same, and there are two at least, that is the ordinary one; of one alone
     /// nobody could say what is ordinary and what is just its own. Where they differ, or where there is one, a value
-    /// that says nothing is ordinary: an empty list or text, `None` and `false`. Other fields are always shown.
+    /// that says nothing is ordinary: an empty list, `None`, and where one has it an empty text or `false`. Other fields
+    /// are always shown.
     pub fn of(models: &[Tree]) -> Base {
         let mut structs = BTreeMap::new();
         for model in models {
@@ -175,14 +180,20 @@ impl Base {
             let part = |(name, usual): (&String, &Usual)| {
                 let shown = match usual {
                     Usual::Value(value) => Base::default().shown(value, ""),
-                    Usual::Struct(key) => Shown::Word(name_of(key).to_owned()),
+                    // At a place in JSON without variants there is nothing else.
+                    Usual::Struct(of) => match of.strip_prefix(&format!("{key}.{name}")) {
+                        Some("") => return None,
+                        Some(variant) => Shown::Word(variant.trim_start_matches('.').to_owned()),
+                        None => Shown::Word(name_of(of).to_owned()),
+                    },
                     Usual::Nothing => return None,
                 };
                 Some((format!("{name}: "), shown))
             };
             let parts: Vec<(String, Shown)> = fields.iter().filter_map(part).collect();
             if !parts.is_empty() {
-                Shown::Group { open: format!("{} {{", name_of(key)), parts, close: '}' }.write(&mut out, 0, 0);
+                let open = format!("{} {{", name_of(key)).trim_start().to_owned();
+                Shown::Group { open, parts, close: '}' }.write(&mut out, 0, 0);
                 out.push('\n');
             }
         }
@@ -263,20 +274,25 @@ impl Base {
 
 /// The name of a type in its key.
 fn name_of(key: &str) -> &str {
-    key.split(" {").next().unwrap_or(key)
+    key.split(" {").next().unwrap_or(key).trim_start_matches('.')
 }
 
-/// What is ordinary of each field in a model or plan, by its type.
+/// What is ordinary of each field in a model or plan, by its type. What has a name, and is the same in several plans of
+/// a list, counts once.
 fn ordinary(model: &Tree) -> BTreeMap<String, BTreeMap<String, Usual>> {
     let mut seen: BTreeMap<String, (usize, BTreeMap<&str, Vec<&Tree>>)> = BTreeMap::new();
-    model.each_struct(&mut |key, part| {
+    let mut named = BTreeSet::new();
+    model.visit("", &mut |key, part| {
+        let Tree::Struct { fields, .. } = part else { return true };
+        if part.field("name").is_some() && !named.insert((key.to_owned(), format!("{part:?}"))) {
+            return false;
+        }
         let (count, values) = seen.entry(key.to_owned()).or_default();
         *count += 1;
-        if let Tree::Struct { fields, .. } = part {
-            for (name, value) in fields {
-                values.entry(name).or_default().push(value);
-            }
+        for (name, value) in fields {
+            values.entry(name).or_default().push(value);
         }
+        true
     });
     let usual = |(key, (count, fields)): (String, (usize, BTreeMap<&str, Vec<&Tree>>))| {
         let always = fields.into_iter().filter(|(_, values)| values.len() == count);
@@ -294,8 +310,8 @@ impl Usual {
         if !others.is_empty() && others.iter().all(|other| other == first) {
             return Usual::Value((*first).clone());
         }
-        if let Some(empty) = values.iter().find(|value| value.is_empty()) {
-            return Usual::Value((*empty).clone());
+        if let Some(empty) = values.iter().find_map(|value| value.empty()) {
+            return Usual::Value(empty);
         }
         let key_of = |value: &Tree| match value {
             Tree::Struct { kind, head, fields } => Some(key(kind, head, fields, place)),
@@ -395,7 +411,8 @@ pub fn variants(tree: &Tree) -> usize {
 }
 
 /// A value that differs from another in one place. There is one for each number, up to the last: with another number,
-/// text or name, with a value where there was none or none where there was one, with an element less or one more. A test
+/// text or name, with a value where there was none or none where there was one, with an element less or one more, and in
+/// JSON with a field less. A test
 /// that nothing is hidden prints them all.
 pub fn variant(tree: &Tree, number: usize) -> Option<Tree> {
     let mut changed = tree.clone();
@@ -416,6 +433,14 @@ fn change(tree: &mut Tree, skipped: &mut usize) -> bool {
         Tree::Struct { kind, head, fields } => {
             let other = other_word(if kind.is_empty() { head } else { kind });
             let kind = if kind.is_empty() { String::new() } else { other.clone() };
+            if kind.is_empty() {
+                // A field of an object may be absent.
+                for at in 0..fields.len() {
+                    let (kind, mut fields) = (kind.clone(), fields.clone());
+                    fields.remove(at);
+                    others.push(Tree::Struct { kind, head: head.clone(), fields });
+                }
+            }
             others.push(Tree::Struct { kind, head: other, fields: fields.clone() });
         }
         Tree::Tuple(name, _) if name == "Some" => others.push(Tree::Scalar("None".to_owned())),

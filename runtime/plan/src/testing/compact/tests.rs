@@ -121,12 +121,12 @@ fn what_all_parts_of_the_base_have_is_left_out() {
 #[test]
 fn what_is_ordinary_is_in_the_snapshot_of_the_base() {
     let more = Base::of(&[tree(&plant(vec![part("a", 1.0), part("b", 2.0)])), tree(&unusual())]);
-    assert_eq!(more.ordinary(&base()), "Moving { limits: Limits }\n");
+    assert_eq!(more.ordinary(&base()), "Held { by: [] }\nMoving { limits: Limits }\n");
     assert_eq!(
         base().ordinary(&Base::default()),
         "Limits { seed: 1 }
 Part { limits: Limits, note: None, state: Idle, timed: true, twice: None }
-Plant { limits: Limits, spare: None }
+Plant { limits: Limits, parts: [], spare: None }
 "
     );
 }
@@ -218,4 +218,21 @@ fn words_fill_their_lines_and_a_single_value_stays_beside_its_name() {
     assert_eq!(lines.len(), 4, "{text}");
     assert!(lines[0] == "Wrapped([" && lines[3] == "])" && lines[1].starts_with("  1000, 1001, "), "{text}");
     assert!(lines.iter().all(|line| line.len() <= WIDTH), "{text}");
+}
+
+#[test]
+fn nothing_is_hidden_in_json() {
+    let json = r#"{ "topics": [
+        { "name": "a", "type": { "kind": "real", "unit": null }, "doc": "", "line": 1 },
+        { "name": "b", "type": { "kind": "int", "unit": "m" }, "timed": false, "line": 1 },
+        { "name": "c", "type": { "kind": "real", "unit": "s" }, "timed": true, "line": 1 } ], "at": { "x": 1 } }"#;
+    let model = Tree::read(json);
+    let variants: Vec<Tree> = (0..variants(&model)).map(|number| variant(&model, number).unwrap()).collect();
+    for base in [Base::of(std::slice::from_ref(&model)), Base::default()] {
+        let mut texts = BTreeSet::from([base.compact(&model)]);
+        for (number, variant) in variants.iter().enumerate() {
+            let text = base.compact(variant);
+            assert!(texts.insert(text.clone()), "change {number} is hidden, or as another one:\n{text}");
+        }
+    }
 }
