@@ -89,7 +89,7 @@ impl Tree {
         });
     }
 
-    /// The same, without the parts of a struct for which the function says so.
+    /// The same, and only the structs within those for which the function says true.
     fn visit<'a>(&'a self, place: &str, found: &mut impl FnMut(&str, &'a Tree) -> bool) {
         match self {
             Tree::Scalar(_) => {}
@@ -399,7 +399,8 @@ impl Shown {
                 part.write(out, inner, name.chars().count());
             }
         }
-        out.push_str(&format!("\n{:indent$}{close}", ""));
+        let end = format!("\n{:indent$}{close}", "");
+        out.push_str(&end);
     }
 }
 

@@ -2,7 +2,6 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::*;
 
-// Only their debug text is read.
 #[expect(dead_code, reason = "only their debug text is read")]
 #[derive(Debug, Clone)]
 struct Plant {
@@ -22,6 +21,7 @@ struct Part {
     state: State,
     note: Option<&'static str>,
     limits: Limits,
+    #[expect(clippy::option_option, reason = "it is to be printed so that all cases differ")]
     twice: Option<Option<u8>>,
 }
 
