@@ -196,9 +196,10 @@ fn metric(metric: &model::Metric) -> plan::Metric {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use sesame_dsl::analyse;
     use sesame_dsl::source::SourceMap;
+    use sesame_plan::testing::compact::{Base, Tree, variant, variants};
 
     use super::*;
 
@@ -422,8 +423,8 @@ mod tests {
         assert_eq!(names, ["collisions", "unused", "near", "time"]);
         assert!(grown.hooks.iter().all(|hook| grown.uses(hook)), "the hook of a variable is compiled");
         assert_eq!(grown.plan.metrics[2].initial, Some(0.0));
-        insta::assert_snapshot!(serde_json::to_string_pretty(&grown.plan.campaign.activation).unwrap());
-        insta::assert_snapshot!(serde_json::to_string_pretty(&grown.plan.tests[0].test).unwrap());
+        let parts = (&grown.plan.campaign.activation, &grown.plan.tests[0].test);
+        insta::assert_snapshot!(Base::default().compact(&tree(&parts)));
         let constraints: Vec<usize> =
             grown.plan.operations.iter().map(|operation| operation.constraints.len()).collect();
         assert_eq!(constraints, [0, 0, 2]);
@@ -524,9 +525,43 @@ mod tests {
         assert_eq!(read, plan);
     }
 
+    /// What is ordinary in a plan: the plans of spaces that have each kind of declaration in its plainest form.
+    pub(crate) fn base() -> Base {
+        let spaces = [
+            include_str!("../../sesame-dsl/tests/good/base.sesame"),
+            include_str!("../../sesame-dsl/tests/good/base_of_ros.sesame"),
+        ];
+        let mut plans = Vec::new();
+        for text in spaces {
+            let mut sources = SourceMap::new();
+            let file = sources.add("base.sesame", text);
+            let space = analyse(&sources, file).model.unwrap();
+            for (campaign, _) in space.campaigns.iter() {
+                plans.push(tree(&lower(&space, campaign, "base.sesame", "sesamec 0.0.0").plan));
+            }
+        }
+        Base::of(&[Tree::List(plans)])
+    }
+
+    /// A part of a plan as its JSON has it.
+    pub(crate) fn tree(part: &impl serde::Serialize) -> Tree {
+        Tree::read(&serde_json::to_string(part).unwrap())
+    }
+
+    #[test]
+    fn snapshots_of_plans_leave_out_what_is_ordinary() {
+        insta::assert_snapshot!(base().ordinary(&Base::default()));
+    }
+
     #[test]
     fn the_whole_plan_is_as_blessed() {
-        let plan = serde_json::to_string_pretty(&lowered("again").plan).unwrap();
-        insta::assert_snapshot!(plan);
+        let plan = tree(&lowered("again").plan);
+        let base = base();
+        let shown = base.compact(&plan);
+        for number in 0..variants(&plan) {
+            let text = base.compact(&variant(&plan, number).unwrap());
+            assert!(text != shown, "change {number} is hidden");
+        }
+        insta::assert_snapshot!(shown);
     }
 }

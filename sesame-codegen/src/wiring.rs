@@ -100,7 +100,7 @@ mod tests {
     #[test]
     fn the_plan_of_a_system_of_ros_is_as_blessed() {
         let plan = plan(ARMS);
-        insta::assert_snapshot!(serde_json::to_string_pretty(&plan).unwrap());
+        insta::assert_snapshot!(crate::lower::tests::base().compact(&crate::lower::tests::tree(&plan)));
         let read: CampaignPlan = serde_json::from_str(&serde_json::to_string(&plan).unwrap()).unwrap();
         assert_eq!(read, plan);
     }

@@ -4,6 +4,8 @@
 //! of a field says so with struct update syntax: `Metric { unit, ..metric("speed", source) }`. So a new field of the
 //! plan is filled in here, and in no test.
 
+pub mod compact;
+
 use crate::{
     Activation, ActivationMode, Bound, Campaign, CampaignPlan, Channel, Choice, Comparison, Copies, Count, Demand,
     Distribution, Domain, Drain, Evidence, Expression, Field, FieldRef, Gate, Guarantee, Input, KnownTest, Lab,

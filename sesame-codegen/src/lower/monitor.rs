@@ -66,6 +66,7 @@ fn mitigation(mitigation: &eddi::Mitigation) -> plan::Mitigation {
 mod tests {
     use sesame_dsl::analyse;
     use sesame_dsl::source::SourceMap;
+    use sesame_plan::testing::compact::Base;
     use sesame_plan::{CampaignPlan, Gate, MitigationValue, MonitorId, TopicId};
 
     use crate::lower::lower;
@@ -130,7 +131,7 @@ mod tests {
         assert_eq!(transport.guarantees[1].gate, expected);
         let mitigation = transport.otherwise.mitigation.as_ref().unwrap();
         assert_eq!((mitigation.field.topic, &mitigation.value), (TopicId(5), &MitigationValue::Int(0)));
-        insta::assert_snapshot!(serde_json::to_string_pretty(&transport.evidence).unwrap());
+        insta::assert_snapshot!(Base::default().compact(&crate::lower::tests::tree(&transport.evidence)));
     }
 
     #[test]
