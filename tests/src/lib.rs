@@ -12,10 +12,11 @@ pub mod python_mcap;
 pub mod rtamt;
 pub mod selecting;
 
-use std::fs;
+use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
-use std::sync::{Mutex, OnceLock};
+use std::sync::OnceLock;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 /// The root of the workspace.
 pub fn workspace() -> &'static Path {
@@ -208,21 +209,31 @@ impl Project {
         done(sesamec.current_dir(&self.folder))
     }
 
+    /// `sesamec run` of a campaign that has to be compiled.
+    pub fn run(&self, campaign: &str, arguments: &[&str]) -> Done {
+        // Cargo puts the program where another project's of the same name may be, and it is started from there.
+        let _turn = turn("build");
+        self.sesamec("run", &[&["--campaign", campaign], arguments].concat())
+    }
+
     /// Generates and builds the runner of a campaign, without running it.
     pub fn build(&self, campaign: &str) -> Runner {
-        // The name of the program is this project's own: in the target folder, another project of the same name
-        // overwrites it.
-        static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+        let _turn = turn("build");
+        self.built(campaign)
+    }
+
+    /// The same for one who has the turn.
+    fn built(&self, campaign: &str) -> Runner {
         self.sesamec("generate", &["--campaign", campaign]).expect(0);
-        let _turn = ONE_AT_A_TIME.lock();
         let built = self.cargo(campaign, "build");
         assert_eq!(built.code, Some(0), "{}", built.err);
         let package = fs::read_to_string(self.runners.join(campaign).join("Cargo.toml")).expect("there is a manifest");
         let name = package.lines().find_map(|line| line.strip_prefix("name = \"")).expect("a package has a name");
         let name = name.trim_end_matches('"');
         let program = self.folder.join(name);
-        // A second name for the same file, for copies would fill the disk. Neither cargo nor a linker writes into a
-        // file that exists: each puts a new one in its place.
+        // In the target folder, another project of the same name overwrites the program, so it gets a second name here;
+        // copies would fill the disk. Neither cargo nor a linker writes into a file that exists: each puts a new one in
+        // its place.
         let _ = fs::remove_file(&program);
         fs::hard_link(target().join("debug").join(name), &program).expect("what was built can be linked");
         Runner { program, folder: self.folder.clone() }
@@ -233,6 +244,46 @@ impl Project {
         let mut cargo = command(env!("CARGO"));
         done(cargo.args([subcommand, "--quiet", "--color", "never"]).current_dir(self.runners.join(campaign)))
     }
+}
+
+/// The runner of a campaign in a fresh folder of this name, built once for all tests that ask for the same one: those
+/// that give the same key. They must leave the project as it is.
+pub fn shared(name: &str, key: &str, campaign: &str, project: impl FnOnce(&str) -> Project) -> Runner {
+    let home = scratch().join("shared").join(key);
+    let stamp = home.join("run");
+    let program = home.join("program");
+    let folder = fresh_folder(name);
+    let _turn = turn("build");
+    if fs::read_to_string(&stamp).is_ok_and(|run| run == this_run()) {
+        return Runner { program, folder };
+    }
+    fs::create_dir_all(&home).expect("a folder can be made");
+    let built = project(key).built(campaign);
+    let _ = fs::remove_file(&program);
+    fs::hard_link(&built.program, &program).expect("what was built can be linked");
+    fs::write(&stamp, this_run()).expect("a stamp can be written");
+    Runner { program, folder }
+}
+
+/// What tells this run of the tests from all others: nextest says it, and cargo runs all tests of a program in one
+/// process.
+fn this_run() -> &'static str {
+    static RUN: OnceLock<String> = OnceLock::new();
+    RUN.get_or_init(|| {
+        std::env::var("NEXTEST_RUN_ID").unwrap_or_else(|_| {
+            let began = SystemTime::now().duration_since(UNIX_EPOCH).expect("the clock is set");
+            format!("{} {}", std::process::id(), began.as_nanos())
+        })
+    })
+}
+
+/// A turn at something that one test at a time may do, in whatever process; it is over when this is dropped.
+#[must_use]
+pub fn turn(what: &str) -> File {
+    fs::create_dir_all(scratch()).expect("a folder can be made");
+    let file = File::create(scratch().join(what).with_extension("lock")).expect("a lock can be made");
+    file.lock().expect("the file system has locks");
+    file
 }
 
 /// A built runner.

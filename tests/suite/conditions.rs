@@ -9,7 +9,7 @@ use sesame_base::observation::Outcome;
 use sesame_plan::condition::{Condition, ConditionSpace};
 use sesame_plan::{Activation, ActivationMode};
 use sesame_results::record::{Origin, Repository, TestRecord};
-use sesame_tests::{Project, Runner};
+use sesame_tests::{Project, Runner, shared};
 
 /// A short run of a campaign by condition, in `r/5`: what it may grow, and the tests that its search made.
 fn searched(runner: &Runner) -> (ConditionSpace, Vec<TestRecord>) {
@@ -58,7 +58,7 @@ fn holds_together(space: &ConditionSpace, records: &[TestRecord]) {
 
 #[test]
 fn conditions_that_a_search_grows_switch_operations_on_and_off() {
-    let runner = Project::kuka_cell("kuka_cell_by_condition").build("condition_experiment");
+    let runner = shared("by_condition", "kuka_cell_by_condition", "condition_experiment", Project::kuka_cell);
     let (space, records) = searched(&runner);
     holds_together(&space, &records);
     let depths: BTreeSet<u32> = conditions(&records).into_iter().map(depth).collect();
@@ -105,7 +105,7 @@ fn operations_may_be_activated_again() {
 
 #[test]
 fn a_campaign_by_condition_comes_out_the_same_on_any_number_of_workers_and_when_it_is_resumed() {
-    let runner = Project::kuka_cell("kuka_cell_by_condition_resumed").build("condition_experiment");
+    let runner = shared("by_condition_resumed", "kuka_cell_by_condition", "condition_experiment", Project::kuka_cell);
     let run = |results: &str, workers: &str| {
         let arguments = ["--results", results, "--seed", "7", "--evaluations", "40", "--workers", workers];
         runner.run(&arguments).expect(0).digest()

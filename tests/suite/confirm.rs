@@ -10,14 +10,16 @@ use sesame_base::observation::Outcome;
 use sesame_patience as patience;
 use sesame_results::record::{Repetition, Repository, TestRow, Verdict};
 use sesame_results::report::summary;
-use sesame_tests::{Done, Project, Runner, command, done, sesamec, workspace};
+use sesame_tests::{Done, Project, Runner, command, done, sesamec, shared, workspace};
 
 use crate::interruption::no_worker_is_left;
 
 /// The runner of a campaign in gusts.
 fn gusty(name: &str, campaign: &str) -> Runner {
     let space = fs::read_to_string(workspace().join("tests/simulators/gusty/space.sesame")).unwrap();
-    Project::new(name, &space.replace("NAME", name), "gusty").build(campaign)
+    shared(name, &format!("gusty-{campaign}"), campaign, |key| {
+        Project::new(key, &space.replace("NAME", "gusty"), "gusty")
+    })
 }
 
 fn results(runner: &Runner, results: &str) -> Repository {

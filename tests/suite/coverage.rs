@@ -5,7 +5,7 @@ use std::path::Path;
 use nix::sys::signal::Signal;
 
 use sesame_results::record::Repository;
-use sesame_tests::{Done, Project, Runner, command, done, sesamec};
+use sesame_tests::{Done, Project, Runner, command, done, sesamec, shared};
 
 use crate::interruption::Running;
 
@@ -37,7 +37,7 @@ fn results(arguments: &[&str], file: &Path) -> Done {
 }
 
 fn build(name: &str) -> Runner {
-    Project::new(name, SPACE, "faulty").build("covering")
+    shared(name, "covering", "covering", |key| Project::new(key, SPACE, "faulty"))
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::fs;
 
 use sesame_base::observation::Outcome;
 use sesame_results::record::{Origin, Repository};
-use sesame_tests::{Done, Project, Runner, workspace};
+use sesame_tests::{Done, Project, Runner, shared, workspace};
 
 /// The runner of a campaign on the faulty simulator, with its hook filled in.
 pub(crate) fn faulty(name: &str, campaign: &str) -> Runner {
@@ -15,19 +15,22 @@ pub(crate) fn faulty(name: &str, campaign: &str) -> Runner {
 
 /// The same, with this clause in all campaigns.
 pub(crate) fn recording(name: &str, campaign: &str, clause: &str) -> Runner {
-    let space = fs::read_to_string(workspace().join("tests/simulators/faulty/space.sesame")).unwrap();
-    let space = space.replace("  end        after 1s\n", &format!("  end        after 1s\n  {clause}\n"));
-    let project = Project::new(name, &space.replace("NAME", name), "faulty");
-    project.sesamec("generate", &["--campaign", campaign]).expect(0);
-    let hook = project.runners.join("hooks/fragile.rs");
-    let stub = fs::read_to_string(&hook).unwrap();
-    let body = "match heard {
+    let key = format!("faulty {campaign} {clause}").trim_end().replace(' ', "-");
+    shared(name, &key, campaign, |key| {
+        let space = fs::read_to_string(workspace().join("tests/simulators/faulty/space.sesame")).unwrap();
+        let space = space.replace("  end        after 1s\n", &format!("  end        after 1s\n  {clause}\n"));
+        let project = Project::new(key, &space.replace("NAME", "faulty"), "faulty");
+        project.sesamec("generate", &["--campaign", campaign]).expect(0);
+        let hook = project.runners.join("hooks/fragile.rs");
+        let stub = fs::read_to_string(&hook).unwrap();
+        let body = "match heard {
             1.0 => panic!(\"the hook was given a 1\"),
             2.0 => ctx.set(f64::NAN),
             _ => ctx.set(heard),
         }";
-    fs::write(&hook, stub.replace("ctx.unimplemented();", body)).unwrap();
-    project.build(campaign)
+        fs::write(&hook, stub.replace("ctx.unimplemented();", body)).unwrap();
+        project
+    })
 }
 
 #[test]

@@ -4,15 +4,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 use std::{fs, thread};
 
 use sesame_base::observation::Outcome;
 use sesame_results::record::{Origin, Repository};
-use sesame_tests::{Done, Project, Runner, done};
+use sesame_tests::{Done, Project, Runner, done, shared};
 
 /// What is to come of a mode.
 #[derive(Debug, Clone, Copy)]
@@ -192,22 +192,23 @@ fn space(modes: &[String]) -> String {
         }"
 }
 
-/// The runner; built once for all tests here. With nextest that is once for each, of which cargo builds the first.
-fn runner() -> &'static Runner {
-    static RUNNER: OnceLock<Runner> = OnceLock::new();
-    RUNNER.get_or_init(|| {
+/// The runner, in a folder of this name.
+fn runner(name: &str) -> Runner {
+    shared(name, "hostile", "all", |key| {
         let listed = done(std::process::Command::new(env!("CARGO_BIN_EXE_hostile")).arg("--list")).expect(0).out;
         let modes: Vec<String> = listed.lines().map(str::to_owned).collect();
         let known = SMALL.iter().chain(LARGE).map(|(name, _)| *name).chain([KILLS_THE_RUNNER]);
         let known: BTreeSet<&str> = known.collect();
         assert_eq!(known, modes.iter().map(String::as_str).collect(), "each mode is tested once");
         assert_eq!(known.len(), modes.len());
-        Project::new("hostile", &space(&modes), "anything").build("all")
+        Project::new(key, &space(&modes), "anything")
     })
 }
 
 /// What came of some modes.
 struct Ran {
+    /// Where its results are.
+    folder: PathBuf,
     said: Done,
     outcomes: BTreeMap<String, Outcome>,
     /// The most that a worker took, in MiB.
@@ -216,9 +217,8 @@ struct Ran {
 
 /// Runs these modes as known tests, each once; afterwards no process may be left.
 fn run(results: &str, modes: &[&str], workers: &str, limit: &str) -> Ran {
-    let runner = runner();
+    let runner = runner(&format!("hostile_{results}"));
     let folder = runner.folder.join(results);
-    fs::remove_dir_all(&folder).ok();
     let limits = ["--timeout", limit, "--reference-timeout", ENOUGH];
     let arguments = [&["known", "--results", results, "--workers", workers], &limits[..], modes].concat();
     let mark = format!("{results}-{}", std::process::id());
@@ -240,7 +240,7 @@ fn run(results: &str, modes: &[&str], workers: &str, limit: &str) -> Ran {
         }
     }
     assert_eq!(outcomes.len(), modes.len(), "{}", said.err);
-    Ran { said, outcomes, peak }
+    Ran { folder, said, outcomes, peak }
 }
 
 /// The largest part of memory that workers of a marked run had at once, watched as it runs.
@@ -343,10 +343,12 @@ fn each_kind_of_misbehaviour_is_the_outcome_of_its_own_test_and_leaves_no_proces
         return;
     }
     let (stuck, small): (Vec<_>, Vec<_>) = SMALL.iter().copied().partition(|(_, it)| matches!(it, Timeout));
-    came_out_as_expected(&run("small", &names(&small), "2", ENOUGH), &small, FEW);
-    came_out_as_expected(&run("stuck", &names(&stuck), "2", LITTLE), &stuck, FEW);
-    let log = |run, worker| runner().folder.join(format!("{run}/known/workers/{worker}/output.log"));
-    let logs = ["small", "stuck"].into_iter().flat_map(|run| [log(run, 1), log(run, 2)]);
+    let of_small = run("small", &names(&small), "2", ENOUGH);
+    came_out_as_expected(&of_small, &small, FEW);
+    let of_stuck = run("stuck", &names(&stuck), "2", LITTLE);
+    came_out_as_expected(&of_stuck, &stuck, FEW);
+    let log = |ran: &Ran, worker| ran.folder.join(format!("known/workers/{worker}/output.log"));
+    let logs = [&of_small, &of_stuck].into_iter().flat_map(|ran| [log(ran, 1), log(ran, 2)]);
     let logged: u64 = logs.filter_map(|log| fs::metadata(log).ok()).map(|file| file.len()).sum();
     assert!((2 << 20..4 << 20).contains(&logged), "two floods of standard error are logged, but not whole: {logged}");
 }
@@ -389,8 +391,8 @@ fn a_simulator_has_a_second_to_end_by_itself_at_the_end_of_a_campaign_and_after_
     }
     for after in ["publishes_nothing", "stops_its_worker"] {
         let results = format!("bye_{after}");
-        run(&results, &["says_bye_after_the_end_of_its_input", after], "1", LITTLE);
-        let bye = runner().folder.join(results).join("known/workers/1/bye");
+        let ran = run(&results, &["says_bye_after_the_end_of_its_input", after], "1", LITTLE);
+        let bye = ran.folder.join("known/workers/1/bye");
         assert_eq!(fs::read_to_string(&bye).unwrap_or_default(), "bye", "{after}");
     }
 }
@@ -401,8 +403,8 @@ fn nothing_is_left_of_a_simulator_that_kills_the_runner() {
         return;
     }
     let mark = format!("killed-{}", std::process::id());
-    fs::remove_dir_all(runner().folder.join("killed")).ok();
-    let mut command = runner().command(&["known", "--results", "killed", "--workers", "2", KILLS_THE_RUNNER]);
+    let runner = runner("hostile_killed");
+    let mut command = runner.command(&["known", "--results", "killed", "--workers", "2", KILLS_THE_RUNNER]);
     let said = done(command.env(MARK, &mark));
     assert_eq!(said.code, None, "{}", said.err);
     nothing_is_left(&mark);

@@ -39,7 +39,7 @@ fn an_interpreted_campaign_and_its_crate_have_the_same_digest() {
     let interpreted = without_cargo(&project, &run).expect(0);
     assert!(!project.runners.join("crossing/Cargo.toml").exists(), "nothing is generated");
     assert!(project.runners.join("crossing/results/42/results.sqlite").is_file());
-    let built = project.sesamec("run", &["--campaign", "crossing", "--build"]).expect(0);
+    let built = project.run("crossing", &["--build"]).expect(0);
     assert!(project.runners.join("crossing/Cargo.toml").is_file());
     assert!(project.runners.join("crossing/results/42-2/results.sqlite").is_file(), "{}", built.out);
     assert_eq!(interpreted.digest(), built.digest());
@@ -150,8 +150,7 @@ fn every_command_of_a_runner_works_from_the_project_without_cargo() {
 fn a_campaign_with_a_hook_is_built_and_its_commands_work_from_the_project_too() {
     let project = Project::kuka_cell("from_the_project");
     let campaign = ["--campaign", "coverage_experiment"];
-    let run = [&campaign[..], &["--", "--evaluations", "6"]].concat();
-    let digest = project.sesamec("run", &run).expect(0).digest();
+    let digest = project.run("coverage_experiment", &["--", "--evaluations", "6"]).expect(0).digest();
     let sesamec = |command: &str, more: &[&str]| project.sesamec(command, &[&campaign[..], more].concat());
     assert_eq!(sesamec("digest", &[]).expect(0).out.trim(), digest);
     let replayed = sesamec("replay", &["T3", "--format", "json"]).expect(0);

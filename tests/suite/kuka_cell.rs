@@ -26,7 +26,7 @@ fn front(folder: &Path) -> Vec<(TestRow, f64)> {
 #[test]
 fn the_first_command_finds_a_front_and_the_same_one_each_time() {
     let project = Project::kuka_cell("kuka_cell");
-    let first = project.sesamec("run", &["--campaign", "coverage_experiment", "--", "--results", "first"]).expect(0);
+    let first = project.run("coverage_experiment", &["--", "--results", "first"]).expect(0);
     for stage in ["Checked", "Generated", "Built"] {
         assert!(first.err.contains(stage), "{}", first.err);
     }

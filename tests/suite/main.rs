@@ -2,7 +2,6 @@
 #![cfg(test)]
 
 mod a50_cell;
-mod architecture;
 mod building;
 mod choice;
 mod commands;
@@ -13,6 +12,8 @@ mod coverage;
 mod custom;
 mod declarative;
 mod disk;
+mod emitted;
+mod emitted_process;
 mod exported;
 mod expressions;
 mod falsification;

@@ -6,7 +6,7 @@ use std::fs;
 
 use sesame_results::analysis::rank_sum;
 use sesame_results::record::Repository;
-use sesame_tests::{Project, Runner, command, done, fresh_folder, sesamec, workspace};
+use sesame_tests::{Project, Runner, command, done, fresh_folder, sesamec, turn, workspace};
 
 use crate::search::quartiles;
 
@@ -15,7 +15,9 @@ fn one_command_finds_missed_hazards_and_none_after_the_mend() {
     let folder = fresh_folder("transport");
     let example = workspace().join("examples/transport");
     let mut run = command(example.join("run"));
+    let turn = turn("build");
     let said = done(run.env("SESAMEC", sesamec()).arg(&folder).current_dir(&folder)).expect(0);
+    drop(turn);
     let line = said.out.lines().find_map(|line| line.strip_prefix("Tests with a missed hazard: ")).expect("a summary");
     let readme = fs::read_to_string(example.join("README.md")).unwrap();
     assert!(readme.contains(line), "the README has other figures than: {line}");
@@ -37,7 +39,7 @@ fn one_command_finds_missed_hazards_and_none_after_the_mend() {
     assert_eq!(reference.values[stood].value, Some(0.0));
     let space = example.join("transport.sesame");
     let again = Project { space, runners: folder.join("transport"), folder: folder.clone() };
-    let again = again.sesamec("run", &["--campaign", "attack", "--", "--workers", "1", "--results", "again"]).expect(0);
+    let again = again.run("attack", &["--", "--workers", "1", "--results", "again"]).expect(0);
     let digest = said.out.lines().find_map(|line| line.trim().strip_prefix("Digest ")).expect("a digest");
     assert_eq!(again.digest(), digest);
 }

@@ -4,6 +4,7 @@
 //! and passes there, but not where `CI=true`.
 #![cfg(test)]
 
+mod architecture;
 mod json_page;
 mod rules;
 

@@ -6,7 +6,8 @@ use sesame_codegen::files::Tree;
 use sesame_codegen::plan::RunnerPlan;
 use sesame_plan::testing::node;
 
-use crate::plans::{awkward, environment, small, with_program};
+use crate::placed::environment;
+use crate::plans::{awkward, small, with_program};
 
 /// All files of trees in one text, those that only copy data left out.
 fn shown(trees: &[Tree]) -> String {

@@ -15,7 +15,8 @@ use sesame_codegen::files::Tree;
 use sesame_codegen::output::{Error, Mode, apply};
 
 use crate::command::{project, sesamec};
-use crate::plans::{environment, small};
+use crate::placed::environment;
+use crate::plans::small;
 
 static TREES: LazyLock<Vec<Tree>> = LazyLock::new(|| emit(&[small("day"), small("night")], &environment()).unwrap());
 

@@ -4,7 +4,6 @@
 mod command;
 mod consert_originals;
 mod emission;
-mod emitted;
 mod hostile_checkout;
 mod meaning;
 mod mutated_imports;
@@ -12,6 +11,7 @@ mod notation;
 mod odd_originals;
 mod options;
 mod originals;
+mod placed;
 mod plans;
 mod random_originals;
 mod regeneration;

@@ -21,7 +21,7 @@ fn write(folder: &Path, files: &[(&str, &str)]) {
 
 fn own_hooks(shared: &[(&str, &str)]) -> Environment {
     let shared = shared.iter().map(|&(path, text)| (path.to_owned(), text.to_owned())).collect();
-    Environment { hooks: HooksFolder::Own { shared }, ..crate::plans::environment() }
+    Environment { hooks: HooksFolder::Own { shared }, ..crate::placed::environment() }
 }
 
 #[test]
@@ -43,7 +43,7 @@ fn a_runner_that_carries_more_is_not_overwritten_by_one_that_carries_less() {
     let out = tempfile::tempdir().unwrap();
     let own = emit(&[small("a")], &own_hooks(&[])).unwrap();
     apply(out.path(), &own[1..], Mode::Write).unwrap();
-    let shared = emit(&[small("a")], &crate::plans::environment()).unwrap();
+    let shared = emit(&[small("a")], &crate::placed::environment()).unwrap();
     let error = apply(out.path(), &shared, Mode::Write).unwrap_err();
     assert!(
         error.to_string().contains("was generated with `--self-contained`: pass `--self-contained` again"),
@@ -66,7 +66,7 @@ fn an_update_is_shown_as_a_diff_and_nothing_is_written() {
     let trees = |doc: &str| {
         let mut plan = small("a");
         plan.plan.campaign.doc = doc.to_owned();
-        emit(&[plan], &crate::plans::environment()).unwrap()
+        emit(&[plan], &crate::placed::environment()).unwrap()
     };
     apply(out.path(), &trees("Before."), Mode::Write).unwrap();
     let report = apply(out.path(), &trees("After."), Mode::Check).unwrap();
@@ -80,7 +80,7 @@ fn an_update_is_shown_as_a_diff_and_nothing_is_written() {
 #[test]
 fn an_edited_file_is_only_overwritten_in_thought_by_a_forced_check() {
     let out = tempfile::tempdir().unwrap();
-    let trees = emit(&[small("a")], &crate::plans::environment()).unwrap();
+    let trees = emit(&[small("a")], &crate::placed::environment()).unwrap();
     apply(out.path(), &trees, Mode::Write).unwrap();
     let main = out.path().join("a/src/main.rs");
     fs::write(&main, "fn main() {}\n").unwrap();
@@ -97,10 +97,10 @@ fn templates(files: &[(&str, &str)]) -> Result<Templates, Vec<Problem>> {
 #[test]
 fn a_template_is_replaced_by_its_name() {
     let replaced = templates(&[("runner/hook.rs.tera", "// {{ metric }} of {{ space }}\n")]).unwrap();
-    let environment = Environment { templates: replaced, ..crate::plans::environment() };
+    let environment = Environment { templates: replaced, ..crate::placed::environment() };
     let trees = emit(&[small("a")], &environment).unwrap();
     assert_eq!(trees[0].files["hooks/top_speed.rs"].text(), "// top_speed of kuka_cell\n");
-    let usual = emit(&[small("a")], &crate::plans::environment()).unwrap();
+    let usual = emit(&[small("a")], &crate::placed::environment()).unwrap();
     assert_eq!(trees[0].files["README.md"], usual[0].files["README.md"]);
 }
 
@@ -118,7 +118,7 @@ fn templates_that_replace_nothing_or_are_none_are_named() {
 #[test]
 fn a_template_that_speaks_of_what_there_is_not_is_named() {
     let replaced = templates(&[("runner/hook.rs.tera", "{{ nothing }}")]).unwrap();
-    let environment = Environment { templates: replaced, ..crate::plans::environment() };
+    let environment = Environment { templates: replaced, ..crate::placed::environment() };
     let problems = emit(&[small("a"), small("b")], &environment).unwrap_err();
     let said: Vec<String> = problems.iter().map(ToString::to_string).collect();
     assert_eq!(said.len(), 1, "{said:?}");
@@ -276,6 +276,6 @@ fn the_settings_name_a_folder_of_templates_and_the_command_line_another() {
 fn the_generators_own_templates_can_be_taken_as_a_start() {
     let all: BTreeMap<String, String> =
         sesame_templates::ALL.iter().map(|&(name, text)| (name.to_owned(), text.to_owned())).collect();
-    let environment = Environment { templates: Templates::replacing(all).unwrap(), ..crate::plans::environment() };
-    assert_eq!(emit(&[small("a")], &environment).unwrap(), emit(&[small("a")], &crate::plans::environment()).unwrap());
+    let environment = Environment { templates: Templates::replacing(all).unwrap(), ..crate::placed::environment() };
+    assert_eq!(emit(&[small("a")], &environment).unwrap(), emit(&[small("a")], &crate::placed::environment()).unwrap());
 }

@@ -1,6 +1,5 @@
-//! Plans to generate from.
+//! Plans to generate from, for these tests and for those in which their runners are compiled.
 
-use sesame_codegen::emit::Environment;
 use sesame_codegen::plan::{HookPlan, RunnerPlan};
 use sesame_plan::testing;
 use sesame_plan::{
@@ -173,24 +172,4 @@ pub(crate) fn awkward() -> RunnerPlan {
         ..testing::metric("last_level", MetricSource::Last { input: level })
     });
     runner
-}
-
-pub(crate) fn environment() -> Environment {
-    let path = |path: &str| {
-        let mut table = toml::Table::new();
-        table.insert("path".into(), path.into());
-        toml::Value::Table(table)
-    };
-    Environment {
-        dependencies: [
-            ("kuka_cell_sim".to_owned(), path("../../simulator")),
-            ("sesame-runtime".to_owned(), path("../../../../runtime")),
-        ]
-        .into(),
-        lock: None,
-        options: [].into(),
-        space_folder: "../..".to_owned(),
-        simulator_folder: "../..".to_owned(),
-        ..Environment::default()
-    }
 }

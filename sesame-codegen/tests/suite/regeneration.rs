@@ -8,7 +8,8 @@ use sesame_codegen::emit::emit;
 use sesame_codegen::output::{Change, Error, Mode, Orphan, Report, apply};
 use sesame_codegen::plan::RunnerPlan;
 
-use crate::plans::{environment, hook, measured, small};
+use crate::placed::environment;
+use crate::plans::{hook, measured, small};
 
 fn generate(out: &Path, plans: &[RunnerPlan], mode: Mode) -> Result<Report, Error> {
     apply(out, &emit(plans, &environment()).unwrap(), mode)

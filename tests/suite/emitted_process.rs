@@ -1,10 +1,10 @@
 //! A runner for a simulator that is a program: generated, built and run, with Python on the other side.
 
 use std::fs;
-use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use sesame_patience as patience;
+use sesame_tests::{Project, Runner, fresh_folder, workspace};
 
 /// Whether there is a Python here. In the pipeline there must be.
 fn python() -> bool {
@@ -16,40 +16,14 @@ fn python() -> bool {
     found
 }
 
-/// The example `two_robots` in a folder, and the program of its campaign `crossing`.
-fn built(folder: &Path) -> PathBuf {
-    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/two_robots");
+/// The example `two_robots` with its simulator, in a folder of its own, and the runner of its campaign `crossing`.
+fn built(name: &str) -> Runner {
+    let folder = fresh_folder(name);
+    let example = workspace().join("examples/two_robots");
     for file in ["two_robots.sesame", "sim.py"] {
         fs::copy(example.join(file), folder.join(file)).unwrap();
     }
-    let generated = Command::new(env!("CARGO_BIN_EXE_sesamec"))
-        .args(["generate", "two_robots.sesame", "--campaign", "crossing"])
-        .current_dir(folder)
-        .output()
-        .unwrap();
-    assert!(generated.status.success(), "{}", String::from_utf8_lossy(&generated.stderr));
-    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join("emitted");
-    let built = Command::new(env!("CARGO"))
-        .args(["build", "--offline", "--quiet", "--color", "never"])
-        .args(["--config", "profile.dev.opt-level=0", "--config", "profile.dev.package.libsqlite3-sys.opt-level=0"])
-        .current_dir(folder.join("runners/crossing"))
-        .env("CARGO_TARGET_DIR", &target)
-        .env_remove("RUSTFLAGS")
-        .output()
-        .unwrap();
-    assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
-    target.join("debug/two_robots-crossing")
-}
-
-fn run(program: &Path, arguments: &[&str]) -> String {
-    let output = Command::new(program).arg("run").args(arguments).output().unwrap();
-    let said = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(output.status.success(), "{said}{}", String::from_utf8_lossy(&output.stderr));
-    said
-}
-
-fn digest(said: &str) -> &str {
-    said.lines().find_map(|line| line.trim().strip_prefix("Digest ")).expect("a run ends with its digest")
+    Project { space: folder.join("two_robots.sesame"), runners: folder.join("runners"), folder }.build("crossing")
 }
 
 /// A simulator that notes its process, and is caught in a loop once it hears nothing in a step.
@@ -82,26 +56,23 @@ fn a_campaign_on_a_python_program_gives_the_same_results_on_any_number_of_worker
     if !python() {
         return;
     }
-    let folder = tempfile::tempdir().unwrap();
-    let program = built(folder.path());
-    let results = |name: &str| folder.path().join(name).to_str().expect("it is text").to_owned();
-    let one = run(&program, &["--evaluations", "12", "--workers", "1", "--results", &results("one")]);
-    let two = run(&program, &["--evaluations", "12", "--workers", "2", "--results", &results("two")]);
-    assert_eq!(digest(&one), digest(&two));
-    assert!(one.contains("R1") && !one.contains("crash"), "{one}");
+    let runner = built("python_program");
+    let one = runner.run(&["run", "--evaluations", "12", "--workers", "1", "--results", "one"]).expect(0);
+    let two = runner.run(&["run", "--evaluations", "12", "--workers", "2", "--results", "two"]).expect(0);
+    assert_eq!(one.digest(), two.digest());
+    assert!(one.out.contains("R1") && !one.out.contains("crash"), "{}", one.out);
 
     #[cfg(target_os = "linux")]
-    no_simulator_outlives_its_worker(folder.path(), &program);
+    no_simulator_outlives_its_worker(&runner);
 }
 
 /// Kills a supervisor while a simulator of its workers is caught in a loop.
 #[cfg(target_os = "linux")]
-fn no_simulator_outlives_its_worker(folder: &Path, program: &Path) {
-    fs::write(folder.join("sim.py"), CAUGHT).unwrap();
-    let results = folder.join("caught");
-    let mut supervisor = Command::new(program)
-        .args(["run", "--workers", "1", "--results"])
-        .arg(&results)
+fn no_simulator_outlives_its_worker(runner: &Runner) {
+    fs::write(runner.folder.join("sim.py"), CAUGHT).unwrap();
+    let results = runner.folder.join("caught");
+    let mut supervisor = runner
+        .command(&["run", "--workers", "1", "--results", "caught"])
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()

@@ -1,17 +1,19 @@
 //! Generated crates really compile, and say it in our words when a hook is wrong.
 
-mod process;
+#[path = "../../sesame-codegen/tests/suite/plans.rs"]
+mod plans;
 
 use std::fs;
 use std::path::Path;
-use std::process::Command;
 
 use sesame_codegen::emit::{Templates, emit};
 use sesame_codegen::environment::{Options, environment};
 use sesame_codegen::output::{Mode, apply};
 use sesame_codegen::plan::RunnerPlan;
 
-use crate::plans::{awkward, small, with_program};
+use sesame_tests::{Done, command, done, fresh_folder, turn, workspace};
+
+use self::plans::{awkward, small, with_program};
 
 /// A project with a simulator that does nothing, and its runners.
 fn generated(folder: &Path, plans: &[RunnerPlan]) {
@@ -37,27 +39,21 @@ fn generated(folder: &Path, plans: &[RunnerPlan]) {
     apply(&out, &emit(plans, &environment).unwrap(), Mode::Write).unwrap();
 }
 
-/// Checks a runner with the versions that this workspace has locked; what rustc says.
-fn check(folder: &Path, runner: &str) -> (bool, String) {
-    let output = Command::new(env!("CARGO"))
-        .args(["check", "--offline", "--quiet", "--color", "never"])
-        // Nothing is run here: what rustc and the C compiler would spend on optimising is saved.
-        .args(["--config", "profile.dev.opt-level=0", "--config", "profile.dev.package.libsqlite3-sys.opt-level=0"])
-        .current_dir(folder.join("runners").join(runner))
-        // One folder for all of these tests and their later runs: the runtime is checked once.
-        .env("CARGO_TARGET_DIR", Path::new(env!("CARGO_TARGET_TMPDIR")).join("emitted"))
-        .env_remove("RUSTFLAGS")
-        .output()
-        .unwrap();
-    (output.status.success(), String::from_utf8_lossy(&output.stderr).into_owned())
+/// Builds a runner; what rustc says.
+fn build(folder: &Path, runner: &str) -> (bool, String) {
+    let _turn = turn("build");
+    let mut cargo = command(env!("CARGO"));
+    cargo.args(["build", "--quiet", "--color", "never"]).current_dir(folder.join("runners").join(runner));
+    let Done { code, err, .. } = done(&mut cargo);
+    (code == Some(0), err)
 }
 
 #[test]
 fn fresh_stubs_of_every_type_and_name_compile_without_a_warning() {
-    let folder = tempfile::tempdir().unwrap();
-    generated(folder.path(), &[awkward(), small("coverage")]);
+    let folder = fresh_folder("stubs_of_every_type");
+    generated(&folder, &[awkward(), small("coverage")]);
     for runner in ["type", "coverage"] {
-        let (compiles, said) = check(folder.path(), runner);
+        let (compiles, said) = build(&folder, runner);
         assert!(compiles, "{said}");
         assert!(!said.contains("src/generated") && !said.contains("hooks/"), "{said}");
     }
@@ -65,23 +61,23 @@ fn fresh_stubs_of_every_type_and_name_compile_without_a_warning() {
 
 #[test]
 fn a_runner_for_a_program_compiles_without_a_simulator_crate() {
-    let folder = tempfile::tempdir().unwrap();
-    generated(folder.path(), &[with_program("coverage")]);
-    fs::remove_dir_all(folder.path().join("simulator")).unwrap();
-    let (compiles, said) = check(folder.path(), "coverage");
+    let folder = fresh_folder("program_without_a_crate");
+    generated(&folder, &[with_program("coverage")]);
+    fs::remove_dir_all(folder.join("simulator")).unwrap();
+    let (compiles, said) = build(&folder, "coverage");
     assert!(compiles && !said.contains("src/generated"), "{said}");
 }
 
 #[test]
 fn a_hook_without_its_impl_is_named_with_its_line_in_the_space() {
-    let folder = tempfile::tempdir().unwrap();
-    generated(folder.path(), &[small("coverage")]);
+    let folder = fresh_folder("hook_without_impl");
+    generated(&folder, &[small("coverage")]);
     fs::write(
-        folder.path().join("runners/hooks/collision_occurrence.rs"),
+        folder.join("runners/hooks/collision_occurrence.rs"),
         "#[derive(Default)]\npub struct CollisionOccurrence {}\n",
     )
     .unwrap();
-    let (compiles, said) = check(folder.path(), "coverage");
+    let (compiles, said) = build(&folder, "coverage");
     assert!(!compiles);
     assert!(said.contains("error[E0277]: metric `collision_occurrence` (kuka_cell.sesame:31) has no hook"), "{said}");
     assert_eq!(said.matches("error[").count(), 1, "{said}");
@@ -89,31 +85,31 @@ fn a_hook_without_its_impl_is_named_with_its_line_in_the_space() {
 
 #[test]
 fn a_hook_without_its_struct_is_named_with_its_line_in_the_space() {
-    let folder = tempfile::tempdir().unwrap();
-    generated(folder.path(), &[small("coverage")]);
-    fs::write(folder.path().join("runners/hooks/collision_occurrence.rs"), "").unwrap();
-    let (compiles, said) = check(folder.path(), "coverage");
+    let folder = fresh_folder("hook_without_struct");
+    generated(&folder, &[small("coverage")]);
+    fs::write(folder.join("runners/hooks/collision_occurrence.rs"), "").unwrap();
+    let (compiles, said) = build(&folder, "coverage");
     assert!(!compiles);
     assert!(said.contains("// metric `collision_occurrence` (kuka_cell.sesame:31)"), "{said}");
 }
 
 #[test]
 fn hooks_may_share_a_file_of_their_own() {
-    let folder = tempfile::tempdir().unwrap();
-    generated(folder.path(), &[small("coverage")]);
-    let hook = folder.path().join("runners/hooks/collision_occurrence.rs");
+    let folder = fresh_folder("hooks_with_a_file");
+    generated(&folder, &[small("coverage")]);
+    let hook = folder.join("runners/hooks/collision_occurrence.rs");
     let filled =
         fs::read_to_string(&hook).unwrap().replace("ctx.unimplemented();", "ctx.add(shared::ONE);") + "\nmod shared;\n";
     fs::write(&hook, filled).unwrap();
     fs::write(hook.with_file_name("shared.rs"), "pub const ONE: f64 = 1.0;\n").unwrap();
-    let (compiles, said) = check(folder.path(), "coverage");
+    let (compiles, said) = build(&folder, "coverage");
     assert!(compiles && !said.contains("hooks/"), "{said}");
 }
 
 #[test]
 fn the_simulator_of_a_new_project_passes_its_own_tests() {
-    let folder = tempfile::tempdir().unwrap();
-    let project = folder.path().join("demo");
+    let folder = fresh_folder("new_simulator");
+    let project = folder.join("demo");
     sesame_codegen::output::create(
         &project,
         &sesame_codegen::project::files(
@@ -125,15 +121,10 @@ fn the_simulator_of_a_new_project_passes_its_own_tests() {
         .unwrap(),
     )
     .unwrap();
-    let workspace = sesame_codegen::environment::checkout_runtime().unwrap();
-    fs::copy(workspace.parent().unwrap().join("Cargo.lock"), project.join("simulator/Cargo.lock")).unwrap();
-    let output = Command::new(env!("CARGO"))
-        .args(["test", "--offline", "--quiet", "--color", "never"])
-        .current_dir(project.join("simulator"))
-        .env("CARGO_TARGET_DIR", Path::new(env!("CARGO_TARGET_TMPDIR")).join("emitted"))
-        .env_remove("RUSTFLAGS")
-        .output()
-        .unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
-    assert!(String::from_utf8_lossy(&output.stdout).contains("1 passed"));
+    fs::copy(workspace().join("Cargo.lock"), project.join("simulator/Cargo.lock")).unwrap();
+    let _turn = turn("build");
+    let mut cargo = command(env!("CARGO"));
+    let tested =
+        done(cargo.args(["test", "--quiet", "--color", "never"]).current_dir(project.join("simulator"))).expect(0);
+    assert!(tested.out.contains("1 passed"), "{}", tested.out);
 }
