@@ -213,21 +213,26 @@ fn constants(definition: &Definition) -> Vec<(String, String)> {
     constants.collect()
 }
 
-#[test]
-fn all_interfaces_of_real_distributions_have_a_layout_and_both_files_give_the_same() {
-    for variable in ["SESAME_ROS2_KILTED", "SESAME_ROS2_JAZZY"] {
-        let Some(share) = share(variable) else { continue };
-        let (from_msg, from_idl) = (all(&share, "msg"), all(&share, "idl"));
-        let names: Vec<&str> = from_msg.names().collect();
-        assert!(names.len() > 100, "{variable}: {}", names.len());
-        for name in names {
-            let layout = from_msg.layout(name).unwrap_or_else(|error| panic!("{variable}: {name}: {error}"));
-            if from_idl.contains(name) {
-                assert_eq!(from_idl.layout(name).unwrap(), layout, "{variable}: {name}");
-                let constants = [&from_msg, &from_idl].map(|catalogue| constants(catalogue.get(name).unwrap()));
-                assert_eq!(constants[0], constants[1], "{variable}: {name}");
+/// What an installed distribution has.
+mod real {
+    use super::*;
+
+    #[test]
+    fn all_interfaces_of_real_distributions_have_a_layout_and_both_files_give_the_same() {
+        for variable in ["SESAME_ROS2_KILTED", "SESAME_ROS2_JAZZY"] {
+            let Some(share) = share(variable) else { continue };
+            let (from_msg, from_idl) = (all(&share, "msg"), all(&share, "idl"));
+            let names: Vec<&str> = from_msg.names().collect();
+            assert!(names.len() > 100, "{variable}: {}", names.len());
+            for name in names {
+                let layout = from_msg.layout(name).unwrap_or_else(|error| panic!("{variable}: {name}: {error}"));
+                if from_idl.contains(name) {
+                    assert_eq!(from_idl.layout(name).unwrap(), layout, "{variable}: {name}");
+                    let constants = [&from_msg, &from_idl].map(|catalogue| constants(catalogue.get(name).unwrap()));
+                    assert_eq!(constants[0], constants[1], "{variable}: {name}");
+                }
             }
+            assert!(from_idl.contains("sensor_msgs/msg/JointState"), "{variable}");
         }
-        assert!(from_idl.contains("sensor_msgs/msg/JointState"), "{variable}");
     }
 }
