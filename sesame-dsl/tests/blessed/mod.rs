@@ -2,8 +2,8 @@
 //! plainest model has as well.
 //!
 //! That one is the model of `good/base.sesame`, which has each kind of declaration in its plainest form, most of them
-//! twice; its own snapshot lists what is ordinary. So a new field of the model changes that snapshot, and those of files
-//! that say more about the field. What only systems of ROS have is in `good/base_of_ros.sesame`.
+//! twice; its own snapshot lists what is ordinary. So a new field of the model changes that snapshot, and those of
+//! files that say more about the field. What only systems of ROS have is in `good/base_of_ros.sesame`.
 //! `sesame_plan::testing::compact` has the rules.
 
 use std::collections::BTreeMap;

@@ -2,14 +2,14 @@
 //!
 //! A snapshot of a whole model in the layout of `{:#?}` has thousands of lines, and a new field of a type that is
 //! everywhere changes all of them. Here a field is left out where its value is the ordinary one, which a [`Base`] says:
-//! a model or plan with each kind of part in its plainest form. What is ordinary is in the snapshot of the base alone, so a
-//! new field changes that one, and those of whatever says more about the field.
+//! a model or plan with each kind of part in its plainest form. What is ordinary is in the snapshot of the base alone,
+//! so a new field changes that one, and those of whatever says more about the field.
 //!
 //! What is left out can be told from what is there and from the base, so nothing is hidden: of the same types and with
 //! the same base, different values print differently. [`variant`] lets a test check that on its own values.
 //!
-//! A [`Tree`] is read from what `{:?}` prints, which every model and plan has, or from JSON, whose names belong to what a
-//! test of a file format is about.
+//! A [`Tree`] is read from what `{:?}` prints, which every model and plan has, or from JSON, whose names belong to what
+//! a test of a file format is about.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -120,8 +120,8 @@ impl Tree {
     }
 }
 
-/// What a type is known by: its name and fields, for several types can have one name; in JSON the place of an object, and
-/// its `kind`.
+/// What a type is known by: its name and fields, for several types can have one name; in JSON the place of an object,
+/// and its `kind`.
 fn key(kind: &str, head: &str, fields: &[(String, Tree)], place: &str) -> String {
     match (kind, head) {
         ("", "") => place.to_owned(),
@@ -156,8 +156,8 @@ impl Base {
     ///
     /// Where all values of a field are the same, and there are two at least, that is the ordinary one; of one alone
     /// nobody could say what is ordinary and what is just its own. Where they differ, or where there is one, a value
-    /// that says nothing is ordinary: an empty list, `None`, and where one has it an empty text or `false`. Other fields
-    /// are always shown.
+    /// that says nothing is ordinary: an empty list, `None`, and where one has it an empty text or `false`. Other
+    /// fields are always shown.
     pub fn of(models: &[Tree]) -> Base {
         let mut structs = BTreeMap::new();
         for model in models {
@@ -412,9 +412,8 @@ pub fn variants(tree: &Tree) -> usize {
 }
 
 /// A value that differs from another in one place. There is one for each number, up to the last: with another number,
-/// text or name, with a value where there was none or none where there was one, with an element less or one more, and in
-/// JSON with a field less. A test
-/// that nothing is hidden prints them all.
+/// text or name, with a value where there was none or none where there was one, with an element less or one more, and
+/// in JSON with a field less. A test that nothing is hidden prints them all.
 pub fn variant(tree: &Tree, number: usize) -> Option<Tree> {
     let mut changed = tree.clone();
     let mut skipped = number;
