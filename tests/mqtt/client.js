@@ -4,9 +4,9 @@
 //     node client.js wait    PORT TOPIC COUNT BATCH QUALITY
 //
 // It says `ready`. For each line on its standard input a publisher then sends a batch, at once or slowly, which are 100
-// messages per second; who waits says `count` after each batch. At its end it says as JSON how many messages there were,
-// the digest of their payloads, and of the one that waits, how many were retained. Payloads have fields and spaces that
-// no space declares.
+// messages per second; who waits says `count` after each batch. At its end it says as JSON how many messages there
+// were, the digest of their payloads, and of the one that waits, how many were retained. Payloads have fields and
+// spaces that no space declares.
 
 const { createHash } = require("crypto");
 const { createInterface } = require("readline");

@@ -8,8 +8,8 @@ use sesame_tests::{Done, command, done, fresh_folder, sesamec, workspace};
 
 use crate::peers::{Broker, packages};
 
-/// Undisturbed, an order takes between one and two seconds, of five; late by four seconds, it takes between five and six,
-/// of eight and a half that are left. What is in between is for a machine that is busy.
+/// Undisturbed, an order takes between one and two seconds, of five; late by four seconds, it takes between five and
+/// six, of eight and a half that are left. What is in between is for a machine that is busy.
 #[test]
 fn vehicles_finish_their_orders_and_under_disturbances_they_are_late_or_never_heard_of_again() {
     let Some(packages) = packages() else { return };

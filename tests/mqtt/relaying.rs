@@ -216,7 +216,8 @@ fn after_a_broker_restarts_every_topic_is_back() {
     let mut system = System::new(&space(&format!("mqtt://127.0.0.1:{port}"), "", ""), &folder);
     let at = port.to_string();
     let mut subscriber = Client::start(&packages, &["wait", &at, TOPIC, "400", "50", "1"]);
-    let publisher = RefCell::new(Client::start(&packages, &["publish", &at, UNDISTURBED, "1000000", "1000000", "1", "slowly"]));
+    let publisher =
+        RefCell::new(Client::start(&packages, &["publish", &at, UNDISTURBED, "1000000", "1000000", "1", "slowly"]));
     let ready = || publisher.borrow_mut().go();
     let mut heard_before = None;
     let outcome = system.relay_until(&Test::default(), ready, || {
