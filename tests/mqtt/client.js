@@ -1,16 +1,19 @@
 // A client of MQTT that publishes numbered messages, or waits for some.
 //
-//     node client.js publish PORT TOPIC COUNT RATE QUALITY [retain] [malformed]
-//     node client.js wait    PORT TOPIC COUNT QUALITY
+//     node client.js publish PORT TOPIC COUNT BATCH QUALITY [retain] [malformed] [slowly]
+//     node client.js wait    PORT TOPIC COUNT BATCH QUALITY
 //
-// It says `ready`, and a publisher then waits for a line on its standard input. At its end it says as JSON how many
-// messages there were, the digest of their payloads, and of the one that waits, how many were retained. Payloads have
-// fields and spaces that no space declares.
+// It says `ready`. For each line on its standard input a publisher then sends a batch, at once or slowly, which are 100
+// messages per second; who waits says `count` after each batch. At its end it says as JSON how many messages there
+// were, the digest of their payloads, and of the one that waits, how many were retained. Payloads have fields and
+// spaces that no space declares.
 
 const { createHash } = require("crypto");
+const { createInterface } = require("readline");
 const mqtt = require("mqtt");
 
-const [part, port, topic, count, ...rest] = process.argv.slice(2);
+const [part, port, topic, count, batch, quality, ...rest] = process.argv.slice(2);
+const qos = Number(quality);
 const client = mqtt.connect(`mqtt://127.0.0.1:${port}`, { reconnectPeriod: 50 });
 const digest = createHash("sha256");
 
@@ -30,27 +33,28 @@ client.once("connect", () => {
       digest.update(bytes);
       heard += 1;
       retained += packet.retain ? 1 : 0;
+      if (heard % Number(batch) === 0) console.log(JSON.stringify({ count: heard }));
+      // What is too much would come now.
       if (heard === Number(count)) setTimeout(() => end({ heard, retained }), 300);
     });
-    client.subscribe(topic, { qos: Number(rest[0]) }, () => console.log("ready"));
+    client.subscribe(topic, { qos }, () => console.log("ready"));
     return;
   }
-  const [rate, qos] = rest.map(Number);
   console.log("ready");
-  process.stdin.once("data", () => {
-    let sent = 0, done = 0;
-    const begin = Date.now();
-    const timer = setInterval(() => {
-      while (sent < Number(count) && sent <= ((Date.now() - begin) * rate) / 1000) {
-        const text = payload(sent, rest.includes("malformed"));
-        digest.update(text);
-        sent += 1;
-        client.publish(topic, text, { qos, retain: rest.includes("retain") }, () => {
-          done += 1;
-          if (done === Number(count)) end({ sent });
-        });
-      }
-      if (sent === Number(count)) clearInterval(timer);
-    }, 1);
+  let sent = 0, done = 0, permitted = 0;
+  const publish = () => {
+    const text = payload(sent, rest.includes("malformed"));
+    digest.update(text);
+    sent += 1;
+    client.publish(topic, text, { qos, retain: rest.includes("retain") }, () => {
+      done += 1;
+      if (done === Number(count)) end({ sent });
+    });
+  };
+  const isPermitted = () => sent < Math.min(permitted, Number(count));
+  if (rest.includes("slowly")) setInterval(() => isPermitted() && publish(), 10);
+  createInterface({ input: process.stdin }).on("line", () => {
+    permitted += Number(batch);
+    while (!rest.includes("slowly") && isPermitted()) publish();
   });
 });

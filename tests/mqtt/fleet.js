@@ -14,11 +14,11 @@ const url = `mqtt://127.0.0.1:${port}`;
 const settings = { interfaceName: "uagv", transport: { brokerUrl: url }, vdaVersion: "2.0.0" };
 const vehicles = Array.from({ length: Number(count) }, (_, at) => ({ manufacturer: "acme", serialNumber: `agv${at}` }));
 
-/** Starts the vehicles, each six metres per second fast. */
+/** Starts the vehicles, each twelve metres per second fast. */
 async function drive() {
   for (const [at, vehicle] of vehicles.entries()) {
     const start = { mapId: "hall", x: 0, y: 2 * at, theta: 0, lastNodeId: "start" };
-    const adapter = { initialPosition: start, vehicleSpeed: 6, tickRate: 20 };
+    const adapter = { initialPosition: start, vehicleSpeed: 12, tickRate: 20 };
     const options = { agvAdapterType: VirtualAgvAdapter, publishStateInterval: 500 };
     await new AgvController(vehicle, settings, options, adapter).start();
   }

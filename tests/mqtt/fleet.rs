@@ -8,6 +8,8 @@ use sesame_tests::{Done, command, done, fresh_folder, sesamec, workspace};
 
 use crate::peers::{Broker, packages};
 
+/// Undisturbed, an order takes between one and two seconds, of five; late by four seconds, it takes between five and
+/// six, of eight and a half that are left. What is in between is for a machine that is busy.
 #[test]
 fn vehicles_finish_their_orders_and_under_disturbances_they_are_late_or_never_heard_of_again() {
     let Some(packages) = packages() else { return };
@@ -29,25 +31,25 @@ fn vehicles_finish_their_orders_and_under_disturbances_they_are_late_or_never_he
            topic finished   = \"fleet/finished\"                           : Finished\n\
            node vehicles {{\n\
              publishes state, connection  subscribes order\n\
-             launch \"node\" \"{program}\" \"vehicles\" \"{vehicles}\" {{ ready when line \"ready\" within 30s }}\n\
+             launch \"node\" \"{program}\" \"vehicles\" \"{vehicles}\" {{ ready when line \"ready\" within 120s }}\n\
            }}\n\
            node control {{\n\
              publishes order, finished  subscribes state, connection  broker \"mqtt://127.0.0.1:{control}\"\n\
-             launch \"node\" \"{program}\" \"control\" \"{control}\" {{ ready when line \"ready\" within 30s }}\n\
+             launch \"node\" \"{program}\" \"control\" \"{control}\" {{ ready when line \"ready\" within 120s }}\n\
            }}\n\
            node report {{ subscribes finished  broker \"mqtt://127.0.0.1:{control}\" }}\n\
          }}\n\
          metric slowest  maximise default 60s = max(finished.seconds)\n\
-         requirement R1 \"Orders are finished soon\" = slowest <= 4.5s\n\
+         requirement R1 \"Orders are finished soon\" = slowest <= 5s\n\
          operation late on order = latency [0s, 10s]\n\
          operation lost on state = blackhole\n\
-         test late_orders {{ late delay 3s from 0s to 8s  expect slowest >= 5s }}\n\
-         test lost_states {{ lost from 0s to 8s  expect slowest >= 60s }}\n\
+         test late_orders {{ late delay 4s from 0s to 10s  expect slowest >= 5s }}\n\
+         test lost_states {{ lost from 0s to 10s  expect slowest >= 60s }}\n\
          campaign first {{\n\
            objectives slowest\n\
            operations late, lost 1 per test\n\
            search     random {{ evaluations 2 }}\n\
-           end        after 8s\n\
+           end        after 10s\n\
          }}\n",
         vehicles = vehicles.0,
         control = control.0,
@@ -67,7 +69,7 @@ fn vehicles_finish_their_orders_and_under_disturbances_they_are_late_or_never_he
         let metrics = test["metrics"].as_array().expect("metrics are measured");
         metrics.iter().find(|it| it["metric"] == "slowest").expect("it is among them")["simulation"]["mean"].as_f64()
     };
-    assert!(slowest(&tests[0]).is_some_and(|seconds| (5.0..8.0).contains(&seconds)), "late: {found:#}");
+    assert!(slowest(&tests[0]).is_some_and(|seconds| (5.0..10.0).contains(&seconds)), "late: {found:#}");
     assert_eq!(slowest(&tests[1]), Some(60.0), "never: {found:#}");
     let page = fs::read_to_string(folder.join("runners/first/results/prepare/report.html"));
     assert!(page.expect("it ends in a page").contains("id=\"known\""));

@@ -2,9 +2,10 @@
 
 use std::fs;
 use std::io::{BufRead as _, BufReader, Write as _};
-use std::net::{Ipv4Addr, TcpListener, TcpStream};
+use std::net::{Ipv4Addr, TcpListener, TcpStream, UdpSocket};
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdout, Command, Stdio};
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
@@ -25,16 +26,40 @@ pub(crate) fn packages() -> Option<PathBuf> {
     packages
 }
 
-/// A port that nobody listens on.
-pub(crate) fn free_port() -> u16 {
-    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).expect("there is a free port");
-    listener.local_addr().expect("it has an address").port()
+/// How long anything may take: longer than it ever takes, on a machine that is busy too.
+pub(crate) const LIMIT: Duration = Duration::from_secs(120);
+
+/// A port for a broker that no other test on this machine uses meanwhile.
+#[derive(Debug)]
+pub(crate) struct Port {
+    number: u16,
+    /// The datagrams of the same port, which nobody wants: whoever has them has the port.
+    _held: UdpSocket,
+}
+
+impl Port {
+    /// One that nobody listens on. The ports lie below those that the system gives to whoever asks for any, so nobody
+    /// takes it before the broker does, or while the broker is being started again. Each process looks from another one
+    /// on: what has just been used may yet have a late visitor.
+    pub(crate) fn free() -> Self {
+        const FIRST: u16 = 10_000;
+        const COUNT: usize = 1_500;
+        let free = (0..COUNT).find_map(|at| {
+            let number = FIRST + u16::try_from((at + std::process::id() as usize) % COUNT).ok()?;
+            let held = UdpSocket::bind((Ipv4Addr::LOCALHOST, number)).ok()?;
+            TcpListener::bind((Ipv4Addr::LOCALHOST, number)).is_ok().then_some(Port { number, _held: held })
+        });
+        free.expect("so many ports are enough for the tests of one machine")
+    }
 }
 
 /// A broker, which is ended when it is dropped.
 pub(crate) struct Broker {
     pub(crate) port: u16,
-    _child: Ended,
+    held: Port,
+    // Ended before somebody else may have its port.
+    child: Option<Ended>,
+    settings: PathBuf,
 }
 
 /// A program that is ended when it is dropped.
@@ -50,30 +75,46 @@ impl Drop for Ended {
 impl Broker {
     /// One for everybody on this machine.
     pub(crate) fn start(folder: &Path) -> Broker {
-        Broker::start_at(folder, free_port(), "allow_anonymous true\n")
+        Broker::with(folder, "allow_anonymous true\n")
     }
 
-    /// One at a port, with these settings.
-    pub(crate) fn start_at(folder: &Path, port: u16, settings: &str) -> Broker {
+    /// One with these settings.
+    pub(crate) fn with(folder: &Path, settings: &str) -> Broker {
+        let held = Port::free();
+        let port = held.number;
         let file = folder.join(format!("mosquitto-{port}.conf"));
         // Without a limit on what waits, so that nothing is dropped for a slow client.
         let settings = format!("listener {port} 127.0.0.1\nmax_queued_messages 0\nuser root\n{settings}");
         fs::write(&file, settings).expect("settings can be written");
-        let child = Command::new("mosquitto").arg("-c").arg(&file).stderr(Stdio::null()).spawn();
-        let child = Ended(child.expect("mosquitto starts"));
-        let limit = Instant::now() + Duration::from_secs(20);
-        while TcpStream::connect((Ipv4Addr::LOCALHOST, port)).is_err() {
+        let mut broker = Broker { port, held, child: None, settings: file };
+        broker.begin();
+        broker
+    }
+
+    /// Ends it and starts it again.
+    pub(crate) fn restart(&mut self) {
+        self.child = None;
+        self.begin();
+    }
+
+    fn begin(&mut self) {
+        let child = Command::new("mosquitto").arg("-c").arg(&self.settings).stderr(Stdio::null()).spawn();
+        self.child = Some(Ended(child.expect("mosquitto starts")));
+        let limit = Instant::now() + LIMIT;
+        while TcpStream::connect((Ipv4Addr::LOCALHOST, self.held.number)).is_err() {
             assert!(Instant::now() < limit, "mosquitto does not listen");
             std::thread::sleep(Duration::from_millis(20));
         }
-        Broker { port, _child: child }
     }
 }
 
 /// A client in JavaScript, which is ended when it is dropped.
 pub(crate) struct Client {
     child: Ended,
-    said: BufReader<ChildStdout>,
+    said: Receiver<String>,
+    /// How many messages it said that it has heard.
+    count: u64,
+    last: String,
 }
 
 impl Client {
@@ -87,22 +128,35 @@ impl Client {
             .stdout(Stdio::piped())
             .spawn();
         let mut child = Ended(child.expect("node starts"));
-        let said = BufReader::new(child.0.stdout.take().expect("its output is a pipe"));
-        let mut client = Client { child, said };
-        assert_eq!(client.line(), "ready");
-        client
+        let output = BufReader::new(child.0.stdout.take().expect("its output is a pipe"));
+        let (sender, said) = channel();
+        std::thread::spawn(move || output.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
+        let ready = said.recv_timeout(LIMIT);
+        assert_eq!(ready.as_deref(), Ok("ready"), "{arguments:?}");
+        Client { child, said, count: 0, last: String::new() }
     }
 
-    fn line(&mut self) -> String {
-        let mut line = String::new();
-        self.said.read_line(&mut line).expect("it speaks UTF-8");
-        line.trim_end().to_owned()
+    fn hear(&mut self, line: String) {
+        let said: Option<Value> = serde_json::from_str(&line).ok();
+        if let Some(count) = said.and_then(|said| said["count"].as_u64()) {
+            self.count = count;
+        }
+        self.last = line;
     }
 
-    /// Tells a publisher to begin.
+    /// How many messages it has said until now that it has heard.
+    pub(crate) fn count(&mut self) -> u64 {
+        while let Ok(line) = self.said.try_recv() {
+            self.hear(line);
+        }
+        self.count
+    }
+
+    /// Tells a publisher to send the next ones.
     pub(crate) fn go(&mut self) {
         let input = self.child.0.stdin.as_mut().expect("its input is a pipe");
-        input.write_all(b"\n").and_then(|()| input.flush()).expect("it listens");
+        // One that has sent all does not listen any more.
+        let _ = input.write_all(b"\n").and_then(|()| input.flush());
     }
 
     /// Whether it has ended by itself.
@@ -112,7 +166,9 @@ impl Client {
 
     /// What it said at its end.
     pub(crate) fn end(mut self) -> Value {
-        let line = self.line();
-        serde_json::from_str(&line).unwrap_or_else(|_| panic!("it ended without a word: {line}"))
+        while let Ok(line) = self.said.recv_timeout(LIMIT) {
+            self.hear(line);
+        }
+        serde_json::from_str(&self.last).unwrap_or_else(|_| panic!("it ended without a word: {}", self.last))
     }
 }

@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use sesame_plan::Test;
 use sesame_tests::fresh_folder;
 
-use crate::peers::{Broker, free_port, packages};
+use crate::peers::{Broker, packages};
 use crate::relaying::{System, space};
 
 pub(crate) const SECRET: &str = "s3cret-of-the-fleet";
@@ -53,7 +53,7 @@ fn a_wrong_password_and_none_are_refused_and_the_right_one_is_not() {
         return;
     }
     let folder = fresh_folder("mqtt_passwords");
-    let broker = Broker::start_at(&folder, free_port(), &passwords(&folder));
+    let broker = Broker::with(&folder, &passwords(&folder));
     let at = format!("mqtt://127.0.0.1:{}", broker.port);
     fs::write(folder.join("right"), SECRET).expect("a file can be written");
     fs::write(folder.join("wrong"), "wrong-secret").expect("a file can be written");
@@ -76,7 +76,7 @@ fn plain_text_to_a_port_of_tls_is_refused_and_so_is_a_certificate_that_nobody_vo
         return;
     }
     let folder = fresh_folder("mqtt_tls");
-    let broker = Broker::start_at(&folder, free_port(), &format!("{}{}", passwords(&folder), certificate(&folder)));
+    let broker = Broker::with(&folder, &format!("{}{}", passwords(&folder), certificate(&folder)));
     fs::write(folder.join("right"), SECRET).expect("a file can be written");
     let login = "user \"relay\"  password from file \"right\"";
     let plain = said(&folder, &format!("mqtt://127.0.0.1:{}", broker.port), login).expect_err("it is plain text");

@@ -78,8 +78,8 @@ pub(crate) struct Domain {
     _held: Vec<UdpSocket>,
 }
 
-/// Domains of tests. Their ports lie below those that the system gives to whoever asks for any, and no example is in one
-/// of these domains.
+/// Domains of tests. Their ports lie below those that the system gives to whoever asks for any, and no example is in
+/// one of these domains.
 const DOMAINS: std::ops::Range<u16> = 62..100;
 
 impl Domain {

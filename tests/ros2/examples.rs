@@ -166,10 +166,11 @@ fn spread_of_free_runs(folder: &str) -> Option<(Value, f64, f64)> {
         ("    every      step left_states, right_states, between, workers, left_tool, right_tool\n", ""),
         ("right_bias 5 times", "right_bias 3 times"),
     ];
-    let Some(cell) = iiwa_cell(folder, &freely) else { return None };
+    let cell = iiwa_cell(folder, &freely)?;
     let ran = cell.sesamec("run", "repeated", &["--", "--workers", "1", "--format", "json"]).expect(0);
-    let ran: Value = serde_json::from_str(&ran.out).unwrap();
-    let spread = ran["spreads"].as_array().unwrap().iter().find(|spread| spread["metric"] == "arm_distance").unwrap();
+    let ran: Value = serde_json::from_str(&ran.out).expect("it is JSON");
+    let spreads = ran["spreads"].as_array().expect("there are spreads");
+    let spread = spreads.iter().find(|spread| spread["metric"] == "arm_distance").expect("one is of the arms");
     let number = |field: &str| spread[field].as_f64().unwrap_or_else(|| panic!("no `{field}` in {spread}"));
     assert_eq!(spread["count"], 3, "{spread}");
     assert!(number("min") <= number("mean") && number("mean") <= number("max"), "{spread}");

@@ -14,8 +14,8 @@ use sesame_tests::{Project, fresh_folder, target, workspace};
 use crate::environment::{Domain, Vendor};
 use crate::relaying::plan;
 
-/// What a message needs on its way from the monitor to the runner at most, in seconds, on a machine that has nothing else
-/// to do.
+/// What a message needs on its way from the monitor to the runner at most, in seconds, on a machine that has nothing
+/// else to do.
 const ON_ITS_WAY: f64 = 0.5;
 
 const BUILT_IN: &str = "eddi upright publishes state {

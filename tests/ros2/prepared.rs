@@ -158,7 +158,9 @@ fn nodes_behind_a_bridge_are_prepared() {
 fn what_is_added_over_each_middleware_stays_within_half_a_second_at_200_hz() {
     let [domain, bridged] = [(), ()].map(|()| Domain::free());
     let behind = Middleware::rosbridge(&bridged, None);
-    let (Some(ros2), Some(ros1), Some(behind)) = (Middleware::ros2(&domain), Middleware::ros1(), behind) else { return };
+    let (Some(ros2), Some(ros1), Some(behind)) = (Middleware::ros2(&domain), Middleware::ros1(), behind) else {
+        return;
+    };
     let worlds = [
         World::new("prepared_ros2_quick", domain, &ros2, "500ms"),
         World::new("prepared_ros1_quick", Domain::free(), &ros1, "500ms"),

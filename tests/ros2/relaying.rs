@@ -229,10 +229,10 @@ impl System {
         let finished = self.drive(
             test,
             || {
-                std::iter::once(from)
-                    .chain(beside.iter().copied())
-                    .chain(to.iter().copied())
-                    .for_each(Peer::await_match)
+                from.await_match();
+                for peer in beside.iter().chain(to) {
+                    peer.await_match();
+                }
             },
             |relay, _| {
                 let seen: u64 = wires.iter().map(|&wire| relay.next_index(wire)).sum();
@@ -245,7 +245,9 @@ impl System {
                         peer.go();
                         peer.await_said("begun");
                     }
-                    beside.iter().for_each(|peer| peer.go());
+                    for peer in beside {
+                        peer.go();
+                    }
                 }
                 // So few are on their way that no queue between here and there is too short for them.
                 let heard = to.iter().map(|peer| peer.told("count")).min().unwrap_or_default();

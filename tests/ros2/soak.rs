@@ -23,8 +23,8 @@ fn memory() -> u64 {
 /// After how many messages of ROS it is seen to it that they arrive.
 const BATCH: u64 = 500;
 
-/// So many messages of ROS; the memory after a tenth of them, and after each part of the others. Few are under way at any
-/// time, so a machine that is busy fills no queue.
+/// So many messages of ROS; the memory after a tenth of them, and after each part of the others. Few are under way at
+/// any time, so a machine that is busy fills no queue.
 fn soaked(count: u64) -> Option<Vec<u64>> {
     let python = Vendor::Kilted.python()?;
     let domain = Domain::free();

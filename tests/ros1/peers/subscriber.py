@@ -2,11 +2,10 @@
 
     subscriber.py TOPIC TYPE COUNT WITHIN
 
-It ends when so many came, or that with the number in a line on its standard input, or after so many seconds without one.
-TYPE `*` takes any type.
-Of messages with a header it says how old they were when they came, in microseconds: of half of them at most so much, and
-of 99 in a hundred. Of numbers as texts it says which are missing between those that came, as pairs of the first one and
-their count.
+It ends when so many came, or that with the number in a line on its standard input, or after so many seconds without
+one. TYPE `*` takes any type. Of messages with a header it says how old they were when they came, in microseconds: of
+half of them at most so much, and of 99 in a hundred. Of numbers as texts it says which are missing between those that
+came, as pairs of the first one and their count.
 """
 
 import hashlib

@@ -5,12 +5,12 @@
     any_types.py subscribe --types 30 --count 10
 
 With rclpy the types are installed ones, in a random order; with Cyclone DDS (`--folder`) they are random definitions,
-and `types` writes their `.msg` files below that folder. Publisher and subscriber print how many samples there were,
-and a digest of each topic: over the bytes with rclpy, and with Cyclone DDS over what it serialises anew. Both say `up`,
-and `matched` when somebody is at the other end of each topic. A publisher sends a probe on each topic for a line `probe`,
+and `types` writes their `.msg` files below that folder. Publisher and subscriber print how many samples there were, and
+a digest of each topic: over the bytes with rclpy, and with Cyclone DDS over what it serialises anew. Both say `up`, and
+`matched` when somebody is at the other end of each topic. A publisher sends a probe on each topic for a line `probe`,
 and all samples for `go`; a subscriber says `heard` with the number of the probe that it has heard on all topics, and at
-a line it says `begun`: what comes then are samples. A publisher stays until its input ends (`common.py` says why).
-Exit codes: 0 all was sent or came; 2 nobody subscribed, or not all came in time.
+a line it says `begun`: what comes then are samples. A publisher stays until its input ends (`common.py` says why). Exit
+codes: 0 all was sent or came; 2 nobody subscribed, or not all came in time.
 """
 
 import argparse

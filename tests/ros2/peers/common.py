@@ -1,9 +1,9 @@
 """What the peers that use rclpy share: their options, qualities of service, and how they wait for each other.
 
 Peers say what has happened as lines of JSON, which a test waits for: `up` when their publishers and subscribers are
-there, `matched` when somebody is at the other end. Somebody who is matched on one side may need a while to be matched on
-the other, so a publisher that is told `probe` sends a message that belongs to nothing, and a subscriber says `heard` with
-its number. When all have heard the latest one, nothing that is sent from then on is lost.
+there, `matched` when somebody is at the other end. Somebody who is matched on one side may need a while to be matched
+on the other, so a publisher that is told `probe` sends a message that belongs to nothing, and a subscriber says `heard`
+with its number. When all have heard the latest one, nothing that is sent from then on is lost.
 """
 
 import argparse
@@ -22,7 +22,7 @@ def add_topic(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--best-effort", action="store_true", help="best effort instead of reliable")
     parser.add_argument("--transient-local", action="store_true", help="transient local instead of volatile")
     parser.add_argument("--depth", type=int, default=1000, help="how many samples are kept (default: 1000)")
-    parser.add_argument("--timeout", type=float, default=120.0, help="seconds without anything to give up (default: 120)")
+    parser.add_argument("--timeout", type=float, default=120.0, help="seconds of silence at most (default: 120)")
 
 
 def quality(options: argparse.Namespace) -> QoSProfile:

@@ -90,7 +90,7 @@ def main() -> None:
     parser.add_argument("--best-effort", action="store_true", help="best effort instead of reliable")
     parser.add_argument("--transient-local", action="store_true", help="transient local instead of volatile")
     parser.add_argument("--depth", type=int, default=1000, help="how many samples are kept (default: 1000)")
-    parser.add_argument("--timeout", type=float, default=120.0, help="seconds without anything to give up (default: 120)")
+    parser.add_argument("--timeout", type=float, default=120.0, help="seconds of silence at most (default: 120)")
     options = parser.parse_args()
     participant = DomainParticipant(int(os.environ.get("ROS_DOMAIN_ID", "0")))
     wanted = quality(options.best_effort, options.transient_local, options.depth)

@@ -27,7 +27,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1, help="of the samples (default: 1)")
     parser.add_argument("--short", action="store_true", help="numbers of a few digits, as JSON has them")
     parser.add_argument("--hold", action="store_true", help="do what lines on standard input say")
-    parser.add_argument("--batch", type=int, help="with --hold: how many samples are sent for each `go`; by default all")
+    parser.add_argument("--batch", type=int, help="with --hold: how many are sent for each `go`; by default all")
     options = parser.parse_args()
     if options.type not in TYPES:
         parser.error(f"--type must be one of {', '.join(TYPES)}")

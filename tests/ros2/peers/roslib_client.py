@@ -3,10 +3,10 @@
     roslib_client.py publish PORT TOPIC COUNT BATCH
     roslib_client.py wait    PORT TOPIC COUNT BATCH [COMPRESSION]
 
-It connects as soon as somebody listens, and says `matched` then. For each line on its standard input a publisher sends a
-`probe`, which is no message, or for `go` a batch of messages; who waits says `heard` with the number of the probe that it
-has heard, and `count` after each batch. At the end it says as JSON how many messages there were, and the digest of what
-they say; a publisher stays until its input ends. Exit codes: 0 all of them; 2 nothing came for too long.
+It connects as soon as somebody listens, and says `matched` then. For each line on its standard input a publisher sends
+a `probe`, which is no message, or for `go` a batch of messages; who waits says `heard` with the number of the probe
+that it has heard, and `count` after each batch. At the end it says as JSON how many messages there were, and the digest
+of what they say; a publisher stays until its input ends. Exit codes: 0 all of them; 2 nothing came for too long.
 """
 
 import hashlib

@@ -1,8 +1,9 @@
 """Subscribes by rclpy, without deserialising, and prints number and digest of the samples as JSON.
 
-It says `up` and `matched`, and `heard` with the number of each probe, which is no sample (`common.py`). With `--tell` it
-says `count` after every so many samples. With `--until-told` it ends at a line on its standard input, once nothing more
-comes. Exit codes: 0 all samples came; 2 nothing came for too long; 3 a sample could not be read (only with `--content`).
+It says `up` and `matched`, and `heard` with the number of each probe, which is no sample (`common.py`). With `--tell`
+it says `count` after every so many samples. With `--until-told` it ends at a line on its standard input, once nothing
+more comes. Exit codes: 0 all samples came; 2 nothing came for too long; 3 a sample could not be read (only with
+`--content`).
 """
 
 import argparse

@@ -5,11 +5,12 @@
 //     node client.mjs attempt URL [TOKEN] [QUERY]
 //     node client.mjs malformed PORT COUNT
 //
-// `publish` and `wait` connect as soon as somebody listens, and say `matched` then. For each line on its standard input a
-// publisher sends a `probe`, which is no message, or for `go` a batch of messages; who waits says `heard` with the number
-// of the probe that it has heard, and `count` after each batch. At the end they say as JSON how many messages there were,
-// and the digest of what they say; a publisher stays until its input ends. `attempt` says whether it was let in, with a
-// token in a header or in the address. `malformed` sends what is no operation, and says how many reports it got.
+// `publish` and `wait` connect as soon as somebody listens, and say `matched` then. For each line on its standard input
+// a publisher sends a `probe`, which is no message, or for `go` a batch of messages; who waits says `heard` with the
+// number of the probe that it has heard, and `count` after each batch. At the end they say as JSON how many messages
+// there were, and the digest of what they say; a publisher stays until its input ends. `attempt` says whether it was
+// let in, with a token in a header or in the address. `malformed` sends what is no operation, and says how many reports
+// it got.
 
 import { createHash } from "node:crypto";
 import { createInterface } from "node:readline";

@@ -7,7 +7,7 @@ use sesame_plan::{
 };
 use sesame_relay::lifecycle::launch::Part;
 use sesame_relay::metric::MetricTable;
-use sesame_relay::relay::Relay;
+use sesame_relay::relay::{Exchange as _, Relay};
 use sesame_relay::wire::WireTable;
 
 use super::*;
@@ -60,12 +60,13 @@ fn launched_programs_find_the_master_of_their_worker_and_write_into_its_folder()
 mod real {
     use super::*;
 
-    #[test]
-    fn a_launched_master_and_nodes_find_each_other_and_are_remapped() {
+    /// Two runs of a launched system whose publisher publishes at 100 Hz, each until something holds of how many messages
+    /// there were and of the time: how many there were at the end of each.
+    fn launched_twice(is_over: impl Fn(u64, SimTime) -> bool) -> Option<[u64; 2]> {
         let Some(python) = std::env::var_os("SESAME_ROS1").map(PathBuf::from) else {
             assert!(std::env::var("CI").as_deref() != Ok("true"), "SESAME_ROS1 names no Python");
             eprintln!("skipped: SESAME_ROS1 names no Python that has rospy");
-            return;
+            return None;
         };
         let mut plan = plan();
         let launch = |program: &str, arguments: &[&str], when: ReadyWhen| Launch {
@@ -73,7 +74,7 @@ mod real {
                 program: program.to_owned(),
                 arguments: arguments.iter().map(|&it| it.to_owned()).collect(),
             },
-            ready: Some(Ready { when, within: 30.0 }),
+            ready: Some(Ready { when, within: 120.0 }),
         };
         let port = ReadyWhen::Port { port: "{port}".to_owned() };
         plan.simulator.lifecycle.launch = Some(launch("roscore", &["-p", "{port}"], port));
@@ -84,26 +85,41 @@ mod real {
             launch(&python.display().to_string(), &arguments, ReadyWhen::Line { text: "ready".to_owned() })
         };
         plan.nodes[0].launch = Some(peer("publisher.py", &["100", "at-once"]));
-        plan.nodes[1].launch = Some(peer("subscriber.py", &["20"]));
+        plan.nodes[1].launch = Some(peer("subscriber.py", &["600"]));
         plan.validate().unwrap();
         let folder = tempfile::tempdir().unwrap();
         let mut transport = at_place(&plan, ros1_of(&plan), place_in(folder.path()));
         // The second run has a master of its own again.
-        for _ in 0..2 {
+        let both = [(), ()].map(|()| {
             let wires = WireTable::new(&plan);
             let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
             let mut relay = Relay::new(&plan, &wires, &test_of(Vec::new()), metrics.start(), &[]).unwrap();
             relay.begin();
             transport.reset(1, &mut relay).unwrap();
-            let until = SimTime::from_seconds(2.0);
-            while transport.now() < until {
+            let peer = wires.find("/peer").unwrap();
+            while !is_over(relay.next_index(peer), transport.now()) {
+                assert!(transport.now() < SimTime::from_seconds(120.0), "messages are awaited");
+                let until = transport.now() + SimTime::from_nanos(20_000_000);
                 transport.advance(until, &mut relay).unwrap();
             }
-            let messages = relay.finish(until).messages;
-            assert!((150..=220).contains(&messages), "two seconds of 100 Hz: {messages}");
-        }
+            relay.finish(transport.now()).messages
+        });
         transport.close();
         assert_eq!(transport.incidents().notes, [""; 0]);
         assert!(folder.path().join("ros/log").is_dir());
+        Some(both)
+    }
+
+    #[test]
+    fn a_launched_master_and_nodes_find_each_other_and_are_remapped() {
+        let both = launched_twice(|messages, _| messages >= 150);
+        assert!(both.is_none_or(|both| both.iter().all(|&messages| messages >= 150)), "{both:?}");
+    }
+
+    #[test]
+    #[ignore = "long: a rate, with nothing beside it"]
+    fn two_seconds_of_a_launched_system_have_what_is_published_in_them() {
+        let Some(both) = launched_twice(|_, now| now >= SimTime::from_seconds(2.0)) else { return };
+        assert!(both.iter().all(|messages| (150..=220).contains(messages)), "two seconds of 100 Hz: {both:?}");
     }
 }

@@ -4,7 +4,8 @@ use std::time::Instant;
 
 use sesame_plan::testing::{at, evidence_above, field, guarantee, message, monitor, node, operation, test_of, use_of};
 use sesame_plan::{
-    CampaignPlan, Channel, Choice, Clock, Gate, MessageId, Node, NodeId, Operation, OperationKind, Test, TextTest, TopicId, Type,
+    CampaignPlan, Channel, Choice, Clock, Gate, MessageId, Node, NodeId, Operation, OperationKind, Test, TextTest,
+    TopicId, Type,
 };
 
 use crate::core::{Core, Program};
@@ -71,7 +72,8 @@ fn heard_by(mut plan: CampaignPlan, names: &[&str]) -> CampaignPlan {
     plan
 }
 
-/// How many messages `rosbag record` queues. On a busy machine it may be given so many at once, and drops what is beyond.
+/// How many messages `rosbag record` queues. On a busy machine it may be given so many at once, and drops what is
+/// beyond.
 const FEW: u64 = 100;
 
 /// What `rostopic hz` says of so many messages at 200 Hz of which the runner, a subscriber and a bag have each one.

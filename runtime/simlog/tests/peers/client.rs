@@ -17,10 +17,10 @@ fn patient(url: &str, patience: u64) -> Options {
 fn what_is_not_taken_overflows() {
     let Some(peer) = Peer::start("simulator2.py", &["--eager"]) else { return };
     let bounds = Bounds { messages: 5, bytes: 1 << 20 };
-    let mut client = Client::connect(&Options { bounds, ..patient(&peer.url(), 5000) }).expect("it listens");
+    let mut client = Client::connect(&Options { bounds, ..patient(&peer.url(), 120_000) }).expect("it listens");
     client.set_step(20).expect("it takes any");
     client.listen("point/in", "").expect("there is such a topic");
-    assert_eq!(client.await_streams(Duration::from_secs(5)), Ok(true));
+    assert_eq!(client.await_streams(Duration::from_secs(120)), Ok(true));
     for _ in 0..10 {
         client.step().expect("it takes steps");
     }
@@ -36,11 +36,11 @@ fn what_is_not_taken_overflows() {
 
 #[test]
 fn nobody_is_named() {
-    let port = TcpListener::bind("127.0.0.1:0").expect("there are ports").local_addr().expect("it has one").port();
-    let url = format!("http://127.0.0.1:{port}");
-    let nobody = Client::connect(&patient(&url, 300)).unwrap_err();
+    // No program is given this port if it asks for any.
+    let url = "http://127.0.0.1:1";
+    let nobody = Client::connect(&patient(url, 300)).unwrap_err();
     assert!(matches!(nobody, ClientError::Unreachable { .. }), "{nobody}");
-    assert!(nobody.to_string().contains(&url), "{nobody}");
+    assert!(nobody.to_string().contains(url), "{nobody}");
 }
 
 #[test]

@@ -7,7 +7,7 @@ use sesame_relay::metric::MetricTable;
 use sesame_relay::wire::WireTable;
 
 use crate::peer::Peer;
-use crate::recorder::{plan, transport};
+use crate::recorder::{plan, settles, transport};
 
 const INT: Type = Type::Int { unit: None };
 
@@ -16,6 +16,7 @@ fn a_state_reaches_a_simulator_although_no_message_says_how_it_is_written() {
     let topics = [("seldom", Type::Real { unit: None }), ("ordered", INT), ("order", INT)];
     let mut plan = plan("", SimlogVersion::V2, &topics);
     plan.nodes[0].every_step = vec![TopicId(1)];
+    settles(&mut plan, 200);
     let late = evidence_above("late", 0, 15.0);
     plan.monitors = vec![monitor("cart", 2, vec![late], vec![guarantee("late", 2, Gate::Evidence(0))])];
     let ordered = FieldRef { topic: TopicId(1), path: Vec::new() };

@@ -124,6 +124,13 @@ pub(crate) fn plan(url: &str, protocol: SimlogVersion, topics: &[(&str, Type)]) 
     plan
 }
 
+/// Ends a step when nothing has come for so many milliseconds, where nobody says how much comes: longer than a message
+/// is ever late on a machine that is busy.
+pub(crate) fn settles(plan: &mut CampaignPlan, milliseconds: u64) {
+    let sesame_plan::Transport::Simlog(simlog) = &mut plan.simulator.transport else { panic!("it speaks SimlogAPI") };
+    simlog.settle_ns = milliseconds * 1_000_000;
+}
+
 /// The transport of a plan.
 pub(crate) fn transport(plan: &CampaignPlan) -> Box<dyn Transport> {
     transport_in(plan, Path::new(env!("CARGO_MANIFEST_DIR")))

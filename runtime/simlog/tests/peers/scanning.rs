@@ -15,7 +15,8 @@ fn found(peer: &Peer, version: SimlogVersion, names: WireNames, topics: &[&str],
         names,
         steps,
         step_ms: 20,
-        listening: Duration::from_secs(3),
+        // After steps it ends as soon as nothing more comes; without them it hears nothing.
+        listening: Duration::from_millis(if steps > 0 { 60_000 } else { 500 }),
     };
     scan(&Options::new(&peer.url(), version), &wanted).expect("the peer runs")
 }

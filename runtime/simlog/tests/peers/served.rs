@@ -60,7 +60,7 @@ fn served(options: server::Options) -> SocketAddr {
     std::thread::spawn(move || {
         server::serve(&options, |address| sender.send(address).expect("it is awaited"), Cart::start)
     });
-    receiver.recv_timeout(Duration::from_secs(10)).expect("it listens")
+    receiver.recv_timeout(Duration::from_secs(120)).expect("it listens")
 }
 
 fn anywhere() -> server::Options {
@@ -164,6 +164,6 @@ fn what_cannot_be_done_is_said() {
     }
     client.set_step(20).expect("that is a length");
     client.listen("carts/in", "").expect("it is asked for only");
-    let said = client.await_streams(Duration::from_secs(5)).unwrap_err().to_string();
+    let said = client.await_streams(Duration::from_secs(120)).unwrap_err().to_string();
     assert!(said.contains("no topic `carts/in`"), "{said}");
 }
