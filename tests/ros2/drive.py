@@ -8,8 +8,9 @@ example say, and how fast it went.
     venv/bin/python drive.py iiwa_cell --relay --bias /right/joint_states 0 -0.3 --from 2 --until 5
 
 With `--relay` the topics that controllers answer and their answers pass through this program, as those that a test
-disturbs pass through a runner. Then runs must print the same digest. Without it they need not: an answer reaches this
-program and the simulator at different moments, so a step may begin before the simulator has it.
+disturbs pass through a runner, and nodes are asked whether they have what passes this program by. Then runs must print
+the same digest. Without it they need not: an answer reaches this program and the simulator at different moments, so a
+step may begin before the simulator has it.
 """
 
 import argparse
@@ -30,6 +31,7 @@ from rclpy.executors import SingleThreadedExecutor, TimeoutException
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
 from geometry_msgs.msg import PoseStamped, Twist
+from rcl_interfaces.srv import GetParameters
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Header
 from std_srvs.srv import Trigger
@@ -47,6 +49,7 @@ class Example:
             self.simulator = ["cell.py", "--lock-step"]
             self.controllers = [["controller.py", "--arm", arm] for arm in ("left", "right")]
             self.services = "/cell"
+            self.asked = ["/left_controller", "/right_controller"]
             self.period = 0.02
             self.states = {f"/{arm}/joint_states": JointState for arm in ("left", "right")}
             self.answers = {f"/{arm}/joint_commands": JointState for arm in ("left", "right")}
@@ -55,6 +58,7 @@ class Example:
             self.simulator = ["fleet.py", "--lock-step"]
             self.controllers = [["planner.py"]]
             self.services = "/fleet"
+            self.asked = []
             self.period = 0.1
             self.states = {f"/robot_{i}/pose": PoseStamped for i in ROBOTS} | {"/fleet/tick": Header}
             self.answers = {f"/robot_{i}/cmd_vel": Twist for i in ROBOTS}
@@ -114,6 +118,11 @@ class Driver:
                 self.publishers[topic] = self.node.create_publisher(kind, topic, deep)
         self.step_service = self.node.create_client(Trigger, f"{example.services}/step")
         self.reset_service = self.node.create_client(Trigger, f"{example.services}/reset")
+        # What passes this program by is there when a node has answered a question that was asked after it was sent.
+        self.questions = [
+            self.node.create_client(GetParameters, f"{name}/get_parameters")
+            for name in (example.services, *example.asked)
+        ]
 
     def spin_until(self, done, seconds: float = 120.0) -> None:
         """Handles messages until a condition holds."""
@@ -132,12 +141,17 @@ class Driver:
 
     def call(self, client) -> None:
         """Calls a service and waits for its answer."""
-        future = client.call_async(Trigger.Request())
+        future = client.call_async(client.srv_type.Request())
         self.spin_until(future.done)
+
+    def ask(self, clients: list) -> None:
+        """Waits until nodes have handled what was sent to them before."""
+        for client in clients:
+            self.call(client)
 
     def match(self) -> None:
         """Waits until all nodes have found each other."""
-        for client in (self.step_service, self.reset_service):
+        for client in (self.step_service, self.reset_service, *self.questions):
             if not client.wait_for_service(timeout_sec=120.0):
                 sys.exit("drive.py: the simulator offers no service")
         node = self.node
@@ -189,6 +203,8 @@ class Driver:
             self.now = number * self.example.period
             self.call(self.step_service)
             self.spin_until(lambda: all(self.received[topic] for topic in self.example.states))
+            if self.relay:
+                self.ask(self.questions[1:])  # of the distance between the arms
             delivered = 0
             for topic in self.example.states:
                 raw = self.received[topic].pop(0)
@@ -203,6 +219,9 @@ class Driver:
                     if self.relay:
                         self.publishers[topic].publish(raw)
                 self.received[topic].clear()
+            if self.relay and self.example.asked:
+                # Of the zone: those who ask for it, who grants it, and those who are answered.
+                self.ask([*self.questions[1:], self.questions[0], *self.questions[1:]])
             for topic in self.example.measures:
                 for raw in self.received[topic]:
                     digest.update(raw)
@@ -277,7 +296,7 @@ def main() -> None:
                 node.terminate()
             for node in nodes:
                 try:
-                    node.wait(3)
+                    node.wait(60)
                 except subprocess.TimeoutExpired:
                     node.kill()
                     print(f"drive.py: {node.args[1]} did not end by itself", file=sys.stderr)

@@ -155,7 +155,6 @@ fn noise_is_fitted_by_how_much_runs_differ_and_varied_from_run_to_run() {
         assert!(child.try_wait().unwrap().is_none(), "it ended before it was killed");
         lines() >= 4
     });
-    println!("{} simulations were tried", lines());
     child.kill().unwrap();
     child.wait().unwrap();
     let again = study.sesamec(&[&asked[..], &["--format", "json"]].concat()).expect(0);

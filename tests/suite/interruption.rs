@@ -91,7 +91,7 @@ impl Clock {
     /// Waits until a run has come this share of its way, or has ended.
     pub(crate) fn wait(&self, process: &mut Child, moment: f64, recorded: impl Fn() -> usize) {
         let way = moment * (self.tests + 1) as f64;
-        let before = way.floor() as usize;
+        let before = (0..=self.tests).rev().find(|&tests| tests as f64 <= way).unwrap_or(0);
         patience::until(format_args!("{before} tests are recorded"), || {
             recorded() >= before || process.try_wait().unwrap().is_some()
         });
@@ -101,7 +101,7 @@ impl Clock {
             _ if before >= self.tests => self.last,
             _ => self.next,
         };
-        sleep(step.mul_f64(way.fract()));
+        sleep(step.mul_f64(way - before as f64));
     }
 }
 

@@ -114,7 +114,6 @@ fn violations_that_were_found_get_smaller_and_stay_violations() {
         assert!(process.try_wait().unwrap().is_none(), "it ended before it could be killed");
         recorded() >= 8
     });
-    println!("{} tests are recorded", recorded());
     process.kill().unwrap();
     process.wait().unwrap();
     no_worker_is_left(&runner);

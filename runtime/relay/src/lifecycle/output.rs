@@ -7,8 +7,7 @@ use std::io::{self, Read, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc};
 use std::thread;
-
-use crate::lifecycle::limits::END_LIMIT;
+use std::time::Duration;
 
 /// How many bytes of a test are logged.
 const LOGGED_BYTES: u64 = 1 << 20;
@@ -16,6 +15,10 @@ const LOGGED_BYTES: u64 = 1 << 20;
 /// How many bytes and lines are kept for error messages.
 const KEPT_BYTES: usize = 4096;
 const KEPT_LINES: usize = 3;
+
+/// How long it may take until all that an ended program has written is read. It takes longer than a moment if this
+/// process is not given a turn, or if another one holds the stream that cannot be ended.
+const READ_LIMIT: Duration = Duration::from_secs(10);
 
 /// Reads what a program writes in threads and copies it to this process's own standard error, up to a limit for each
 /// test.
@@ -127,7 +130,7 @@ impl OutputTail {
 
     /// The last lines of a program that has ended.
     pub(super) fn last_lines(&self) -> String {
-        self.end.recv_timeout(END_LIMIT).ok();
+        self.end.recv_timeout(READ_LIMIT).ok();
         self.last_lines_so_far()
     }
 

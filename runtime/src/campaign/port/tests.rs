@@ -1,7 +1,7 @@
 //! Attacks on the port, over real sockets.
 
 use std::io::Write as _;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 
 use sesame_patience as patience;
@@ -17,7 +17,7 @@ struct Attack {
     begun: Sender<()>,
     done: AtomicBool,
     /// Bytes that were written one by one.
-    written: AtomicUsize,
+    written: AtomicU32,
 }
 
 impl Attack {
@@ -25,7 +25,7 @@ impl Attack {
     fn on(port: &Port) -> (Attack, Receiver<()>) {
         let (begun, has_begun) = channel();
         let address = port.address().unwrap();
-        (Attack { address, begun, done: AtomicBool::new(false), written: AtomicUsize::new(0) }, has_begun)
+        (Attack { address, begun, done: AtomicBool::new(false), written: AtomicU32::new(0) }, has_begun)
     }
 
     /// The strangers have connected: now the worker comes.
@@ -118,7 +118,7 @@ fn a_byte_every_so_often_holds_up_nobody_and_does_not_move_the_deadline() {
         assert_eq!(error.kind(), io::ErrorKind::TimedOut, "{error}");
         // Were the deadline moved by each byte, all of them would be heard first.
         let written = attack.written.load(Ordering::Relaxed);
-        assert!(written < WHOLE as usize, "{written} bytes were written");
+        assert!(written < WHOLE, "{written} bytes were written");
     });
 }
 
