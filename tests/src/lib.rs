@@ -97,6 +97,11 @@ pub fn command(program: impl AsRef<Path>) -> Command {
         .env("NO_COLOR", "1")
         .env("RUST_BACKTRACE", "0")
         .stdin(Stdio::null());
+    // Optimising the runtime as runners do takes longer than all that runners of the suite do with it; the results are
+    // the same bits. The long suite measures runners as they are.
+    if std::env::var("NEXTEST_PROFILE").as_deref() != Ok("long") {
+        command.env("CARGO_PROFILE_DEV_OPT_LEVEL", "1");
+    }
     command
 }
 
