@@ -296,7 +296,7 @@ def main() -> None:
                 node.terminate()
             for node in nodes:
                 try:
-                    node.wait(60)
+                    node.wait(5)
                 except subprocess.TimeoutExpired:
                     node.kill()
                     print(f"drive.py: {node.args[1]} did not end by itself", file=sys.stderr)

@@ -152,7 +152,7 @@ const LARGE: &[(&str, Expected)] = &[
 /// Ends the runner itself, so it is in none of the others.
 const KILLS_THE_RUNNER: &str = "kills_the_runner";
 
-/// How long a test may take, in seconds: little where it takes for ever, and more than enough where it comes to its end.
+/// How long a test may take, in seconds: little where it takes for ever, and enough where it comes to its end.
 const LITTLE: &str = "3";
 const ENOUGH: &str = "120";
 
