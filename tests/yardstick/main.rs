@@ -23,8 +23,8 @@ fn main() {
             let value = f64::from(number).sqrt() * 0.5 + words.get(&word).copied().unwrap_or(1.0);
             words.insert(word, value);
         }
-        let text: String = words.iter().map(|(word, value)| format!("{word} {value:.3}\n")).collect();
-        for line in text.lines() {
+        let lines: Vec<String> = words.iter().map(|(word, value)| format!("{word} {value:.3}")).collect();
+        for line in lines.join("\n").lines() {
             let value: f64 = line.split_once(' ').and_then(|(_, value)| value.parse().ok()).expect("it was written so");
             sum += value;
         }

@@ -1,14 +1,12 @@
 //! Diagnostics and their renderers, over all files of the corpus: what they may say, and that every code occurs.
 
-mod files;
-
 use std::collections::BTreeSet;
 
 use sesame_dsl::analyse;
 use sesame_dsl::diagnostic::{CODES, page, render};
 use sesame_dsl::source::SourceMap;
 
-use files::{analyse_text, corpus};
+use crate::files::{analyse_text, corpus};
 
 #[test]
 fn nothing_in_a_file_becomes_a_command_of_github() {
@@ -96,7 +94,7 @@ fn codes_are_unique_and_sorted_and_found_in_any_case() {
 
 #[test]
 fn ten_mistakes_give_ten_diagnostics_at_once() {
-    let text = include_str!("bad/ten_mistakes.sesame");
+    let text = include_str!("../bad/ten_mistakes.sesame");
     let (sources, analysis) = analyse_text("ten_mistakes", text);
     let lines: Vec<u32> =
         analysis.diagnostics.iter().map(|diagnostic| sources.position(diagnostic.span).line).collect();
@@ -109,7 +107,7 @@ fn ten_mistakes_give_ten_diagnostics_at_once() {
 
 #[test]
 fn one_line_and_json_say_the_same_as_the_long_form() {
-    let (sources, analysis) = analyse_text("ten_mistakes", include_str!("bad/ten_mistakes.sesame"));
+    let (sources, analysis) = analyse_text("ten_mistakes", include_str!("../bad/ten_mistakes.sesame"));
     insta::assert_snapshot!("ten_mistakes_short", render::short(&analysis.diagnostics, &sources));
     insta::assert_snapshot!("ten_mistakes_json", render::json(&analysis.diagnostics, &sources));
     insta::assert_snapshot!("ten_mistakes_github", render::github(&analysis.diagnostics, &sources));

@@ -1,8 +1,6 @@
 //! Suggestions, applied: each removes the mistake it belongs to, and one that a program may apply without asking makes
 //! no other mistake.
 
-mod files;
-
 use std::collections::{BTreeMap, BTreeSet};
 
 use proptest::prelude::*;
@@ -12,13 +10,13 @@ use proptest::test_runner::{RngSeed, TestRunner};
 use sesame_dsl::diagnostic::{Applicability, Code, Diagnostic, Severity, Suggestion};
 use sesame_dsl::span::Span;
 
-use files::{analyse_text, corpus};
+use crate::files::{analyse_text, corpus};
 
 /// Spaces of the examples, in order, which mutations begin with.
 const EXAMPLES: [&str; 3] = [
-    include_str!("../../examples/kuka_cell/kuka_cell.sesame"),
-    include_str!("../../examples/two_robots/two_robots.sesame"),
-    include_str!("good/whole_language.sesame"),
+    include_str!("../../../examples/kuka_cell/kuka_cell.sesame"),
+    include_str!("../../../examples/two_robots/two_robots.sesame"),
+    include_str!("../good/whole_language.sesame"),
 ];
 
 fn diagnostics(text: &str) -> Vec<Diagnostic> {

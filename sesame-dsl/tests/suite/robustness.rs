@@ -1,17 +1,15 @@
 //! Any text gets an answer: no panic, spans that lie in the file, and an answer in every rendering.
 
-mod sound;
-
 use proptest::prelude::*;
 
-use sound::{analyse_text, has_a_sound_answer};
+use crate::sound::{analyse_text, has_a_sound_answer};
 
 const SAMPLES: &[&str] = &[
-    include_str!("good/kuka_cell.sesame"),
-    include_str!("good/conditions.sesame"),
-    include_str!("bad/ten_mistakes.sesame"),
-    include_str!("bad/e0104_later_constructs.sesame"),
-    include_str!("good/blocks.sesame"),
+    include_str!("../good/kuka_cell.sesame"),
+    include_str!("../good/conditions.sesame"),
+    include_str!("../bad/ten_mistakes.sesame"),
+    include_str!("../bad/e0104_later_constructs.sesame"),
+    include_str!("../good/blocks.sesame"),
 ];
 
 /// Pieces that mean something somewhere.

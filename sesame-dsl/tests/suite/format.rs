@@ -149,7 +149,7 @@ fn every_construct_of_the_grammar_is_in_a_file_that_is_formatted() {
 
 #[test]
 fn the_layout_of_an_untidy_file() {
-    insta::assert_snapshot!(formatted(include_str!("format/untidy.sesame")).unwrap());
+    insta::assert_snapshot!(formatted(include_str!("../format/untidy.sesame")).unwrap());
 }
 
 #[test]
@@ -234,7 +234,7 @@ proptest! {
 
 #[test]
 fn examples_and_new_projects_are_in_the_layout() {
-    let template = include_str!("../../templates/project/space.sesame.tera").replace("{{ name }}", "demo");
+    let template = include_str!("../../../templates/project/space.sesame.tera").replace("{{ name }}", "demo");
     let examples = files().into_iter().filter(|(path, _)| path.to_string_lossy().contains("examples"));
     for (path, text) in examples.chain([("the space of a new project".into(), template)]) {
         assert_eq!(formatted(&text).unwrap(), text, "{}: `sesamec fmt` brings it into the layout", path.display());

@@ -8,16 +8,14 @@
 //! `SESAME_FUZZ_MINUTES` says how long (1 if not said), `SESAME_FUZZ_SEED` which mutations, `SESAME_FUZZ_KEEP` a folder
 //! for what is kept: all of it in `kept`, in `worth_keeping` what would make the corpus better.
 
-mod sound;
-
 use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hasher as _};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
+use crate::sound::has_a_sound_answer;
 use sesame_dsl::Analysis;
-use sound::has_a_sound_answer;
 
 /// Most a text grows to.
 const MAX_BYTES: usize = 12_000;
@@ -336,7 +334,7 @@ fn no_text_is_too_much_for_the_front_end() {
     let mut child = Command::new("sh")
         .args(["-c", &format!("ulimit -v {MAX_MEMORY_KIB}; exec \"$@\""), "sh"])
         .arg(&program)
-        .args(["--exact", "search", "--ignored", "--nocapture"])
+        .args(["--exact", "fuzz::search", "--ignored", "--nocapture"])
         .env("SESAME_FUZZ_KEEP", &keep)
         .spawn()
         .expect("there is a shell");

@@ -121,7 +121,7 @@ fn the_first_of_several_definitions_is_meant_and_imported_ones_are_first() {
 
 #[test]
 fn what_is_known_inside_of_a_monitor_is_meant_there() {
-    let text = include_str!("good/blocks.sesame");
+    let text = include_str!("../good/blocks.sesame");
     let (sources, index, _) = index(text);
     let at = |name: &str, line: u32| (name.to_owned(), line);
     assert_eq!(uses(&sources, &index, "transport.conveyor_stops"), [at("transport", 37), at("transport", 38)]);
@@ -132,7 +132,7 @@ fn what_is_known_inside_of_a_monitor_is_meant_there() {
 
 #[test]
 fn what_is_said_of_a_monitor_elsewhere_mentions_it_and_its_parts() {
-    let text = include_str!("good/monitors.sesame");
+    let text = include_str!("../good/monitors.sesame");
     let (sources, index, has_errors) = index(text);
     assert!(!has_errors);
     let who = |name: &str| uses(&sources, &index, name).into_iter().map(|(who, _)| who).collect::<Vec<_>>();

@@ -20,7 +20,7 @@ use sesame_dsl::diagnostic::{CODES, Severity, render};
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::{analyse, load_imports, units};
 
-const GRAMMAR: &str = include_str!("../../grammars/sesame.pest");
+const GRAMMAR: &str = include_str!("../../../grammars/sesame.pest");
 
 fn project() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the crate lies in the project").to_owned()
