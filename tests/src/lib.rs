@@ -252,22 +252,23 @@ impl Project {
 }
 
 /// The runner of a campaign in a fresh folder of this name, built once for all tests that ask for the same one: those
-/// that give the same key. They must leave the project as it is.
+/// that give the same key. They must leave the project as it is. The program has another name for each test, by which its
+/// processes are told from those of others.
 pub fn shared(name: &str, key: &str, campaign: &str, project: impl FnOnce(&str) -> Project) -> Runner {
     let home = scratch().join("shared").join(key);
-    let stamp = home.join("run");
-    let program = home.join("program");
+    let (stamp, program) = (home.join("run"), home.join("program"));
     let folder = fresh_folder(name);
+    let runner = Runner { program: folder.join("program"), folder };
     let _turn = turn("build");
-    if fs::read_to_string(&stamp).is_ok_and(|run| run == this_run()) {
-        return Runner { program, folder };
+    if fs::read_to_string(&stamp).ok().as_deref() != Some(this_run()) {
+        fs::create_dir_all(&home).expect("a folder can be made");
+        let built = project(key).built(campaign);
+        let _ = fs::remove_file(&program);
+        fs::hard_link(&built.program, &program).expect("what was built can be linked");
+        fs::write(&stamp, this_run()).expect("a stamp can be written");
     }
-    fs::create_dir_all(&home).expect("a folder can be made");
-    let built = project(key).built(campaign);
-    let _ = fs::remove_file(&program);
-    fs::hard_link(&built.program, &program).expect("what was built can be linked");
-    fs::write(&stamp, this_run()).expect("a stamp can be written");
-    Runner { program, folder }
+    fs::hard_link(&program, &runner.program).expect("what was built can be linked");
+    runner
 }
 
 /// What tells this run of the tests from all others: nextest says it, and cargo runs all tests of a program in one

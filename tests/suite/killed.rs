@@ -18,7 +18,7 @@ use proptest::test_runner::{RngSeed, TestRunner};
 use sesame_base::observation::Outcome;
 use sesame_patience as patience;
 use sesame_results::record::{Repository, TestRow, Verdict};
-use sesame_tests::{Done, Project, Runner, shared, workspace};
+use sesame_tests::{Done, Project, Runner, workspace};
 
 use crate::interruption::Clock;
 
@@ -32,9 +32,8 @@ fn breeding(name: &str, campaign: &str) -> Option<Runner> {
         return None;
     }
     let space = fs::read_to_string(workspace().join("tests/simulators/breeding/space.sesame")).unwrap();
-    Some(shared(name, &format!("breeding-{campaign}"), campaign, |key| {
-        Project::new(key, &space.replace("NAME", "breeding"), "breeding")
-    }))
+    // Simulators run in the project's folder, by which their processes are found, so each test has one of its own.
+    Some(Project::new(name, &space.replace("NAME", name), "breeding").build(campaign))
 }
 
 /// What a process is in a campaign.
