@@ -8,7 +8,7 @@ use sesame_base::observation::Outcome;
 use sesame_results::record::{Origin, Repository};
 use sesame_tests::{Done, Project, Runner, shared, workspace};
 
-/// The runner of a campaign on the faulty simulator, with its hook filled in.
+/// The runner of a campaign on the faulty simulator, with its hook filled in, for tests that say where results go.
 pub(crate) fn faulty(name: &str, campaign: &str) -> Runner {
     recording(name, campaign, "")
 }
@@ -16,21 +16,24 @@ pub(crate) fn faulty(name: &str, campaign: &str) -> Runner {
 /// The same, with this clause in all campaigns.
 pub(crate) fn recording(name: &str, campaign: &str, clause: &str) -> Runner {
     let key = format!("faulty {campaign} {clause}").trim_end().replace(' ', "-");
-    shared(name, &key, campaign, |key| {
-        let space = fs::read_to_string(workspace().join("tests/simulators/faulty/space.sesame")).unwrap();
-        let space = space.replace("  end        after 1s\n", &format!("  end        after 1s\n  {clause}\n"));
-        let project = Project::new(key, &space.replace("NAME", "faulty"), "faulty");
-        project.sesamec("generate", &["--campaign", campaign]).expect(0);
-        let hook = project.runners.join("hooks/fragile.rs");
-        let stub = fs::read_to_string(&hook).unwrap();
-        let body = "match heard {
+    shared(name, &key, campaign, |key| project(key, campaign, clause))
+}
+
+/// A project in a folder of this name, with such a runner.
+pub(crate) fn project(name: &str, campaign: &str, clause: &str) -> Project {
+    let space = fs::read_to_string(workspace().join("tests/simulators/faulty/space.sesame")).unwrap();
+    let space = space.replace("  end        after 1s\n", &format!("  end        after 1s\n  {clause}\n"));
+    let project = Project::new(name, &space.replace("NAME", "faulty"), "faulty");
+    project.sesamec("generate", &["--campaign", campaign]).expect(0);
+    let hook = project.runners.join("hooks/fragile.rs");
+    let stub = fs::read_to_string(&hook).unwrap();
+    let body = "match heard {
             1.0 => panic!(\"the hook was given a 1\"),
             2.0 => ctx.set(f64::NAN),
             _ => ctx.set(heard),
         }";
-        fs::write(&hook, stub.replace("ctx.unimplemented();", body)).unwrap();
-        project
-    })
+    fs::write(&hook, stub.replace("ctx.unimplemented();", body)).unwrap();
+    project
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::fs;
 use nix::sys::signal::Signal;
 use sesame_tests::{Runner, workspace};
 
-use crate::faults::faulty;
+use crate::faults::project;
 use crate::interruption::Running;
 
 /// The folder of results that a runner has by default, without what an earlier run of these tests left there.
@@ -18,7 +18,7 @@ fn results(runner: &Runner) -> std::path::PathBuf {
 
 #[test]
 fn without_a_folder_the_killed_run_is_gone_on_with_and_the_latest_one_reported() {
-    let runner = faulty("latest", "harmless");
+    let runner = project("latest", "harmless", "").build("harmless");
     let results = results(&runner);
     let nothing = runner.run(&["resume"]).expect(1);
     assert!(nothing.err.contains("there is nothing to go on with"), "{}", nothing.err);

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
-use sesame_tests::{Done, Project, command, done, fresh_folder, target, workspace};
+use sesame_tests::{Done, Project, command, done, fresh_folder, target, turn, workspace};
 
 use crate::monitors::rows;
 
@@ -77,6 +77,8 @@ fn project(name: &str, space: &str) -> Project {
 /// The built program of the monitor.
 fn built(project: &Project) -> PathBuf {
     project.sesamec("generate", &["--eddi", "transport"]).expect(0);
+    // Another test's monitor has the same name.
+    let _turn = turn("build");
     let cargo = |subcommand: &str| project.cargo("transport_monitor", subcommand).expect(0);
     let said = cargo("build").err;
     assert!(!said.contains("warning"), "{said}");
