@@ -252,8 +252,8 @@ impl Project {
 }
 
 /// The runner of a campaign in a fresh folder of this name, built once for all tests that ask for the same one: those
-/// that give the same key. They must leave the project as it is. The program has another name for each test, by which its
-/// processes are told from those of others.
+/// that give the same key. They must leave the project as it is. The program has another name for each test, by which
+/// its processes are told from those of others.
 pub fn shared(name: &str, key: &str, campaign: &str, project: impl FnOnce(&str) -> Project) -> Runner {
     let home = scratch().join("shared").join(key);
     let (stamp, program) = (home.join("run"), home.join("program"));

@@ -60,8 +60,8 @@ fn launched_programs_find_the_master_of_their_worker_and_write_into_its_folder()
 mod real {
     use super::*;
 
-    /// Two runs of a launched system whose publisher publishes at 100 Hz, each until something holds of how many messages
-    /// there were and of the time: how many there were at the end of each.
+    /// Two runs of a launched system whose publisher publishes at 100 Hz, each until something holds of how many
+    /// messages there were and of the time: how many there were at the end of each.
     fn launched_twice(is_over: impl Fn(u64, SimTime) -> bool) -> Option<[u64; 2]> {
         let Some(python) = std::env::var_os("SESAME_ROS1").map(PathBuf::from) else {
             assert!(std::env::var("CI").as_deref() != Ok("true"), "SESAME_ROS1 names no Python");
