@@ -166,22 +166,7 @@ pub fn innermost(ty: &WireType) -> &WireType {
 /// A type as a `.msg` file has it.
 pub fn in_words(ty: &WireType) -> String {
     match ty {
-        WireType::Primitive { primitive } => {
-            let word = match primitive {
-                Primitive::Bool => "bool",
-                Primitive::Int8 => "int8",
-                Primitive::Uint8 => "uint8",
-                Primitive::Int16 => "int16",
-                Primitive::Uint16 => "uint16",
-                Primitive::Int32 => "int32",
-                Primitive::Uint32 => "uint32",
-                Primitive::Int64 => "int64",
-                Primitive::Uint64 => "uint64",
-                Primitive::Float32 => "float32",
-                Primitive::Float64 => "float64",
-            };
-            word.to_owned()
-        }
+        WireType::Primitive { primitive } => primitive.name().to_owned(),
         WireType::String => "string".to_owned(),
         WireType::WString => "wstring".to_owned(),
         WireType::Interface { name } => name.clone(),

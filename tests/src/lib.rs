@@ -97,8 +97,8 @@ pub fn command(program: impl AsRef<Path>) -> Command {
         .env("NO_COLOR", "1")
         .env("RUST_BACKTRACE", "0")
         .stdin(Stdio::null());
-    // Optimising the runtime as runners do takes longer than all that runners of the suite do with it; the results are
-    // the same bits. The long suite measures runners as they are.
+    // The suite compiles the runtime several times, so it is optimised less than in runners of users. The long suite
+    // measures runners as they are.
     if std::env::var("NEXTEST_PROFILE").as_deref() != Ok("long") {
         command.env("CARGO_PROFILE_DEV_OPT_LEVEL", "1");
     }

@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-/// How often the work is done: about two seconds on a machine of 2024.
+/// How often the work is done.
 const TIMES: u32 = 200;
 
 fn main() {
