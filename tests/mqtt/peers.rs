@@ -2,14 +2,14 @@
 
 use std::fs;
 use std::io::{BufRead as _, BufReader, Write as _};
-use std::net::{Ipv4Addr, TcpListener, TcpStream, UdpSocket};
+use std::net::{Ipv4Addr, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
-use sesame_tests::workspace;
+use sesame_tests::{Port, workspace};
 
 /// The folder of the peers' packages. Without one the test is to be skipped, which is said here; with `CI=true` that is
 /// an error.
@@ -28,30 +28,6 @@ pub(crate) fn packages() -> Option<PathBuf> {
 
 /// How long anything may take: longer than it ever takes, on a machine that is busy too.
 pub(crate) const LIMIT: Duration = Duration::from_secs(120);
-
-/// A port for a broker that no other test on this machine uses meanwhile.
-#[derive(Debug)]
-pub(crate) struct Port {
-    number: u16,
-    /// The datagrams of the same port, which nobody wants: whoever has them has the port.
-    _held: UdpSocket,
-}
-
-impl Port {
-    /// One that nobody listens on. The ports lie below those that the system gives to whoever asks for any, so nobody
-    /// takes it before the broker does, or while the broker is being started again. Each process looks from another one
-    /// on: what has just been used may yet have a late visitor.
-    pub(crate) fn free() -> Self {
-        const FIRST: u16 = 10_000;
-        const COUNT: usize = 1_500;
-        let free = (0..COUNT).find_map(|at| {
-            let number = FIRST + u16::try_from((at + std::process::id() as usize) % COUNT).ok()?;
-            let held = UdpSocket::bind((Ipv4Addr::LOCALHOST, number)).ok()?;
-            TcpListener::bind((Ipv4Addr::LOCALHOST, number)).is_ok().then_some(Port { number, _held: held })
-        });
-        free.expect("so many ports are enough for the tests of one machine")
-    }
-}
 
 /// A broker, which is ended when it is dropped.
 pub(crate) struct Broker {
@@ -81,7 +57,7 @@ impl Broker {
     /// One with these settings.
     pub(crate) fn with(folder: &Path, settings: &str) -> Broker {
         let held = Port::free();
-        let port = held.number;
+        let port = held.number();
         let file = folder.join(format!("mosquitto-{port}.conf"));
         // Without a limit on what waits, so that nothing is dropped for a slow client.
         let settings = format!("listener {port} 127.0.0.1\nmax_queued_messages 0\nuser root\n{settings}");
@@ -101,7 +77,7 @@ impl Broker {
         let child = Command::new("mosquitto").arg("-c").arg(&self.settings).stderr(Stdio::null()).spawn();
         self.child = Some(Ended(child.expect("mosquitto starts")));
         let limit = Instant::now() + LIMIT;
-        while TcpStream::connect((Ipv4Addr::LOCALHOST, self.held.number)).is_err() {
+        while TcpStream::connect((Ipv4Addr::LOCALHOST, self.held.number())).is_err() {
             assert!(Instant::now() < limit, "mosquitto does not listen");
             std::thread::sleep(Duration::from_millis(20));
         }

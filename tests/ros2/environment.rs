@@ -1,8 +1,9 @@
 //! The Pythons of the peers, and domains and ports in which tests do not hear each other.
 
-use std::fmt;
-use std::net::{Ipv4Addr, TcpListener, UdpSocket};
+use std::net::{Ipv4Addr, UdpSocket};
 use std::path::{Path, PathBuf};
+
+use sesame_tests::from_own_place;
 
 /// An environment with a middleware.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -97,42 +98,4 @@ impl Domain {
         });
         free.expect("so many domains are enough for the tests of one machine")
     }
-}
-
-/// A port for a server that no other test on this machine uses meanwhile.
-#[derive(Debug)]
-pub(crate) struct Port {
-    number: u16,
-    /// The datagrams of the same port, which nobody wants: whoever has them has the port.
-    _held: UdpSocket,
-}
-
-impl Port {
-    /// One that nobody listens on. The ports lie below those that the system gives to whoever asks for any, so nobody
-    /// takes it before the server does, or while the server is being started again.
-    pub(crate) fn free() -> Self {
-        let free = from_own_place(12_000..=14_999).into_iter().find_map(|number| {
-            let held = UdpSocket::bind((Ipv4Addr::LOCALHOST, number)).ok()?;
-            TcpListener::bind((Ipv4Addr::LOCALHOST, number)).is_ok().then_some(Port { number, _held: held })
-        });
-        free.expect("so many ports are enough for the tests of one machine")
-    }
-
-    pub(crate) fn number(&self) -> u16 {
-        self.number
-    }
-}
-
-impl fmt::Display for Port {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.number.fmt(f)
-    }
-}
-
-/// All of these numbers, but each process begins elsewhere: what has just been used may yet have a late message.
-fn from_own_place(all: std::ops::RangeInclusive<u16>) -> Vec<u16> {
-    let mut all: Vec<u16> = all.collect();
-    let own = std::process::id() as usize % all.len();
-    all.rotate_left(own);
-    all
 }

@@ -9,7 +9,7 @@ use sesame_relay::monitor::Decided;
 use sesame_relay::trace::feed_telling;
 use sesame_relay::wire::WireTable;
 use sesame_results::record::Repository;
-use sesame_tests::{Project, fresh_folder, target, workspace};
+use sesame_tests::{Project, fresh_folder, workspace};
 
 use crate::environment::{Domain, Vendor};
 use crate::relaying::plan;
@@ -65,11 +65,7 @@ fn built(name: &str, domain: &Domain) -> PathBuf {
     let folder = fresh_folder(&format!("{name}_inside"));
     let project = Project { space: folder.join("swing.sesame"), runners: folder.join("runners"), folder };
     fs::write(&project.space, space(domain, "", BUILT_IN)).expect("a space can be written");
-    project.sesamec("generate", &["--eddi", "upright"]).expect(0);
-    project.cargo("upright_monitor", "build").expect(0);
-    let program = project.folder.join("monitor");
-    fs::copy(target().join("debug/swing-upright_monitor"), &program).expect("what was built can be copied");
-    program
+    project.monitor("upright")
 }
 
 /// Compares what a monitor beside real nodes publishes with what the runner decides on the same recording: the longest

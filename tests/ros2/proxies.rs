@@ -7,9 +7,9 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use sesame_plan::Test;
-use sesame_tests::{fresh_folder, workspace};
+use sesame_tests::{Port, fresh_folder, workspace};
 
-use crate::environment::{Domain, Port, packages_of_roslib};
+use crate::environment::{Domain, packages_of_roslib};
 use crate::peer::{LIMIT, Peer};
 use crate::relaying::{Exchange, System, plan, space};
 use crate::rosbridge::{BATCH, JOINTS, Pythons, Server};

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
 use sesame_plan::Test;
-use sesame_tests::workspace;
+use sesame_tests::{Port, workspace};
 
-use crate::environment::{Domain, Port, Vendor};
+use crate::environment::{Domain, Vendor};
 use crate::peer::Peer;
 use crate::relaying::{Exchange, System, plan, space};
 

@@ -11,9 +11,9 @@ use std::time::{Duration, Instant};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::Value;
-use sesame_tests::{Done, command, done, fresh_folder, sesamec, workspace};
+use sesame_tests::{Done, Port, command, done, fresh_folder, sesamec, workspace};
 
-use crate::environment::{Domain, Port, Vendor};
+use crate::environment::{Domain, Vendor};
 use crate::peer::{LIMIT, Peer};
 use crate::rosbridge::{JOINTS, Pythons, Server};
 

@@ -7,6 +7,7 @@ pub mod dds;
 pub mod gap;
 pub mod models;
 pub mod optimisers;
+mod port;
 mod python;
 pub mod python_mcap;
 pub mod rtamt;
@@ -17,6 +18,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::sync::OnceLock;
 use std::time::{SystemTime, UNIX_EPOCH};
+
+pub use port::{Port, from_own_place};
 
 /// The root of the workspace.
 pub fn workspace() -> &'static Path {
@@ -218,22 +221,39 @@ impl Project {
     pub fn run(&self, campaign: &str, arguments: &[&str]) -> Done {
         // Cargo puts the program where another project's of the same name may be, and it is started from there.
         let _turn = turn("build");
+        let runner = self.runners.join(campaign);
+        if runner.exists() {
+            renew(&runner);
+        }
         self.sesamec("run", &[&["--campaign", campaign], arguments].concat())
     }
 
     /// Generates and builds the runner of a campaign, without running it.
     pub fn build(&self, campaign: &str) -> Runner {
-        let _turn = turn("build");
-        self.built(campaign)
+        self.built(&turn("build"), campaign)
     }
 
-    /// The same for one who has the turn.
-    fn built(&self, campaign: &str) -> Runner {
+    fn built(&self, turn: &Turn, campaign: &str) -> Runner {
         self.sesamec("generate", &["--campaign", campaign]).expect(0);
-        let built = self.cargo(campaign, "build");
+        let built = self.cargo(turn, campaign, "build");
         assert_eq!(built.code, Some(0), "{}", built.err);
-        let package = fs::read_to_string(self.runners.join(campaign).join("Cargo.toml")).expect("there is a manifest");
-        let name = package.lines().find_map(|line| line.strip_prefix("name = \"")).expect("a package has a name");
+        Runner { program: self.program(campaign), folder: self.folder.clone() }
+    }
+
+    /// Generates and builds the program of a monitor, without a warning.
+    pub fn monitor(&self, monitor: &str) -> PathBuf {
+        let turn = turn("build");
+        self.sesamec("generate", &["--eddi", monitor]).expect(0);
+        let package = format!("{monitor}_monitor");
+        let built = self.cargo(&turn, &package, "build").expect(0);
+        assert!(!built.err.contains("warning"), "{}", built.err);
+        self.program(&package)
+    }
+
+    /// The program of a package that has just been built, in the project's own folder.
+    fn program(&self, package: &str) -> PathBuf {
+        let manifest = fs::read_to_string(self.runners.join(package).join("Cargo.toml")).expect("there is a manifest");
+        let name = manifest.lines().find_map(|line| line.strip_prefix("name = \"")).expect("a package has a name");
         let name = name.trim_end_matches('"');
         let program = self.folder.join(name);
         // In the target folder, another project of the same name overwrites the program, so it gets a second name here;
@@ -241,13 +261,31 @@ impl Project {
         // its place.
         let _ = fs::remove_file(&program);
         fs::hard_link(target().join("debug").join(name), &program).expect("what was built can be linked");
-        Runner { program, folder: self.folder.clone() }
+        program
     }
 
-    /// `cargo SUBCOMMAND` in the runner of a campaign.
-    pub fn cargo(&self, campaign: &str, subcommand: &str) -> Done {
-        let mut cargo = command(env!("CARGO"));
-        done(cargo.args([subcommand, "--quiet", "--color", "never"]).current_dir(self.runners.join(campaign)))
+    /// `cargo SUBCOMMAND` in a package of the project: the runner of a campaign, or the program of a monitor.
+    pub fn cargo(&self, turn: &Turn, package: &str, subcommand: &str) -> Done {
+        cargo(turn, &self.runners.join(package), &[subcommand, "--quiet"])
+    }
+}
+
+/// `cargo` in the folder of a package, on everything that is in it. Whoever has the turn to build can use what comes of
+/// it until the turn is over.
+pub fn cargo(_: &Turn, package: &Path, arguments: &[&str]) -> Done {
+    renew(package);
+    done(command(env!("CARGO")).args(arguments).args(["--color", "never"]).current_dir(package))
+}
+
+/// Makes the sources of a package newer than whatever was built before. To cargo, packages of one name in two projects
+/// are one package, which it takes for built if the other one was built after these sources were written.
+fn renew(package: &Path) {
+    for entry in fs::read_dir(package.join("src")).expect("a package has sources") {
+        let file = entry.expect("a folder can be listed").path();
+        if file.is_file() {
+            let file = File::options().append(true).open(file).expect("a source can be opened");
+            file.set_modified(SystemTime::now()).expect("a file has a time");
+        }
     }
 }
 
@@ -259,10 +297,10 @@ pub fn shared(name: &str, key: &str, campaign: &str, project: impl FnOnce(&str) 
     let (stamp, program) = (home.join("run"), home.join("program"));
     let folder = fresh_folder(name);
     let runner = Runner { program: folder.join("program"), folder };
-    let _turn = turn("build");
+    let turn = turn("build");
     if fs::read_to_string(&stamp).ok().as_deref() != Some(this_run()) {
         fs::create_dir_all(&home).expect("a folder can be made");
-        let built = project(key).built(campaign);
+        let built = project(key).built(&turn, campaign);
         let _ = fs::remove_file(&program);
         fs::hard_link(&built.program, &program).expect("what was built can be linked");
         fs::write(&stamp, this_run()).expect("a stamp can be written");
@@ -284,12 +322,18 @@ fn this_run() -> &'static str {
 }
 
 /// A turn at something that one test at a time may do, in whatever process; it is over when this is dropped.
+#[derive(Debug)]
 #[must_use]
-pub fn turn(what: &str) -> File {
+pub struct Turn {
+    _locked: File,
+}
+
+/// Waits for a turn at this.
+pub fn turn(what: &str) -> Turn {
     fs::create_dir_all(scratch()).expect("a folder can be made");
     let file = File::create(scratch().join(what).with_extension("lock")).expect("a lock can be made");
     file.lock().expect("the file system has locks");
-    file
+    Turn { _locked: file }
 }
 
 /// A built runner.

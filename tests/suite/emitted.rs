@@ -11,7 +11,7 @@ use sesame_codegen::environment::{Options, environment};
 use sesame_codegen::output::{Mode, apply};
 use sesame_codegen::plan::RunnerPlan;
 
-use sesame_tests::{Done, command, done, fresh_folder, turn, workspace};
+use sesame_tests::{Done, cargo, fresh_folder, turn, workspace};
 
 use self::plans::{awkward, small, with_program};
 
@@ -41,10 +41,7 @@ fn generated(folder: &Path, plans: &[RunnerPlan]) {
 
 /// Builds a runner; what rustc says.
 fn build(folder: &Path, runner: &str) -> (bool, String) {
-    let _turn = turn("build");
-    let mut cargo = command(env!("CARGO"));
-    cargo.args(["build", "--quiet", "--color", "never"]).current_dir(folder.join("runners").join(runner));
-    let Done { code, err, .. } = done(&mut cargo);
+    let Done { code, err, .. } = cargo(&turn("build"), &folder.join("runners").join(runner), &["build", "--quiet"]);
     (code == Some(0), err)
 }
 
@@ -122,9 +119,6 @@ fn the_simulator_of_a_new_project_passes_its_own_tests() {
     )
     .unwrap();
     fs::copy(workspace().join("Cargo.lock"), project.join("simulator/Cargo.lock")).unwrap();
-    let _turn = turn("build");
-    let mut cargo = command(env!("CARGO"));
-    let tested =
-        done(cargo.args(["test", "--quiet", "--color", "never"]).current_dir(project.join("simulator"))).expect(0);
+    let tested = cargo(&turn("build"), &project.join("simulator"), &["test", "--quiet"]).expect(0);
     assert!(tested.out.contains("1 passed"), "{}", tested.out);
 }

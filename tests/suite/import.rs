@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use sesame_results::analysis::{self, Datum, Selection};
 use sesame_results::record::{DATABASE, Origin, Repository, Status};
-use sesame_tests::{Done, Project, command, done, fresh_folder, sesamec, workspace};
+use sesame_tests::{Done, Project, command, done, fresh_folder, sesamec, turn, workspace};
 
 const LEGACY: &str = "SESAME_LEGACY_DIR";
 
@@ -99,7 +99,7 @@ fn every_imported_space_generates_crates_that_compile() {
             let runner = runner.unwrap().path();
             if runner.join("Cargo.toml").exists() {
                 let campaign = runner.file_name().unwrap().to_str().unwrap().to_owned();
-                let checked = project.cargo(&campaign, "check");
+                let checked = project.cargo(&turn("build"), &campaign, "check");
                 assert_eq!(checked.code, Some(0), "{stem}, {campaign}: {}", checked.err);
                 compiled += 1;
             }

@@ -1,10 +1,10 @@
 //! A monitor as a program of its own decides what the runner's own monitor decides.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde_json::Value;
-use sesame_tests::{Done, Project, command, done, fresh_folder, target, turn, workspace};
+use sesame_tests::{Done, Project, command, done, fresh_folder, workspace};
 
 use crate::monitors::rows;
 
@@ -74,19 +74,6 @@ fn project(name: &str, space: &str) -> Project {
     Project { space: folder.join("alone.sesame"), runners: folder.join("runners"), folder }
 }
 
-/// The built program of the monitor.
-fn built(project: &Project) -> PathBuf {
-    project.sesamec("generate", &["--eddi", "transport"]).expect(0);
-    // Another test's monitor has the same name.
-    let _turn = turn("build");
-    let cargo = |subcommand: &str| project.cargo("transport_monitor", subcommand).expect(0);
-    let said = cargo("build").err;
-    assert!(!said.contains("warning"), "{said}");
-    let program = project.folder.join("monitor");
-    fs::copy(target().join("debug/alone-transport_monitor"), &program).unwrap();
-    program
-}
-
 fn on(program: &Path, recording: &Path) -> Done {
     done(command(program).args(["--format", "json", "--recording"]).arg(recording))
 }
@@ -118,7 +105,7 @@ fn beside_the_cell_and_on_recordings_it_decides_what_the_runner_decides() {
     let inside = project("alone_inside", &space(python, "topic sight = \"eddi/sight\" : text", BUILT_IN));
     inside.sesamec("known", &["-c", "watch", "--workers", "1"]).expect(0);
     let results = inside.runners.join("watch/results/known");
-    let program = built(&inside);
+    let program = inside.monitor("transport");
     // On recordings.
     let tests = ["T0", "T1", "T2", "T3", "T4"];
     for test in tests {
@@ -166,7 +153,7 @@ fn beside_a_cell_that_runs_freely_it_decides_what_the_recording_shows() {
     let monitors = BUILT_IN.replace("stale after 250ms", "stale after 1500ms");
     assert!(monitors != BUILT_IN);
     let inside = project("alone_inside_freely", &space(python, "topic sight = \"eddi/sight\" : text", &monitors));
-    let program = built(&inside);
+    let program = inside.monitor("transport");
     let shown = program.display();
     let beside = format!(r#""{shown}" "--decisions" "decisions.json" "--" "python3" "freely.py" {{ free running }}"#);
     let external = space(&beside, "", EXTERNAL).replace("after 13s", "after 6s");
@@ -204,7 +191,7 @@ fn what_cannot_be_generated_or_run_is_said_with_a_remedy() {
     let outside = project("alone_refused_external", &space(python, "", EXTERNAL));
     let refused = outside.sesamec("generate", &["--eddi", "transport"]).expect(1).err;
     assert!(refused.contains("monitor `transport` is external"), "{refused}");
-    let program = built(&inside);
+    let program = inside.monitor("transport");
     let said = |arguments: &[&str]| done(command(&program).args(arguments));
     assert!(said(&[]).expect(1).err.contains("give it behind `--`"));
     assert!(said(&["--recording", "gone.mcap"]).expect(1).err.contains("cannot read the recording"));

@@ -1,0 +1,43 @@
+//! Ports in which tests do not hear each other.
+
+use std::fmt;
+use std::net::{Ipv4Addr, TcpListener, UdpSocket};
+
+/// A port for a server that no other test on this machine uses meanwhile.
+#[derive(Debug)]
+pub struct Port {
+    number: u16,
+    /// The datagrams of the same port, which nobody wants: whoever has them has the port.
+    _held: UdpSocket,
+}
+
+impl Port {
+    /// One that nobody listens on. The ports lie below those that the system gives to whoever asks for any, so nobody
+    /// takes it before the server does, or while the server is being started again.
+    pub fn free() -> Self {
+        let free = from_own_place(10_000..=14_999).into_iter().find_map(|number| {
+            let held = UdpSocket::bind((Ipv4Addr::LOCALHOST, number)).ok()?;
+            TcpListener::bind((Ipv4Addr::LOCALHOST, number)).is_ok().then_some(Port { number, _held: held })
+        });
+        free.expect("so many ports are enough for the tests of one machine")
+    }
+
+    /// Its number.
+    pub fn number(&self) -> u16 {
+        self.number
+    }
+}
+
+impl fmt::Display for Port {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.number.fmt(f)
+    }
+}
+
+/// All of these numbers, but each process begins elsewhere: what has just been used may yet have a late message.
+pub fn from_own_place(all: std::ops::RangeInclusive<u16>) -> Vec<u16> {
+    let mut all: Vec<u16> = all.collect();
+    let own = std::process::id() as usize % all.len();
+    all.rotate_left(own);
+    all
+}
