@@ -1,7 +1,8 @@
 //! What the tests across crates share: the real `sesamec`, projects for it to work on, and the runners that come out.
 //!
 //! Everything lies below the workspace's target folder: projects in folders of fixed names, since a path is part of
-//! what cargo knows a crate by, and all runners in one target folder, so that the runtime is compiled once.
+//! what cargo knows a crate by, and what is compiled for runners beside what was compiled for the tests, so that both
+//! share what they can and the runtime is compiled once.
 
 pub mod dds;
 pub mod gap;
@@ -33,9 +34,10 @@ fn scratch() -> PathBuf {
     target.join("across")
 }
 
-/// The target folder of everything that these tests compile.
+/// The target folder of everything that these tests compile, which is that of the tests.
 pub fn target() -> PathBuf {
-    scratch().join("target")
+    let scratch = scratch();
+    scratch.parent().expect("it lies in the target folder").to_owned()
 }
 
 /// The program `sesamec` of this workspace, with the transports that the rest of these tests has.
@@ -100,12 +102,44 @@ pub fn command(program: impl AsRef<Path>) -> Command {
         .env("NO_COLOR", "1")
         .env("RUST_BACKTRACE", "0")
         .stdin(Stdio::null());
-    // The suite compiles the runtime several times, so it is optimised less than in runners of users. The long suite
-    // measures runners as they are.
-    if std::env::var("NEXTEST_PROFILE").as_deref() != Ok("long") {
-        command.env("CARGO_PROFILE_DEV_OPT_LEVEL", "1");
-    }
+    static SETTINGS: OnceLock<()> = OnceLock::new();
+    SETTINGS.get_or_init(settings);
     command
+}
+
+/// What runners are compiled with in the suite, which compiles the runtime several times: only that is optimised in which
+/// campaigns spend their time.
+const SETTINGS: &str = "\
+[profile.dev]
+opt-level = 0
+
+[profile.dev.package]
+kuka_cell_sim = { opt-level = 2 }
+libm = { opt-level = 1 }
+serde_json = { opt-level = 1 }
+sesame-base = { opt-level = 1 }
+sesame-notation = { opt-level = 0 }
+sesame-plan = { opt-level = 0 }
+sesame-relay = { opt-level = 1 }
+sesame-results = { opt-level = 0 }
+sesame-rng = { opt-level = 1 }
+sesame-runtime = { opt-level = 0 }
+sesame-search = { opt-level = 1 }
+sha2 = { opt-level = 1 }
+";
+
+/// Writes these settings where cargo looks for them. The long suite measures runners as users build them.
+fn settings() {
+    let long = std::env::var("NEXTEST_PROFILE").as_deref() == Ok("long");
+    let (wanted, folder) = (if long { "" } else { SETTINGS }, scratch().join(".cargo"));
+    let file = folder.join("config.toml");
+    if fs::read_to_string(&file).ok().as_deref() != Some(wanted) {
+        fs::create_dir_all(&folder).expect("a folder can be made");
+        // Other tests may read it meanwhile.
+        let new = folder.join(format!("config.{}", std::process::id()));
+        fs::write(&new, wanted).expect("settings can be written");
+        fs::rename(&new, &file).expect("a file can be renamed");
+    }
 }
 
 /// What a command did.

@@ -70,7 +70,7 @@ impl Setup {
 }
 
 /// What is wrong with a parameter that a simulator does not have.
-#[cfg(any(feature = "in-process", feature = "process"))]
+#[cfg(feature = "in-process")]
 pub(crate) fn no_such_parameter(name: &str, known: &[String]) -> String {
     let known: Vec<String> = known.iter().map(|name| format!("`{name}`")).collect();
     let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };

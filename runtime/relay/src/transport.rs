@@ -248,7 +248,7 @@ fn hint(near: Option<&str>, known: &[String]) -> String {
 }
 
 /// That the simulator lacks a topic of the space, with the most similar one of those it has.
-#[cfg(any(feature = "in-process", feature = "process"))]
+#[cfg(feature = "in-process")]
 fn unknown_topic<'a>(path: &str, known: impl Iterator<Item = &'a String> + Clone) -> TransportError {
     let near = known
         .clone()
