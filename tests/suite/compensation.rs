@@ -15,7 +15,8 @@ struct Study {
 }
 
 impl Study {
-    fn new(name: &str, lab: &str, fit: &str) -> Self {
+    /// With tests of so many seconds.
+    fn new(name: &str, seconds: u32, lab: &str, fit: &str) -> Self {
         let folder = fresh_folder(name);
         let text = fs::read_to_string(workspace().join("examples/kuka_cell/study.sesame")).unwrap();
         let (before, _) = text.split_once("  fit ").unwrap();
@@ -26,8 +27,8 @@ impl Study {
             .replace("nsga2 { population 20  evaluations 120", "random { evaluations 4")
             .replace("repeats   5", "repeats   3")
             .replace("budget    5", "budget    3")
-            .replace("end        after 70s", "end        after 20s")
-            .replace("within [0s, 65s]", "within [0s, 18s]");
+            .replace("end        after 70s", &format!("end        after {seconds}s"))
+            .replace("within [0s, 65s]", &format!("within [0s, {}s]", seconds - 2));
         fs::write(folder.join("study.sesame"), text).unwrap();
         Study { folder }
     }
@@ -62,7 +63,7 @@ impl Study {
 fn a_lag_shows_in_traces_and_a_fitted_delay_closes_the_gap() {
     let lab = "\"--as-modelled\" \"--latency\" \"180\" \"--zone-shift\" \"60,0,0\"";
     let fit = "relay delay on link1 [0ms, 400ms], parameter \"zone_shift_x\" [-0.1, 0.1]";
-    let study = Study::new("compensation", lab, fit).carried_out();
+    let study = Study::new("compensation", 20, lab, fit).carried_out();
     let (run, hall) = (study.results("42"), study.results("42-hall"));
 
     // The arm is later by the latency, and by the step in which targets act.
@@ -133,8 +134,12 @@ fn page_of(study: &Study, run: &str, hall: &str) {
 #[test]
 fn noise_is_fitted_by_how_much_runs_differ_and_varied_from_run_to_run() {
     // The model has torque noise; without it, noise on targets has to stand for it.
-    let study =
-        Study::new("compensation_noise", "\"--as-modelled\" \"--noise\" \"8\"", "relay noise on link1 [0rad, 0.2rad]");
+    let study = Study::new(
+        "compensation_noise",
+        12,
+        "\"--as-modelled\" \"--noise\" \"8\"",
+        "relay noise on link1 [0rad, 0.2rad]",
+    );
     let study = study.carried_out();
     let hall = study.results("42-hall");
     let asked = ["compensate", "study.sesame", &hall, "--evaluations", "5", "--no-campaign"];
@@ -167,7 +172,7 @@ fn noise_is_fitted_by_how_much_runs_differ_and_varied_from_run_to_run() {
 
 #[test]
 fn the_budget_chooses_tests_and_variations_of_one_are_named_by_where_they_are() {
-    let study = Study::new("explore", "", "relay delay [0ms, 100ms]");
+    let study = Study::new("explore", 12, "", "relay delay [0ms, 100ms]");
     study.sesamec(&["run", "study.sesame"]).expect(0);
     // Without names, the lab's budget chooses among the tests of the front.
     let said = study.sesamec(&["physical", "study.sesame", "--results", "42"]).expect(0).err;
@@ -190,7 +195,7 @@ fn the_budget_chooses_tests_and_variations_of_one_are_named_by_where_they_are() 
 #[test]
 fn what_cannot_be_fitted_is_refused_with_what_to_do() {
     let study =
-        Study::new("compensation_refused", "\"--as-modelled\"", "parameter \"zone_shift_w\" [0, 1]").carried_out();
+        Study::new("compensation_refused", 12, "\"--as-modelled\"", "parameter \"zone_shift_w\" [0, 1]").carried_out();
     let (run, hall) = (study.results("42"), study.results("42-hall"));
     let refused =
         |arguments: &[&str]| study.sesamec(&[&["compensate", "study.sesame"][..], arguments].concat()).expect(1).err;
