@@ -102,8 +102,7 @@ pub fn command(program: impl AsRef<Path>) -> Command {
         .env("NO_COLOR", "1")
         .env("RUST_BACKTRACE", "0")
         .stdin(Stdio::null());
-    static SETTINGS: OnceLock<()> = OnceLock::new();
-    SETTINGS.get_or_init(settings);
+    settings();
     command
 }
 
@@ -130,6 +129,11 @@ sha2 = { opt-level = 1 }
 
 /// Writes these settings where cargo looks for them. The long suite measures runners as users build them.
 fn settings() {
+    static WRITTEN: OnceLock<()> = OnceLock::new();
+    WRITTEN.get_or_init(write_settings);
+}
+
+fn write_settings() {
     let long = std::env::var("NEXTEST_PROFILE").as_deref() == Ok("long");
     let (wanted, folder) = (if long { "" } else { SETTINGS }, scratch().join(".cargo"));
     let file = folder.join("config.toml");
