@@ -1,8 +1,7 @@
 //! What the tests across crates share: the real `sesamec`, projects for it to work on, and the runners that come out.
 //!
 //! Everything lies below the workspace's target folder: projects in folders of fixed names, since a path is part of
-//! what cargo knows a crate by, and what is compiled for runners beside what was compiled for the tests, so that both
-//! share what they can and the runtime is compiled once.
+//! what cargo knows a crate by, and all runners in one target folder, so that the runtime is compiled once.
 
 pub mod dds;
 pub mod gap;
@@ -34,10 +33,10 @@ fn scratch() -> PathBuf {
     target.join("across")
 }
 
-/// The target folder of everything that these tests compile, which is that of the tests.
+/// The target folder of everything that these tests compile. No project lies in it: cargo knows what lies in its target
+/// folder by the path from there, and would look for changes of one project in another.
 pub fn target() -> PathBuf {
-    let scratch = scratch();
-    scratch.parent().expect("it lies in the target folder").to_owned()
+    scratch().join("target")
 }
 
 /// The program `sesamec` of this workspace, with the transports that the rest of these tests has.
@@ -260,7 +259,7 @@ impl Project {
         // Cargo puts the program where another project's of the same name may be, and it is started from there.
         let _turn = turn("build");
         let runner = self.runners.join(campaign);
-        if runner.exists() {
+        if runner.join("src").exists() {
             renew(&runner);
         }
         self.sesamec("run", &[&["--campaign", campaign], arguments].concat())
