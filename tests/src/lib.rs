@@ -105,8 +105,8 @@ pub fn command(program: impl AsRef<Path>) -> Command {
     command
 }
 
-/// What runners are compiled with in the suite, which compiles the runtime several times: only that is optimised in which
-/// campaigns spend their time.
+/// What runners are compiled with in the suite, which compiles the runtime several times: only that is optimised in
+/// which campaigns spend their time.
 const SETTINGS: &str = "\
 [profile.dev]
 opt-level = 0
