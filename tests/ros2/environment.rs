@@ -79,7 +79,7 @@ pub(crate) struct Domain {
     _held: Vec<UdpSocket>,
 }
 
-/// Domains of tests. Their ports lie below those that the system gives to whoever asks for any, and no example is in
+/// The domains of tests. Their ports lie below the ports that the system assigns by itself, and no example is in
 /// one of these domains.
 const DOMAINS: std::ops::Range<u16> = 62..100;
 

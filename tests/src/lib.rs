@@ -105,8 +105,9 @@ pub fn command(program: impl AsRef<Path>) -> Command {
     command
 }
 
-/// What runners are compiled with in the suite, which compiles the runtime several times: only that is optimised in
-/// which campaigns spend their time.
+/// The profile with which the suite compiles runners. The suite compiles the runtime several times, so it optimises
+/// only the crates in which campaigns spend their time. The zeros overrule what a runner's manifest says of these
+/// crates.
 const SETTINGS: &str = "\
 [profile.dev]
 opt-level = 0
@@ -277,7 +278,7 @@ impl Project {
         Runner { program: self.program(campaign), folder: self.folder.clone() }
     }
 
-    /// Generates and builds the program of a monitor, without a warning.
+    /// Generates a monitor as a program, builds it, and insists that rustc has no warnings.
     pub fn monitor(&self, monitor: &str) -> PathBuf {
         let turn = turn("build");
         self.sesamec("generate", &["--eddi", monitor]).expect(0);
@@ -287,7 +288,7 @@ impl Project {
         self.program(&package)
     }
 
-    /// The program of a package that has just been built, in the project's own folder.
+    /// Links a program that was just built into the project's own folder. `package` is the folder of its package.
     fn program(&self, package: &str) -> PathBuf {
         let manifest = fs::read_to_string(self.runners.join(package).join("Cargo.toml")).expect("there is a manifest");
         let name = manifest.lines().find_map(|line| line.strip_prefix("name = \"")).expect("a package has a name");
@@ -301,21 +302,22 @@ impl Project {
         program
     }
 
-    /// `cargo SUBCOMMAND` in a package of the project: the runner of a campaign, or the program of a monitor.
+    /// `cargo SUBCOMMAND` in one of the project's packages, which are its runners and monitors.
     pub fn cargo(&self, turn: &Turn, package: &str, subcommand: &str) -> Done {
         cargo(turn, &self.runners.join(package), &[subcommand, "--quiet"])
     }
 }
 
-/// `cargo` in the folder of a package, on everything that is in it. Whoever has the turn to build can use what comes of
-/// it until the turn is over.
+/// Runs `cargo` in a package's folder, after marking its sources as new. What it builds may be overwritten by another
+/// test as soon as the turn is over.
 pub fn cargo(_: &Turn, package: &Path, arguments: &[&str]) -> Done {
     renew(package);
     done(command(env!("CARGO")).args(arguments).args(["--color", "never"]).current_dir(package))
 }
 
-/// Makes the sources of a package newer than whatever was built before. To cargo, packages of one name in two projects
-/// are one package, which it takes for built if the other one was built after these sources were written.
+/// Makes a package's sources newer than everything that was built before. Cargo cannot tell packages apart that have
+/// the same name and lie in different projects: it would not build this one if the other was built after these sources
+/// were written.
 fn renew(package: &Path) {
     for entry in fs::read_dir(package.join("src")).expect("a package has sources") {
         let file = entry.expect("a folder can be listed").path();
@@ -327,8 +329,8 @@ fn renew(package: &Path) {
 }
 
 /// The runner of a campaign in a fresh folder of this name, built once for all tests that ask for the same one: those
-/// that give the same key. They must leave the project as it is. The program has another name for each test, by which
-/// its processes are told from those of others.
+/// that give the same key. They must leave the project as it is. Each test gets the program under a path of its own, so
+/// that it can tell its processes from those of other tests.
 pub fn shared(name: &str, key: &str, campaign: &str, project: impl FnOnce(&str) -> Project) -> Runner {
     let home = scratch().join("shared").join(key);
     let (stamp, program) = (home.join("run"), home.join("program"));

@@ -7,13 +7,13 @@ use std::net::{Ipv4Addr, TcpListener, UdpSocket};
 #[derive(Debug)]
 pub struct Port {
     number: u16,
-    /// The datagrams of the same port, which nobody wants: whoever has them has the port.
+    /// Reserves the port: each test binds the UDP port of the same number, which no server uses.
     _held: UdpSocket,
 }
 
 impl Port {
-    /// One that nobody listens on. The ports lie below those that the system gives to whoever asks for any, so nobody
-    /// takes it before the server does, or while the server is being started again.
+    /// A port that nobody listens on. The range lies below the ports that the system assigns by itself, so nobody takes
+    /// the port before the server does, or while the server is restarted.
     pub fn free() -> Self {
         let free = from_own_place(10_000..=14_999).into_iter().find_map(|number| {
             let held = UdpSocket::bind((Ipv4Addr::LOCALHOST, number)).ok()?;
@@ -34,7 +34,8 @@ impl fmt::Display for Port {
     }
 }
 
-/// All of these numbers, but each process begins elsewhere: what has just been used may yet have a late message.
+/// All of these numbers. Each process starts at another one, since a late message may still be on its way to a number
+/// that was just in use.
 pub fn from_own_place(all: std::ops::RangeInclusive<u16>) -> Vec<u16> {
     let mut all: Vec<u16> = all.collect();
     let own = std::process::id() as usize % all.len();

@@ -8,7 +8,8 @@ use sesame_base::observation::Outcome;
 use sesame_results::record::{Origin, Repository};
 use sesame_tests::{Done, Project, Runner, shared, workspace};
 
-/// The runner of a campaign on the faulty simulator, with its hook filled in, for tests that say where results go.
+/// The runner of this campaign, with the faulty simulator and the hook filled in. It is shared, so tests that use it
+/// must say where results go.
 pub(crate) fn faulty(name: &str, campaign: &str) -> Runner {
     recording(name, campaign, "")
 }

@@ -15,7 +15,7 @@ use sesame_codegen::output::{Mode, apply};
 use sesame_codegen::plan::RunnerPlan;
 use sesame_plan::CampaignPlan;
 use sesame_tests::models::{MARK, Model, model};
-use sesame_tests::{Done, command, copy, done, fresh_folder, target, workspace};
+use sesame_tests::{Done, cargo, command, copy, done, fresh_folder, target, turn, workspace};
 
 /// The plans of a space in a folder, which has to be free of errors.
 fn plans(seed: u64, model: &Model, folder: &Path) -> Vec<RunnerPlan> {
@@ -166,7 +166,7 @@ fn compile_and_run(name: &str, seeds: Range<u64>) {
          other => panic!(\"{{other:?}}\"),\n    }}\n}}\n"
     );
     fs::write(folder.join("src/main.rs"), main).unwrap();
-    let built = done(command(env!("CARGO")).args(["build", "--color", "never"]).current_dir(&folder)).expect(0);
+    let built = cargo(&turn("build"), &folder, &["build"]).expect(0);
     let warned = built.err.lines().filter(|line| line.starts_with("warning")).collect::<Vec<_>>();
     assert!(warned.is_empty(), "{}", built.err);
     let program = target().join("debug/random-runners");
