@@ -32,9 +32,25 @@ pub(super) struct OutputTail {
 struct Captured {
     /// Who writes, for the log.
     writer: String,
-    tail: VecDeque<u8>,
+    /// The last lines, in the order in which they began. Two streams may write at once, in pieces: a line consists of
+    /// what one stream wrote.
+    lines: VecDeque<Line>,
     logged: u64,
     omitted: u64,
+}
+
+/// A line that is written, or the end of one that is long.
+struct Line {
+    stream: Stream,
+    text: Vec<u8>,
+    ended: bool,
+}
+
+/// One of the two streams of a program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Stream {
+    Output,
+    Error,
 }
 
 /// Looks for a text in the lines that a program writes.
@@ -73,7 +89,7 @@ impl OutputTail {
     /// Of a stream whose writer the log calls so.
     pub(super) fn capture(from: impl Read + Send + 'static, writer: &str) -> Self {
         let (tail, sender) = OutputTail::of(writer);
-        tail.read(from, io::stderr(), Watch::default(), sender);
+        tail.read(Stream::Error, from, io::stderr(), Watch::default(), sender);
         tail
     }
 
@@ -85,8 +101,8 @@ impl OutputTail {
         watch: &Watch,
     ) -> Self {
         let (tail, sender) = OutputTail::of(writer);
-        tail.read(output, io::stderr(), watch.clone(), sender.clone());
-        tail.read(error, io::stderr(), watch.clone(), sender);
+        tail.read(Stream::Output, output, io::stderr(), watch.clone(), sender.clone());
+        tail.read(Stream::Error, error, io::stderr(), watch.clone(), sender);
         tail
     }
 
@@ -98,6 +114,7 @@ impl OutputTail {
 
     fn read(
         &self,
+        stream: Stream,
         mut from: impl Read + Send + 'static,
         mut log: impl Write + Send + 'static,
         watch: Watch,
@@ -113,7 +130,7 @@ impl OutputTail {
                     Ok(0) => return,
                     // The program must not block because the log cannot be written.
                     Ok(count) => {
-                        lock(&target).append(&buffer[..count], &mut log).ok();
+                        lock(&target).append(stream, &buffer[..count], &mut log).ok();
                         watch.look(&mut before, &buffer[..count]);
                     }
                     Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
@@ -136,18 +153,24 @@ impl OutputTail {
 
     /// The last lines of a program that is running.
     pub(super) fn last_lines_so_far(&self) -> String {
-        let bytes: Vec<u8> = lock(&self.captured).tail.iter().copied().collect();
-        let text = String::from_utf8_lossy(&bytes);
-        let lines: Vec<&str> = text.lines().filter(|line| !line.trim().is_empty()).collect();
+        let captured = lock(&self.captured);
+        let text = |line: &Line| String::from_utf8_lossy(&line.text).trim_end_matches('\r').to_owned();
+        let lines: Vec<String> = captured.lines.iter().filter(|line| !line.is_blank()).map(text).collect();
         lines[lines.len().saturating_sub(KEPT_LINES)..].join("\n")
     }
 }
 
+impl Line {
+    fn is_blank(&self) -> bool {
+        self.text.trim_ascii().is_empty()
+    }
+}
+
 impl Captured {
-    fn append(&mut self, written: &[u8], log: &mut impl Write) -> io::Result<()> {
-        self.tail.extend(&written[written.len().saturating_sub(KEPT_BYTES)..]);
-        let over = self.tail.len().saturating_sub(KEPT_BYTES);
-        self.tail.drain(..over);
+    fn append(&mut self, stream: Stream, written: &[u8], log: &mut impl Write) -> io::Result<()> {
+        for piece in written[written.len().saturating_sub(KEPT_BYTES)..].split_inclusive(|byte| *byte == b'\n') {
+            self.keep(stream, piece);
+        }
         let room = usize::try_from(LOGGED_BYTES - self.logged).unwrap_or(usize::MAX);
         let (logged, omitted) = written.split_at(written.len().min(room));
         self.logged += logged.len() as u64;
@@ -158,6 +181,32 @@ impl Captured {
         }
         self.omitted += omitted.len() as u64;
         Ok(())
+    }
+
+    /// Adds what one stream wrote of one line, and forgets the oldest lines.
+    fn keep(&mut self, stream: Stream, piece: &[u8]) {
+        let begun = self.lines.iter().position(|line| line.stream == stream && !line.ended);
+        let at = begun.unwrap_or(self.lines.len());
+        if begun.is_none() {
+            self.lines.push_back(Line { stream, text: Vec::new(), ended: false });
+        }
+        let line = &mut self.lines[at];
+        line.ended = piece.ends_with(b"\n");
+        line.text.extend_from_slice(piece.strip_suffix(b"\n").unwrap_or(piece));
+        if line.ended && line.is_blank() {
+            self.lines.remove(at);
+        }
+        if self.lines.len() > KEPT_LINES {
+            // What is not ended may still become one of the last lines, so the other stream's line is kept as well.
+            let oldest = self.lines.iter().position(|line| line.ended).unwrap_or(0);
+            self.lines.remove(oldest);
+        }
+        let mut over = self.lines.iter().map(|line| line.text.len()).sum::<usize>().saturating_sub(KEPT_BYTES);
+        for line in &mut self.lines {
+            let forgotten = over.min(line.text.len());
+            line.text.drain(..forgotten);
+            over -= forgotten;
+        }
     }
 
     fn clear(&mut self) {
@@ -180,7 +229,7 @@ mod tests {
         let mut log = Vec::new();
         for written in tests {
             for part in written.chunks(1000) {
-                captured.append(part, &mut log).unwrap();
+                captured.append(Stream::Error, part, &mut log).unwrap();
             }
             captured.clear();
         }
@@ -204,11 +253,29 @@ mod tests {
     fn the_last_lines_of_a_flood_are_kept() {
         let written = [vec![b'x'; 3 << 20], b"\none\ntwo\n\nthree\n".to_vec()].concat();
         let (tail, sender) = OutputTail::of("the simulator");
-        tail.read(io::Cursor::new(written), io::sink(), Watch::default(), sender);
+        tail.read(Stream::Error, io::Cursor::new(written), io::sink(), Watch::default(), sender);
         assert_eq!(tail.last_lines(), "one\ntwo\nthree");
         tail.clear();
         assert_eq!(tail.last_lines(), "");
     }
+
+    #[test]
+    fn a_line_consists_of_what_one_stream_wrote_however_the_pieces_of_both_come() {
+        let last_lines = |pieces: &[(Stream, &str)]| {
+            let (tail, _sender) = OutputTail::of("a program");
+            for (stream, piece) in pieces {
+                lock(&tail.captured).append(*stream, piece.as_bytes(), &mut io::sink()).unwrap();
+            }
+            tail.last_lines_so_far()
+        };
+        use Stream::{Error, Output};
+        assert_eq!(last_lines(&[(Output, "up"), (Error, "out of memory\n"), (Output, "\n")]), "up\nout of memory");
+        assert_eq!(last_lines(&[(Output, "up"), (Error, "out "), (Output, "\n\n"), (Error, "of")]), "up\nout of");
+        assert_eq!(last_lines(&[(Output, "1\n2\n3\n"), (Error, "a"), (Output, "\r\n4\r\n"), (Error, "b")]), "3\nab\n4");
+        // A stream that never ends its line has one line, however much the other one writes.
+        assert_eq!(last_lines(&[(Error, "50 %"), (Output, "1\n2\n3\n4\n"), (Error, "\r90 %")]), "50 %\r90 %\n3\n4");
+    }
+
     #[test]
     fn a_text_is_found_in_a_line_that_comes_in_pieces_and_not_in_two_streams_together() {
         let watch = Watch::new(Some("is ready"));

@@ -235,7 +235,8 @@ fn a_launched_program_that_ends_later_is_named_with_its_last_lines_and_is_the_sy
     assert_eq!(error.fault(), crate::transport::Fault::Crash);
     let error = error.to_string();
     assert!(error.starts_with("the program `python3 -u -c "), "{error}");
-    assert!(error.contains("` of node `n0` ended (exit status: 9); the last lines that it wrote:\nup\nout of memory"));
+    let ended = "` of node `n0` ended (exit status: 9); the last lines that it wrote:\nup\nout of memory";
+    assert!(error.contains(ended), "{error}");
     assert!(alarm.load(std::sync::atomic::Ordering::Relaxed));
     assert!(!system.launched.is_started());
 }
