@@ -261,6 +261,7 @@ mod tests {
 
     #[test]
     fn a_line_consists_of_what_one_stream_wrote_however_the_pieces_of_both_come() {
+        use Stream::{Error, Output};
         let last_lines = |pieces: &[(Stream, &str)]| {
             let (tail, _sender) = OutputTail::of("a program");
             for (stream, piece) in pieces {
@@ -268,7 +269,6 @@ mod tests {
             }
             tail.last_lines_so_far()
         };
-        use Stream::{Error, Output};
         assert_eq!(last_lines(&[(Output, "up"), (Error, "out of memory\n"), (Output, "\n")]), "up\nout of memory");
         assert_eq!(last_lines(&[(Output, "up"), (Error, "out "), (Output, "\n\n"), (Error, "of")]), "up\nout of");
         assert_eq!(last_lines(&[(Output, "1\n2\n3\n"), (Error, "a"), (Output, "\r\n4\r\n"), (Error, "b")]), "3\nab\n4");
