@@ -136,7 +136,7 @@ fn noise_is_fitted_by_how_much_runs_differ_and_varied_from_run_to_run() {
     // The model has torque noise; without it, noise on targets has to stand for it.
     let study = Study::new(
         "compensation_noise",
-        12,
+        8,
         "\"--as-modelled\" \"--noise\" \"8\"",
         "relay noise on link1 [0rad, 0.2rad]",
     );
@@ -172,7 +172,7 @@ fn noise_is_fitted_by_how_much_runs_differ_and_varied_from_run_to_run() {
 
 #[test]
 fn the_budget_chooses_tests_and_variations_of_one_are_named_by_where_they_are() {
-    let study = Study::new("explore", 12, "", "relay delay [0ms, 100ms]");
+    let study = Study::new("explore", 8, "", "relay delay [0ms, 100ms]");
     study.sesamec(&["run", "study.sesame"]).expect(0);
     // Without names, the lab's budget chooses among the tests of the front.
     let said = study.sesamec(&["physical", "study.sesame", "--results", "42"]).expect(0).err;
@@ -195,7 +195,7 @@ fn the_budget_chooses_tests_and_variations_of_one_are_named_by_where_they_are() 
 #[test]
 fn what_cannot_be_fitted_is_refused_with_what_to_do() {
     let study =
-        Study::new("compensation_refused", 12, "\"--as-modelled\"", "parameter \"zone_shift_w\" [0, 1]").carried_out();
+        Study::new("compensation_refused", 8, "\"--as-modelled\"", "parameter \"zone_shift_w\" [0, 1]").carried_out();
     let (run, hall) = (study.results("42"), study.results("42-hall"));
     let refused =
         |arguments: &[&str]| study.sesamec(&[&["compensate", "study.sesame"][..], arguments].concat()).expect(1).err;
