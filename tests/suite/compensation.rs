@@ -172,7 +172,7 @@ fn noise_is_fitted_by_how_much_runs_differ_and_varied_from_run_to_run() {
 
 #[test]
 fn the_budget_chooses_tests_and_variations_of_one_are_named_by_where_they_are() {
-    let study = Study::new("explore", 8, "", "relay delay [0ms, 100ms]");
+    let study = Study::new("explore", 12, "", "relay delay [0ms, 100ms]");
     study.sesamec(&["run", "study.sesame"]).expect(0);
     // Without names, the lab's budget chooses among the tests of the front.
     let said = study.sesamec(&["physical", "study.sesame", "--results", "42"]).expect(0).err;
