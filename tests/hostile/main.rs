@@ -5,6 +5,7 @@
 
 use std::fs;
 use std::io::{BufRead as _, Write as _};
+use std::os::fd::OwnedFd;
 use std::os::unix::process::CommandExt as _;
 use std::path::PathBuf;
 use std::process::{Command, Stdio, exit};
@@ -319,7 +320,8 @@ const MODES: &[(&str, Act)] = &[
     ),
     (
         "closes_its_standard_error",
-        Does(|_| {
+        Does(|hostile| {
+            hostile.standard_error = rustix::io::dup(rustix::stdio::stderr()).ok();
             rustix::stdio::dup2_stderr(null()).ok();
         }),
     ),
@@ -460,6 +462,9 @@ struct Hostile {
     at_reset: Option<fn(&mut Hostile)>,
     after_input: Option<fn()>,
     held: Option<fs::File>,
+    /// What it closed in its test: which test comes next in this process depends on how busy the machine is, and that
+    /// test says something there.
+    standard_error: Option<OwnedFd>,
     memory: Vec<u8>,
 }
 
@@ -471,6 +476,9 @@ impl Hostile {
                 (self.acted, self.step, self.pause, self.at_the_end) = (false, 0, Duration::ZERO, None);
                 self.ahead = false;
                 self.unsaid.clear();
+                if let Some(kept) = self.standard_error.take() {
+                    rustix::stdio::dup2_stderr(kept).ok();
+                }
                 match at_reset {
                     Some(act) => act(self),
                     None => say(READY.as_bytes()),
