@@ -11,7 +11,7 @@ use std::io;
 use std::net::{SocketAddr, TcpListener as Listener};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::thread;
+use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use sesame_plan::Renamed;
@@ -60,12 +60,22 @@ pub(crate) struct Proxy {
     pub(crate) bridge: Address,
 }
 
-/// Proxies that listen. Dropping them ends all their connections.
+/// Proxies that listen. Once they are dropped, all their connections have ended and their addresses are free.
 pub(crate) struct Proxies {
     listening: Vec<Arc<Listening>>,
     notes: Receiver<String>,
     /// Dropped with this, which ends the thread.
-    _running: oneshot::Sender<()>,
+    running: Option<(oneshot::Sender<()>, JoinHandle<()>)>,
+}
+
+impl Drop for Proxies {
+    fn drop(&mut self) {
+        if let Some((running, thread)) = self.running.take() {
+            drop(running);
+            // What it does at this moment for a client takes no longer than a moment.
+            thread.join().ok();
+        }
+    }
 }
 
 /// A proxy that listens.
@@ -111,8 +121,8 @@ impl Proxies {
             ended.await.ok();
         };
         let in_thread = move || runtime.block_on(serve);
-        thread::Builder::new().name("rosbridge proxy".to_owned()).spawn(in_thread).map_err(failed)?;
-        Ok(Proxies { listening, notes: noted, _running: running })
+        let thread = thread::Builder::new().name("rosbridge proxy".to_owned()).spawn(in_thread).map_err(failed)?;
+        Ok(Proxies { listening, notes: noted, running: Some((running, thread)) })
     }
 
     /// Which proxies have no client that reaches the bridge, in words; and those whose last client came a moment ago.
@@ -277,4 +287,29 @@ fn objection(request: &Request, token: &Token) -> Option<&'static str> {
 fn is_same(left: &[u8], right: &[u8]) -> bool {
     let differences = left.iter().zip(right).fold(0, |differences, (left, right)| differences | (left ^ right));
     left.len() == right.len() && std::hint::black_box(differences) == 0
+}
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use super::*;
+
+    // Other systems have one loopback address only, and there a connection of another test may take the port meanwhile.
+    #[test]
+    fn once_proxies_are_dropped_their_addresses_are_free() {
+        let free = Listener::bind("127.0.0.2:0").unwrap().local_addr().unwrap();
+        let url = format!("ws://{free}");
+        let bridge = Address { url: url.clone(), token: None, trusted: None, found_again_within: Duration::ZERO };
+        for _ in 0..100 {
+            let proxy = Proxy {
+                node: "station".to_owned(),
+                url: url.clone(),
+                token: None,
+                tls: None,
+                public: false,
+                renamed: Renamed::default(),
+                bridge: bridge.clone(),
+            };
+            drop(Proxies::listen(vec![proxy]).unwrap());
+        }
+    }
 }
