@@ -39,7 +39,7 @@ struct Captured {
     omitted: u64,
 }
 
-/// A line that is written, or the end of one that is long.
+/// A line, or the end of a long one.
 struct Line {
     stream: Stream,
     text: Vec<u8>,
@@ -168,7 +168,7 @@ impl Line {
 
 impl Captured {
     fn append(&mut self, stream: Stream, written: &[u8], log: &mut impl Write) -> io::Result<()> {
-        for piece in written[written.len().saturating_sub(KEPT_BYTES)..].split_inclusive(|byte| *byte == b'\n') {
+        for piece in written.split_inclusive(|byte| *byte == b'\n') {
             self.keep(stream, piece);
         }
         let room = usize::try_from(LOGGED_BYTES - self.logged).unwrap_or(usize::MAX);
@@ -197,7 +197,7 @@ impl Captured {
             self.lines.remove(at);
         }
         if self.lines.len() > KEPT_LINES {
-            // What is not ended may still become one of the last lines, so the other stream's line is kept as well.
+            // A line that has not ended may still grow, so it is kept as well.
             let oldest = self.lines.iter().position(|line| line.ended).unwrap_or(0);
             self.lines.remove(oldest);
         }
@@ -272,6 +272,13 @@ mod tests {
         assert_eq!(last_lines(&[(Output, "up"), (Error, "out of memory\n"), (Output, "\n")]), "up\nout of memory");
         assert_eq!(last_lines(&[(Output, "up"), (Error, "out "), (Output, "\n\n"), (Error, "of")]), "up\nout of");
         assert_eq!(last_lines(&[(Output, "1\n2\n3\n"), (Error, "a"), (Output, "\r\n4\r\n"), (Error, "b")]), "3\nab\n4");
+        // However much comes at once, what ends a line ends it.
+        let much = format!("\n{}\nend\n", "x".repeat(KEPT_BYTES));
+        assert_eq!(
+            last_lines(&[(Output, "out\n"), (Error, "begun"), (Error, &much), (Error, "new")]).lines().last(),
+            Some("new")
+        );
+        assert!(!last_lines(&[(Output, "out\n"), (Error, "begun"), (Error, &much)]).contains("begunx"));
         // A stream that never ends its line has one line, however much the other one writes.
         assert_eq!(last_lines(&[(Error, "50 %"), (Output, "1\n2\n3\n4\n"), (Error, "\r90 %")]), "50 %\r90 %\n3\n4");
     }

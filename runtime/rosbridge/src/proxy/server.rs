@@ -72,7 +72,7 @@ impl Drop for Proxies {
     fn drop(&mut self) {
         if let Some((running, thread)) = self.running.take() {
             drop(running);
-            // What it does at this moment for a client takes no longer than a moment.
+            // It ends as soon as it has done what it is doing for a client.
             thread.join().ok();
         }
     }
