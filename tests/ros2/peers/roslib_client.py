@@ -74,7 +74,8 @@ def wait(client: roslibpy.Ros, topic: str, digest, count: int, batch: int, optio
         nonlocal heard
         if content["name"][0] == "probe":
             say(heard=round(content["position"][0]))
-        else:
+        elif heard < count:
+            # What comes after is not waited for: this thread goes on until the other one ends the program.
             digest.update(said(content))
             heard += 1
             if heard % batch == 0 and heard < count:
