@@ -19,29 +19,32 @@ struct Disk(PathBuf);
 /// Set where a test runs once more, in a namespace of its own.
 const WITHIN: &str = "SESAME_TEST_NAMESPACE";
 
-/// Runs a test that mounts disks. A user who may not mount any may in a user namespace, where Linux permits those:
-/// there the test, which has this name, runs once more. Where neither is permitted it is skipped, which is said.
+/// Runs a test that mounts disks, once more and in a mount namespace of its own, of which nothing is left however the
+/// test ends. A user who may not mount any may in a user namespace, where Linux permits it. Where neither is permitted,
+/// the test, which has this name, is skipped, which is said.
 fn with_disks(test: &str, body: fn()) {
-    let may_mount = |command: &mut Command| {
-        let place = tempfile::tempdir().unwrap();
-        let script = "mount -t tmpfs -o size=64k sesame-test \"$0\" && umount \"$0\"";
-        command.args(["sh", "-c", script]).arg(place.path()).output().is_ok_and(|said| said.status.success())
-    };
-    let namespace = || {
+    if std::env::var_os(WITHIN).is_some() {
+        return body();
+    }
+    let namespace = |options: &[&str]| {
         let mut unshare = Command::new("unshare");
-        unshare.args(["--user", "--map-root-user", "--mount"]);
+        unshare.arg("--mount").args(options);
         unshare
     };
-    if may_mount(&mut Command::new("env")) {
-        body();
-    } else if std::env::var_os(WITHIN).is_none() && may_mount(&mut namespace()) {
-        let mut again = namespace();
-        again.arg(std::env::current_exe().unwrap()).args([&format!("disk::{test}"), "--exact", "--nocapture"]);
-        let said = done(again.env(WITHIN, "1")).expect(0);
-        assert!(said.out.contains("1 passed"), "{}", said.out);
-    } else {
+    let may_mount = |options: &[&str]| {
+        let place = tempfile::tempdir().unwrap();
+        let script = "mount -t tmpfs -o size=64k sesame-test \"$0\"";
+        let said = namespace(options).args(["sh", "-c", script]).arg(place.path()).output();
+        said.is_ok_and(|said| said.status.success())
+    };
+    let Some(options) = [&[][..], &["--user", "--map-root-user"]].into_iter().find(|options| may_mount(options)) else {
         eprintln!("skipped: a small disk can be mounted neither by this user nor in a user namespace");
-    }
+        return;
+    };
+    let mut again = namespace(options);
+    again.arg(std::env::current_exe().unwrap()).args([&format!("disk::{test}"), "--exact", "--nocapture"]);
+    let said = done(again.env(WITHIN, "1")).expect(0);
+    assert!(said.out.contains("1 passed"), "{}", said.out);
 }
 
 impl Disk {
