@@ -19,9 +19,9 @@ struct Disk(PathBuf);
 /// Set where a test runs once more, in a namespace of its own.
 const WITHIN: &str = "SESAME_TEST_NAMESPACE";
 
-/// Runs a test that mounts disks, once more and in a mount namespace of its own, of which nothing is left however the
-/// test ends. A user who may not mount any may in a user namespace, where Linux permits it. Where neither is permitted,
-/// the test, which has this name, is skipped, which is said.
+/// Runs a test that mounts disks in a mount namespace of its own, so that no mount is left behind however the test
+/// ends. For that, this program is started again with the test of this name only. A user who is not root gets a user
+/// namespace too, where Linux permits it. Where neither is permitted, the test says that it is skipped.
 fn with_disks(test: &str, body: fn()) {
     if std::env::var_os(WITHIN).is_some() {
         return body();
