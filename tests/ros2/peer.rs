@@ -10,6 +10,8 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
 use serde_json::Value;
 use sesame_tests::workspace;
 
@@ -78,7 +80,11 @@ impl Peer {
             .env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
             .env("ROS_LOG_DIR", std::env::temp_dir().join("sesame_tests_ros2"))
             .env("CYCLONEDDS_URI", CYCLONE)
+            // In shared memory, Fast DDS leaves half a megabyte of each peer that is killed, and locks that later peers
+            // of the domain take. A runner speaks UDP anyway.
+            .env("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
             .env("PYTHONDONTWRITEBYTECODE", "1")
+            .env("PYTHONFAULTHANDLER", "1")
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
@@ -139,13 +145,22 @@ impl Peer {
     }
 
     /// Closes its input, which those that stay wait for, and waits for its end.
+    #[track_caller]
     fn wait(&mut self) -> (ExitStatus, Vec<String>) {
         drop(lock(&self.child).stdin.take());
+        self.await_end();
         if let Some(listening) = self.listening.take() {
             let _ = listening.join();
         }
         let status = lock(&self.child).wait().expect("a child can be awaited");
         (status, std::mem::take(&mut lock(&self.said.lines).all))
+    }
+
+    /// Waits until it has ended by itself.
+    #[track_caller]
+    fn await_end(&self) {
+        let ended = sesame_patience::comes(|| self.has_ended());
+        assert!(ended, "{} does not end, and said {:?}", self.name, lock(&self.said.lines).all);
     }
 
     /// Waits for its end: all that it said.
@@ -177,7 +192,9 @@ impl Drop for Peer {
     fn drop(&mut self) {
         if !self.has_ended() {
             let mut child = lock(&self.child);
-            let _ = child.kill();
+            // In a test that fails its Python writes to the standard error where each of its threads is.
+            let signal = if std::thread::panicking() { Signal::SIGABRT } else { Signal::SIGKILL };
+            let _ = kill(Pid::from_raw(child.id().cast_signed()), signal);
             let _ = child.wait();
         }
     }

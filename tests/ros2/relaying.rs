@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use sesame_base::observation::Observation;
 use sesame_base::time::SimTime;
 use sesame_codegen::frontend::{Look, SESAME};
+use sesame_patience::Watch;
 use sesame_plan::{CampaignPlan, Test};
 use sesame_relay::evaluate::{Custom, Run, evaluate_tapped};
 use sesame_relay::metric::MetricTable;
@@ -121,6 +122,11 @@ impl Exchanged {
     }
 }
 
+/// How many messages a relay has seen on all of these wires.
+fn seen_on(relay: &Relay<'_>, wires: &[Wire]) -> u64 {
+    wires.iter().map(|&wire| relay.next_index(wire)).sum()
+}
+
 /// After how long another probe is sent. Only what was lost is sent again, so it may be long.
 const ANOTHER: Duration = Duration::from_secs(1);
 
@@ -154,6 +160,9 @@ pub(crate) struct System {
     transport: Box<dyn Transport>,
     /// What the transport has noted, and nobody has taken.
     noted: Vec<String>,
+    /// Over a transport that does not return from what it does, once it was driven by hand: whole runs may be long. It
+    /// is dropped last.
+    watch: Option<Watch>,
 }
 
 impl System {
@@ -168,7 +177,7 @@ impl System {
             _ => sesame_ros2::ros2(folder),
         };
         let transport = connect.transport(&plan);
-        System { plan, transport, noted: Vec::new() }
+        System { plan, transport, noted: Vec::new(), watch: None }
     }
 
     /// A whole run of a test, as campaigns make them, and what the transport noted.
@@ -185,6 +194,7 @@ impl System {
     pub(crate) fn run_tapped(&mut self, test: &Test, tap: Option<&mut dyn Listener>) -> (Observation, Vec<String>) {
         let wires = WireTable::new(&self.plan);
         let metrics = MetricTable::new(&self.plan, &wires, &[]).expect("the metrics need no hooks");
+        self.watch = None;
         let (transport, custom) = (&mut *self.transport, &mut Custom::none());
         let run = Run { test, simulator_seed: 1, withheld: &[] };
         let run = evaluate_tapped(&self.plan, &wires, &metrics, transport, &run, custom, tap);
@@ -222,10 +232,8 @@ impl System {
         mut done: impl FnMut(u64) -> bool,
     ) -> Exchanged {
         let Exchange { from, beside, to, batch, begins } = *exchange;
-        let wires = WireTable::new(&self.plan);
-        let paths = self.plan.topics.iter().flat_map(|topic| &topic.paths);
-        let wires: Vec<Wire> = paths.filter_map(|path| wires.find(path)).collect();
-        let (mut probing, mut probes, mut batches, begun) = (Probing::default(), None, 0, Instant::now());
+        let wires = self.wires();
+        let (mut probing, mut probes, mut batches) = (Probing::default(), None, 0);
         let finished = self.drive(
             test,
             || {
@@ -235,7 +243,7 @@ impl System {
                 }
             },
             |relay, _| {
-                let seen: u64 = wires.iter().map(|&wire| relay.next_index(wire)).sum();
+                let seen = seen_on(relay, &wires);
                 if probes.is_none() {
                     if !probing.is_over(from, to) {
                         return false;
@@ -255,13 +263,21 @@ impl System {
                     from.go();
                     batches += 1;
                 }
-                assert!(begun.elapsed() < 10 * LIMIT, "{seen} messages, {heard} heard: nothing more comes");
                 done(seen - probes.unwrap_or_default())
             },
         );
         Exchanged { finished, probes: probes.unwrap_or_default() }
     }
 
+    /// The wires of the topics.
+    fn wires(&self) -> Vec<Wire> {
+        let wires = WireTable::new(&self.plan);
+        let paths = self.plan.topics.iter().flat_map(|topic| &topic.paths);
+        paths.filter_map(|path| wires.find(path)).collect()
+    }
+
+    /// A run that lasts until something holds. It fails when no message comes for longer than peers wait for one, so
+    /// that a peer that never ends shows where it is.
     fn drive(
         &mut self,
         test: &Test,
@@ -271,10 +287,19 @@ impl System {
         let wires = WireTable::new(&self.plan);
         let metrics = MetricTable::new(&self.plan, &wires, &[]).expect("the metrics need no hooks");
         let mut relay = Relay::new(&self.plan, &wires, test, metrics.start(), &[]).expect("the test fits the plan");
+        let topics = self.wires();
+        let watch = self.watch.insert(Watch::over("the runner"));
         relay.begin();
         self.transport.reset(1, &mut relay).unwrap_or_else(|error| panic!("{error}"));
         ready();
+        let (mut seen, mut since) = (0, Instant::now());
         loop {
+            watch.goes_on();
+            let now = seen_on(&relay, &topics);
+            if now > seen {
+                (seen, since) = (now, Instant::now());
+            }
+            assert!(since.elapsed() < 2 * LIMIT, "after {seen} messages no more come, and the peers do not end");
             if done(&relay, &mut *self.transport) {
                 return relay.finish(self.transport.now());
             }

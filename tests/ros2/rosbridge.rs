@@ -48,7 +48,12 @@ impl Server {
 impl Drop for Server {
     fn drop(&mut self) {
         drop(self.child.stdin.take());
-        self.child.wait().expect("a child can be awaited");
+        let ended = sesame_patience::comes(|| self.child.try_wait().expect("a child can be asked").is_some());
+        if !ended {
+            let _ = self.child.kill();
+            let _ = self.child.wait();
+        }
+        assert!(ended || std::thread::panicking(), "the server does not end");
     }
 }
 

@@ -6,6 +6,7 @@
 //! says what it waited for.
 
 use std::fmt::Display;
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -39,6 +40,42 @@ pub fn until_some<T>(what: impl Display, mut look: impl FnMut() -> Option<T>) ->
 #[must_use]
 pub fn comes(holds: impl FnMut() -> bool) -> bool {
     within(LIMIT, holds)
+}
+
+/// Watches a test whose own code may hang, where no condition can be asked any more. If the test neither says that it
+/// goes on nor drops the watch within the limit, the watch names what hangs and aborts the test's process.
+#[derive(Debug)]
+pub struct Watch(Sender<()>);
+
+impl Watch {
+    /// Watches from now on.
+    #[must_use]
+    pub fn over(what: impl Display) -> Watch {
+        Watch::within(what.to_string(), 2 * LIMIT)
+    }
+
+    fn within(what: String, limit: Duration) -> Watch {
+        let (signs, seen) = channel();
+        std::thread::spawn(move || {
+            loop {
+                match seen.recv_timeout(limit) {
+                    Ok(()) => {}
+                    Err(RecvTimeoutError::Disconnected) => return,
+                    Err(RecvTimeoutError::Timeout) => {
+                        eprintln!("{}", in_vain(&format_args!("a sign of life of {what}"), limit));
+                        std::process::abort();
+                    }
+                }
+            }
+        });
+        Watch(signs)
+    }
+
+    /// The test goes on.
+    pub fn goes_on(&self) {
+        // The other end stays until this one is dropped.
+        let _ = self.0.send(());
+    }
 }
 
 fn within(limit: Duration, mut holds: impl FnMut() -> bool) -> bool {
@@ -78,6 +115,26 @@ mod tests {
     fn what_is_seen_at_last_is_returned() {
         let mut left = vec![Some("door"), None, None];
         assert_eq!(until_some("the door", || left.pop().flatten()), "door");
+    }
+
+    /// Set in a process whose test is to hang.
+    const HANGS: &str = "SESAME_PATIENCE_HANGS";
+
+    #[test]
+    fn a_test_whose_own_code_hangs_is_ended_and_what_hangs_is_named() {
+        if std::env::var_os(HANGS).is_some() {
+            let watch = Watch::within("the door".to_owned(), Duration::from_millis(100));
+            watch.goes_on();
+            sleep(LIMIT);
+            return drop(watch);
+        }
+        let name = "tests::a_test_whose_own_code_hangs_is_ended_and_what_hangs_is_named";
+        let program = std::env::current_exe().expect("a test has a program");
+        let hung = std::process::Command::new(program).args(["--exact", name, "--nocapture"]).env(HANGS, "1").output();
+        let hung = hung.expect("the program starts");
+        assert!(!hung.status.success());
+        let said = String::from_utf8_lossy(&hung.stderr).into_owned();
+        assert!(said.contains("a sign of life of the door: awaited for 0 s in vain"), "{said}");
     }
 
     #[test]
