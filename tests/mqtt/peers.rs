@@ -9,6 +9,8 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
+// How long a client may take to say anything.
+pub(crate) use sesame_patience::LIMIT;
 use sesame_tests::{Port, workspace};
 
 /// The folder of the peers' packages. Without one the test is to be skipped, which is said here; with `CI=true` that is
@@ -25,9 +27,6 @@ pub(crate) fn packages() -> Option<PathBuf> {
     }
     packages
 }
-
-/// How long anything may take: longer than it ever takes, on a machine that is busy too.
-pub(crate) const LIMIT: Duration = Duration::from_secs(120);
 
 /// A broker, which is ended when it is dropped.
 pub(crate) struct Broker {

@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use sesame_base::time::SimTime;
 use sesame_codegen::frontend::{Look, SESAME};
+use sesame_patience::Watch;
 use sesame_plan::{CampaignPlan, Test};
 use sesame_relay::metric::MetricTable;
 use sesame_relay::relay::Relay;
@@ -67,11 +68,13 @@ impl System {
         let wires = WireTable::new(&self.plan);
         let metrics = MetricTable::new(&self.plan, &wires, &[]).expect("the metrics need no hooks");
         let mut relay = Relay::new(&self.plan, &wires, test, metrics.start(), &[]).expect("the test fits the plan");
+        let watch = Watch::over("the runner");
         relay.begin();
         self.transport.reset(1, &mut relay).map_err(|error| error.to_string())?;
         ready();
         let limit = Instant::now() + 3 * LIMIT;
         while !done() {
+            watch.goes_on();
             assert!(Instant::now() < limit, "nothing came of it: {:?}", self.notes());
             let until = self.transport.now() + SimTime::from_nanos(5_000_000);
             while self.transport.now() < until {

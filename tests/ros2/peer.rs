@@ -8,17 +8,15 @@ use std::path::Path;
 use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
-use std::time::Duration;
 
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::Value;
+// How long a peer may take to say anything.
+pub(crate) use sesame_patience::LIMIT;
 use sesame_tests::workspace;
 
 use crate::environment::Domain;
-
-/// How long anything may take that a peer is to say: longer than it ever takes, on a machine that is busy too.
-pub(crate) const LIMIT: Duration = Duration::from_secs(120);
 
 /// Cyclone on this machine only: on the loopback interface, where it finds others without multicast.
 const CYCLONE: &str = "<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"lo\"/></Interfaces></General>\
@@ -80,8 +78,8 @@ impl Peer {
             .env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
             .env("ROS_LOG_DIR", std::env::temp_dir().join("sesame_tests_ros2"))
             .env("CYCLONEDDS_URI", CYCLONE)
-            // In shared memory, Fast DDS leaves half a megabyte of each peer that is killed, and locks that later peers
-            // of the domain take. A runner speaks UDP anyway.
+            // When a peer is killed, Fast DDS leaves half a megabyte of shared memory and the locks of its ports
+            // behind. A runner speaks UDP anyway.
             .env("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
             .env("PYTHONDONTWRITEBYTECODE", "1")
             .env("PYTHONFAULTHANDLER", "1")
@@ -148,19 +146,13 @@ impl Peer {
     #[track_caller]
     fn wait(&mut self) -> (ExitStatus, Vec<String>) {
         drop(lock(&self.child).stdin.take());
-        self.await_end();
+        let ended = sesame_patience::comes(|| self.has_ended());
+        assert!(ended, "{} does not end, and said {:?}", self.name, lock(&self.said.lines).all);
         if let Some(listening) = self.listening.take() {
             let _ = listening.join();
         }
         let status = lock(&self.child).wait().expect("a child can be awaited");
         (status, std::mem::take(&mut lock(&self.said.lines).all))
-    }
-
-    /// Waits until it has ended by itself.
-    #[track_caller]
-    fn await_end(&self) {
-        let ended = sesame_patience::comes(|| self.has_ended());
-        assert!(ended, "{} does not end, and said {:?}", self.name, lock(&self.said.lines).all);
     }
 
     /// Waits for its end: all that it said.

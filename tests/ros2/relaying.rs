@@ -122,11 +122,6 @@ impl Exchanged {
     }
 }
 
-/// How many messages a relay has seen on all of these wires.
-fn seen_on(relay: &Relay<'_>, wires: &[Wire]) -> u64 {
-    wires.iter().map(|&wire| relay.next_index(wire)).sum()
-}
-
 /// After how long another probe is sent. Only what was lost is sent again, so it may be long.
 const ANOTHER: Duration = Duration::from_secs(1);
 
@@ -232,7 +227,6 @@ impl System {
         mut done: impl FnMut(u64) -> bool,
     ) -> Exchanged {
         let Exchange { from, beside, to, batch, begins } = *exchange;
-        let wires = self.wires();
         let (mut probing, mut probes, mut batches) = (Probing::default(), None, 0);
         let finished = self.drive(
             test,
@@ -242,8 +236,7 @@ impl System {
                     peer.await_match();
                 }
             },
-            |relay, _| {
-                let seen = seen_on(relay, &wires);
+            |seen, _| {
                 if probes.is_none() {
                     if !probing.is_over(from, to) {
                         return false;
@@ -269,38 +262,33 @@ impl System {
         Exchanged { finished, probes: probes.unwrap_or_default() }
     }
 
-    /// The wires of the topics.
-    fn wires(&self) -> Vec<Wire> {
-        let wires = WireTable::new(&self.plan);
-        let paths = self.plan.topics.iter().flat_map(|topic| &topic.paths);
-        paths.filter_map(|path| wires.find(path)).collect()
-    }
-
-    /// A run that lasts until something holds. It fails when no message comes for longer than peers wait for one, so
-    /// that a peer that never ends shows where it is.
+    /// A run that lasts until something holds, which is asked with how many messages the runner has seen. It fails when
+    /// no message comes for longer than peers wait for one, so that a peer that never ends shows where it is.
     fn drive(
         &mut self,
         test: &Test,
         ready: impl FnOnce(),
-        mut done: impl FnMut(&Relay<'_>, &mut dyn Transport) -> bool,
+        mut done: impl FnMut(u64, &mut dyn Transport) -> bool,
     ) -> Finished {
         let wires = WireTable::new(&self.plan);
         let metrics = MetricTable::new(&self.plan, &wires, &[]).expect("the metrics need no hooks");
         let mut relay = Relay::new(&self.plan, &wires, test, metrics.start(), &[]).expect("the test fits the plan");
-        let topics = self.wires();
+        let paths = self.plan.topics.iter().flat_map(|topic| &topic.paths);
+        let topics: Vec<Wire> = paths.filter_map(|path| wires.find(path)).collect();
         let watch = self.watch.insert(Watch::over("the runner"));
         relay.begin();
         self.transport.reset(1, &mut relay).unwrap_or_else(|error| panic!("{error}"));
+        watch.goes_on();
         ready();
         let (mut seen, mut since) = (0, Instant::now());
         loop {
             watch.goes_on();
-            let now = seen_on(&relay, &topics);
+            let now: u64 = topics.iter().map(|&wire| relay.next_index(wire)).sum();
             if now > seen {
                 (seen, since) = (now, Instant::now());
             }
-            assert!(since.elapsed() < 2 * LIMIT, "after {seen} messages no more come, and the peers do not end");
-            if done(&relay, &mut *self.transport) {
+            assert!(since.elapsed() < 2 * LIMIT, "after {seen} messages no more come, and the run is not over");
+            if done(seen, &mut *self.transport) {
                 return relay.finish(self.transport.now());
             }
             let until = self.transport.now() + SimTime::from_nanos(5_000_000);
