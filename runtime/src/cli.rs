@@ -22,6 +22,7 @@ mod null;
 mod over_budget;
 #[cfg(feature = "process")]
 mod physical;
+mod place;
 #[cfg(feature = "process")]
 mod preparation;
 #[cfg(feature = "process")]
@@ -62,6 +63,7 @@ use crate::runner::Runner;
 
 pub use self::caller::{CALLER, Caller};
 pub use self::commands::{Internal, Running, Showing};
+pub use self::place::RUNNER;
 
 /// What the exit codes of a runner mean.
 pub const EXIT_CODES: &str = "Exit codes: 0 done; 1 failed; 2 wrong usage; 3 done, but not as required (`known`: an \
@@ -92,10 +94,12 @@ enum Command {
 
 /// The runner's command line. A generated `main` is nothing but this call.
 pub fn main(runner: Runner) -> ExitCode {
-    concluded(WorkerProgram::compiled().map_err(Failure::from).and_then(|program| {
-        let session = Session::new(runner, program, Caller::of_this_process())?;
-        dispatch(&session, std::env::args_os())
-    }))
+    concluded(place::check(&runner.directory).and_then(|()| WorkerProgram::compiled().map_err(Failure::from)).and_then(
+        |program| {
+            let session = Session::new(runner, program, Caller::of_this_process())?;
+            dispatch(&session, std::env::args_os())
+        },
+    ))
 }
 
 /// The command line of a runner that is interpreted: `arguments` are those after the program's name.

@@ -79,5 +79,8 @@ macro_rules! assert_generator_abi {
             $crate::GENERATOR_ABI == $abi,
             "this runner was generated for another version of sesame-runtime: run `sesamec generate` again"
         );
+        // Cargo builds the crate anew where this is another folder: two projects with spaces and campaigns of the same
+        // names have runners that cargo cannot tell apart, and would take one for the other.
+        const _: ::core::option::Option<&str> = ::core::option_env!("SESAME_RUNNER");
     };
 }

@@ -8,6 +8,7 @@ mod gap;
 mod import;
 mod lab;
 mod monitor;
+mod owner;
 mod progress;
 mod results;
 mod runner;

@@ -272,7 +272,7 @@ fn runner(runner: &RunnerPlan, environment: &Environment) -> Result<Tree, Proble
     if let Some(lock) = &environment.lock {
         tree.add("Cargo.lock", Owner::Seed, lock.clone());
     }
-    tree.add("campaign.plan.json", Owner::Machine, json);
+    tree.add(CAMPAIGN_PLAN, Owner::Machine, json);
     // As seen from the runner's folder, and from its src/generated/.
     let (hooks_folder, hooks_path) = match environment.hooks {
         HooksFolder::Shared => ("../hooks", "../../../hooks"),
@@ -435,7 +435,10 @@ fn by(plan: &CampaignPlan, command: &str) -> String {
     ))
 }
 
-/// The plan of a runner, as `campaign.plan.json` holds it.
+/// The file of a runner with its plan.
+pub(crate) const CAMPAIGN_PLAN: &str = "campaign.plan.json";
+
+/// The plan of a runner, as the file `campaign.plan.json` holds it.
 pub fn plan_json(runner: &RunnerPlan) -> String {
     let mut json = serde_json::to_string_pretty(&runner.plan).expect("a plan is plain data");
     json.push('\n');

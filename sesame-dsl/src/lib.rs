@@ -17,6 +17,7 @@ pub mod source;
 pub mod span;
 mod synonyms;
 mod syntax;
+mod tried;
 pub mod units;
 
 use diagnostic::{Diagnostic, Severity};
@@ -62,13 +63,41 @@ pub fn analyse_with(sources: &SourceMap, root: FileId, interfaces: &dyn Interfac
     let (mut diagnostics, mut undecided) = (Vec::new(), Vec::new());
     let merged = import::merge(sources, root, &mut diagnostics);
     let index = index::build::index(&merged);
-    let model = resolve::resolve(sources, root, merged, interfaces, &mut diagnostics, &mut undecided);
+    let model = resolved(sources, root, merged, interfaces, &mut diagnostics, Some(&mut undecided));
+    tried::keep_what_mends(sources, &mut diagnostics, |changed| diagnose_with(changed, root, interfaces));
+    Analysis { index, model, diagnostics, undecided }
+}
+
+/// The diagnostics of [`analyse`] alone, in a fraction of its time: certificates of monitors are not checked, and no
+/// suggestion has been tried.
+pub fn diagnose(sources: &SourceMap, root: FileId) -> Vec<Diagnostic> {
+    diagnose_with(sources, root, &NoInterfaces)
+}
+
+fn diagnose_with(sources: &SourceMap, root: FileId, interfaces: &dyn Interfaces) -> Vec<Diagnostic> {
+    let mut diagnostics = Vec::new();
+    let merged = import::merge(sources, root, &mut diagnostics);
+    resolved(sources, root, merged, interfaces, &mut diagnostics, None);
+    diagnostics
+}
+
+/// The model of what was read, with all diagnostics in order. Certificates are checked if what is undecided about them
+/// is asked for.
+fn resolved(
+    sources: &SourceMap,
+    root: FileId,
+    merged: import::Merged,
+    interfaces: &dyn Interfaces,
+    diagnostics: &mut Vec<Diagnostic>,
+    undecided: Option<&mut Vec<(Span, String)>>,
+) -> Option<Space> {
+    let model = resolve::resolve(sources, root, merged, interfaces, diagnostics, undecided);
     if let Some(space) = &model {
         diagnostics.extend(check::check(space, root));
     }
     diagnostics.sort_by_key(|diagnostic| (diagnostic.span, diagnostic.code));
     diagnostics.dedup();
-    Analysis { index, model, diagnostics, undecided }
+    model
 }
 
 /// Whether a word is reserved, so that nothing but a message field can be named by it.

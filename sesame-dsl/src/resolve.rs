@@ -31,6 +31,7 @@ mod depth;
 mod disturbance;
 mod eddi;
 mod evidence;
+mod examples;
 mod exploration;
 mod formula;
 mod function;
@@ -78,14 +79,14 @@ use ros_types::RosTypes;
 use words::list;
 
 /// Resolves the files of a space. `None` exactly when there is an error, be it in `diagnostics` before or after. Adds
-/// to `undecided` what could not be decided about monitors.
+/// to `undecided` what could not be decided about monitors, whose certificates are checked only if it is there.
 pub(crate) fn resolve(
     sources: &SourceMap,
     root: FileId,
     merged: Merged,
     interfaces: &dyn Interfaces,
     diagnostics: &mut Vec<Diagnostic>,
-    undecided: &mut Vec<(Span, String)>,
+    undecided: Option<&mut Vec<(Span, String)>>,
 ) -> Option<Space> {
     let Merged { mut file, names, ranks } = merged;
     inherit::inherit(&mut file, diagnostics);
@@ -115,10 +116,12 @@ pub(crate) fn resolve(
     let requirements = resolver.requirements();
     resolver.hazards_of_scores(&requirements);
     resolver.operations();
-    resolver.tests();
+    resolver.tests(&requirements);
     let campaigns = resolver.campaigns();
     let physicals = resolver.physicals();
-    undecided.extend(resolver.certificates());
+    if let Some(undecided) = undecided {
+        undecided.extend(resolver.certificates());
+    }
 
     let Resolver { system, metrics, operations, tests, eddis, diagnostics, .. } = resolver;
     if diagnostics.iter().any(|diagnostic| diagnostic.severity() == Severity::Error) {
@@ -248,9 +251,12 @@ impl<'a> Resolver<'a> {
             Some(definition) => {
                 let is = definition.kind.with_article();
                 let title = format!("`{name}` is {is}, not {}", kind.with_article());
-                let diagnostic = Diagnostic::new(Code::OTHER_KIND, span, title)
+                let mut diagnostic = Diagnostic::new(Code::OTHER_KIND, span, title)
                     .label(format!("expected {}", kind.with_article()))
                     .secondary(definition.span, format!("declared as {is} here"));
+                if (definition.kind, kind) == (Kind::Metric, Kind::Requirement) {
+                    diagnostic = diagnostic.note(format!("or a bound on the metric, such as `{name} <= 0`"));
+                }
                 self.report(diagnostic);
                 return None;
             }
@@ -355,14 +361,6 @@ impl<'a> Resolver<'a> {
                 .secondary(spans[0], "first given here");
             self.report(diagnostic);
         }
-    }
-
-    fn missing(&mut self, at: &Name, what: &str, example: &str) {
-        let title = format!("`{}` is missing {what}", at.text);
-        let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, at.span, title)
-            .label(format!("add {what}"))
-            .note(format!("for example `{example}`"));
-        self.report(diagnostic);
     }
 }
 

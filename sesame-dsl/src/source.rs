@@ -54,6 +54,19 @@ impl SourceMap {
         self.unreadable.insert(name.into(), why.into());
     }
 
+    /// The same files, one of them with another text.
+    pub(crate) fn with_text(&self, id: FileId, text: &str) -> SourceMap {
+        let mut changed = self.clone();
+        let file = &mut changed.files[id.0 as usize];
+        *file = SourceFile::new(std::mem::take(&mut file.name), text.to_owned());
+        changed
+    }
+
+    /// How many bytes all files have together.
+    pub(crate) fn bytes(&self) -> usize {
+        self.files.iter().map(|file| file.text.len()).sum()
+    }
+
     /// Why the file of a name cannot be read, if that was said.
     pub fn unreadable(&self, name: &str) -> Option<&str> {
         self.unreadable.get(name).map(String::as_str)

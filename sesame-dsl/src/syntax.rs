@@ -13,6 +13,7 @@ mod phrases;
 mod syntax_error;
 mod text;
 mod token;
+mod values;
 
 pub use limits::MAX_BYTES;
 pub(crate) use limits::parse_bounded;

@@ -3,8 +3,9 @@
 //     node fleet.js vehicles PORT [COUNT]
 //     node fleet.js control  PORT [COUNT]
 //
-// Vehicles are virtual: they drive as orders say. The control sends each an order over 12 m shortly after it said
-// that it is ready, and publishes on `fleet/finished` how many seconds each order took until it heard of its end.
+// Vehicles are virtual: they drive as orders say. The control sends each an order over 12 m shortly after it has heard
+// all of them, which may take long on a busy machine, and publishes on `fleet/finished` how many seconds each order
+// took until it heard of its end.
 
 const { AgvController, MasterController, VirtualAgvAdapter } = require("vda-5050-lib");
 const mqtt = require("mqtt");
@@ -43,7 +44,16 @@ async function control() {
   const client = await mqtt.connectAsync?.(url) ?? mqtt.connect(url);
   const master = new MasterController(settings, {});
   await master.start();
+  const silent = new Set(vehicles.map(({ serialNumber }) => serialNumber));
+  const heard = new Promise((resolve) => client.on("message", (topic) => {
+    silent.delete(topic.split("/")[3]);
+    if (silent.size === 0) resolve();
+  }));
+  await new Promise((resolve, reject) => {
+    client.subscribe("uagv/v2/acme/+/state", (error) => error ? reject(error) : resolve());
+  });
   console.log("ready");
+  await heard;
   await new Promise((resolve) => setTimeout(resolve, 1500));
   for (const [at, vehicle] of vehicles.entries()) {
     const begin = process.hrtime.bigint();

@@ -167,8 +167,10 @@ fn spread_of_free_runs(folder: &str) -> Option<(Value, f64, f64)> {
         ("right_bias 5 times", "right_bias 3 times"),
     ];
     let cell = iiwa_cell(folder, &freely)?;
-    let ran = cell.sesamec("run", "repeated", &["--", "--workers", "1", "--format", "json"]).expect(0);
-    let ran: Value = serde_json::from_str(&ran.out).expect("it is JSON");
+    let done = cell.sesamec("run", "repeated", &["--", "--workers", "1", "--format", "json"]);
+    let ran: Value = serde_json::from_str(&done.out).unwrap_or_else(|_| panic!("no JSON: {}", done.err));
+    // On a busy machine arms that nobody steps may move in another way at the end, and then the run has to say so.
+    done.expect(if ran["closing_run"].is_null() { 0 } else { 3 });
     let spreads = ran["spreads"].as_array().expect("there are spreads");
     let spread = spreads.iter().find(|spread| spread["metric"] == "arm_distance").expect("one is of the arms");
     let number = |field: &str| spread[field].as_f64().unwrap_or_else(|| panic!("no `{field}` in {spread}"));
@@ -298,7 +300,10 @@ fn what_a_scan_of_the_running_cell_writes_is_run_with_a_campaign_below_it() {
         Peer::start_in(&example, &python, &domain, &words[0], &words[1..])
     });
     let mut run = command(sesamec());
-    let ran = done(run.arg("run").arg(&space).args(["--", "--workers", "1"]).current_dir(&folder)).expect(0);
+    let ran = done(run.arg("run").arg(&space).args(["--", "--workers", "1"]).current_dir(&folder));
+    // On a busy machine the first run may be over before all nodes have found the runner, which the last one shows.
+    let ran =
+        if ran.out.contains("the reference run after the campaign differs") { ran.expect(3) } else { ran.expect(0) };
     assert!(ran.out.contains("2 evaluations"), "{}", ran.out);
     assert!(ran.out.contains("arm_distance"), "{}", ran.out);
 }

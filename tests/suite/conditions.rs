@@ -127,6 +127,8 @@ fn a_campaign_by_condition_comes_out_the_same_on_any_number_of_workers_and_when_
         ("series_pieces", "test"),
         ("events", "test"),
         ("wall_times", "test"),
+        ("traffic", "test"),
+        ("unreached", "test"),
         ("tests", "number"),
     ] {
         connection.execute(&format!("DELETE FROM {table} WHERE {column} IN ({later})"), []).unwrap();
@@ -194,7 +196,10 @@ fn an_exported_test_by_condition_reproduces_its_values() {
         let name = format!("T{}", record.number);
         let results = format!("{campaign}/5");
         text.push_str(
-            &runner.run(&["export", &name, "--results", &results, "--name", campaign_test(campaign)]).expect(0).out,
+            &runner
+                .run(&["export", &name, "--results", &results, "--pin", "--name", campaign_test(campaign)])
+                .expect(0)
+                .out,
         );
         found.push((campaign, record));
     }

@@ -9,7 +9,7 @@ use sesame_dsl::source::SourceMap;
 use sesame_notation as notation;
 use sesame_plan::{Activation, Bound, CampaignPlan, Choice, Domain, OperationId, Test, TestOperation};
 use sesame_results::record::{Origin, Recorder, TestRecord};
-use sesame_results::report::export;
+use sesame_results::report::{Expected, export};
 use sesame_search as search;
 use sesame_tests::models::model;
 
@@ -97,6 +97,8 @@ fn check(plan: &CampaignPlan, tests: &[(Test, f64)]) {
             end: 70.0,
             operations: Vec::new(),
             unheard: Vec::new(),
+            unreached: Vec::new(),
+            traffic: Vec::new(),
             metrics: vec![metric(*value); plan.metrics.len()],
             monitors: Vec::new(),
             messages: 0,
@@ -116,7 +118,8 @@ fn check(plan: &CampaignPlan, tests: &[(Test, f64)]) {
         recorder.commit(&record).unwrap();
     }
     let repository = recorder.finish("done").unwrap();
-    let blocks = (1..=tests.len()).map(|number| export(&repository, &format!("T{number}"), None).unwrap().block);
+    let blocks = (1..=tests.len())
+        .map(|number| export(&repository, &format!("T{number}"), None, Expected::Values).unwrap().block);
     let again = self::plan(&format!("{SPACE}\n{}", blocks.collect::<String>()));
     assert_eq!(again.tests.len(), tests.len());
     for (known, (test, value)) in again.tests.iter().zip(tests) {

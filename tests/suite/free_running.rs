@@ -3,16 +3,12 @@
 use std::fs;
 
 use sesame_base::observation::Outcome;
-use sesame_results::record::{EventKind, Origin, Repository};
+use sesame_results::record::{EventKind, Origin, Repository, Verdict};
 use sesame_tests::{Project, workspace};
 
 #[test]
 fn equal_tests_of_a_free_running_simulator_are_simulated_again_and_a_replay_may_differ() {
-    let found =
-        std::process::Command::new("python3").arg("--version").output().is_ok_and(|output| output.status.success());
-    assert!(found || std::env::var_os("CI").is_none(), "python3 is needed");
-    if !found {
-        eprintln!("skipped: there is no python3 here");
+    if !python() {
         return;
     }
     let space = fs::read_to_string(workspace().join("tests/simulators/free_running/space.sesame")).unwrap();
@@ -44,4 +40,45 @@ fn equal_tests_of_a_free_running_simulator_are_simulated_again_and_a_replay_may_
     let replayed = runner.run(&["replay", "T2", "--results", "known/known"]).expect(0);
     assert!(replayed.err.contains("the simulator runs freely"), "{}", replayed.err);
     assert!(replayed.out.contains("1.5"), "the difference is shown: {}", replayed.out);
+}
+
+#[test]
+fn a_system_that_has_gone_silent_is_never_taken_for_a_safe_one() {
+    use Verdict::{Inconclusive, Satisfied};
+
+    if !python() {
+        return;
+    }
+    let space = fs::read_to_string(workspace().join("tests/simulators/falls_silent/space.sesame")).unwrap();
+    let runner = Project::new("falls_silent", &space, "falls_silent").build("known_only");
+    let ran = runner.run(&["known", "--workers", "1", "--results", "r"]).expect(3);
+    let repository = Repository::open(&runner.folder.join("r/known")).unwrap();
+    let verdicts = |number: u32| {
+        let row = repository.row(number).unwrap();
+        repository.plan().requirements.iter().map(|requirement| row.verdict(requirement)).collect::<Vec<_>>()
+    };
+    assert_eq!(verdicts(1), [Satisfied, Satisfied]);
+    // The distance was silent from one second on: nobody knows how near it came.
+    assert_eq!(verdicts(2), [Inconclusive, Satisfied]);
+    let warnings = &repository.test(2).unwrap().observation.warnings;
+    let note = "`robot/distance` was silent from 0.950 s to the end of the run (in the reference run never longer than \
+                0.050 s); what metrics read from a topic that fell silent is not known from then on";
+    assert_eq!(warnings, &[note]);
+    // The reference run at the end heard nothing at all, however often it was tried.
+    let closing = repository.row(3).unwrap();
+    assert!(matches!(&closing.outcome, Outcome::Disconnect { message } if message.contains("nothing was heard")));
+    let differs = "the reference run after the campaign differs from the one before it: the outcome was completed and is \
+                   disconnect";
+    assert!(ran.err.contains(&format!("not as required: {differs}")), "{}", ran.err);
+    assert_eq!(repository.test(0).unwrap().observation.traffic.len(), 2, "what was heard is recorded");
+}
+
+fn python() -> bool {
+    let found =
+        std::process::Command::new("python3").arg("--version").output().is_ok_and(|output| output.status.success());
+    assert!(found || std::env::var_os("CI").is_none(), "python3 is needed");
+    if !found {
+        eprintln!("skipped: there is no python3 here");
+    }
+    found
 }

@@ -168,20 +168,27 @@ fn an_objective_whose_hook_is_a_stub_is_told_of_before_the_build() {
 }
 
 #[test]
-fn two_spaces_in_one_folder_do_not_share_results_and_none_are_written_through_a_link() {
+fn two_spaces_in_one_folder_may_have_campaigns_of_one_name_and_nothing_is_written_through_a_link() {
     let project = two_robots("interpreted_beside");
     let run = |space: &str| without_cargo(&project, &["run", space, "-c", "crossing"]);
     run("two_robots.sesame").expect(0);
-    fs::copy(&project.space, project.folder.join("other.sesame")).unwrap();
-    for told in [
-        run("other.sesame").expect(1),
-        without_cargo(&project, &["list", "other.sesame", "-c", "crossing"]).expect(1),
-        without_cargo(&project, &["replay", "other.sesame", "-c", "crossing", "T3"]).expect(1),
-    ] {
-        assert!(told.err.contains("contains results of `two_robots.sesame`, not of `other.sesame`"), "{}", told.err);
+    // A variant has the campaigns of the space that it imports.
+    fs::write(project.folder.join("other.sesame"), "space other\nimport \"two_robots.sesame\"\n").unwrap();
+    let told = without_cargo(&project, &["run", "other.sesame", "-c", "crossing", "-o", "runners"]).expect(1);
+    assert!(told.err.contains("crossing belongs to `two_robots.sesame`, not to `other.sesame`"), "{}", told.err);
+    let told = without_cargo(&project, &["list", "other.sesame", "-c", "crossing"]).expect(1);
+    assert!(told.err.contains("runners/other.sesame/crossing/results"), "{}", told.err);
+    let said = run("other.sesame").expect(0);
+    assert!(said.out.contains("runners/other.sesame/crossing/results/42/report.html"), "{}", said.out);
+    for command in ["list", "replay"] {
+        let test = (command == "replay").then_some("T3");
+        let command = [&[command, "other.sesame", "-c", "crossing"][..], test.as_slice()].concat();
+        without_cargo(&project, &command).expect(0);
     }
+    assert!(!project.runners.join("crossing/results/42-2").exists(), "the first space's folder is its own");
     // A renamed space keeps its results.
-    fs::remove_file(&project.space).unwrap();
+    fs::remove_dir_all(project.runners.join("other.sesame")).unwrap();
+    fs::rename(&project.space, project.folder.join("other.sesame")).unwrap();
     without_cargo(&project, &["replay", "other.sesame", "-c", "crossing", "T3"]).expect(0);
     without_cargo(&project, &["list", "other.sesame", "-c", "crossing"]).expect(0);
 

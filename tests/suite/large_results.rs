@@ -112,6 +112,8 @@ fn record(plan: &CampaignPlan, permitted: &TestSpace, number: u32) -> TestRecord
             end: 100.0,
             operations: test.operations.iter().map(|operation| effect(&operation.activation)).collect(),
             unheard: Vec::new(),
+            unreached: Vec::new(),
+            traffic: Vec::new(),
             metrics: values(objectives, number, &mut stream).map(metric).to_vec(),
             monitors: Vec::new(),
             messages: 10_000,

@@ -18,6 +18,33 @@ const HIDDEN: &str = "
     }
 ";
 
+/// May act only before the belt has said anything, and only after everything was said.
+const UNREACHED: &str = "
+    operation too_early on link0 = blackhole within [0s, 10ms]
+    operation reaches   on link0 = blackhole within [0s, 65s]
+    campaign early {
+      objectives top_speed
+      operations too_early, reaches 1..2 per test each at most once
+      activate   by time
+      search     random { evaluations 6  seed 1 }
+      end        after 70s
+    }
+";
+
+#[test]
+fn a_campaign_with_an_operation_that_can_never_act_ends_before_it_fuzzes_and_is_not_green_afterwards() {
+    let project = Project::kuka_cell_with("kuka_cell_unreached", UNREACHED);
+    let runner = project.build("early");
+    for command in [&["run", "--results", "r"][..], &["resume", "r/1"]] {
+        let refused = runner.run(command).expect(1);
+        let said = "operation `too_early` cannot act: in the reference run, `link0` has no message from 0 s to 0.01 s, the \
+                    only time at which the operation may be active; the nearest message is at ";
+        assert!(refused.err.contains(said) && !refused.err.contains("`reaches`"), "{command:?}: {}", refused.err);
+    }
+    let ran = runner.run(&["resume", "r/1", "--allow-unheard"]);
+    assert!(ran.err.contains("operation `too_early` cannot act"), "{}", ran.err);
+}
+
 #[test]
 fn a_campaign_that_nobody_hears_ends_before_it_fuzzes_and_names_its_operations() {
     let project = Project::kuka_cell_with("kuka_cell_unheard", HIDDEN);

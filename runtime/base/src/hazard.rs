@@ -1,19 +1,18 @@
-//! When a requirement was violated for the first time in a run: a *hazard*, which a monitor foresees, misses, or
-//! prevents.
+//! When a requirement was lost in a run: a *hazard*, which a monitor foresees, misses, or prevents.
 
 use sesame_plan::{CampaignPlan, MetricSource, RequirementId};
 
-use crate::observation::{MetricObservation, MetricValue, Outcome};
+use crate::observation::{MetricObservation, MetricValue, Outcome, Reach};
 use crate::robustness::{Quantifier, lost, quantifier};
-use crate::verdict::{Verdict, ends, verdict};
+use crate::verdict::{Verdict, breaks, ends, verdict};
 
-/// The first moment, in seconds, at which the metric of a requirement was outside of its bound, from what all metrics
-/// showed in a run that ended at `end`; `None` if it never was. Of several values of one instant the last one counts.
+/// The first moment, in seconds, from which no continuation of a run could satisfy a requirement, from what all metrics
+/// showed in a run that ended at `end`; `None` if the run did not violate it. If an instant has several values, the
+/// last one counts.
 ///
-/// The robustness of a temporal formula is known when all is over, and its signal says when it was violated. A metric
-/// that has only its default is outside at the end of a run that came to its end. Of a value that grows with time, the
-/// fuzzing time or the time in a state, the series has the ends of its growth, and the hazard is the end after which it
-/// is known.
+/// A metric that only gets worse, such as a maximum with an upper bound, is lost when it leaves its bound. For all
+/// others, only the end decides: a mean may recover, and a count may yet be reached. The robustness of a temporal
+/// formula is known when all is over, and its signal says when it was lost.
 pub fn hazard(
     plan: &CampaignPlan,
     requirement: RequirementId,
@@ -23,15 +22,18 @@ pub fn hazard(
 ) -> Option<f64> {
     let declared = plan.requirement(requirement);
     let observed = metrics.get(declared.metric.index())?;
-    if matches!(plan.metric(declared.metric).source, MetricSource::Robustness { .. }) {
+    let metric = plan.metric(declared.metric);
+    if matches!(metric.source, MetricSource::Robustness { .. }) {
         return of_formula(plan, requirement, outcome, observed);
     }
-    let bound = declared.bound;
+    if verdict(declared.bound, outcome, MetricValue::from(observed)) != Verdict::Violated {
+        return None;
+    }
     let next = |at: usize| observed.series.get(at + 1).map(|point| point.0);
     let lasting = observed.series.iter().enumerate().filter(|(at, point)| next(*at) != Some(point.0));
-    let first = lasting.map(|(_, point)| *point).find(|(_, value)| !bound.holds(*value));
-    let by_default = !observed.set && outcome.is_whole() && observed.value.is_some_and(|value| !bound.holds(value));
-    first.map(|(time, _)| time).or(by_default.then_some(end))
+    let mut lasting = lasting.map(|(_, point)| *point);
+    let lost = lasting.find(|&(_, value)| breaks(declared.bound, Reach::onwards(metric.trend, Some(value))));
+    Some(lost.map_or(end, |(time, _)| time))
 }
 
 /// When a requirement on the robustness of a formula was violated, from what that showed; `None` if it was not.
@@ -64,32 +66,36 @@ pub fn of_formula(
 #[cfg(test)]
 mod tests {
     use sesame_plan::testing::{metric, minimal, requirement};
-    use sesame_plan::{Bound, FieldRef, TopicId};
+    use sesame_plan::{Bound, FieldRef, Metric, TopicId, Trend};
 
     use super::*;
 
     #[test]
-    fn it_is_the_first_moment_outside_of_the_bound_after_all_of_its_instant() {
+    fn it_is_the_first_moment_from_which_nothing_could_satisfy_the_requirement() {
         let last = MetricSource::Last { input: FieldRef { topic: TopicId(0), path: Vec::new() } };
-        let plan = CampaignPlan {
-            metrics: vec![metric("gap", last)],
-            requirements: vec![requirement("apart", 0, Bound::AtLeast { value: 1.0 })],
-            ..minimal()
-        };
-        let of = |outcome: &Outcome, series: &[(f64, f64)], default: f64| {
+        let of = |trend, outcome: &Outcome, series: &[(f64, f64)], default: f64| {
+            let plan = CampaignPlan {
+                metrics: vec![Metric { trend, ..metric("gap", last.clone()) }],
+                requirements: vec![requirement("apart", 0, Bound::AtLeast { value: 1.0 })],
+                ..minimal()
+            };
             let value = series.last().map_or(default, |point| point.1);
-            let observed = MetricObservation::whole(Some(value), !series.is_empty(), series.to_vec());
+            let mut observed = MetricObservation::whole(Some(value), !series.is_empty(), series.to_vec());
+            if !outcome.is_whole() {
+                observed.reach = Reach::onwards(trend, series.last().map(|point| point.1));
+            }
             hazard(&plan, RequirementId(0), outcome, &[observed], 9.0)
         };
-        let whole = &Outcome::Completed;
-        assert_eq!(
-            of(whole, &[(1.0, 3.0), (2.0, 0.5), (3.0, 2.0)], 5.0),
-            Some(2.0),
-            "although it is inside at the end"
-        );
-        assert_eq!(of(whole, &[(2.0, 0.5), (2.0, 2.0), (4.0, 0.1)], 5.0), Some(4.0), "within an instant it is nothing");
-        assert_eq!(of(whole, &[(2.0, 1.0)], 5.0), None);
-        assert_eq!((of(whole, &[], 0.5), of(whole, &[], 5.0)), (Some(9.0), None));
-        assert_eq!(of(&Outcome::crash("gone".to_owned()), &[], 0.5), None, "it might still have been set");
+        let (whole, crash) = (&Outcome::Completed, &Outcome::crash("gone".to_owned()));
+        let falling = Some(Trend::Falling);
+        assert_eq!(of(falling, whole, &[(1.0, 3.0), (2.0, 0.5), (3.0, 0.25)], 5.0), Some(2.0));
+        assert_eq!(of(falling, crash, &[(1.0, 3.0), (2.0, 0.5)], 5.0), Some(2.0));
+        assert_eq!(of(falling, whole, &[(2.0, 0.5), (2.0, 2.0), (4.0, 0.1)], 5.0), Some(4.0), "not within an instant");
+        assert_eq!(of(None, whole, &[(1.0, 3.0), (2.0, 0.5), (3.0, 2.0)], 5.0), None, "it is satisfied at the end");
+        assert_eq!(of(None, whole, &[(1.0, 3.0), (2.0, 0.5)], 5.0), Some(9.0), "until the end it could recover");
+        assert_eq!(of(None, crash, &[(2.0, 0.5)], 5.0), None, "it might still have recovered");
+        assert_eq!(of(Some(Trend::Rising), whole, &[(2.0, 0.5)], 5.0), Some(9.0));
+        assert_eq!(of(falling, whole, &[(2.0, 1.0)], 5.0), None);
+        assert_eq!((of(None, whole, &[], 0.5), of(None, whole, &[], 5.0)), (Some(9.0), None));
     }
 }

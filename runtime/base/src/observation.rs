@@ -1,6 +1,7 @@
 //! What was observed in one run of a test: what a worker reports and the results repository keeps.
 
 mod monitor;
+mod traffic;
 
 use std::fmt::Write as _;
 
@@ -9,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use sesame_plan::{Span, Trend};
 
 pub use monitor::{CHANGES_KEPT, ChangeCause, EvidenceChange, MonitorDecision, MonitorHazard, MonitorObservation};
+pub use traffic::{Traffic, Unreached};
 
 /// How a run ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -42,7 +44,7 @@ pub enum Outcome {
         /// What is known of the cause.
         message: String,
     },
-    /// The clock of the simulator went back.
+    /// The clock of the simulator went back, or leapt ahead.
     WrongClock {
         /// From when to when.
         message: String,
@@ -127,6 +129,13 @@ pub struct Observation {
     /// Of a run that came to its end: names on the wire that operations of the campaign act on and that nobody heard,
     /// in order of declaration. Neither did the simulator subscribe to them, nor reads them an outbound metric.
     pub unheard: Vec<String>,
+    /// In a run without operations: those of the campaign that would have found no message, in order of declaration.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub unreached: Vec<Unreached>,
+    /// What was published on each wire that spoke, in order of declaration; empty after a crash of the worker. It
+    /// explains what came of the run, and is not part of the digest.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub traffic: Vec<Traffic>,
     /// Per metric of the plan, in its order; empty after a crash of the worker.
     pub metrics: Vec<MetricObservation>,
     /// Per monitor of the plan, in its order; empty after a crash of the worker.
@@ -256,6 +265,13 @@ impl Reach {
         value.map_or(Reach::ANY, Reach::only)
     }
 
+    /// All values from the least to the greatest of both.
+    #[must_use]
+    pub fn or(self, other: Reach) -> Self {
+        let both = |a: Option<f64>, b: Option<f64>, choose: fn(f64, f64) -> f64| a.zip(b).map(|(a, b)| choose(a, b));
+        Reach { low: both(self.low, other.low, f64::min), high: both(self.high, other.high, f64::max) }
+    }
+
     /// What is left for a metric that only goes one way and has come to this value; without a value, or where it may go
     /// both ways, everything.
     pub fn onwards(trend: Option<Trend>, value: Option<f64>) -> Self {
@@ -307,6 +323,8 @@ impl Observation {
             end: 0.0,
             operations: Vec::new(),
             unheard: Vec::new(),
+            unreached: Vec::new(),
+            traffic: Vec::new(),
             metrics: Vec::new(),
             monitors: Vec::new(),
             messages: 0,
@@ -315,7 +333,7 @@ impl Observation {
         }
     }
 
-    /// The same run without the series of its metrics and what its monitors did, which are most of it.
+    /// The same run without the series of its metrics, its traffic and what its monitors did, which are most of it.
     #[must_use]
     pub fn without_series(&self) -> Self {
         let metric = |&MetricObservation { value, set, reach, not_finite, .. }: &MetricObservation| MetricObservation {
@@ -331,6 +349,8 @@ impl Observation {
             end: self.end,
             operations: self.operations.clone(),
             unheard: self.unheard.clone(),
+            unreached: self.unreached.clone(),
+            traffic: Vec::new(),
             metrics: self.metrics.iter().map(metric).collect(),
             monitors: Vec::new(),
             messages: self.messages,

@@ -32,22 +32,31 @@ impl Verdict {
 /// The verdict of a run on a requirement. This rule is the only one: tables, margins, confirmations, and the views of
 /// the database follow it.
 ///
-/// The requirement is violated if the bound holds for none of the values that the metric could have taken by the
-/// planned end of the run. It is satisfied if the run reached its planned end, everything that the metric read was
-/// finite, and the bound holds for its value. Otherwise the run is inconclusive.
+/// The requirement is violated if the bound holds for none of the values that the metric could have had at the planned
+/// end of the run. It is satisfied if the run reached its planned end, everything that the metric read was finite, and
+/// the bound holds for all of these values. Otherwise the run is inconclusive.
 pub fn verdict(bound: Bound, outcome: &Outcome, shown: MetricValue) -> Verdict {
     if breaks(bound, shown.reach) {
         return Verdict::Violated;
     }
     let trusted = outcome.is_whole() && shown.not_finite.is_none();
-    match shown.value {
-        Some(x) if trusted && bound.holds(x) => Verdict::Satisfied,
-        Some(_) | None => Verdict::Inconclusive,
+    if trusted && shown.value.is_some() && keeps(bound, shown.reach) {
+        Verdict::Satisfied
+    } else {
+        Verdict::Inconclusive
     }
 }
 
+/// Whether a bound holds for all of these values.
+fn keeps(bound: Bound, reach: Reach) -> bool {
+    let (low, low_excluded, high, high_excluded) = ends(bound);
+    let above = low.is_none_or(|end| reach.low.is_some_and(|x| x > end || (!low_excluded && x == end)));
+    let below = high.is_none_or(|end| reach.high.is_some_and(|x| x < end || (!high_excluded && x == end)));
+    above && below
+}
+
 /// Whether a bound holds for none of these values.
-fn breaks(bound: Bound, reach: Reach) -> bool {
+pub fn breaks(bound: Bound, reach: Reach) -> bool {
     let (low, low_excluded, high, high_excluded) = ends(bound);
     let too_low = reach.high.zip(low).is_some_and(|(x, end)| x < end || (low_excluded && x == end));
     let too_high = reach.low.zip(high).is_some_and(|(x, end)| x > end || (high_excluded && x == end));
@@ -64,13 +73,46 @@ pub fn fails(
     match failing {
         Failing::Crash => matches!(outcome, Outcome::Crash { .. }),
         Failing::Timeout => matches!(outcome, Outcome::Timeout { .. }),
-        Failing::Violation { requirements } => {
+        Failing::Violation { requirements, margins } => {
             *outcome != Outcome::NoEffect
-                && requirements.iter().all(|&id| {
+                && requirements.iter().enumerate().all(|(at, &id)| {
                     let requirement = plan.requirement(id);
-                    verdict(requirement.bound, outcome, value(requirement.metric)) == Verdict::Violated
+                    let bound = widened(requirement.bound, margins.get(at).copied().unwrap_or(0.0));
+                    verdict(bound, outcome, value(requirement.metric)) == Verdict::Violated
                 })
         }
+    }
+}
+
+/// The share of its bound by which a requirement must be violated at least, for a test to count as one that fails in
+/// the same way as another.
+const MARGIN: f64 = 1e-6;
+
+/// By how much a requirement must be violated by a test that fails like one in which its metric had this value: a small
+/// share of the bound, or of the violation if that is less (a bound of 0 has no size).
+pub fn margin(bound: Bound, value: f64) -> f64 {
+    let (low, _, high, _) = ends(bound);
+    let violation = |end: f64, by: f64| {
+        let size = if end == 0.0 { by } else { end.abs().min(by) };
+        if by > 0.0 { MARGIN * size } else { 0.0 }
+    };
+    let below = low.map_or(0.0, |end| violation(end, end - value));
+    let above = high.map_or(0.0, |end| violation(end, value - end));
+    below.max(above)
+}
+
+/// A bound that only values keep or miss by at most this much.
+fn widened(bound: Bound, margin: f64) -> Bound {
+    if margin == 0.0 {
+        return bound;
+    }
+    match bound {
+        Bound::AtMost { value } => Bound::AtMost { value: value + margin },
+        Bound::Below { value } => Bound::Below { value: value + margin },
+        Bound::AtLeast { value } => Bound::AtLeast { value: value - margin },
+        Bound::Above { value } => Bound::Above { value: value - margin },
+        Bound::Equal { value } => Bound::Within { low: value - margin, high: value + margin },
+        Bound::Within { low, high } => Bound::Within { low: low - margin, high: high + margin },
     }
 }
 
@@ -175,8 +217,10 @@ mod tests {
         plan.requirements = [(0, 0.0), (1, 70.0)]
             .map(|(metric, value)| requirement(&format!("R{metric}"), metric, Bound::AtMost { value }))
             .to_vec();
-        let violation =
-            |ids: &[u32]| Failing::Violation { requirements: ids.iter().copied().map(RequirementId).collect() };
+        let violation = |ids: &[u32]| Failing::Violation {
+            requirements: ids.iter().copied().map(RequirementId).collect(),
+            margins: Vec::new(),
+        };
         let with = |outcome: &Outcome, failing: &Failing, collisions: f64, cycle: f64| {
             fails(&plan, failing, outcome, |id| {
                 cut_off(if id.0 == 1 { cycle } else { collisions }, Some(Trend::Rising))
@@ -190,6 +234,24 @@ mod tests {
         assert!(with(&crash, &both, 1.0, 71.0), "a violation seen before a crash stands");
         assert!(with(&crash, &Failing::Crash, 0.0, 0.0) && !with(&crash, &Failing::Timeout, 0.0, 0.0));
         assert!(with(&Outcome::Timeout { limit: 1.0 }, &Failing::Timeout, 0.0, 0.0));
+    }
+
+    #[test]
+    fn a_violation_by_rounding_is_not_the_failure_of_another_test() {
+        let mut plan = plan(Vec::new());
+        plan.requirements = vec![requirement("R1", 0, Bound::AtMost { value: 2.0 })];
+        let with = |found: f64, value: f64| {
+            let margins = vec![margin(plan.requirements[0].bound, found)];
+            let failing = Failing::Violation { requirements: vec![RequirementId(0)], margins };
+            fails(&plan, &failing, &Outcome::Completed, |_| MetricValue::whole(Some(value), true))
+        };
+        assert!(with(3.0, 3.0) && with(3.0, 2.001));
+        assert!(!with(3.0, 2.0 + 1e-12), "it may as well be none");
+        // The test itself violated it by no more than that.
+        assert!(with(2.0 + 1e-9, 2.0 + 1e-9) && !with(2.0 + 1e-9, 2.0 + 1e-16));
+        assert!((margin(Bound::AtMost { value: 0.0 }, 5.0) - 5e-6).abs() < 1e-15);
+        assert!((margin(Bound::Within { low: 1.0, high: 2.0 }, 0.5) - 0.5e-6).abs() < 1e-15);
+        assert_eq!(margin(Bound::AtMost { value: 2.0 }, 1.0), 0.0);
     }
 
     proptest! {

@@ -2,9 +2,9 @@
 //!
 //! Its value at an instant is a function of the messages until then, exact to the nanosecond:
 //!
-//! - Unknown before the first message of any of its topics.
-//! - While its topics have been silent for longer than `stale after`: false or unknown, as declared. A message exactly
-//!   that old is still fresh.
+//! - Unknown until each of its sources, which are topics or members of groups, had a message.
+//! - While any of its sources has been silent for longer than `stale after`, or all of them with `all stale after`:
+//!   false or unknown, as declared. A message exactly that old is still fresh.
 //! - Otherwise the truth of its condition at the last message. If that is true and must be `held`, it is false until
 //!   the condition has been true that long without a break, and true from then on. A condition that is false or
 //!   unknown is a break, and so is silence that made it stale.
@@ -19,8 +19,19 @@ use crate::truth::Truth;
 pub struct Rule {
     /// How long the condition must have been true; 0 is at once.
     pub held: i64,
-    /// The longest silence, and the value when it has been longer.
-    pub stale: Option<(i64, Truth)>,
+    /// When it is too old.
+    pub stale: Option<Stale>,
+}
+
+/// When evidence is too old, in nanoseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Stale {
+    /// The longest silence.
+    pub after: i64,
+    /// The value when it has been longer.
+    pub is: Truth,
+    /// Whether the silence is that of all sources; else that of the one which has been silent longest.
+    pub all: bool,
 }
 
 impl Rule {
@@ -31,7 +42,7 @@ impl Rule {
                 StaleIs::False => Truth::False,
                 StaleIs::Unknown => Truth::Unknown,
             };
-            (SimTime::from_seconds(stale.after).nanos(), is)
+            Stale { after: SimTime::from_seconds(stale.after).nanos(), is, all: stale.all }
         });
         Rule { held: SimTime::from_seconds(evidence.held).nanos(), stale }
     }
@@ -46,7 +57,7 @@ pub struct Automaton {
     value: Truth,
     /// When the condition became true without a break since; of meaning only while it is true and fresh.
     since: i64,
-    /// When the topics became silent; `i64::MAX` before the first message, and while it is stale.
+    /// Since when the silence that counts lasts; `i64::MAX` before the first message, and while it is stale.
     last: i64,
     /// Whether there was a message.
     heard: bool,
@@ -68,21 +79,30 @@ impl Automaton {
         self.raw
     }
 
-    /// Takes what the condition says at a message. Timers due until then must have been taken with
+    /// Takes what the condition says at a message, and since when the source is silent that has been silent longest:
+    /// for evidence with one source, since this message. Timers due until then must have been taken with
     /// [`Automaton::pass`].
-    pub fn observe(&mut self, rule: &Rule, at: SimTime, raw: Truth) {
+    pub fn observe(&mut self, rule: &Rule, at: SimTime, raw: Truth, oldest: SimTime) {
         let at = at.nanos();
         let broken = self.raw != Truth::True || self.is_stale();
         if raw == Truth::True && broken {
             self.since = at;
         }
         self.raw = raw;
-        self.last = at;
         self.heard = true;
+        self.last = at;
         self.value = match raw {
             Truth::True => Truth::from(at.saturating_sub(self.since) >= rule.held),
             other => other,
         };
+        if oldest.nanos() < at
+            && let Some(stale) = rule.stale.filter(|stale| !stale.all)
+        {
+            self.last = oldest.nanos();
+            if at.saturating_sub(self.last) > stale.after {
+                (self.last, self.value) = (i64::MAX, stale.is);
+            }
+        }
     }
 
     /// Takes that time has passed until this instant without a message.
@@ -92,7 +112,7 @@ impl Automaton {
         }
         let to = to.nanos();
         match rule.stale {
-            Some((after, is)) if to.saturating_sub(self.last) > after => {
+            Some(Stale { after, is, .. }) if to.saturating_sub(self.last) > after => {
                 self.last = i64::MAX;
                 self.value = is;
             }
@@ -107,7 +127,7 @@ impl Automaton {
         if self.last == i64::MAX {
             return i64::MAX;
         }
-        let stale = rule.stale.map_or(i64::MAX, |(after, _)| self.last.saturating_add(after).saturating_add(1));
+        let stale = rule.stale.map_or(i64::MAX, |it| self.last.saturating_add(it.after).saturating_add(1));
         if self.raw == Truth::True && self.value != Truth::True {
             stale.min(self.since.saturating_add(rule.held))
         } else {
@@ -126,8 +146,12 @@ mod tests {
 
     const T: fn(i64) -> SimTime = SimTime::from_nanos;
     const HELD: Rule = Rule { held: 100, stale: None };
-    const STALE: Rule = Rule { held: 0, stale: Some((200, Truth::False)) };
-    const BOTH: Rule = Rule { held: 100, stale: Some((60, Truth::Unknown)) };
+    const STALE: Rule = Rule { held: 0, stale: Some(after(200, Truth::False)) };
+    const BOTH: Rule = Rule { held: 100, stale: Some(after(60, Truth::Unknown)) };
+
+    const fn after(after: i64, is: Truth) -> Stale {
+        Stale { after, is, all: false }
+    }
 
     /// The values at these instants, with nothing between.
     fn values(rule: &Rule, heard: &[(i64, Truth)], at: &[i64]) -> Vec<Truth> {
@@ -138,7 +162,7 @@ mod tests {
                     let due = automaton.due(rule);
                     automaton.pass(rule, T(due));
                 }
-                automaton.observe(rule, T(when), raw);
+                automaton.observe(rule, T(when), raw, T(when));
             }
             while automaton.due(rule) <= instant {
                 let due = automaton.due(rule);
@@ -184,9 +208,30 @@ mod tests {
 
     #[test]
     fn what_is_stale_and_held_at_one_instant_is_stale() {
-        let rule = Rule { held: 61, stale: Some((60, Truth::False)) };
+        let rule = Rule { held: 61, stale: Some(after(60, Truth::False)) };
         assert_eq!(values(&rule, &[(0, True)], &[60, 61, 1000]), [False, False, False]);
         assert_eq!(values(&rule, &[(0, True), (30, True)], &[60, 61, 90, 91]), [False, True, True, False]);
+    }
+
+    #[test]
+    fn one_silent_source_makes_it_stale_and_with_all_the_last_one_does() {
+        let any = Rule { held: 0, stale: Some(after(60, False)) };
+        let all = Rule { held: 0, stale: Some(Stale { all: true, ..after(60, False) }) };
+        // One source speaks at 10 only, the other at 10, 50 and 90.
+        let value = |rule: &Rule, instant: i64| {
+            let mut automaton = Automaton::new();
+            for at in [10, 50, 90].into_iter().filter(|at| *at <= instant) {
+                while automaton.due(rule) <= at {
+                    let due = automaton.due(rule);
+                    automaton.pass(rule, T(due));
+                }
+                automaton.observe(rule, T(at), True, T(10));
+            }
+            automaton.pass(rule, T(instant));
+            automaton.value()
+        };
+        assert_eq!([10, 70, 71, 90, 200].map(|at| value(&any, at)), [True, True, False, False, False]);
+        assert_eq!([10, 70, 71, 90, 150, 151].map(|at| value(&all, at)), [True, True, True, True, True, False]);
     }
 
     #[test]

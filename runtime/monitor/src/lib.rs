@@ -28,5 +28,5 @@ pub mod tolerance;
 pub mod truth;
 pub mod why;
 
-pub use network::{Changes, Decision, EvidenceChange, EvidenceId, Invalid, Network, Run, State};
+pub use network::{Changes, Decision, EvidenceChange, EvidenceId, Invalid, Network, Reading, Run, State};
 pub use truth::Truth;

@@ -18,7 +18,7 @@ use crate::gate;
 
 pub(crate) use decide::Deciding;
 pub use decide::{Decision, State};
-pub use run::{Changes, EvidenceChange, Run};
+pub use run::{Changes, EvidenceChange, Reading, Run};
 
 /// A piece of evidence of a network: its monitor's place first, then its position there, counted through.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -1,11 +1,13 @@
-//! What a monitor was worth in a run: hazards foreseen and missed, lead times, false alarms, time in each state.
+//! What a monitor was worth in a run: hazards foreseen, detected and missed, lead times, false alarms, time in each
+//! state.
 //!
-//! A *hazard* is the first moment at which the metric of a requirement was outside its bound. The state *at* an instant
+//! A *hazard* is the first moment from which nothing could satisfy a requirement any more. The state *at* an instant
 //! is the last one decided at it, so it does not matter which of two things of one instant is told first.
 //!
 //! An *alarm* is a stay in the safe state that began because a guarantee was lost. The stay with which a run begins is
-//! none: nothing was lost, and no mitigation is sent. A hazard in it counts as foreseen all the same, because the
-//! monitor had promised nothing.
+//! none: nothing was lost, no mitigation is sent, and every run begins with one. Only if the monitor never leaves it,
+//! so that it promised nothing in the whole run, it is a false alarm unless there was a hazard. A hazard in it counts
+//! as foreseen all the same, because the monitor had promised nothing.
 //!
 //! [`Scorer`] takes decisions and hazards as they come, so that scores are metrics while a run goes on; [`score`] is
 //! the same over a whole run.
@@ -43,27 +45,32 @@ pub struct Score {
 pub struct Hazard {
     /// Which requirement was violated: whatever number the caller has for it.
     pub requirement: u32,
-    /// When its metric was first outside its bound.
+    /// When it was lost.
     pub at: SimTime,
-    /// For how long the monitor had been in the safe state at that time; `None` if it was not, so that the hazard was
-    /// missed.
+    /// For how long the monitor had been in the safe state at that time, zero if the hazard was only detected; `None`
+    /// if it was not, so that the hazard was missed.
     pub lead: Option<SimTime>,
 }
 
 impl Score {
-    /// How many hazards were foreseen.
+    /// How many hazards were foreseen: the monitor was in its safe state before them.
     pub fn foreseen(&self) -> usize {
-        self.hazards.iter().filter(|hazard| hazard.lead.is_some()).count()
+        self.hazards.iter().filter(|hazard| hazard.lead.is_some_and(|lead| lead > SimTime::ZERO)).count()
+    }
+
+    /// How many hazards were detected: the monitor went into its safe state in the very instant.
+    pub fn detected(&self) -> usize {
+        self.hazards.iter().filter(|hazard| hazard.lead == Some(SimTime::ZERO)).count()
     }
 
     /// How many hazards were missed.
     pub fn missed(&self) -> usize {
-        self.hazards.len() - self.foreseen()
+        self.hazards.iter().filter(|hazard| hazard.lead.is_none()).count()
     }
 
     /// The shortest lead time of a hazard that was foreseen.
     pub fn least_lead(&self) -> Option<SimTime> {
-        self.hazards.iter().filter_map(|hazard| hazard.lead).min()
+        self.hazards.iter().filter_map(|hazard| hazard.lead).filter(|lead| *lead > SimTime::ZERO).min()
     }
 }
 
@@ -167,6 +174,7 @@ impl Scorer {
     pub fn end(&self, now: SimTime) -> Score {
         let mut score = self.so_far(now);
         score.false_alarms += std::mem::take(&mut score.open_alarms);
+        score.false_alarms += u32::from(score.changes == 0 && score.hazards.is_empty());
         score
     }
 

@@ -3,8 +3,8 @@
 //!
 //! **The delayed recording.** Some streams are delayed by one delay: each of their messages is heard that much later,
 //! by all evidence that hears it. All others are heard when they were recorded. Messages of one instant are heard in
-//! the order of the recording, and timers before them. What would be heard after the end of the recording is not
-//! heard.
+//! the order of the recording, and timers before them; evidence that hears several streams changes after them. What
+//! would be heard after the end of the recording is not heard.
 //!
 //! **What is kept.** Each monitor makes the same decisions in the same order, each at most as much earlier or later as
 //! the delay. Decisions that may still come after the end (those of the recording within the delay before its end) may
@@ -61,12 +61,12 @@ pub struct Message {
 pub trait Conditions {
     /// What the condition of a piece of evidence says when it hears the message at this position of the recording,
     /// given the position of the latest message of each of its streams, in the order of [`Recording::streams`]. It
-    /// must be the same for the same arguments.
-    fn truth(&mut self, evidence: EvidenceId, heard: usize, latest: &[Option<usize>]) -> Truth;
+    /// must be the same for the same arguments. It is asked once each of them had a message.
+    fn truth(&mut self, evidence: EvidenceId, heard: usize, latest: &[usize]) -> Truth;
 }
 
-impl<F: FnMut(EvidenceId, usize, &[Option<usize>]) -> Truth> Conditions for F {
-    fn truth(&mut self, evidence: EvidenceId, heard: usize, latest: &[Option<usize>]) -> Truth {
+impl<F: FnMut(EvidenceId, usize, &[usize]) -> Truth> Conditions for F {
+    fn truth(&mut self, evidence: EvidenceId, heard: usize, latest: &[usize]) -> Truth {
         self(evidence, heard, latest)
     }
 }
@@ -274,12 +274,12 @@ impl<'a> Search<'a> {
         }
         let end = self.recording.end;
         changes.retain(|change| change.at <= end);
-        changes.sort_unstable_by_key(|change| (change.event(), change.evidence));
+        changes.sort_unstable_by_key(|change| (change.moment(), change.evidence));
 
         let mut deciding = Deciding::new(self.network);
         let begin = Step { at: SimTime::ZERO, state: State::Safe };
         let mut decisions = vec![vec![begin]; self.monitors.len()];
-        for event in changes.chunk_by(|a, b| a.event() == b.event()) {
+        for event in changes.chunk_by(|a, b| a.moment() == b.moment()) {
             for change in event {
                 deciding.set(self.network, change.evidence, change.truth);
             }
@@ -301,7 +301,7 @@ impl<'a> Search<'a> {
         in_time.push(self.recording.end);
         for &evidence in &self.mixed {
             let rule = self.network.rule(evidence);
-            let stale = rule.stale.map(|(after, _)| after.saturating_add(1));
+            let stale = rule.stale.map(|stale| stale.after.saturating_add(1));
             let timers = [Some(0), Some(rule.held), stale];
             let streams = &self.recording.streams[evidence.index()];
             for heard in &self.prepared.heard[evidence.index()] {

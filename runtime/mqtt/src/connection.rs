@@ -3,6 +3,7 @@
 
 use std::io;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{SyncSender, TrySendError};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -83,6 +84,7 @@ impl Received {
 /// The sending side of a connection. Dropping it ends the connection.
 pub(crate) struct Connection {
     outgoing: mpsc::Sender<Publish>,
+    stands: Arc<AtomicBool>,
 }
 
 impl Connection {
@@ -90,9 +92,16 @@ impl Connection {
     pub(crate) fn start(account: Account, received: Received) -> io::Result<Connection> {
         let (outgoing, to_send) = mpsc::channel(WAITING);
         let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build()?;
-        let run = move || runtime.block_on(run(account, to_send, received));
+        let stands = Arc::new(AtomicBool::new(false));
+        let shown = Arc::clone(&stands);
+        let run = move || runtime.block_on(run(account, to_send, received, &shown));
         thread::Builder::new().name("mqtt".to_owned()).spawn(run)?;
-        Ok(Connection { outgoing })
+        Ok(Connection { outgoing, stands })
+    }
+
+    /// Whether the broker is there at this moment.
+    pub(crate) fn stands(&self) -> bool {
+        self.stands.load(Ordering::Relaxed)
     }
 
     /// Sends a message, or gives it back if too many wait. An error if the connection is lost for good.
@@ -105,7 +114,7 @@ impl Connection {
     }
 }
 
-async fn run(account: Account, mut to_send: mpsc::Receiver<Publish>, received: Received) {
+async fn run(account: Account, mut to_send: mpsc::Receiver<Publish>, received: Received, stands: &AtomicBool) {
     // How the connection ended and when; `None` before there was one.
     let mut lost: Option<(String, Instant)> = None;
     let mut again: Vec<Publish> = Vec::new();
@@ -119,11 +128,13 @@ async fn run(account: Account, mut to_send: mpsc::Receiver<Publish>, received: R
                 if received.pass(found).await.is_err() {
                     return;
                 }
+                stands.store(true, Ordering::Relaxed);
                 let resent = session.resend(&mut again).await;
                 let end = match resent {
                     Ok(()) => session.serve(&mut to_send, &received).await,
                     Err(end) => end,
                 };
+                stands.store(false, Ordering::Relaxed);
                 again.append(&mut session.unacknowledged());
                 lost = Some((String::new(), Instant::now()));
                 end

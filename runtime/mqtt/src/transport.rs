@@ -280,6 +280,10 @@ impl Bus for Brokers {
         missing.map(|(&broker, how)| format!("the broker at `{}`: {how}", self.urls[broker])).collect()
     }
 
+    fn is_connected(&self) -> bool {
+        self.connections.iter().all(Connection::stands)
+    }
+
     fn receive(&mut self, timeout: Duration) -> Result<Option<Event>, TransportError> {
         let limit = Instant::now() + timeout;
         loop {

@@ -117,7 +117,8 @@ pub fn end_clause(seconds: f64, when: Option<&str>) -> Clause {
     ("end", format!("after {}{when}", Unit::SECONDS.number(seconds)))
 }
 
-fn exploration_clause(exploration: &Exploration) -> Clause {
+/// How a search explores, with every number.
+pub fn exploration_clause(exploration: &Exploration) -> Clause {
     match exploration {
         Exploration::Boost { every_generations, children, tries } => {
             let (kind, children) = match children {

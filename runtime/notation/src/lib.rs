@@ -16,10 +16,14 @@ mod text;
 mod unit;
 
 pub use campaign::{
-    Clause, campaign, campaign_block, coverage_clause, end_clause, operations_clause, repeat_clause, search_clause,
+    Clause, campaign, campaign_block, coverage_clause, end_clause, exploration_clause, operations_clause,
+    repeat_clause, search_clause,
 };
 pub use monitor::{evidence, mitigation};
 pub use operation::{Clauses, constraint, custom_domain, integer_constraint, operation, resource};
-pub use test::{activation, activation_named, expectation, simulator_seed, test_block, test_member, test_operation};
+pub use test::{
+    activation, activation_named, expectation, expected_requirement, simulator_seed, test_block, test_member,
+    test_operation,
+};
 pub use text::{doc_comment, is_name, quoted};
 pub use unit::Unit;

@@ -24,7 +24,8 @@ pub fn evidence(plan: &CampaignPlan, evidence: &Evidence) -> String {
             StaleIs::False => "false",
             StaleIs::Unknown => "unknown",
         };
-        let _ = write!(text, " stale after {} is {is}", Unit::SECONDS.number(stale.after));
+        let all = if stale.all { " all" } else { "" };
+        let _ = write!(text, "{all} stale after {} is {is}", Unit::SECONDS.number(stale.after));
     }
     if evidence.side == Side::Inbound {
         text += " inbound";
@@ -234,7 +235,7 @@ mod tests {
 
     #[test]
     fn a_condition_has_the_unit_of_its_topic_and_all_that_belongs_to_evidence() {
-        let stale = Some(Stale { after: 0.25, is: StaleIs::Unknown });
+        let stale = Some(Stale { after: 0.25, is: StaleIs::Unknown, all: false });
         let whole = Evidence { held: 0.1, stale, side: Side::Inbound, ..evidence_above("ok", 0, 400.0) };
         assert_eq!(evidence(&plan(), &whole), "pressure > 400kPa held 0.1s stale after 0.25s is unknown inbound");
         assert_eq!(evidence(&plan(), &evidence_above("far", 1, 0.5)), "min(gaps) > 0.5m");

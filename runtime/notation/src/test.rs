@@ -70,6 +70,11 @@ pub fn simulator_seed(seed: u64) -> String {
     format!("simulator seed {seed}")
 }
 
+/// That a requirement of this name is expected to be satisfied, as a member of a `test` block.
+pub fn expected_requirement(requirement: &str) -> String {
+    format!("expect {requirement}")
+}
+
 /// What is expected of a metric, as a member of a `test` block.
 pub fn expectation(expected: &Expectation, metrics: &[Metric]) -> String {
     let metric = &metrics[expected.metric.index()];

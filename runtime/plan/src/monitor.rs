@@ -154,10 +154,13 @@ pub struct Evidence {
 /// When evidence is too old.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Stale {
-    /// The longest time since the last message of any of its topics, in seconds; positive.
+    /// The longest silence of a topic that it reads, or of a member of a group, in seconds; positive.
     pub after: f64,
-    /// Its value when that has passed.
+    /// Its value after that.
     pub is: StaleIs,
+    /// Whether all topics and members must be silent for so long; else one of them is enough.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub all: bool,
 }
 
 /// The value of stale evidence.

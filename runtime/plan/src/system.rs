@@ -52,6 +52,17 @@ pub enum Transport {
 }
 
 impl Transport {
+    /// Simulation time of one step, in nanoseconds; `None` for a system that runs freely.
+    pub fn step_ns(&self) -> Option<u64> {
+        match self {
+            Transport::InProcess { step_ns, .. } => Some(*step_ns),
+            Transport::Process { step_ns, .. } => *step_ns,
+            Transport::Ros2(ros2) => ros2.step.as_ref().map(|step| step.step_ns),
+            Transport::Simlog(simlog) => Some(simlog.step_ns),
+            Transport::Rosbridge(_) | Transport::Ros1(_) | Transport::Mqtt(_) => None,
+        }
+    }
+
     /// The keyword of its kind.
     pub fn word(&self) -> &'static str {
         match self {

@@ -116,13 +116,17 @@ pub struct Shrinking {
 }
 
 /// How a test fails.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Failing {
     /// It violates each of these requirements; at least one.
     Violation {
         /// Which.
         requirements: Vec<RequirementId>,
+        /// For each of them by how much at least, in the unit of its metric: a test that violates it by less could as
+        /// well be one that keeps it, in other arithmetic. Finite and not negative; none is any violation.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        margins: Vec<f64>,
     },
     /// Its run crashes.
     Crash,

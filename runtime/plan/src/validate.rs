@@ -256,9 +256,16 @@ impl CampaignPlan {
             Task::Repeat { test, .. } => at("test", self.validate_test(test)),
             Task::Shrink(Shrinking { test, failing, runs, .. }) => {
                 at("test", self.validate_test(test))?;
-                if let Failing::Violation { requirements } = failing {
+                if let Failing::Violation { requirements, margins } = failing {
                     at("failing.requirements", filled(requirements))?;
                     each("failing.requirements", requirements, |&id| self.has_requirement(id))?;
+                    let sound = |&margin: &f64| margin.is_finite() && margin >= 0.0;
+                    if !(margins.is_empty() || margins.len() == requirements.len()) || !margins.iter().all(sound) {
+                        return at(
+                            "failing.margins",
+                            wrong("is not one finite number of at least 0 for each requirement"),
+                        );
+                    }
                 }
                 at("runs", at_least_one(*runs))
             }

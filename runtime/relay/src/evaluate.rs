@@ -17,6 +17,10 @@ use crate::simulator::Progress;
 use crate::transport::{Fault, Transport, TransportError};
 use crate::wire::WireTable;
 
+/// Why a run in which nobody spoke is none.
+const NOTHING_HEARD: &str =
+    "nothing was heard: no message came on any topic of the space from the beginning of the run to its end";
+
 /// Runs a test and returns what was observed. If the simulator fails, or the simulator or a hook panics, this is an
 /// observation too, with everything seen until then; only a test that does not match the plan is an error. After a
 /// crash the transport is in an unknown state and must not be used again.
@@ -76,9 +80,14 @@ pub fn evaluate_tapped(
     }
     let end = transport.now();
     let finished = relay.finish(end);
+    let silent = finished.traffic.is_empty() && wires.iter().next().is_some();
     let effect = finished.operations.iter().any(|operation| operation.counters.any_effect());
     let outcome = match failure {
         Some(Failure { fault, message }) => outcome(fault, message),
+        // A system that is stepped says by its steps that it is there.
+        None if silent && !transport.capabilities().lock_stepped => {
+            outcome(Fault::Disconnect, NOTHING_HEARD.to_owned())
+        }
         None if test.operations.is_empty() || effect => Outcome::Completed,
         None => Outcome::NoEffect,
     };
@@ -89,6 +98,8 @@ pub fn evaluate_tapped(
         operations: finished.operations,
         // A run that broke off may have been about to subscribe.
         unheard: if ended { finished.unheard } else { Vec::new() },
+        unreached: if ended { finished.unreached } else { Vec::new() },
+        traffic: finished.traffic,
         metrics: finished.metrics,
         monitors: finished.monitors,
         messages: finished.messages,
@@ -156,6 +167,7 @@ fn drive(
     // What comes at the end of an instant is known when the next one begins, so the condition is weighed between steps.
     let is_over = |relay: &Relay<'_>| when.is_some_and(|condition| relay.holds(condition));
     while transport.advance(end, relay)? == Progress::Running && !is_over(relay) {}
+    transport.ended()?;
     relay.end(transport.now());
     relay.before_or_after_run(Moment::AfterEnd, files).map_err(Failure::crash)
 }

@@ -9,19 +9,22 @@ use sesame_plan::Trend;
 use crate::value::{Text, Value};
 
 mod aggregate;
+mod attendance;
 mod engine;
 mod expression;
 #[cfg(test)]
 mod group_tests;
+mod growth;
 mod held;
 mod probe;
 mod region;
 mod robustness;
+mod tally;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use engine::Shown;
 pub use engine::{MetricError, MetricTable, Metrics};
+pub(crate) use engine::{Shown, next_mark};
 pub(crate) use expression::{Held, Moment, holds};
 pub(crate) use held::{HeldInputs, hear};
 pub(crate) use probe::sample;

@@ -1,7 +1,8 @@
 //! Runtime monitors in a run: they hear messages, decide, and say what is to be published.
 //!
-//! A monitor is a subscriber. Its evidence is evaluated at each message of one of its topics: as delivered, or as
-//! published where the space says `inbound`. A message that is delivered at once is one event for both.
+//! A monitor is a subscriber. Its evidence is evaluated at each message of its topic: as delivered, or as published
+//! where the space says `inbound`. A message that is delivered at once is one event for both. Evidence that reads
+//! several topics, or several members of a group, is evaluated once per instant, after all its messages.
 //!
 //! Nothing is published here: whoever runs the monitors takes what is to be published and passes it on, as messages of
 //! the same instant. A recording that is fed to metrics takes nothing, because what was published is in it.
@@ -19,8 +20,8 @@ use std::sync::Arc;
 
 use sesame_base::observation::{ChangeCause, MetricObservation, MonitorObservation};
 use sesame_base::time::SimTime;
-use sesame_monitor::{Changes, EvidenceId, Network, Run, Truth};
-use sesame_plan::{CampaignPlan, MetricId, MonitorId, Side, TopicId};
+use sesame_monitor::{Changes, EvidenceId, Network, Reading, Run, Truth};
+use sesame_plan::{CampaignPlan, Evidence, MetricId, MonitorId, Side, TopicId};
 
 use crate::metric::Metrics;
 use crate::value::Value;
@@ -43,12 +44,17 @@ pub(crate) struct Monitors<'p> {
     run: Run,
     listeners: Listeners,
     evidence: Vec<EvidenceState<'p>>,
-    /// What evidence heard in the event at hand, each at most once, and of which message.
-    heard: Vec<(EvidenceId, Truth)>,
+    /// What evidence with one source heard in the event at hand, each at most once, and of which message.
+    heard: Vec<Reading>,
     /// The event at hand, and per evidence the last one in which it heard something.
     event: u64,
     last_heard: Vec<u64>,
     message: Option<(Wire, u64)>,
+    /// Per evidence with several sources: the last message that it heard.
+    latest: Vec<Option<(Wire, u64)>>,
+    /// Evidence with several sources that heard something in the instant at hand, each once.
+    waiting: Vec<EvidenceId>,
+    is_waiting: Vec<bool>,
     /// Kept to be used again.
     changes: Changes,
     /// Before this instant no evidence changes if nothing is heard until then.
@@ -81,8 +87,7 @@ impl Listeners {
                 Side::Inbound => &mut listeners.published,
                 Side::Outbound => &mut listeners.delivered,
             };
-            let reads = |topic| evidence.inputs.iter().any(|input| input.field.topic == topic);
-            for wire in wires.iter().filter(|&wire| reads(wires.topic(wire))) {
+            for wire in read_by(evidence, wires) {
                 of[wire.index()].push(id);
             }
         }
@@ -95,6 +100,12 @@ impl Listeners {
             Side::Outbound => &self.delivered[wire.index()],
         }
     }
+}
+
+/// The wires of the topics that evidence reads.
+fn read_by<'a>(evidence: &'a Evidence, wires: &'a WireTable) -> impl Iterator<Item = Wire> + use<'a> {
+    let reads = |topic| evidence.inputs.iter().any(|input| input.field.topic == topic);
+    wires.iter().filter(move |&wire| reads(wires.topic(wire)))
 }
 
 impl<'p> Monitors<'p> {
@@ -110,7 +121,8 @@ impl<'p> Monitors<'p> {
         let members = members.collect();
         let all = (0..).take(network.evidence_count()).map(|at| network.owner(EvidenceId(at)));
         let evidence = all.map(|(monitor, at)| &plan.monitor(monitor).evidence[at as usize]);
-        let evidence: Vec<_> = evidence.map(|evidence| EvidenceState::new(evidence, plan)).collect();
+        let state = |evidence: &'p Evidence| EvidenceState::new(evidence, plan, read_by(evidence, wires));
+        let evidence: Vec<_> = evidence.map(state).collect();
         let listeners = Listeners::new(plan, wires, network);
         let mut changes = Changes::default();
         let run = Run::start(Arc::clone(network), &mut changes);
@@ -122,6 +134,9 @@ impl<'p> Monitors<'p> {
             listeners,
             event: 1,
             last_heard: vec![0; evidence.len()],
+            latest: vec![None; evidence.len()],
+            waiting: Vec::new(),
+            is_waiting: vec![false; evidence.len()],
             evidence,
             heard: Vec::new(),
             message: None,
@@ -134,7 +149,7 @@ impl<'p> Monitors<'p> {
             told: Told::new(),
             problem: None,
         };
-        monitors.take_changes(None);
+        monitors.take_changes(None, false);
         monitors.told.only_if_asked();
         Some(monitors)
     }
@@ -175,15 +190,24 @@ impl<'p> Monitors<'p> {
             self.decide(now);
         }
         self.message = Some((wire, index));
-        let (topic, member) = self.members[wire.index()];
+        let member = self.members[wire.index()];
         for at in 0..count {
             let id = self.listeners.of(side, wire)[at];
-            match self.evidence[id.index()].message(topic, member, now, value) {
-                Ok(truth) => {
-                    self.last_heard[id.index()] = self.event;
-                    self.heard.push((id, truth));
+            let evidence = &mut self.evidence[id.index()];
+            match evidence.hear(wire, member, now, value) {
+                Err(lacking) => {
+                    self.note(id, wire, &lacking);
                 }
-                Err(lacking) => self.note(id, wire, &lacking),
+                Ok(()) if evidence.sources().are_several() => {
+                    self.latest[id.index()] = Some((wire, index));
+                    if !std::mem::replace(&mut self.is_waiting[id.index()], true) {
+                        self.waiting.push(id);
+                    }
+                }
+                Ok(()) => {
+                    self.last_heard[id.index()] = self.event;
+                    self.heard.push(Reading::now(now, id, evidence.truth(now)));
+                }
             }
         }
     }
@@ -200,11 +224,58 @@ impl<'p> Monitors<'p> {
 
     /// Ends an event: monitors decide on what was heard in it.
     pub(crate) fn decide(&mut self, now: SimTime) {
-        let Some((wire, index)) = self.message.take() else { return };
+        if let Some(message) = self.message.take() {
+            self.observe(now, Some(message));
+        }
+    }
+
+    /// Because of a message, or, for evidence with several sources, of the last one that each heard.
+    fn observe(&mut self, now: SimTime, message: Option<(Wire, u64)>) {
         self.run.observe(now, &self.heard, &mut self.changes);
         self.heard.clear();
         self.event += 1;
-        self.take_changes(Some((wire, index)));
+        self.take_changes(message, true);
+    }
+
+    /// Whether evidence waits for the end of this instant.
+    #[inline]
+    pub(crate) fn wait(&self) -> bool {
+        !self.waiting.is_empty()
+    }
+
+    /// Ends an instant, or goes on to its end after messages that monitors published: they decide on evidence with
+    /// several sources. Returns whether there was any.
+    pub(crate) fn settle(&mut self, now: SimTime) -> bool {
+        self.settle_those(now, |_| true)
+    }
+
+    /// As [`Monitors::settle`], of an instant in which the run broke off: evidence of which a source had no message in
+    /// it is left out, because that instant was perhaps not over.
+    pub(crate) fn settle_whole(&mut self, now: SimTime) -> bool {
+        self.settle_those(now, |oldest| oldest == now)
+    }
+
+    fn settle_those(&mut self, now: SimTime, counts: impl Fn(SimTime) -> bool) -> bool {
+        if self.waiting.is_empty() {
+            return false;
+        }
+        self.decide(now);
+        for evidence in self.waiting.drain(..) {
+            self.is_waiting[evidence.index()] = false;
+            let state = &self.evidence[evidence.index()];
+            if let Some(oldest) = state.sources().oldest().filter(|&oldest| counts(oldest)) {
+                self.heard.push(Reading { evidence, truth: state.truth(now), oldest });
+            }
+        }
+        self.observe(now, None);
+        true
+    }
+
+    /// Evidence that waits is not evaluated any more.
+    pub(crate) fn stop_waiting(&mut self) {
+        for evidence in self.waiting.drain(..) {
+            self.is_waiting[evidence.index()] = false;
+        }
     }
 
     /// Time passes: what is due until this instant, and at it, happens.
@@ -213,19 +284,20 @@ impl<'p> Monitors<'p> {
             return;
         }
         self.run.advance(now, &mut self.changes);
-        self.take_changes(None);
+        self.take_changes(None, false);
     }
 
-    /// When something happens next even without a message.
+    /// When something happens next even without a message, other than the [end of an instant](Monitors::wait).
     pub(crate) fn next_due(&self) -> Option<SimTime> {
         self.due.into_iter().chain(self.scores.next_due()).min()
     }
 
-    /// Records what has changed, and queues what is to be published.
-    fn take_changes(&mut self, message: Option<(Wire, u64)>) {
+    /// Records what has changed, because of messages or of time, and queues what is to be published.
+    fn take_changes(&mut self, message: Option<(Wire, u64)>, by_messages: bool) {
         let mut changes = std::mem::take(&mut self.changes);
         for change in &changes.evidence {
-            let cause = match message {
+            let latest = || self.latest[change.evidence.index()].filter(|_| by_messages);
+            let cause = match message.or_else(latest) {
                 Some((wire, index)) => ChangeCause::Message { topic: self.wires.path(wire).to_owned(), index },
                 None if change.truth == Truth::True => ChangeCause::Held,
                 None => ChangeCause::Stale,
@@ -292,6 +364,7 @@ impl<'p> Monitors<'p> {
     /// The run has come to its end, and metrics have their last values.
     pub(crate) fn end(&mut self, now: SimTime, metrics: &mut Metrics<'_>, fuzzing_time: SimTime) {
         self.decide(now);
+        self.settle(now);
         self.advance(now);
         self.scores.end(now, &self.run, metrics, fuzzing_time);
     }

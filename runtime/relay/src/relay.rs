@@ -7,7 +7,7 @@
 //!
 //! Conditions are evaluated when a metric that they read may have changed: after the inbound metrics of a message and
 //! before its operations, after a message has been delivered, and at the end of an instant, for values that are known
-//! only then. They are also evaluated at edges, and when the fuzzing time reaches a number with which it is compared.
+//! only then. They are also evaluated at edges, and when a time that grows reaches what it is compared with.
 //! Evaluating the same values again changes nothing, so no message that a condition does not read, and no step of time,
 //! switches an operation. A test without conditions has no cost for them.
 //!
@@ -25,12 +25,13 @@ mod pass;
 mod publishing;
 mod release;
 mod stage;
+mod traffic;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use fuzzing_time::Read;
 use publishing::Publishing;
-use release::{Held, ReleaseQueue, Why};
+use release::{Held, ReleaseQueue};
 use stage::Stage;
 
 use sesame_base::activation::{Activity, Edge, TICK};
@@ -50,7 +51,6 @@ use crate::wire::{Wire, WireTable};
 pub use exchange::{Delivery, Exchange};
 pub use finished::Finished;
 pub use listener::{Listener, MessageRef, OperationEvent};
-#[cfg(feature = "mcap")]
 pub(crate) use marks::{beyond, reaching};
 
 /// The most messages that operations may hold back at once; beyond it, the oldest is released early, with a warning.
@@ -77,6 +77,7 @@ pub struct Relay<'a> {
     disturbed_by: Vec<usize>,
     /// Per wire: messages published so far.
     published: Vec<u64>,
+    traffic: traffic::Recorder,
     queue: ReleaseQueue,
     metrics: Metrics<'a>,
     /// `None` for a plan without monitors.
@@ -115,10 +116,8 @@ struct Conditions {
     read: Vec<bool>,
     /// Whether a condition reads a metric of messages as they are delivered, or a score of a monitor.
     reads_delivered: bool,
-    /// What the fuzzing time is compared with.
-    compared: Vec<Operand>,
-    /// What times in states of monitors are compared with.
-    stays: Vec<(MetricId, Operand)>,
+    /// Times that grow while nothing happens, each with what it is compared with.
+    growing: Vec<(MetricId, Operand)>,
     /// Whether copies of one operation wait for each other.
     apart: bool,
 }
@@ -139,7 +138,7 @@ impl<'a> Relay<'a> {
         plan: &CampaignPlan,
         wires: &'a WireTable,
         test: &Test,
-        metrics: Metrics<'a>,
+        mut metrics: Metrics<'a>,
         hooks: &[OperationEntry],
     ) -> Result<Self, ChoiceError> {
         let mut order: Vec<usize> = (0..test.operations.len()).collect();
@@ -167,6 +166,7 @@ impl<'a> Relay<'a> {
                 counters: Counters::default(),
                 first_touch: None,
                 last_touch: None,
+                unheard: BTreeMap::new(),
             });
         }
         let mut pipelines = vec![Vec::new(); wires.len_with_links()];
@@ -177,7 +177,10 @@ impl<'a> Relay<'a> {
             }
         }
         let conditional = (0..operations.len()).filter(|&at| operations[at].activity.is_conditional()).collect();
-        let Read { variables, compared, stays } = Read::by(plan, test);
+        let Read { variables, growing, formulas } = Read::by(plan, test);
+        for (metric, with) in formulas {
+            metrics.compare(metric, with);
+        }
         let reads = |wire, side| variables.iter().any(|&metric| metrics.hears(metric, wire, side));
         let is_score = |&metric: &MetricId| matches!(plan.metric(metric).source, MetricSource::Monitor { .. });
         let monitors = Monitors::new(&metrics, wires);
@@ -194,8 +197,7 @@ impl<'a> Relay<'a> {
                 operations: conditional,
                 read: wires.iter().map(|wire| reads(wire, Side::Inbound)).collect(),
                 reads_delivered: wires.iter().any(|wire| reads(wire, Side::Outbound)) || variables.iter().any(is_score),
-                compared,
-                stays,
+                growing,
                 apart: plan.campaign.copies != Copies::MayOverlap,
             },
             phase: Phase::New,
@@ -204,6 +206,7 @@ impl<'a> Relay<'a> {
             order,
             pipelines,
             published: vec![0; wires.len()],
+            traffic: traffic::Recorder::new(plan, wires, test),
             queue: ReleaseQueue::new(test.operations.len(), wires.len_with_links()),
             monitors,
             publishing: Publishing::default(),
@@ -285,6 +288,7 @@ impl<'a> Relay<'a> {
 
     /// Tells the metrics that the run has ended.
     pub fn end(&mut self, now: SimTime) {
+        self.settle_monitors(&mut Vec::new());
         self.metrics.end(now);
         self.monitors_end(now);
         self.ended = true;
@@ -302,7 +306,9 @@ impl<'a> Relay<'a> {
             if self.now >= now {
                 return;
             }
-            self.leave();
+            if self.leave(deliveries) {
+                continue;
+            }
             let Some(moment) = self.next_moment().filter(|&moment| moment <= now) else {
                 self.now = now;
                 self.tell_time(now);
@@ -315,12 +321,13 @@ impl<'a> Relay<'a> {
         }
     }
 
-    /// The next edge, release, or moment at which the fuzzing time reaches a number with which it is compared.
+    /// The next edge, release, or moment at which a time that grows reaches what it is compared with.
     #[expect(clippy::inline_always, reason = "the call would be a fiftieth of what a message costs")]
     #[inline(always)]
     fn next_moment(&self) -> Option<SimTime> {
         let edges = self.operations.iter().filter_map(|stage| stage.activity.next_edge());
-        edges.chain(self.queue.next_release()).chain(self.next_comparison()).chain(self.monitors_due()).min()
+        let of_values = self.next_comparison().into_iter().chain(self.metrics.next_change());
+        edges.chain(self.queue.next_release()).chain(of_values).chain(self.monitors_due()).min()
     }
 
     /// Carries out the edges at time zero, once.
@@ -345,14 +352,20 @@ impl<'a> Relay<'a> {
     }
 
     /// Ends an instant, when time advances: some values are known only now. They switch operations one nanosecond
-    /// later, since the instant to which they belong is over.
-    fn leave(&mut self) {
+    /// later, since the instant to which they belong is over. Returns whether that is why time has advanced: then there
+    /// is another instant to end.
+    fn leave(&mut self, deliveries: &mut Vec<Delivery>) -> bool {
+        self.settle_monitors(deliveries);
         let waited = self.metrics.settle();
         if self.monitors_leave() || waited {
             self.now = self.now + TICK;
             self.tell_time(self.now);
+            // What ends at that moment ends before conditions see the values.
+            self.arrive();
+            return true;
         }
         self.evaluate_conditions();
+        false
     }
 
     /// Evaluates the conditions of all operations on the same values: first which operations become inactive, then
@@ -441,14 +454,8 @@ impl<'a> Relay<'a> {
             Some(Drain::Flush) => return self.queue.release_all(at, now),
             Some(Drain::Drop) => {
                 let lost = self.queue.take_all(at);
-                let counters = &mut self.operations[at].counters;
-                for (why, _) in &lost {
-                    match why {
-                        Why::Delayed => counters.delayed -= 1,
-                        Why::Queued => counters.queued -= 1,
-                        Why::Unheard => continue,
-                    }
-                    counters.dropped += 1;
+                for (why, held) in &lost {
+                    self.operations[at].lost(held.wire, *why);
                 }
                 for (_, held) in lost {
                     self.tell(now, at, OperationEvent::Dropped(held.message_ref()));
@@ -472,6 +479,12 @@ impl Exchange for Relay<'_> {
 
     fn subscribed(&mut self, wire: Wire) {
         self.heard[wire.index()] = true;
+    }
+
+    fn found(&mut self, wire: Wire) {
+        if !std::mem::replace(&mut self.heard[wire.index()], true) {
+            self.operations.iter_mut().for_each(|stage| stage.found(wire));
+        }
     }
 
     fn advance(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>) {
@@ -513,7 +526,7 @@ impl Exchange for Relay<'_> {
     }
 
     fn carried_out(&mut self, now: SimTime, operation: usize) {
-        self.operations[operation].count(true, now, 1, |counters| &mut counters.side_effects);
+        self.operations[operation].acted(now, 1, |counters| &mut counters.side_effects);
     }
 
     fn next_due(&self) -> Option<SimTime> {

@@ -15,15 +15,14 @@
 //!
 //! **Windows** are closed: at time `t`, an interval from `a` to `b` is `t + a <= s <= t + b`, both ends included, so a
 //! jump at `t + b` is seen. They are cut at the end of the trace: times after it neither satisfy nor violate anything.
-//! A window that is completely after it is empty: `always` is then positive infinity, `eventually` and `until`
-//! negative infinity, the least and greatest element of nothing.
+//! An operator whose window is completely after the end has no robustness at that time, nor has anything that is
+//! computed from it at that time. Operators around it go over the times at which there is one. So `always (request
+//! implies eventually [a, b] answer)` says nothing of requests in the last `a` of the trace, whether they were answered
+//! or not. A formula without a robustness at the beginning of the trace has infinite robustness, as nothing was asked.
 //!
 //! **Whole windows** are the other interpretation of the end, by [`Monitor::over_whole_windows`]: an operator with a
-//! bounded window has no robustness at times at which its window would be cut, nor has anything that is computed from
-//! it at those times. Operators around it go over the times at which there is one; an unbounded window has no end that
-//! could be cut. So `always (request implies eventually [0, d] answer)` says nothing of requests in the last `d` of the
-//! trace, whether they were answered or not. A formula without a robustness at the beginning of the trace has infinite
-//! robustness, as nothing was asked.
+//! bounded window has no robustness as soon as its window would be cut. An unbounded window has no end that could be
+//! cut. So `always (request implies eventually [a, b] answer)` says nothing of requests in the last `b` of the trace.
 //!
 //! **Until** is non-strict at both ends: for `left until right` at `t` there is a time `s` in the window at which
 //! `right` holds, and `left` holds for `t <= r <= s`. So `left` has to hold at `s` too: a trace on which `left` ends at
@@ -45,7 +44,7 @@
 
 use std::collections::VecDeque;
 
-use node::{Node, Stretch};
+use node::{Node, Stretch, Unknown};
 use piece::{Piece, Span};
 use thiserror::Error;
 
@@ -220,8 +219,8 @@ impl Monitor {
         assert!(end >= self.now, "a trace ends no earlier than its last sample, and {end} is before {}", self.now);
         let start = self.start?;
         self.extend((end - start).nanos().saturating_add(1), true, None);
-        // Without it no window is whole that the formula asks for. The sum turns the zero that is negative, a matter of
-        // how often it was negated, into the other.
+        // Without it nothing is left of the windows that the formula asks for. The sum turns the zero that is
+        // negative, a matter of how often it was negated, into the other.
         Some((start, self.robustness.front().map_or(f64::INFINITY, |first| first.value + 0.0)))
     }
 
@@ -241,13 +240,14 @@ impl Monitor {
             if known > 0 {
                 ahead.extend(known, false, None);
             }
-            ahead.extend(FOREVER, true, Some(extreme));
-            ahead.robustness.front().map_or(extreme, |first| first.value + 0.0)
+            ahead.extend(FOREVER, true, Some(Unknown { known, extreme }));
+            let value = ahead.robustness.front().map_or(extreme, |first| first.value + 0.0);
+            if value.abs() == f64::MAX { extreme } else { value }
         };
         (extreme(f64::NEG_INFINITY), extreme(f64::INFINITY))
     }
 
-    fn extend(&mut self, end: i64, last: bool, unknown: Option<f64>) {
+    fn extend(&mut self, end: i64, last: bool, unknown: Option<Unknown>) {
         let stretch = Stretch { end, last, unknown, whole: self.whole };
         self.root.extend(stretch, &self.values, &mut self.robustness);
         if self.decided.is_none() && !self.robustness.is_empty() {

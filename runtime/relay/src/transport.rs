@@ -6,6 +6,8 @@
 pub mod added;
 #[cfg(feature = "process")]
 pub mod bus;
+#[cfg(feature = "process")]
+pub mod clock;
 #[cfg(feature = "in-process")]
 mod in_process;
 #[cfg(feature = "process")]
@@ -52,6 +54,12 @@ pub trait Transport {
 
     /// Simulation time now.
     fn now(&self) -> SimTime;
+
+    /// The run has come to its end. The error says that the simulator is out of reach at this moment, so that nobody
+    /// can know what it did last.
+    fn ended(&mut self) -> Result<(), TransportError> {
+        Ok(())
+    }
 
     /// Ends the connection, and everything that the transport started.
     fn close(&mut self);
@@ -170,6 +178,16 @@ pub enum TransportError {
         /// The time after it.
         to: SimTime,
     },
+    /// The clock of the simulator leapt ahead.
+    #[error("the clock of the simulator leapt ahead, from {from} to {to}, while it usually goes on by {usual}")]
+    ClockLeap {
+        /// The time before.
+        from: SimTime,
+        /// The time after it.
+        to: SimTime,
+        /// Its usual tick.
+        usual: SimTime,
+    },
     /// The clock of the simulator stands still, or the simulator says nothing.
     #[error("{awaited} was awaited for {limit} s of wall time")]
     Silent {
@@ -207,7 +225,7 @@ pub enum Fault {
     LaunchFailed,
     /// The environment's: the connection to the simulator was lost.
     Disconnect,
-    /// The environment's: the simulator's clock went back.
+    /// The environment's: the simulator's clock went back, or leapt ahead.
     WrongClock,
 }
 
@@ -217,7 +235,7 @@ impl TransportError {
         match self {
             TransportError::LaunchFailed { .. } => Fault::LaunchFailed,
             TransportError::ConnectionLost { .. } => Fault::Disconnect,
-            TransportError::ClockBack { .. } => Fault::WrongClock,
+            TransportError::ClockBack { .. } | TransportError::ClockLeap { .. } => Fault::WrongClock,
             TransportError::Silent { limit, .. } => Fault::Timeout { limit: *limit },
             // A simulator that cannot be started is the space's mistake; running the test again does not help.
             TransportError::Simulator(_)

@@ -29,15 +29,16 @@ use sesame_search::sspr::Convention;
 
 use crate::analysis::confirmed::confirmed_tests;
 use crate::analysis::statistics::Sample;
-use crate::record::{EnteredRun, Origin, Provenance, RecordError, Repository, ScannedTest};
+use crate::record::{EnteredRun, NoPoint, Origin, Provenance, RecordError, Repository, ScannedTest, not_imported};
 
 pub use crate::present::table::{Datum, Table, TextOptions};
-pub use candidates::{Candidate, Candidates, LeftOut, Terms, candidates, qualities};
+pub use candidates::{Candidate, Candidates, LeftOut, Terms, candidates, excluded, exclusions, qualities};
 pub use compare::{CompareError, Comparison, Run, compare};
 pub use distances::{FrontDistance, GivenFront, GivenFrontError, distance_table, distances};
 pub use extents::extents;
 pub use indicators::{Indicator, IndicatorAnalysis, indicators};
 pub use rank_sum::{RankSum, rank_sum};
+pub use sesame_base::test_number::{TestNumber, first_of};
 pub use sesame_optimise::igd::Scaling;
 
 /// Which tests are looked at.
@@ -194,11 +195,10 @@ pub fn statistics(repository: &Repository, selection: &Selection) -> Result<Tabl
     Ok(table)
 }
 
-/// A test's operations in its order, apart by spaces.
+/// A test's operations in its order, apart by spaces; behind them how many could not be imported.
 fn operations(plan: &CampaignPlan, test: &ScannedTest) -> String {
-    let names: Vec<&str> =
-        test.operations.iter().map(|operation| plan.operation(operation.operation).name.as_str()).collect();
-    names.join(" ")
+    let names = test.operations.iter().map(|operation| plan.operation(operation.operation).name.clone());
+    names.chain(not_imported(test.left_out).map(|left_out| format!("({left_out})"))).collect::<Vec<_>>().join(" ")
 }
 
 /// The tests of a selection that no other of it dominates, by their recorded values, or those of their repetitions
@@ -263,7 +263,7 @@ pub fn front(repository: &Repository, selection: &Selection) -> Result<Table, Re
 }
 
 /// The point of each test in the reduced parameter space, from what was observed. Tests in which no operation was
-/// active are left out.
+/// active are left out, and so are those that [`without_point`] names.
 pub fn sspr(
     repository: &Repository,
     selection: &Selection,
@@ -284,6 +284,40 @@ pub fn sspr(
     })?;
     Ok(dataset)
 }
+
+/// Sentences about the tests of a selection that were imported, disturbed something, and have no point: one for each
+/// reason.
+pub fn without_point(
+    repository: &Repository,
+    selection: &Selection,
+    convention: Convention,
+) -> Result<Vec<String>, RecordError> {
+    let plan = repository.plan();
+    let mut found: BTreeMap<NoPoint, Vec<TestNumber>> = BTreeMap::new();
+    repository.scan(&mut |test| {
+        let counts = test.origin != Origin::Reference && selection.holds(test.number);
+        if let Some(why) = counts.then(|| test.placed(plan, convention).err()).flatten() {
+            found.entry(why).or_default().push(TestNumber(test.number));
+        }
+    })?;
+    let sentences = found.into_iter().filter_map(|(why, tests)| {
+        let since = match why {
+            NoPoint::Inactive => return None,
+            NoPoint::LeftOut => "since operations were not imported",
+            NoPoint::Outside => "since operations acted or chose values beyond what the file permits them",
+        };
+        let mut named: Vec<String> = tests.iter().take(NAMED).map(ToString::to_string).collect();
+        if tests.len() > NAMED {
+            named.push(format!("and {} more", tests.len() - NAMED));
+        }
+        let have = if tests.len() == 1 { "1 test has".to_owned() } else { format!("{} tests have", tests.len()) };
+        Some(format!("{have} no point, {since}: {}", named.join(", ")))
+    });
+    Ok(sentences.collect())
+}
+
+/// Tests that a sentence names at most.
+const NAMED: usize = 5;
 
 /// How much of a grid the tests of a selection cover.
 #[derive(Debug, Clone, PartialEq)]

@@ -18,8 +18,11 @@ mod error;
 mod files;
 mod folder;
 mod fresh;
+mod imported;
 mod lab_runs;
+mod left_out_operations;
 mod monitors;
+mod original_extents;
 mod quarantine;
 mod read_monitors;
 mod read_tests;
@@ -37,12 +40,13 @@ mod series_views;
 mod split_operations;
 #[cfg(test)]
 mod tests;
+mod traffic;
 mod write_tests;
 
 use serde::Serialize;
 
-use sesame_base::observation::Observation;
-use sesame_plan::{KnownTestId, Requirement, Test};
+use sesame_base::observation::{MonitorHazard, Observation};
+use sesame_plan::{KnownTestId, MonitorId, Requirement, RequirementId, Test};
 
 pub use difference::{Difference, differences};
 pub use entered::{ENTERED_OUTCOMES, Entered, EnteredRun, Provenance, entered_outcome};
@@ -50,11 +54,14 @@ pub use error::RecordError;
 pub use files::{DATABASE, LOCK, TRACES, trace_file};
 pub use folder::{Claim, claim_folder, latest_folder, latest_unfinished};
 pub use fresh::{Standing, Tally};
+pub use left_out_operations::{LeftOutOperations, NOT_IMPORTED, not_imported};
+pub use original_extents::OriginalExtent;
 pub use quarantine::{QUARANTINE, is_quarantined, may_be_quarantined};
+pub use read_tests::Uses;
 pub use recorder::Recorder;
-pub use repetitions::{Judge, confirmed_fitness, confirming_runs};
+pub use repetitions::{Judge, confirmed_fitness, confirming_runs, missed};
 pub use repository::{CampaignFacts, Repository, digest};
-pub use scan::{ScannedOperation, ScannedTest};
+pub use scan::{NoPoint, ScannedOperation, ScannedTest};
 pub use schema::SCHEMA;
 pub use sesame_base::observation::{MetricValue, Outcome};
 pub use sesame_base::verdict::{Verdict, fails, verdict, violation_spans};
@@ -99,6 +106,8 @@ pub struct Repetition {
     pub messages: u64,
     /// Per metric of the plan, in its order; empty after a crash of the worker.
     pub values: Vec<MetricValue>,
+    /// Per monitor of the plan, in its order: the hazards that it was to foresee; empty after a crash of the worker.
+    pub hazards: Vec<Vec<MonitorHazard>>,
 }
 
 impl Repetition {
@@ -113,6 +122,7 @@ impl Repetition {
             end: observation.end,
             messages: observation.messages,
             values: values.collect(),
+            hazards: observation.monitors.iter().map(|monitor| monitor.hazards.clone()).collect(),
         }
     }
 
@@ -124,6 +134,12 @@ impl Repetition {
     /// What this run says about a requirement.
     pub fn verdict(&self, requirement: &Requirement) -> Verdict {
         verdict(requirement.bound, &self.outcome, self.value(requirement.metric))
+    }
+
+    /// The hazard of a requirement that a monitor was to foresee, if there was one.
+    pub fn hazard(&self, monitor: MonitorId, requirement: RequirementId) -> Option<MonitorHazard> {
+        let of_monitor = self.hazards.get(monitor.index())?;
+        of_monitor.iter().copied().find(|hazard| hazard.requirement == requirement)
     }
 }
 
@@ -160,6 +176,8 @@ pub struct TestRow {
     pub generation: Option<u32>,
     /// What it disturbs.
     pub test: Test,
+    /// Per operation of the test: whether it is known to have had no effect.
+    pub idle: Vec<bool>,
     /// How its run ended.
     pub outcome: Outcome,
     /// Simulation time at which it ended, in seconds.
@@ -168,6 +186,8 @@ pub struct TestRow {
     pub duplicate_of: Option<u32>,
     /// Per metric of the plan, in its order; empty after a crash of the worker.
     pub values: Vec<MetricValue>,
+    /// How many of its operations could not be imported, so that it did more than its operations say.
+    pub left_out: u32,
 }
 
 impl TestRow {

@@ -21,7 +21,7 @@ pub use self::twin::twin_text;
 pub use crate::analysis::confirmed::{ConfirmedTest, FindingAgain};
 pub use crate::present::number::quantity;
 pub use crate::present::table::TextOptions;
-pub use export::{ExportError, Exported, export};
+pub use export::{Expected, ExportError, Exported, export};
 pub use facts::certificate::campaign::{HazardSummary, MissedHazard, MonitorSummary, MonitorsSummary, StateShare};
 pub use facts::certificate::mend::{Mend, MendedTest, mend};
 pub use facts::certificate::moment::{MomentError, MomentReport, MonitorMoment, PartReport, show_at};
@@ -45,8 +45,8 @@ pub use facts::show::{
 pub use facts::shrinking::{ShrinkStep, Shrinking, TestSize};
 pub use facts::stacked::{Stacked, StackedSum};
 pub use facts::summary::{
-    Counts, ExpectationSummary, Failure, FrontTest, NotFinite, Objective, Quarantined, RequirementSummary, Spread,
-    Summary, Worst, summary,
+    CLOSING_RUN_DIFFERS, Counts, ExpectationSummary, Failure, FrontTest, NotFinite, Objective, Quarantined,
+    RequirementSummary, Spread, Summary, WithoutEffect, Worst, summary,
 };
 pub use facts::twin::{MitigationVerdict, SentMitigation, Twin, TwinRequirement, twin};
 pub use file::write_aside;

@@ -33,6 +33,9 @@ const GUEST: &str = "/sesame_monitor_";
 /// The type of a clock.
 const CLOCK: &str = "rosgraph_msgs/Clock";
 
+/// How long the master may leave calls unanswered before it counts as away.
+const UNANSWERED: Duration = Duration::from_secs(1);
+
 /// Connects to a system of ROS 1 nodes; launched programs run in this folder.
 ///
 /// The runner listens on the loopback interface, unless `ROS_HOSTNAME` or `ROS_IP` names another address of this
@@ -222,6 +225,10 @@ impl Bus for Ros1Bus {
                 return Ok(Some(event));
             }
         }
+    }
+
+    fn is_connected(&self) -> bool {
+        self.node.as_ref().is_some_and(|node| node.silent_for() < UNANSWERED)
     }
 
     fn publish(&mut self, line: usize, sink: usize, value: &Value, call: Option<u64>) -> Result<(), TransportError> {

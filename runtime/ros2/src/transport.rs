@@ -26,6 +26,7 @@ use sesame_relay::lifecycle::launch::{Launched, Place};
 use sesame_relay::relay::{Delivery, Exchange};
 use sesame_relay::simulator::Progress;
 use sesame_relay::transport::added::{AddedOnWire, join, objections};
+use sesame_relay::transport::clock::Ticks;
 use sesame_relay::transport::{Capabilities, Connect, Incidents, Transport, TransportError, wall_time_since};
 use sesame_relay::wire::WireTable;
 
@@ -66,6 +67,7 @@ struct System {
     now: SimTime,
     /// What the clock showed at time zero.
     zero: Zero,
+    ticks: Ticks,
     /// When the clock went on last.
     ticked: Instant,
     deliveries: Vec<Delivery>,
@@ -123,6 +125,7 @@ impl System {
             reserved: None,
             now: SimTime::ZERO,
             zero: Zero::Steps,
+            ticks: Ticks::default(),
             ticked: now(),
             deliveries: Vec::new(),
             incidents: Incidents::default(),
@@ -197,7 +200,8 @@ impl Transport for System {
             Ok(Progress::Ended) => self.undo(None).map(|()| Progress::Ended),
             other => other,
         };
-        let advanced = advanced.and_then(|progress| self.look_around().map(|()| progress));
+        let ended = matches!(advanced, Ok(Progress::Ended));
+        let advanced = advanced.and_then(|progress| self.look_around(ended, relay).map(|()| progress));
         self.collect_notes();
         advanced.map_err(|error| self.fail(error))
     }
@@ -226,12 +230,14 @@ impl Transport for System {
 }
 
 impl System {
-    /// Notes who has come and gone, if it is time to look. A guest connects to those who have come.
-    fn look_around(&mut self) -> Result<(), TransportError> {
+    /// Notes who has come and gone, if it is time to look, and tells the relay who listens. A guest connects to those
+    /// who have come.
+    fn look_around(&mut self, ended: bool, relay: &mut dyn Exchange) -> Result<(), TransportError> {
         let now = now();
-        if self.session.as_ref().is_none_or(|session| !session.watch.is_due(now)) {
+        let Some(session) = self.session.as_ref().filter(|session| ended || session.watch.is_due(now)) else {
             return Ok(());
-        }
+        };
+        session.tell_subscribers(relay);
         if self.plan.is_guest() {
             let Some(session) = &mut self.session else { return Ok(()) };
             session.watch.looked(now);

@@ -10,6 +10,7 @@
 )]
 
 use std::io;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
@@ -94,6 +95,7 @@ pub struct Client {
     incoming: Receiver<Incoming>,
     /// What is said again to a bridge that is found again.
     standing: Arc<Mutex<Vec<String>>>,
+    stands: Arc<AtomicBool>,
 }
 
 impl Client {
@@ -103,16 +105,28 @@ impl Client {
         let (received, incoming) = sync_channel(WAITING);
         let (connected, outcome) = sync_channel(1);
         let standing = Arc::new(Mutex::new(Vec::new()));
-        let line = Line { address: address.clone(), to_send, received, standing: Arc::clone(&standing) };
+        let stands = Arc::new(AtomicBool::new(true));
+        let line = Line {
+            address: address.clone(),
+            to_send,
+            received,
+            standing: Arc::clone(&standing),
+            stands: Arc::clone(&stands),
+        };
         let refused = |error: io::Error| ConnectError::Refused { url: address.url.clone(), reason: error.to_string() };
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(refused)?;
         let in_thread = move || runtime.block_on(line.run(&connected));
         thread::Builder::new().name("rosbridge".to_owned()).spawn(in_thread).map_err(refused)?;
         match outcome.recv() {
-            Ok(Ok(())) => Ok(Client { outgoing, incoming, standing }),
+            Ok(Ok(())) => Ok(Client { outgoing, incoming, standing, stands }),
             Ok(Err(error)) => Err(error),
             Err(_) => Err(ConnectError::Refused { url: address.url.clone(), reason: "its thread ended".to_owned() }),
         }
+    }
+
+    /// Whether the bridge is there at this moment.
+    pub fn stands(&self) -> bool {
+        self.stands.load(Ordering::Relaxed)
     }
 
     /// Says something once. Waits while too much waits to be said; false if the connection is lost for good.
@@ -143,6 +157,7 @@ struct Line {
     to_send: mpsc::Receiver<String>,
     received: SyncSender<Incoming>,
     standing: Arc<Mutex<Vec<String>>>,
+    stands: Arc<AtomicBool>,
 }
 
 /// Why a connection ended.
@@ -165,6 +180,7 @@ impl Line {
         connected.try_send(Ok(())).ok();
         loop {
             let End::Lost(how) = self.serve(socket).await else { return };
+            self.stands.store(false, Ordering::Relaxed);
             let lost = Instant::now();
             socket = loop {
                 tokio::time::sleep(PAUSE).await;
@@ -180,6 +196,7 @@ impl Line {
                     }
                 }
             };
+            self.stands.store(true, Ordering::Relaxed);
             // If nobody takes it any more, the client is gone.
             if self.pass(Incoming::FoundAgain(lost.elapsed())).await.is_err() {
                 return;

@@ -419,6 +419,10 @@ impl Bus for Bridge {
         missing
     }
 
+    fn is_connected(&self) -> bool {
+        self.client.as_ref().is_some_and(Client::stands)
+    }
+
     fn receive(&mut self, timeout: Duration) -> Result<Option<Event>, TransportError> {
         if let Some(proxies) = &self.proxies {
             self.reported.extend(proxies.notes());

@@ -4,7 +4,8 @@
 //! Guarantees: the result fails, or is the original test; it is permitted if the original is; it keeps the operation
 //! seeds, so that the rest of a disturbance is what it was; no single step can shrink it further, unless the
 //! evaluations were used up; and no test is run twice for it. A step is one operation, one side of an `and` or `or` of
-//! a condition, one activation by condition, or [`RESOLUTION`] of the permitted range of a time or a parameter.
+//! a condition, one activation by condition, or [`RESOLUTION`] of the permitted range of a time or a parameter. Times
+//! and parameters end on numbers with three significant digits of that range where the test with these still fails.
 //!
 //! Like every [`Strategy`] it is a function of what it was told, so an interrupted run can be resumed.
 

@@ -143,7 +143,7 @@ pub fn confirm_recorded(
     let timeout = settings.timeout.unwrap_or_else(|| default_timeout(longest));
     let mut pool = Pool::start(&settings.pool(total, directory, timeout))?;
     let plan = repository.plan().clone();
-    let mut evaluator = Evaluator::for_repetitions(recorder, &mut pool, interrupted)?;
+    let mut evaluator = Evaluator::for_repetitions(&plan, recorder, &mut pool, interrupted)?;
     match evaluator.repeat(&plan, &mut repeated, &runs, settings.seed, &mut |runs| each(runs, total)) {
         Ok(()) => Ok(true),
         Err(Halt::Stopped) => Ok(false),

@@ -5,7 +5,7 @@ use sesame_search::SearchError;
 use sesame_search::coverage::GridError;
 
 use crate::campaign::executor::ExecutorError;
-use crate::campaign::reference::Unheard;
+use crate::campaign::reference::Ineffective;
 
 /// Why a campaign could not go on.
 #[derive(Debug, thiserror::Error)]
@@ -40,14 +40,15 @@ pub enum CampaignError {
         /// What is known of it.
         reason: String,
     },
-    /// No part of the system receives what operations disturb, so tests with them would show nothing.
+    /// Operations disturb what no part of the system receives, or act when there is nothing to disturb, so tests with
+    /// them would show nothing.
     #[error(
-        "{}\nnothing was fuzzed: such tests would pass without having disturbed anything. Disturb what the simulator \
-         subscribes to, let it subscribe to this topic, or read the topic by a metric with `outbound`. With \
-         `--allow-unheard`, such tests run all the same",
-        .0.iter().map(Unheard::to_string).collect::<Vec<_>>().join("\n")
+        "{}\nnothing was fuzzed: such tests would pass without having disturbed anything. {}. With `--allow-unheard`, \
+         such tests run all the same",
+        .0.iter().map(Ineffective::to_string).collect::<Vec<_>>().join("\n"),
+        Ineffective::remedies(.0)
     )]
-    Unheard(Vec<Unheard>),
+    Ineffective(Vec<Ineffective>),
     /// A trace could not be written. The test is not recorded, so that `resume` runs it again with its trace.
     #[error(
         "{reason}\nT{test} is not recorded without its trace, and what was recorded before is kept: when this is mended, \
@@ -78,7 +79,7 @@ impl CampaignError {
             CampaignError::Search(_)
             | CampaignError::Grid(_)
             | CampaignError::Reference(_)
-            | CampaignError::Unheard(_)
+            | CampaignError::Ineffective(_)
             | CampaignError::OtherCampaign(_) => false,
         }
     }

@@ -6,12 +6,14 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use sesame_base::observation::Observation;
 use sesame_plan::{CampaignPlan, Compensation, Recorded};
 use sesame_results::record::{self, Event, EventKind, Origin, RecordError, Recorder, Repetition, TestRecord};
 
 use crate::campaign::error::{CampaignError, Halt};
 use crate::campaign::executor::{Executor, Job, JobResult, TraceRequest};
 use crate::campaign::numbering::PlannedTest;
+use crate::campaign::silence;
 
 /// How many recorded tests are read at once when a campaign is resumed.
 const READ_TOGETHER: u32 = 50;
@@ -21,6 +23,9 @@ const WAIT: Duration = Duration::from_millis(100);
 
 /// Runs tests and records them; what is recorded already is read instead.
 pub(super) struct Evaluator<'a> {
+    plan: &'a CampaignPlan,
+    /// What the first reference run showed, once it has ended; `None` for results without one.
+    reference: Option<Observation>,
     pub(super) recorder: &'a mut Recorder,
     pub(super) executor: &'a mut dyn Executor,
     /// Numbers of the tests that were recorded when the campaign was resumed.
@@ -55,7 +60,7 @@ impl<'a> Evaluator<'a> {
 
     /// One that goes on with what the recorder holds. `series` says whether the search reads the series of metrics.
     pub(super) fn new(
-        plan: &CampaignPlan,
+        plan: &'a CampaignPlan,
         series: bool,
         recorder: &'a mut Recorder,
         executor: &'a mut dyn Executor,
@@ -68,18 +73,26 @@ impl<'a> Evaluator<'a> {
             Some(keep) => Some(Traces { folder: repository.make_trace_folder()?, keep }),
             None => None,
         };
-        Ok(Evaluator { recorder, executor, recorded, repetitions, traces, series, interrupted })
+        let reference = None;
+        Ok(Evaluator { plan, reference, recorder, executor, recorded, repetitions, traces, series, interrupted })
     }
 
     /// One that only repeats tests that are recorded.
     pub(super) fn for_repetitions(
+        plan: &'a CampaignPlan,
         recorder: &'a mut Recorder,
         executor: &'a mut dyn Executor,
         interrupted: &'a AtomicBool,
     ) -> Result<Self, RecordError> {
         let repetitions = recorder.repository().repetitions()?;
-        let recorded = BTreeSet::new();
-        Ok(Evaluator { recorder, executor, recorded, repetitions, traces: None, series: false, interrupted })
+        let reference = recorder.repository().reference_run()?.map(|record| record.observation);
+        let (recorded, traces, series) = (BTreeSet::new(), None, false);
+        Ok(Evaluator { plan, reference, recorder, executor, recorded, repetitions, traces, series, interrupted })
+    }
+
+    /// From now on, what is heard in a run is compared with what was heard in this one.
+    pub(super) fn compare_with(&mut self, reference: &Observation) {
+        self.reference = Some(reference.clone());
     }
 
     /// Runs tests and records each as it ends; `each` sees all of them, in the order in which they end.
@@ -163,7 +176,10 @@ impl<'a> Evaluator<'a> {
             if self.interrupted.load(Ordering::Relaxed) {
                 return Err(Halt::Stopped);
             }
-            if let Some(result) = self.executor.next(WAIT)? {
+            if let Some(mut result) = self.executor.next(WAIT)? {
+                if let Some(reference) = &self.reference {
+                    silence::judge(self.plan, reference, &mut result.observation);
+                }
                 return Ok(result);
             }
             awaited();

@@ -24,7 +24,7 @@ use crate::campaign::numbering::{Numbering, PlannedTest};
 use crate::campaign::observer::{EndedTest, Generation, Observer};
 use crate::campaign::observers::{counted_point, observers};
 use crate::campaign::pool::Pool;
-use crate::campaign::reference::{self, Unheard};
+use crate::campaign::reference::{self, Ineffective};
 use crate::campaign::settings::{Settings, default_timeout};
 
 /// The warning of a campaign whose simulator nobody steps.
@@ -81,7 +81,7 @@ fn run_with(
                 // The reference run stays recorded as it is, so there is nothing that `resume` could go on with.
                 CampaignError::Reference(_) => drop(recorder.finish("the reference run failed")?),
                 // The run stays unfinished, so that `resume --allow-unheard` can go on with it.
-                CampaignError::Unheard(_) => recorder.interrupt()?,
+                CampaignError::Ineffective(_) => recorder.interrupt()?,
                 _ => {}
             }
             Err(error)
@@ -144,12 +144,14 @@ impl<'a, 'l> Campaign<'a, 'l> {
             }
             Outcome::Completed | Outcome::NoEffect | Outcome::Unknown => {}
         }
-        let unheard = reference::unheard(plan, task, &reference);
-        if unheard.iter().any(Unheard::wholly) && !settings.allow_unheard {
-            return Err(CampaignError::Unheard(unheard.into_iter().filter(Unheard::wholly).collect()).into());
+        evaluator.compare_with(&reference);
+        let ineffective = reference::ineffective(plan, task, &reference);
+        if ineffective.iter().any(Ineffective::wholly) && !settings.allow_unheard {
+            let wholly = ineffective.into_iter().filter(Ineffective::wholly);
+            return Err(CampaignError::Ineffective(wholly.collect()).into());
         }
         let observers = observers(plan, &reference)?;
-        let of_run = unheard.iter().map(Unheard::to_string).chain(reference::violations(plan, &reference));
+        let of_run = ineffective.iter().map(Ineffective::to_string).chain(reference::violations(plan, &reference));
         let of_campaign = (!lock_stepped).then(|| FREE_RUNNING.to_owned());
         let of_observers = observers.iter().filter_map(|observer| observer.warning());
         let warnings = of_run
@@ -207,9 +209,8 @@ impl<'a, 'l> Campaign<'a, 'l> {
             return Ok(reason);
         }
         let last = reference_run(&mut self.evaluator, &mut self.numbering, &mut || {})?;
-        // A simulator that runs freely differs in any case, and the campaign has said so.
         let lock_stepped = self.evaluator.executor.lock_stepped();
-        if let Some(text) = reference::difference(self.plan, &self.reference, &last).filter(|_| lock_stepped) {
+        if let Some(text) = reference::difference(self.plan, lock_stepped, &self.reference, &last) {
             self.evaluator.warn(Some(self.numbering.last()), text)?;
         }
         if !self.plan.campaign.objectives.is_empty() {

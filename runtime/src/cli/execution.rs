@@ -291,7 +291,7 @@ pub(super) fn perform(
     let end = end.map_err(|error| {
         let continued = match &error {
             error if error.leaves_the_run_resumable() => format!("\nThis continues the run:\n    {}", again(&[])),
-            CampaignError::Unheard(_) => {
+            CampaignError::Ineffective(_) => {
                 format!("\nThis runs the campaign as it is:\n    {}", again(&["--allow-unheard"]))
             }
             _ => String::new(),

@@ -7,7 +7,7 @@ use clap::Args;
 
 use sesame_base::visible::visible_lines;
 use sesame_notation::is_name;
-use sesame_results::report;
+use sesame_results::report::{self, Expected};
 
 use crate::cli::failure::Failure;
 use crate::cli::results_folder::open;
@@ -23,6 +23,9 @@ pub struct Options {
     /// Name of the block; by default made of the campaign's name and the test's
     #[arg(long, value_name = "NAME", value_parser = name)]
     name: Option<String>,
+    /// Expect the measured values, so that the test notices any change of them; by default it expects the requirements
+    #[arg(long)]
+    pin: bool,
     #[command(flatten)]
     which: Which,
 }
@@ -37,7 +40,8 @@ fn name(text: &str) -> Result<String, String> {
 
 pub(super) fn export(results: &Path, options: &Options) -> Result<ExitCode, Failure> {
     let repository = open(results, options.which.results.as_deref())?;
-    let exported = report::export(&repository, &options.test, options.name.as_deref())?;
+    let expected = if options.pin { Expected::Values } else { Expected::Requirements };
+    let exported = report::export(&repository, &options.test, options.name.as_deref(), expected)?;
     match options.which.format {
         // A block is the test to the last sign of its texts; on a terminal some of these would do more than be read.
         Format::Text if console::Term::stdout().is_term() => print(&visible_lines(&exported.block)),

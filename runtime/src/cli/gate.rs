@@ -157,16 +157,24 @@ fn insufficient(summary: &Summary, plan: &CampaignPlan, task: &Task) -> Vec<Stri
     let is_about_one_test = task.shrinking().is_some() || task.repeated(plan).is_some() || task.of_lab().is_some();
     let disturbs_nothing = task.undisturbed().is_some();
     let ran = counts.evaluations - counts.duplicates;
+    let mut objections: Vec<String> = summary.closing_run.iter().cloned().collect();
     if ran == 0 || is_about_one_test || disturbs_nothing {
-        return Vec::new();
+        return objections;
     }
-    let mut objections = Vec::new();
     let broken = broken_off(summary, &["crash", "timeout"]).len();
     if 2 * broken > ran {
         objections.push(format!("{broken} of {} broke off by crash or timeout, more than half", tests(ran)));
     }
     if counts.no_effect == counts.evaluations {
         objections.push(format!("no operation had an effect in any of {}", tests(ran)));
+    }
+    if counts.no_effect < counts.evaluations {
+        objections.extend(
+            summary
+                .without_effect
+                .iter()
+                .map(|it| format!("operation `{}` had no effect in any of its {} uses", it.operation, it.uses)),
+        );
     }
     let judged = summary.requirements.iter().any(|requirement| requirement.satisfied + requirement.violated > 0);
     if !summary.requirements.is_empty() && !judged {
@@ -179,7 +187,7 @@ fn insufficient(summary: &Summary, plan: &CampaignPlan, task: &Task) -> Vec<Stri
 mod tests {
     use sesame_plan::KnownTestId;
     use sesame_results::record::{Standing, sample};
-    use sesame_results::report::{ExpectationSummary, Failure, FindingAgain, NotFinite, summary};
+    use sesame_results::report::{ExpectationSummary, Failure, FindingAgain, NotFinite, WithoutEffect, summary};
 
     use super::*;
 
@@ -259,6 +267,29 @@ mod tests {
         assert_eq!(objections(&[], &summary, &plan), ["none of 13 tests is conclusive about any requirement"]);
         summary.requirements.clear();
         assert_eq!(objections(&[], &summary, &plan), [""; 0], "there was nothing to judge");
+    }
+
+    #[test]
+    fn an_operation_that_never_acts_and_a_system_that_is_no_longer_what_it_was_are_not_green() {
+        let (mut summary, plan) = found();
+        let operation = WithoutEffect { operation: "weak_brakes".to_owned(), uses: 30 };
+        summary.without_effect = vec![operation];
+        assert_eq!(objections(&[], &summary, &plan), ["operation `weak_brakes` had no effect in any of its 30 uses"]);
+        assert_eq!(objections(&[Finding::Nothing], &summary, &plan), [""; 0]);
+        // That none has an effect says it all.
+        summary.counts.no_effect = summary.counts.evaluations;
+        assert_eq!(objections(&[], &summary, &plan), ["no operation had an effect in any of 13 tests"]);
+
+        let (mut summary, plan) = found();
+        let differs = "the reference run after the campaign differs from the one before it: it is silent";
+        summary.closing_run = Some(differs.to_owned());
+        assert_eq!(objections(&[], &summary, &plan), [differs]);
+        let repeated = Task::Repeat { name: "T1".to_owned(), test: plan.tests[0].test.clone(), times: 5 };
+        assert_eq!(
+            Gate::default().objections(&summary, &plan, &repeated),
+            [differs],
+            "also where it is about one test"
+        );
     }
 
     #[test]

@@ -9,6 +9,7 @@ use clap::Args;
 use sesame_base::test_number::TestNumber;
 use sesame_plan::{Lab, LabTask, LabTest, Task};
 use sesame_results::analysis::choice::choice_for;
+use sesame_results::analysis::exclusions;
 use sesame_results::record::Repository;
 use sesame_rng::derive_seed;
 
@@ -40,6 +41,9 @@ pub struct Options {
     /// Folder in which the results of the lab get a folder of their own; by default beside the run
     #[arg(long, value_name = "DIR")]
     into: Option<PathBuf>,
+    /// Run tests that the lab excludes as too dangerous, too
+    #[arg(long)]
+    although_excluded: bool,
     #[command(flatten)]
     execution: ExecutionArgs,
     #[command(flatten)]
@@ -60,6 +64,11 @@ pub(super) fn physical(session: &Session, options: &Options) -> Result<ExitCode,
             return Err(Failure(format!("{} is named twice", TestNumber(number))));
         }
         numbers.push(number);
+    }
+    if !options.although_excluded
+        && let Some(excluded) = exclusions(&repository, lab, &numbers)?
+    {
+        return Err(Failure(format!("{excluded}; leave them out, or pass `--although-excluded`")));
     }
     let mut tests = Vec::with_capacity(numbers.len());
     for &number in &numbers {

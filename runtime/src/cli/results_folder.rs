@@ -7,15 +7,18 @@ use sesame_results::record::{self, Repository};
 use crate::cli::execution::shown;
 use crate::cli::failure::Failure;
 use crate::cli::session::Session;
+use crate::cli::terminal::say;
 
-/// The results in this folder, or those of the campaign's latest run.
+/// The results in this folder, or those of the campaign's latest run, which is then named on standard error.
 pub(super) fn open(results: &Path, folder: Option<&Path>) -> Result<Repository, Failure> {
-    let folder = match folder {
-        Some(folder) => run_folder(results, folder),
-        None => record::latest_folder(results)?
-            .ok_or_else(|| Failure(format!("there are no results yet in {}: `run` makes some", results.display())))?,
-    };
-    Ok(Repository::open(&folder)?)
+    if let Some(folder) = folder {
+        return Ok(Repository::open(&run_folder(results, folder))?);
+    }
+    let folder = record::latest_folder(results)?
+        .ok_or_else(|| Failure(format!("there are no results yet in {}: `run` makes some", results.display())))?;
+    let repository = Repository::open(&folder)?;
+    say(format_args!("results of the latest run: {}", shown(&folder)));
+    Ok(repository)
 }
 
 /// The folder of a run that the user names: by its path, or by its place in the folder of all results, such as `42`.

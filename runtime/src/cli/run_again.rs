@@ -7,6 +7,7 @@ use sesame_base::observation::{Observation, Outcome};
 use sesame_plan::{MonitorId, Recorded};
 use sesame_results::record::{Repository, TestRecord};
 
+use crate::campaign::silence;
 use crate::campaign::{Job, JobResult, SingleSettings, TraceRequest, default_timeout, run_single};
 use crate::cli::execution::{claim_files, interruptible, refuse_unfilled};
 use crate::cli::failure::Failure;
@@ -70,12 +71,16 @@ pub(super) fn run_again(session: &Session, asked: Asked<'_>) -> Result<Option<Ag
     };
     let ended = run_single(job, &settings, &interrupted);
     files.finish()?;
-    let Some(JobResult { observation, notes, lock_stepped, trace_failure, .. }) = ended? else {
+    let Some(JobResult { mut observation, notes, lock_stepped, trace_failure, .. }) = ended? else {
         say(format_args!("stopped; a {} leaves nothing behind", asked.run));
         return Ok(None);
     };
     for note in notes {
         say(format_args!("{note}"));
+    }
+    // As it was judged when it was recorded: a reference run is compared with an earlier one only.
+    if let Some(reference) = repository.reference_run()?.filter(|reference| reference.number < record.number) {
+        silence::judge(plan, &reference.observation, &mut observation);
     }
     Ok(Some(Again { repository, record, observation, lock_stepped, trace_failure, trace: file, _folder: folder }))
 }

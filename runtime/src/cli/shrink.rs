@@ -7,6 +7,7 @@ use clap::Args;
 
 use sesame_base::observation::{Observation, Outcome};
 use sesame_base::test_number::TestNumber;
+use sesame_base::verdict::margin;
 use sesame_plan::{CampaignPlan, Failing, RequirementId, Shrinking, Task};
 use sesame_results::record::{self, Origin, RecordError, Repository, TestRecord, Verdict, verdict};
 
@@ -142,7 +143,12 @@ pub(super) fn failing(repository: &Repository, record: &TestRecord, wanted: &[St
             names.join(", ")
         )));
     }
-    Ok(Failing::Violation { requirements: caused })
+    let of = |id: &RequirementId| {
+        let requirement = plan.requirement(*id);
+        record.observation.value(requirement.metric).value.map_or(0.0, |value| margin(requirement.bound, value))
+    };
+    let margins = caused.iter().map(of).collect();
+    Ok(Failing::Violation { requirements: caused, margins })
 }
 
 /// The requirements that a run violates.
@@ -181,13 +187,19 @@ mod tests {
 
     #[test]
     fn a_test_is_shrunk_by_the_requirements_that_it_violates_and_the_reference_run_does_not() {
-        let violation = |requirements: &[u32]| {
-            Ok(Failing::Violation { requirements: requirements.iter().copied().map(RequirementId).collect() })
+        let violation = |requirements: &[u32]| Ok(requirements.iter().copied().map(RequirementId).collect::<Vec<_>>());
+        let found_violation = |name: &str, wanted: &[&str]| match found(name, wanted) {
+            Ok(Failing::Violation { requirements, margins }) => {
+                assert!(margins.len() == requirements.len() && margins.iter().all(|margin| *margin > 0.0));
+                Ok(requirements)
+            }
+            Ok(other) => panic!("{other:?}"),
+            Err(words) => Err(words),
         };
         assert_eq!(found("T23", &[]), Ok(Failing::Crash));
         assert_eq!(found("T31", &[]), Ok(Failing::Timeout));
-        assert_eq!(found("known_jitter", &[]), violation(&[0]));
-        assert_eq!(found("known_jitter", &["R1"]), violation(&[0]));
+        assert_eq!(found_violation("known_jitter", &[]), violation(&[0]));
+        assert_eq!(found_violation("known_jitter", &["R1"]), violation(&[0]));
         assert_eq!(found("known_jitter", &["R3"]), Err("T1 does not violate `R3`; it violates R1".to_owned()));
         assert!(found("reference", &[]).unwrap_err().starts_with("T0 has no operations"));
         let folder = tempfile::tempdir().unwrap();

@@ -81,7 +81,7 @@ pub(super) fn read_all(folder: &Path) -> Read {
     ask!(report::list(&repository), |list| report::list_text(&list, options));
     for name in ["reference", "T1", "T17", "T20", "T44"] {
         ask!(report::show(&repository, name), |test| report::test_text(&test, options));
-        ask!(report::export(&repository, name, None), |exported| exported);
+        ask!(report::export(&repository, name, None, report::Expected::Values), |exported| exported);
         ask!(
             repository.find(name).and_then(|number| repository.test(number)),
             |record: sesame_results::record::TestRecord| {

@@ -145,7 +145,7 @@ pub(super) fn wholes() -> Vec<Whole> {
         let task = Task::Shrink(Shrinking {
             name: "known_jitter".to_owned(),
             test: plan.tests[0].test.clone(),
-            failing: Failing::Violation { requirements: vec![RequirementId(0)] },
+            failing: Failing::Violation { requirements: vec![RequirementId(0)], margins: Vec::new() },
             simulator_seed: u64::MAX,
             runs: 1,
             evaluations: 12,

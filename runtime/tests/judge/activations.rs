@@ -5,39 +5,32 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use sesame_base::observation::Observation;
 use sesame_plan::condition::{Condition, Operand};
-use sesame_plan::{Activation, Copies, MetricId, MetricSource};
+use sesame_plan::{Activation, Aggregate, Copies, Metric, MetricId, MetricSource, OperationKind};
 
+use crate::adapter::STEP;
 use crate::case::{Case, topics_of, variables};
-use crate::formulas::{Judged, first_blank, hears_deliveries, is_by_instant, judged};
-use crate::ledger::Ledger;
+use crate::computations::When;
+use crate::formulas::{Judged, first_blank, heard, hears_deliveries, judged};
+use crate::ledger::{Ledger, Message};
 
 /// Something that changes what a condition says: the values of all its variables from then on.
 struct Change {
     time: i64,
+    /// Whether time alone makes it, before anything is heard at that moment.
+    by_time: bool,
     start: bool,
     end: bool,
 }
 
-/// Intervals that are not where the documentation has them. Conditions over what is computed once per instant, over
-/// active time, and copies that wait for each other are left to other tests.
+/// Intervals that are not where the documentation has them. Conditions over active time, over durations that are
+/// compared with each other, and copies that wait for each other are left to other tests.
 pub(crate) fn contradictions(case: &Case, observed: &Observation, ledger: &Ledger) -> Vec<String> {
     let mut wrong = Vec::new();
     for (used, effect) in case.test.operations.iter().zip(&observed.operations) {
-        let plain = |metric: &MetricId| {
+        let known = |metric: &MetricId| {
             let metric = case.plan.metric(*metric);
-            let mut topics = topics_of(metric);
-            topics.sort_unstable();
-            topics.dedup();
-            let by_instant = match &metric.source {
-                MetricSource::Formula { formula } => {
-                    is_by_instant(&case.plan, &formula.inputs, Some(&formula.aggregate))
-                }
-                _ => topics.len() != 1,
-            };
-            // What one key has held is known only with its next message.
-            let held = matches!(&metric.source, MetricSource::Formula { formula } if formula.per.is_some());
-            let open = held || first_blank(&case.plan, metric, ledger).is_some();
-            !by_instant && !open && !matches!(metric.source, MetricSource::Robustness { .. })
+            let open = first_blank(&case.plan, metric, ledger).is_some();
+            !open && !matches!(metric.source, MetricSource::Robustness { .. } | MetricSource::FuzzingTime)
         };
         let copies = case.test.operations.iter().filter(|other| other.operation == used.operation).count();
         let apart = copies == 1 || case.plan.campaign.copies == Copies::MayOverlap;
@@ -45,7 +38,13 @@ pub(crate) fn contradictions(case: &Case, observed: &Observation, ledger: &Ledge
         let window = (nanos(within.start), nanos(within.end));
         let expected = match &used.activation {
             Activation::Condition { .. } | Activation::ConditionFor { .. } => {
-                if !apart || !variables(&used.activation).iter().all(plain) {
+                let growing = |metric: &MetricId| grows(case, *metric) && compares_metrics(&used.activation);
+                let metrics = variables(&used.activation);
+                // Conditions see what was delivered when a message and its copies have all been.
+                if metrics.iter().any(|&metric| hears_copies(case, metric)) {
+                    continue;
+                }
+                if !apart || !metrics.iter().all(known) || metrics.iter().any(growing) {
                     continue;
                 }
                 switched(case, &used.activation, window, ledger)
@@ -68,6 +67,17 @@ pub(crate) fn contradictions(case: &Case, observed: &Observation, ledger: &Ledge
         }
     }
     wrong
+}
+
+/// Whether a metric hears what is delivered on a topic on which an operation of the test makes copies.
+fn hears_copies(case: &Case, metric: MetricId) -> bool {
+    let metric = case.plan.metric(metric);
+    let mut used = case.test.operations.iter().map(|used| case.plan.operation(used.operation));
+    hears_deliveries(metric)
+        && used.any(|operation| {
+            operation.kind == OperationKind::Duplicate
+                && operation.topic.is_some_and(|topic| topics_of(metric).contains(&topic))
+        })
 }
 
 fn nanos(seconds: f64) -> i64 {
@@ -102,8 +112,10 @@ fn switched(case: &Case, activation: &Activation, window: (i64, i64), ledger: &L
         if now < window.0 || now >= window.1 {
             continue;
         }
-        let before = changes.iter().rfind(|change| change.time < now);
-        for look in before.into_iter().chain(changes.iter().filter(|change| change.time == now)) {
+        let at_now = || changes.iter().filter(|change| change.time == now);
+        let is_new = at_now().next().is_some_and(|change| change.by_time);
+        let before = changes.iter().rfind(|change| change.time < now).filter(|_| !is_new);
+        for look in before.into_iter().chain(at_now()) {
             let holds = look.start && !look.end;
             waits = on.is_none() && holds && (waits || !held);
             held = holds;
@@ -123,7 +135,7 @@ fn switched(case: &Case, activation: &Activation, window: (i64, i64), ledger: &L
     intervals
 }
 
-/// What start and end say: first before any message, then after each message that changes a variable.
+/// What start and end say: first before any message, then whenever a variable may have changed.
 fn changes(
     case: &Case,
     activation: &Activation,
@@ -131,42 +143,146 @@ fn changes(
     end: Option<&Condition>,
     ledger: &Ledger,
 ) -> Vec<Change> {
-    let mut values: BTreeMap<MetricId, Option<f64>> =
-        variables(activation).into_iter().map(|metric| (metric, case.plan.metric(metric).initial)).collect();
-    let said = |time, values: &BTreeMap<MetricId, Option<f64>>| Change {
+    let metrics = variables(activation);
+    let said = |time, by_time, values: &BTreeMap<MetricId, Option<f64>>| Change {
         time,
+        by_time,
         start: holds(start, values),
         end: end.is_some_and(|end| holds(end, values)),
     };
-    let mut changes = vec![said(i64::MIN, &values)];
-    let metrics: Vec<MetricId> = values.keys().copied().collect();
-    for &(delivered, at) in &ledger.order {
-        let message = if delivered { &ledger.delivered[at] } else { &ledger.published[at] };
-        let mut heard = false;
-        for &id in &metrics {
-            let metric = case.plan.metric(id);
-            let on = topics_of(metric).iter().any(|&topic| case.plan.topic(topic).paths.contains(&message.path));
-            if !on || hears_deliveries(metric) != delivered {
-                continue;
-            }
-            heard = true;
-            let until = Ledger {
-                paths: Vec::new(),
-                published: if delivered { Vec::new() } else { ledger.published[..=at].to_vec() },
-                delivered: if delivered { ledger.delivered[..=at].to_vec() } else { Vec::new() },
-                order: Vec::new(),
-                deeds: Vec::new(),
-                end: message.time,
-            };
-            if let Judged::Value(value) = judged(&case.plan, metric, &until) {
-                values.insert(id, Some(value));
-            }
+    let initial = metrics.iter().map(|&metric| (metric, case.plan.metric(metric).initial)).collect();
+    let mut changes = vec![said(i64::MIN, true, &initial)];
+    let mut moments = moments_of_time(case, activation, &metrics, ledger).into_iter().peekable();
+    let values = |time: i64, heard: &[(bool, usize)]| -> BTreeMap<MetricId, Option<f64>> {
+        let value = |id: MetricId| value_at(case, id, ledger, time, heard).or(case.plan.metric(id).initial);
+        metrics.iter().map(|&metric| (metric, value(metric))).collect()
+    };
+    for (at, &(delivered, message)) in ledger.order.iter().enumerate() {
+        let message = if delivered { &ledger.delivered[message] } else { &ledger.published[message] };
+        while let Some(moment) = moments.next_if(|&moment| moment <= message.time) {
+            changes.push(said(moment, true, &values(moment, &ledger.order[..at])));
         }
-        if heard {
-            changes.push(said(message.time, &values));
+        let hears = |id: &MetricId| {
+            let metric = case.plan.metric(*id);
+            hears_deliveries(metric) == delivered
+                && topics_of(metric).iter().any(|&topic| case.plan.topic(topic).paths.contains(&message.path))
+        };
+        if metrics.iter().any(hears) {
+            changes.push(said(message.time, false, &values(message.time, &ledger.order[..=at])));
         }
     }
+    changes.extend(moments.map(|moment| said(moment, true, &values(moment, &ledger.order))));
     changes
+}
+
+/// The value of a metric at a moment at which so much was heard; `None` before it has one.
+fn value_at(case: &Case, id: MetricId, ledger: &Ledger, time: i64, heard: &[(bool, usize)]) -> Option<f64> {
+    let metric = case.plan.metric(id);
+    // What is computed once per instant is known when the instant is over.
+    let until = if when(case, metric) == When::Message { time + 1 } else { time };
+    let messages = |side: bool, messages: &[Message]| -> Vec<Message> {
+        let heard = heard.iter().filter(|(delivered, _)| *delivered == side).map(|&(_, at)| &messages[at]);
+        heard.filter(|message| message.time < until).cloned().collect()
+    };
+    let until = Ledger {
+        paths: Vec::new(),
+        published: messages(false, &ledger.published),
+        delivered: messages(true, &ledger.delivered),
+        order: Vec::new(),
+        deeds: Vec::new(),
+        end: time,
+        steps: time - 1,
+    };
+    match judged(&case.plan, metric, &until) {
+        Judged::Value(value) => Some(value),
+        Judged::Unset | Judged::Open => None,
+    }
+}
+
+/// When time alone makes new values of metrics known: an instant is over, or a duration reaches a number.
+fn moments_of_time(case: &Case, activation: &Activation, metrics: &[MetricId], ledger: &Ledger) -> BTreeSet<i64> {
+    let mut moments = BTreeSet::new();
+    for &id in metrics {
+        let metric = case.plan.metric(id);
+        let when = when(case, metric);
+        if when != When::Message {
+            let of_metric = |message: &&Message| {
+                topics_of(metric).iter().any(|&topic| case.plan.topic(topic).paths.contains(&message.path))
+            };
+            moments.extend(heard(metric, ledger).iter().filter(of_metric).map(|message| message.time + 1));
+        }
+        if when == When::Step {
+            moments.extend((0..=ledger.end / STEP).map(|step| step * STEP + 1));
+        }
+        if grows(case, id) {
+            for number in numbers(activation) {
+                let reached = |time| value_at(case, id, ledger, time, &ledger.order).is_some_and(|it| it >= number);
+                let passed = |time| value_at(case, id, ledger, time, &ledger.order).is_some_and(|it| it > number);
+                moments.extend(first(ledger.end, reached));
+                moments.extend(first(ledger.end, passed));
+            }
+        }
+    }
+    moments
+}
+
+/// The first nanosecond from which on something holds.
+fn first(end: i64, holds: impl Fn(i64) -> bool) -> Option<i64> {
+    let (mut low, mut high) = (0, end + 1);
+    while low < high {
+        let middle = low + (high - low) / 2;
+        if holds(middle) { high = middle } else { low = middle + 1 }
+    }
+    (low <= end).then_some(low)
+}
+
+fn when(case: &Case, metric: &Metric) -> When {
+    match &metric.source {
+        MetricSource::Formula { formula } => When::of(&case.plan, formula),
+        _ => When::Message,
+    }
+}
+
+fn grows(case: &Case, metric: MetricId) -> bool {
+    let source = &case.plan.metric(metric).source;
+    matches!(source, MetricSource::Formula { formula } if matches!(formula.aggregate, Aggregate::Duration { .. }))
+}
+
+/// All numbers in the conditions of an activation.
+fn numbers(activation: &Activation) -> Vec<f64> {
+    let number = |operand: &Operand| match operand {
+        Operand::Number(number) => Some(*number),
+        Operand::Variable(_) => None,
+    };
+    comparisons(activation).iter().flat_map(|(left, right)| [number(left), number(right)]).flatten().collect()
+}
+
+/// Whether metrics are compared with each other.
+fn compares_metrics(activation: &Activation) -> bool {
+    let is_metric = |operand: &Operand| matches!(operand, Operand::Variable(_));
+    comparisons(activation).iter().any(|(left, right)| is_metric(left) && is_metric(right))
+}
+
+fn comparisons(activation: &Activation) -> Vec<(Operand, Operand)> {
+    fn of(condition: &Condition, found: &mut Vec<(Operand, Operand)>) {
+        match condition {
+            Condition::Compare { left, right, .. } => found.push((*left, *right)),
+            Condition::And(a, b) | Condition::Or(a, b) => {
+                of(a, found);
+                of(b, found);
+            }
+        }
+    }
+    let mut found = Vec::new();
+    match activation {
+        Activation::Condition { start, end, .. } => {
+            of(start, &mut found);
+            of(end, &mut found);
+        }
+        Activation::ConditionFor { start, .. } => of(start, &mut found),
+        Activation::Time { .. } | Activation::Offline => {}
+    }
+    found
 }
 
 fn holds(condition: &Condition, values: &BTreeMap<MetricId, Option<f64>>) -> bool {

@@ -15,7 +15,7 @@ use sesame_plan::{
 use sesame_relay::evaluate::{Custom, Run, evaluate_tapped};
 use sesame_relay::metric::MetricTable;
 use sesame_relay::relay::OperationEvent;
-use sesame_relay::transport::in_process;
+use sesame_relay::transport::{Transport, in_process};
 use sesame_relay::wire::WireTable;
 use sesame_results::record::{DATABASE, MetricValue, Origin, Recorder, TestRecord, Verdict, verdict};
 
@@ -112,16 +112,30 @@ pub(crate) fn plan(
 
 /// What a run of a robot showed, and all its messages.
 pub(crate) fn run(plan: &CampaignPlan, test: &Test, script: &Script) -> (Observation, Ledger) {
+    run_over(in_process::<Robot>().transport(plan), plan, test, 1, script)
+}
+
+/// The same with a simulator that is reached in another way. The script is for a robot on this thread.
+pub(crate) fn run_over(
+    mut transport: Box<dyn Transport>,
+    plan: &CampaignPlan,
+    test: &Test,
+    simulator_seed: u64,
+    script: &Script,
+) -> (Observation, Ledger) {
     let wires = WireTable::new(plan);
     let metrics = MetricTable::new(plan, &wires, &entries()).expect("made-up metrics are sound");
-    let mut transport = in_process::<Robot>().transport(plan);
     let mut ledger = Ledger::new(&wires);
     set_script(script.clone());
-    let run = Run { test, simulator_seed: 1, withheld: &[] };
+    let run = Run { test, simulator_seed, withheld: &[] };
     let observation =
         evaluate_tapped(plan, &wires, &metrics, transport.as_mut(), &run, &mut Custom::none(), Some(&mut ledger));
+    transport.close();
     let observation = observation.expect("made-up tests fit their plans");
     ledger.end = sesame_base::time::SimTime::from_seconds(observation.end).nanos();
+    // Nobody knows whether the step was over in which a run broke off.
+    let ended = matches!(observation.outcome, Outcome::Completed | Outcome::NoEffect);
+    ledger.steps = if ended { ledger.end } else { ledger.end - 1 };
     (observation, ledger)
 }
 

@@ -1,6 +1,8 @@
 //! Cases: a space, a test and a robot, made of a number and of nothing else.
 
 mod maker;
+mod monitored;
+pub(crate) mod places;
 mod unread;
 
 use sesame_plan::{
@@ -9,6 +11,7 @@ use sesame_plan::{
 use sesame_rng::Stream;
 
 use self::maker::Maker;
+pub(crate) use self::unread::Added;
 use crate::robot::{Carries, Script};
 
 /// A space with a test and a robot.

@@ -1,12 +1,9 @@
 //! The value of each metric, from the complete lists of messages of a run, by the words of the documentation.
 
 use sesame_plan::stl::Robustness;
-use sesame_plan::{
-    Aggregate, CampaignPlan, Condition, Expression, FieldRef, Formula, Input, Members, Metric, MetricSource, Side,
-    TopicId,
-};
-use sesame_relay::value::Value;
+use sesame_plan::{Aggregate, CampaignPlan, Condition, Expression, FieldRef, Formula, Metric, MetricSource, Side};
 
+use crate::computations::{Computed, Hearing, Units, When, computations, key, member, number};
 use crate::hooks::HookKind;
 use crate::ledger::{Ledger, Message};
 use crate::robot::number_of;
@@ -46,8 +43,8 @@ pub(crate) fn judged(plan: &CampaignPlan, metric: &Metric, ledger: &Ledger) -> J
                 HookKind::Latest => numbers.last().copied(),
             }
         }
-        MetricSource::Formula { formula } => of_formula(plan, formula, messages, ledger.end),
-        MetricSource::Robustness { robustness } => of_robustness(plan, robustness, messages, ledger.end),
+        MetricSource::Formula { formula } => of_formula(plan, formula, messages, ledger),
+        MetricSource::Robustness { robustness } => of_robustness(plan, robustness, messages, ledger),
     };
     value.map_or(Judged::Unset, Judged::Value)
 }
@@ -91,154 +88,20 @@ pub(crate) fn first_blank(plan: &CampaignPlan, metric: &Metric, ledger: &Ledger)
     heard(metric, ledger).iter().find(blank).map(|message| message.time)
 }
 
-/// Which member of a topic a wire is.
-fn member(plan: &CampaignPlan, topic: TopicId, path: &str) -> Option<usize> {
-    plan.topic(topic).paths.iter().position(|of| of == path)
-}
-
-fn number(message: &Value, path: &[String]) -> Option<f64> {
-    let value = path.iter().try_fold(message, |value, name| match value {
-        Value::Record(record) => record.get(name),
-        _ => None,
-    })?;
-    match value {
-        Value::Real(x) => Some(*x),
-        Value::Int(n) => Some(*n as f64),
-        Value::Bool(b) => Some(f64::from(u8::from(*b))),
-        _ => None,
-    }
-}
-
-/// What tells messages apart.
-fn key(plan: &CampaignPlan, per: &FieldRef, message: &Message) -> Option<String> {
-    member(plan, per.topic, &message.path)?;
-    let Value::Record(record) = &message.value else { return None };
-    Some(match record.get(&per.path[0])? {
-        Value::Text(text) => text.to_string(),
-        other => format!("{other:?}"),
-    })
-}
-
-/// Whether a formula is computed once per instant: of several topics, of all members of a group, or with a duration for
-/// each member.
-pub(crate) fn is_by_instant(plan: &CampaignPlan, inputs: &[Input], aggregate: Option<&Aggregate>) -> bool {
-    let mut topics: Vec<TopicId> = inputs.iter().map(|input| input.field.topic).collect();
-    topics.sort_unstable();
-    topics.dedup();
-    let members = |input: &Input| plan.topic(input.field.topic).paths.len();
-    let of_all_members = |input: &Input| input.members != Members::Each && members(input) > 1;
-    let each = inputs.iter().any(|input| input.members == Members::Each);
-    topics.len() > 1
-        || inputs.iter().any(of_all_members)
-        || each && matches!(aggregate, Some(Aggregate::Duration { .. }))
-}
-
-/// A time at which a formula has a value, with its inputs then.
-type Moment = (i64, Vec<f64>);
-
-/// The values of inputs whenever a formula over them is computed: of one topic, or of each member of one group, at each
-/// message; of several topics, or of all members, once per instant, when all its messages are known; as soon as every
-/// input had a message. Only messages that `counts` lets
-/// through are heard; nothing is computed before the first message that `begins` it.
-fn moments(
-    plan: &CampaignPlan,
-    inputs: &[Input],
-    messages: &[Message],
-    counts: impl Fn(&Message) -> bool,
-    begins: impl Fn(&Message) -> bool,
-    each: Option<usize>,
-    always_by_instant: bool,
-) -> Vec<Moment> {
-    let mut topics: Vec<TopicId> = inputs.iter().map(|input| input.field.topic).collect();
-    topics.sort_unstable();
-    topics.dedup();
-    let of_all_members =
-        |input: &Input| input.members != Members::Each && plan.topic(input.field.topic).paths.len() > 1;
-    let by_instant = always_by_instant || topics.len() > 1 || inputs.iter().any(of_all_members);
-    let heard: Vec<&Message> = messages
-        .iter()
-        .filter(|message| topics.iter().any(|&topic| member(plan, topic, &message.path).is_some()) && counts(message))
-        .collect();
-    let Some(first) = heard.iter().position(|message| begins(message)) else { return Vec::new() };
-    let mut last: Vec<Vec<Option<f64>>> =
-        inputs.iter().map(|input| vec![None; plan.topic(input.field.topic).paths.len()]).collect();
-    let mut latest: Vec<Option<f64>> = vec![None; inputs.len()];
-    let mut moments = Vec::new();
-    for (at, message) in heard.iter().enumerate() {
-        for (of, input) in inputs.iter().enumerate() {
-            let Some(member) = member(plan, input.field.topic, &message.path) else { continue };
-            if input.members == Members::Each && each.is_some_and(|own| own != member) {
-                continue;
-            }
-            let value = number(&message.value, &input.field.path);
-            last[of][member] = value;
-            latest[of] = value;
-        }
-        let instant_is_over = heard.get(at + 1).is_none_or(|next| next.time > message.time);
-        if by_instant && !instant_is_over || at < first && !(by_instant && heard[first].time == message.time) {
-            continue;
-        }
-        // Of `each of` a group, every member with a message in the instant counts once, the latest last.
-        let of_each = |topic| inputs.iter().any(|it| it.members == Members::Each && it.field.topic == topic);
-        let mut turns: Vec<(TopicId, usize)> = Vec::new();
-        if by_instant && each.is_none() {
-            for message in heard[..=at].iter().filter(|other| other.time == message.time) {
-                for topic in topics.iter().copied().filter(|&topic| of_each(topic)) {
-                    let Some(member) = member(plan, topic, &message.path) else { continue };
-                    turns.retain(|&turn| turn != (topic, member));
-                    turns.push((topic, member));
-                }
-            }
-        }
-        let mut turns: Vec<Option<(TopicId, usize)>> = turns.into_iter().map(Some).collect();
-        if turns.is_empty() {
-            turns.push(None);
-        }
-        for turn in turns {
-            for (of, input) in inputs.iter().enumerate() {
-                if let Some((_, member)) = turn.filter(|turn| turn.0 == input.field.topic) {
-                    latest[of] = last[of][member];
-                }
-            }
-            let value = |(of, input): (usize, &Input)| {
-                let known = last[of].iter().flatten().copied();
-                match input.members {
-                    Members::Each => latest[of],
-                    Members::Min => known.reduce(f64::min),
-                    Members::Max => known.reduce(f64::max),
-                    Members::Sum => known.reduce(|a, b| a + b),
-                    Members::First | Members::Second => unreachable!("no case has pairs"),
-                }
-            };
-            let values: Option<Vec<f64>> = inputs.iter().enumerate().map(value).collect();
-            moments.extend(values.map(|values| (message.time, values)));
-        }
-    }
-    moments
-}
-
-fn of_formula(plan: &CampaignPlan, formula: &Formula, messages: &[Message], end: i64) -> Option<f64> {
-    let each = formula.inputs.iter().find(|input| input.members == Members::Each).map(|input| input.field.topic);
-    let streams: Vec<Vec<Moment>> = match &formula.per {
-        // What holds of one member says nothing about another.
-        None if each.is_some() && matches!(formula.aggregate, Aggregate::Duration { .. }) => {
-            let of = |member| moments(plan, &formula.inputs, messages, |_| true, |_| true, Some(member), true);
-            (0..plan.topic(each.expect("it has such an input")).paths.len()).map(of).collect()
-        }
-        None => vec![moments(plan, &formula.inputs, messages, |_| true, |_| true, None, false)],
+fn of_formula(plan: &CampaignPlan, formula: &Formula, messages: &[Message], ledger: &Ledger) -> Option<f64> {
+    let (inputs, when, steps) = (&formula.inputs[..], When::of(plan, formula), ledger.steps);
+    let of_key = |key: Option<(&FieldRef, &str)>| computations(&Hearing { plan, inputs, messages, key, when, steps });
+    let streams: Vec<Vec<Computed>> = match &formula.per {
+        None => vec![of_key(None)],
         Some(per) => {
             let mut keys: Vec<String> = messages.iter().filter_map(|message| key(plan, per, message)).collect();
             keys.sort_unstable();
             keys.dedup();
-            let own = |of: &String| {
-                let counts = |message: &Message| key(plan, per, message).is_none_or(|key| key == *of);
-                let begins = |message: &Message| key(plan, per, message).is_some();
-                moments(plan, &formula.inputs, messages, counts, begins, None, false)
-            };
-            keys.iter().map(own).collect()
+            keys.iter().map(|key| of_key(Some((per, key.as_str())))).collect()
         }
     };
-    let values = streams.iter().filter_map(|stream| aggregated(formula, stream, end));
+    let units = Units::of(plan, inputs);
+    let values = streams.iter().filter_map(|stream| aggregated(formula, &units, stream, ledger.end));
     match formula.aggregate {
         // Durations are here in whole nanoseconds.
         Aggregate::Duration { .. } => values.reduce(|a, b| a + b).map(|nanos| nanos / 1e9),
@@ -248,86 +111,101 @@ fn of_formula(plan: &CampaignPlan, formula: &Formula, messages: &[Message], end:
     }
 }
 
-fn aggregated(formula: &Formula, stream: &[Moment], end: i64) -> Option<f64> {
+/// The value of the computations for one key, or of all of them.
+fn aggregated(formula: &Formula, units: &Units, stream: &[Computed], end: i64) -> Option<f64> {
     stream.first()?;
-    let when = |moment: &&Moment| formula.when.as_ref().is_none_or(|when| holds(when, &moment.1));
-    let limited = |candidates: Vec<&Moment>| -> Vec<Moment> {
-        let Some(every) = formula.every else { return candidates.into_iter().cloned().collect() };
-        let period = (every * 1e9).round() as i64;
-        let mut counted: Vec<Moment> = Vec::new();
-        for moment in candidates {
-            if counted.last().is_none_or(|last| moment.0 - last.0 >= period) {
-                counted.push(moment.clone());
-            }
-        }
-        counted
-    };
+    let counts = |at: &Computed| formula.when.as_ref().is_none_or(|when| holds(when, at));
     match &formula.aggregate {
-        Aggregate::Count { of } => {
-            let candidates = stream.iter().filter(when).filter(|moment| holds(of, &moment.1)).collect();
-            Some(limited(candidates).len() as f64)
-        }
+        Aggregate::Count { of } => Some(limited(formula, stream, |at| counts(at) && holds(of, at)).len() as f64),
+        // What holds of one member says nothing about another.
         Aggregate::Duration { of } => {
-            let next = stream.iter().skip(1).map(|moment| moment.0).chain([end]);
-            let held = stream.iter().zip(next).filter(|(moment, _)| when(moment) && holds(of, &moment.1));
-            Some(held.map(|(moment, next)| next - moment.0).sum::<i64>() as f64)
+            let mut sum = 0;
+            for unit in 0..units.count() {
+                let own: Vec<&Computed> = stream.iter().filter(|at| at.of == unit).collect();
+                for (at, computed) in own.iter().enumerate() {
+                    let next = own.get(at + 1).map_or(end, |next| next.time);
+                    sum += if counts(computed) && holds(of, computed) { next - computed.time } else { 0 };
+                }
+            }
+            Some(sum as f64)
         }
         Aggregate::Last { of } | Aggregate::Min { of } | Aggregate::Max { of } | Aggregate::Mean { of } => {
-            let counted = limited(stream.iter().filter(when).collect());
-            let values: Vec<f64> = counted.iter().map(|moment| value(of, &moment.1)).collect();
-            match formula.aggregate {
+            let counted = limited(formula, stream, counts);
+            let all: Vec<(usize, f64)> = counted.iter().map(|at| (at.of, value(of, at))).collect();
+            let summary = |values: Vec<f64>| match formula.aggregate {
                 Aggregate::Last { .. } => values.last().copied(),
                 Aggregate::Min { .. } => values.into_iter().reduce(f64::min),
                 Aggregate::Max { .. } => values.into_iter().reduce(f64::max),
                 _ => (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64),
+            };
+            // Each pair has a value of its own, while members have one together.
+            if !matches!(units, Units::Pairs(_)) {
+                return summary(all.into_iter().map(|(_, value)| value).collect());
             }
+            let of_pair = |pair| all.iter().filter(|(of, _)| *of == pair).map(|(_, value)| *value).collect();
+            let each = (0..units.count()).filter_map(|pair| summary(of_pair(pair)));
+            each.reduce(if matches!(formula.aggregate, Aggregate::Max { .. }) { f64::max } else { f64::min })
         }
     }
 }
 
-fn of_robustness(plan: &CampaignPlan, of: &Robustness, messages: &[Message], end: i64) -> Option<f64> {
-    let each = of.inputs.iter().find(|input| input.members == Members::Each).map(|input| input.field.topic);
-    let instances: Vec<Option<usize>> = match each {
-        None => vec![None],
-        Some(topic) => (0..plan.topic(topic).paths.len()).map(Some).collect(),
-    };
-    let of_instance = |own: &Option<usize>| {
-        let moments = moments(plan, &of.inputs, messages, |_| true, |_| true, *own, true);
-        let signals = |moment: &Moment| of.signals.iter().map(|signal| value(signal, &moment.1)).collect();
-        let samples: Vec<Moment> = moments.iter().map(|moment| (moment.0, signals(moment))).collect();
-        temporal::robustness(&of.formula, &samples, end, crate::adapter::over_whole_windows(of))
-    };
-    instances.iter().filter_map(of_instance).reduce(f64::min).filter(|robustness| robustness.is_finite())
+/// The computations that count: after one that does, the next one of the same member only once the time of `every` has
+/// passed.
+fn limited<'a>(formula: &Formula, stream: &'a [Computed], counts: impl Fn(&Computed) -> bool) -> Vec<&'a Computed> {
+    let candidates = stream.iter().filter(|at| counts(at));
+    let Some(every) = formula.every else { return candidates.collect() };
+    let period = (every * 1e9).round() as i64;
+    let mut counted: Vec<&Computed> = Vec::new();
+    for at in candidates {
+        let before = counted.iter().rfind(|before| before.of == at.of);
+        if before.is_none_or(|before| at.time - before.time >= period) {
+            counted.push(at);
+        }
+    }
+    counted
 }
 
-fn value(of: &Expression, inputs: &[f64]) -> f64 {
-    let all = |of: &[Expression]| of.iter().map(|it| value(it, inputs)).collect::<Vec<f64>>().into_iter();
+fn of_robustness(plan: &CampaignPlan, of: &Robustness, messages: &[Message], ledger: &Ledger) -> Option<f64> {
+    let (inputs, when, steps) = (&of.inputs[..], When::of_robustness(of), ledger.steps);
+    let all = computations(&Hearing { plan, inputs, messages, key: None, when, steps });
+    let of_unit = |unit: usize| {
+        let own = all.iter().filter(|at| at.of == unit);
+        let signals = |at: &Computed| of.signals.iter().map(|signal| value(signal, at)).collect();
+        let samples: Vec<(i64, Vec<f64>)> = own.map(|at| (at.time, signals(at))).collect();
+        temporal::robustness(&of.formula, &samples, ledger.end, crate::adapter::over_whole_windows(of))
+    };
+    let units = Units::of(plan, inputs).count();
+    (0..units).filter_map(of_unit).reduce(f64::min).filter(|robustness| robustness.is_finite())
+}
+
+fn value(of: &Expression, at: &Computed) -> f64 {
+    let all = |of: &[Expression]| of.iter().map(|it| value(it, at)).collect::<Vec<f64>>().into_iter();
     match of {
         Expression::Constant(value) => *value,
-        Expression::Input(at) => inputs[*at as usize],
-        Expression::Negate(of) => -value(of, inputs),
+        Expression::Input(input) => at.values[*input as usize],
+        Expression::Time => at.time as f64 / 1e9,
+        Expression::Negate(of) => -value(of, at),
         Expression::Sum(of) => all(of).reduce(|a, b| a + b).unwrap(),
         Expression::Product(of) => all(of).reduce(|a, b| a * b).unwrap(),
-        Expression::Absolute(of) => value(of, inputs).abs(),
+        Expression::Absolute(of) => value(of, at).abs(),
         Expression::Min(of) => all(of).reduce(f64::min).unwrap(),
         Expression::Max(of) => all(of).reduce(f64::max).unwrap(),
         Expression::Divide { .. }
         | Expression::Distance(_)
         | Expression::SignedDistance(_)
-        | Expression::Time
         | Expression::Unary { .. }
         | Expression::Binary { .. } => unreachable!("no case has these"),
     }
 }
 
-fn holds(of: &Condition, inputs: &[f64]) -> bool {
+pub(crate) fn holds(of: &Condition, at: &Computed) -> bool {
     match of {
         Condition::Constant(value) => *value,
-        Condition::Input(at) => inputs[*at as usize] != 0.0,
-        Condition::Compare { left, by, right } => by.holds(value(left, inputs), value(right, inputs)),
-        Condition::Same { left, right } => holds(left, inputs) == holds(right, inputs),
-        Condition::All(of) => of.iter().all(|part| holds(part, inputs)),
-        Condition::Any(of) => of.iter().any(|part| holds(part, inputs)),
-        Condition::Not(of) => !holds(of, inputs),
+        Condition::Input(input) => at.values[*input as usize] != 0.0,
+        Condition::Compare { left, by, right } => by.holds(value(left, at), value(right, at)),
+        Condition::Same { left, right } => holds(left, at) == holds(right, at),
+        Condition::All(of) => of.iter().all(|part| holds(part, at)),
+        Condition::Any(of) => of.iter().any(|part| holds(part, at)),
+        Condition::Not(of) => !holds(of, at),
     }
 }

@@ -42,6 +42,8 @@ pub(crate) struct Ledger {
     pub(crate) deeds: Vec<(i64, usize, OperationEvent)>,
     /// When the run ended.
     pub(crate) end: i64,
+    /// The last moment at which a step of the simulator can have been over.
+    pub(crate) steps: i64,
 }
 
 impl Ledger {
@@ -53,6 +55,7 @@ impl Ledger {
             order: Vec::new(),
             deeds: Vec::new(),
             end: 0,
+            steps: 0,
         }
     }
 

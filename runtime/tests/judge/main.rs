@@ -6,7 +6,7 @@
 //! two passes and without any of the runtime's code. What the runtime says of a requirement never contradicts it.
 //!
 //! A case is a function of its number: a failure prints the number and the whole case, and `JUDGE_CASE=NUMBER` runs it
-//! alone.
+//! alone. `JUDGE_CASES=COUNT` shortens the long tests.
 #![cfg(test)]
 #![expect(
     clippy::cast_possible_truncation,
@@ -16,10 +16,14 @@
 
 mod activations;
 mod adapter;
+mod broken_off;
 mod case;
+mod computations;
 mod formulas;
 mod hooks;
 mod ledger;
+mod metamorphic;
+mod monitors;
 mod properties;
 mod robot;
 mod temporal;

@@ -21,6 +21,8 @@ pub(crate) struct Script {
     pub(crate) over: Option<u32>,
     /// Numbers that it does not know.
     pub(crate) blanks: Vec<Blank>,
+    /// Lines of which it publishes half of the messages twice, one right after the other.
+    pub(crate) doubled: Vec<usize>,
 }
 
 /// One topic on the wire.
@@ -89,14 +91,15 @@ impl Simulator for Robot {
             }
         }
         let mut robot = Robot { script, ports, step: 0, state: 0.0 };
-        robot.publish(bus)?;
+        // Over the protocol of processes nothing arrives before the first step.
+        robot.publish(bus, false)?;
         Ok(robot)
     }
 
     fn step(&mut self, bus: &mut Bus<'_>) -> Result<Progress, SimulatorError> {
         self.step += 1;
         self.hear(bus);
-        self.publish(bus)?;
+        self.publish(bus, true)?;
         Ok(if self.script.over == Some(self.step) { Progress::Ended } else { Progress::Running })
     }
 }
@@ -114,7 +117,7 @@ impl Robot {
         }
     }
 
-    fn publish(&mut self, bus: &mut Bus<'_>) -> Result<(), SimulatorError> {
+    fn publish(&mut self, bus: &mut Bus<'_>, hears: bool) -> Result<(), SimulatorError> {
         // Where each message comes in the step depends on its own line alone: a further line moves no other.
         let mut messages: Vec<(f64, usize, u32)> = Vec::new();
         for (at, line) in self.script.lines.iter().enumerate() {
@@ -129,8 +132,14 @@ impl Robot {
                 return Err(SimulatorError("out of breath".to_owned()));
             }
             sent += usize::from(!unread[line]);
-            bus.publish(self.ports[line], self.message(line, n));
-            self.hear(bus);
+            let message = self.message(line, n);
+            if self.script.doubled.contains(&line) && draw(self.script.lines[line].seed, self.step, 4000 + n) < 0.5 {
+                bus.publish(self.ports[line], message.clone());
+            }
+            bus.publish(self.ports[line], message);
+            if hears {
+                self.hear(bus);
+            }
         }
         match self.script.crash {
             Some((step, after)) if step == self.step && sent <= after => {

@@ -2,8 +2,9 @@
 //! the least or greatest over all of the window.
 //!
 //! Time is whole nanoseconds. A signal is a list of pieces `(from, value)`, each up to the next one, the last up to the
-//! end of the trace, that time included. Over whole windows a signal ends earlier: where the window of its operator, or
-//! of one inside, would go beyond the end of what it is about.
+//! end of the trace, that time included. A signal ends earlier where the whole window of its operator, or of one
+//! inside, would lie after the end of what it is about; over whole windows, as soon as the window would go beyond that
+//! end.
 
 use sesame_plan::Comparison;
 use sesame_plan::stl::{Formula, Interval};
@@ -43,7 +44,7 @@ impl Trace<'_> {
     fn ends(&self, formula: &Formula) -> i64 {
         let of = |interval: &Interval, inner: i64| {
             let (from, to) = bounds(interval);
-            if self.whole { inner - to.unwrap_or(from) } else { inner }
+            inner - if self.whole { to.unwrap_or(from) } else { from }
         };
         match formula {
             Formula::Predicate { .. } => self.end,
@@ -86,7 +87,7 @@ impl Trace<'_> {
     fn window(&self, interval: &Interval, of: &Formula, none: f64, join: fn(f64, f64) -> f64) -> Pieces {
         let (from, to) = bounds(interval);
         let (inner, end) = (self.of(of), self.ends(of));
-        let until = if self.whole { end - to.unwrap_or(from) } else { end };
+        let until = end - if self.whole { to.unwrap_or(from) } else { from };
         let changes: Vec<i64> = inner.iter().map(|piece| piece.0).chain([end + 1]).collect();
         let times =
             changes.iter().flat_map(|&change| [Some(change - from), to.map(|to| change - to)]).flatten().collect();

@@ -28,6 +28,9 @@ pub(crate) fn case(case: &Case) -> String {
     for operation in &case.plan.operations {
         writeln!(text, "  operation {}", json(operation)).unwrap();
     }
+    for monitor in &case.plan.monitors {
+        writeln!(text, "  monitor {}", json(monitor)).unwrap();
+    }
     writeln!(text, "  copies {:?}", case.plan.campaign.copies).unwrap();
     for used in &case.test.operations {
         writeln!(text, "  test: {}", json(used)).unwrap();

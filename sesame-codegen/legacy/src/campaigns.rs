@@ -5,13 +5,18 @@ use std::collections::{BTreeMap, BTreeSet};
 use sesame_notation::{self as notation, Clause, Unit};
 use sesame_plan::{Copies, CoverageGoal, Dimension, GridAxis, Strategy};
 
+use crate::boosting;
 use crate::known_tests::{harmless_member, held_by, known_test};
+use crate::lacks::PASSIVE;
 use crate::notes::Kind;
 use crate::original::{
     Activation, ActivationMode, Approach, Campaign, Condition, Coverage, Operand, Operation, Original, Reference,
 };
 use crate::writer::{Writer, called_before, meant};
 use crate::xml::printable;
+
+/// How operations are activated that have windows of time.
+const BY_TIME: &str = "time";
 
 /// When the tests of a campaign end, in seconds. Where a campaign does not say it is the original's own constant, or
 /// later where its operations are.
@@ -89,18 +94,20 @@ fn campaign_text(
         names
     };
     let repeats = matches!(campaign.approach, Approach::Repeat { .. });
+    // Lines that are true only if the campaign is kept are written once that is decided.
+    let mut of_it: Vec<(Kind, String)> = Vec::new();
     let of_campaign = || campaign.metrics.iter().filter_map(|&metric| original.metric(metric));
     let mut objectives = names(writer, &mut of_campaign().filter(|&at| original.metrics[at].optimised));
     if objectives.is_empty() {
         objectives = names(writer, &mut of_campaign());
         if !objectives.is_empty() && !repeats {
             let text = format!("campaign `{shown}` marks no metric for optimisation: all that it has are objectives");
-            writer.notes.say(Kind::Noted, text);
+            of_it.push((Kind::Noted, text));
         }
     }
     if objectives.is_empty() && !repeats {
         objectives = writer.mapped.metrics.iter().flatten().cloned().collect();
-        writer.notes.say(Kind::Changed, format!("campaign `{shown}` measures nothing: it has all objectives now"));
+        of_it.push((Kind::Changed, format!("campaign `{shown}` measures nothing: all metrics are objectives now")));
     }
     // What else its tests have values or conditions of is measured too, so that results have a place for it.
     let measured: BTreeSet<usize> =
@@ -118,7 +125,7 @@ fn campaign_text(
     if campaign.limit.is_none() {
         let after = Unit::SECONDS.number(end);
         let text = format!("campaign `{shown}` does not say when its tests end: after {after} now");
-        writer.notes.say(Kind::Changed, text);
+        of_it.push((Kind::Changed, text));
     }
 
     let found = if repeats {
@@ -133,11 +140,13 @@ fn campaign_text(
             return None;
         }
         Err(why) => {
-            observed.extend(objectives.into_iter().filter(|name| !observed.contains(name)).collect::<Vec<_>>());
-            writer.notes.say(
-                Kind::Changed,
-                format!("campaign `{shown}`: {why}, so it only observes now; its results are kept"),
-            );
+            observed.extend(objectives.iter().filter(|name| !observed.contains(name)).cloned().collect::<Vec<_>>());
+            let kept = if repeats || objectives.is_empty() { "" } else { ", with its objectives" };
+            let text = format!("campaign `{shown}`: {why}, {}; its results are kept{kept}", PASSIVE.says);
+            writer.notes.say(Kind::Changed, text);
+            if !repeats {
+                writer.mapped.objectives.insert(writer.mapped.campaigns.len(), objectives);
+            }
             let times = match campaign.approach {
                 Approach::Repeat { times, .. } => times.max(1),
                 _ => 1,
@@ -145,6 +154,9 @@ fn campaign_text(
             vec![("passive", format!("{times} times"))]
         }
     };
+    for (kind, text) in of_it {
+        writer.notes.say(kind, text);
+    }
     if !observed.is_empty() {
         clauses.push(("observes", observed.join(", ")));
     }
@@ -198,11 +210,6 @@ fn repetition(
     let Some((place, named)) = repeated(original, writer.mapped.campaigns.len()) else {
         return Err("the test that it repeats is not in the file".to_owned());
     };
-    if !named {
-        let text =
-            format!("campaign `{shown}`: the test that it repeats is not in the file; it repeats its first copy");
-        writer.notes.say(Kind::Changed, text);
-    }
     let test = if let Some(name) = known.get(&place) {
         name.clone()
     } else {
@@ -219,6 +226,11 @@ fn repetition(
         known.insert(place, name.clone());
         name
     };
+    if !named {
+        let text =
+            format!("campaign `{shown}`: the test that it repeats is not in the file; it repeats its first copy");
+        writer.notes.say(Kind::Changed, text);
+    }
     Ok(vec![notation::repeat_clause(&test, times.max(1), None)])
 }
 
@@ -236,8 +248,8 @@ fn search(
     held.extend(writer.mapped.holders.used_by(original, &campaign.tests));
     held.sort_unstable();
     held.dedup();
-    if held.iter().all(|&at| writer.mapped.parts[at].is_empty()) && !campaign.tests.is_empty() {
-        writer.notes.say(Kind::Changed, format!("campaign `{shown}` has no operations: it may use all now"));
+    let uses_all = held.iter().all(|&at| writer.mapped.parts[at].is_empty()) && !campaign.tests.is_empty();
+    if uses_all {
         // All that can be active before its tests end.
         let end = end_of(original, campaign);
         let acts = |&at: &usize| writer.permitted(at).is_none_or(|window| window.start < end);
@@ -251,6 +263,9 @@ fn search(
     if objectives.is_empty() {
         return Err("it measures nothing that could be an objective".to_owned());
     }
+    if uses_all {
+        writer.notes.say(Kind::Changed, format!("campaign `{shown}` has no operations: it may use all now"));
+    }
     let parts = |operation: &Operation| {
         writer.mapped.holders.find(original, operation).map_or(0, |at| writer.mapped.parts[at].len())
     };
@@ -262,14 +277,16 @@ fn search(
         // The original platform lets copies of one operation act together.
         notation::operations_clause(&operations, (1, most), Copies::MayOverlap),
     ];
-    clauses.push(("activate", format!("by {}", activation(writer, campaign, shown, observed))));
-    strategy(writer, campaign, shown, &mut clauses);
+    let activation = activation(writer, campaign, shown, observed);
+    let by_time = activation == BY_TIME;
+    clauses.push(("activate", format!("by {activation}")));
+    strategy(writer, campaign, shown, by_time, &mut clauses);
     Ok(clauses)
 }
 
 /// By what the tests of a campaign switch operations. Variables of conditions are observed anyway.
 fn activation(writer: &mut Writer<'_>, campaign: &Campaign, shown: &str, observed: &mut Vec<String>) -> String {
-    let Some(depth) = by_condition(campaign) else { return "time".to_owned() };
+    let Some(depth) = by_condition(campaign) else { return BY_TIME.to_owned() };
     if campaign.activation.is_none() {
         let text = format!("campaign `{shown}` does not say how operations are switched; its tests do it by condition");
         writer.notes.say(Kind::Changed, text);
@@ -282,7 +299,7 @@ fn activation(writer: &mut Writer<'_>, campaign: &Campaign, shown: &str, observe
     }
     if over.is_empty() {
         writer.notes.say(Kind::Changed, format!("campaign `{shown}` has no condition metrics: it activates by time"));
-        return "time".to_owned();
+        return BY_TIME.to_owned();
     }
     observed.retain(|name| !over.contains(&name.as_str()));
     let settings = if depth == 0 { String::new() } else { format!(" {{ depth {} }}", depth.min(10)) };
@@ -290,10 +307,10 @@ fn activation(writer: &mut Writer<'_>, campaign: &Campaign, shown: &str, observe
 }
 
 /// How a campaign finds its tests, and the cells that it counts.
-fn strategy(writer: &mut Writer<'_>, campaign: &Campaign, shown: &str, clauses: &mut Vec<Clause>) {
+fn strategy(writer: &mut Writer<'_>, campaign: &Campaign, shown: &str, by_time: bool, clauses: &mut Vec<Clause>) {
     let performed = u32::try_from(campaign.tests.len()).unwrap_or(u32::MAX);
     match &campaign.approach {
-        Approach::Nsga { population, evaluations, coverage } => {
+        Approach::Nsga { population, evaluations, coverage, boosting } => {
             let settled = population.max(&2).saturating_add(population % 2);
             let total = (*evaluations).max(settled);
             if (settled, total) != (*population, *evaluations) {
@@ -303,8 +320,10 @@ fn strategy(writer: &mut Writer<'_>, campaign: &Campaign, shown: &str, clauses: 
                 writer.notes.say(Kind::Changed, text);
             }
             clauses.push(notation::search_clause(Strategy::Nsga2 { population: settled }, total, None, None));
-            if let Some(coverage) = coverage {
-                clauses.extend(cells(writer, coverage, shown).as_ref().map(notation::coverage_clause));
+            let cells = coverage.as_ref().and_then(|coverage| cells(writer, coverage, shown));
+            clauses.extend(cells.as_ref().map(notation::coverage_clause));
+            if let Some(boosting) = boosting {
+                clauses.extend(boosting::clause(writer, boosting, shown, by_time, cells.is_some()));
             }
         }
         approach => {
@@ -351,9 +370,9 @@ fn cells(writer: &mut Writer<'_>, coverage: &Coverage, shown: &str) -> Option<Co
     }
     if axes.is_empty() {
         let text = format!(
-            "campaign `{shown}`: the file does not say which cells its coverage counts; add `coverage {{ … }}`"
+            "campaign `{shown}`: it counts no coverage, since the file does not say which cells; add `coverage {{ … }}`"
         );
-        writer.notes.say(Kind::LeftOut, text);
+        writer.notes.say(Kind::Changed, text);
         return None;
     }
     let stop_at = (coverage.target > 0.0 && coverage.target <= 1.0).then(|| meant(coverage.target));

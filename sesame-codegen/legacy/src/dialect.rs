@@ -24,7 +24,7 @@ const RENAMED: [(&str, &str); 12] = [
 ];
 
 /// Elements and attributes that are read.
-const READ: [&str; 83] = [
+const READ: [&str; 90] = [
     "name",
     "dir",
     "relatedVariables",
@@ -56,6 +56,7 @@ const READ: [&str; 83] = [
     "seed",
     "priority",
     "inclusionProbability",
+    "includeInTiming",
     "conditionConstraints",
     "minValue",
     "maxValue",
@@ -85,10 +86,16 @@ const READ: [&str; 83] = [
     "iterations",
     "coveragePerCell",
     "targetCoverageProportion",
+    "coverageBoostingStrategy",
+    "useMutationEnhancingCoverage",
+    "useBoostingOnceEveryGenerations",
+    "useBoostingOnceEveryIterations",
+    "startingBoostingCount",
+    "endingBoostingCount",
+    "countDropEveryGeneration",
     "dimensionRecords",
     "dimID",
     "count",
-    "extraData",
     "testToRepeat",
     "repeatCount",
     "performedTests",
@@ -126,6 +133,103 @@ const BESIDE: [&str; 14] = [
     "maximumActivations",
     "operationTime",
     "TestingSpace",
+];
+
+/// Elements and attributes that are not carried over, why, and what the language has to do with it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LeftOut {
+    /// What files call them.
+    pub names: &'static [&'static str],
+    /// What an import says of them.
+    pub why: &'static str,
+    /// Words of the language that take their place. The sentence is wrong if the language does not have them.
+    pub has: &'static [&'static str],
+    /// Words that the language would have if it could say this. The sentence is wrong once the language has them.
+    pub lacks: &'static [&'static str],
+}
+
+/// What an import says of a name that is in no list here.
+const UNKNOWN: &str = "imports do not know what it means";
+
+/// All that files of the original platform may hold and imports do not carry over.
+pub const LEFT_OUT: [LeftOut; 12] = [
+    LeftOut {
+        names: &["launchFileLocation", "launchDelaySeconds", "customTerminateFileLocation"],
+        why: "the line of the simulator says how it is started, and `launch` and `terminate` say what else is",
+        has: &["launch", "terminate"],
+        lacks: &[],
+    },
+    LeftOut {
+        names: &["recordFileLocation"],
+        why: "`record mcap` in a campaign records its messages",
+        has: &["record", "mcap"],
+        lacks: &[],
+    },
+    LeftOut { names: &["res"], why: "the values of a metric are in the results", has: &[], lacks: &["sink", "csv"] },
+    LeftOut {
+        names: &["execStrategy"],
+        why: "workers are a matter of each run",
+        has: &[],
+        lacks: &["workers", "distribute"],
+    },
+    LeftOut {
+        names: &["customProcessClass"],
+        why: "its code is to be written in Rust",
+        has: &["custom"],
+        lacks: &["java", "class"],
+    },
+    LeftOut {
+        names: &["extraData"],
+        why: "the cells of P1 and P2 count all parameters of a test",
+        has: &["coverage"],
+        lacks: &["parameter_of", "value_set"],
+    },
+    LeftOut {
+        names: &["fromNodes", "toNodes", "messagesFromAllComponenents", "messagesToAllComponenents"],
+        why: "the original never used it; here `from` and `to` limit an operation to the messages of certain nodes",
+        has: &["from", "to"],
+        lacks: &[],
+    },
+    LeftOut {
+        names: &["nodeToFuzz"],
+        why: "the original never used it; here an operation can act `on node`",
+        has: &["on", "node"],
+        lacks: &[],
+    },
+    LeftOut {
+        names: &["debugFlags"],
+        why: "a campaign that is `passive` only observes",
+        has: &["passive"],
+        lacks: &[],
+    },
+    LeftOut {
+        names: &["useStepping"],
+        why: "the `step` in the line of the simulator says whether it is stepped",
+        has: &["step"],
+        lacks: &[],
+    },
+    LeftOut {
+        names: &["useGUI"],
+        why: "how a simulator shows itself is a matter of its own settings",
+        has: &[],
+        lacks: &["gui", "headless"],
+    },
+    LeftOut {
+        names: &[
+            "allPublishingVars",
+            "publishingVars",
+            "allSubscribingVars",
+            "subscribingVars",
+            "propertyToAffect",
+            "subProperty",
+            "subParameters",
+            "properties",
+            "property",
+        ],
+        why: "the original never used it",
+        has: &[],
+        lacks: &[],
+    },
 ];
 
 /// How a file speaks, as far as it was read.
@@ -176,17 +280,7 @@ impl Dialect {
 
     /// Why something is not carried over.
     pub(crate) fn why(name: &str) -> &'static str {
-        match name {
-            "useMutationEnhancingCoverage" | "coverageBoostingStrategy" => "coverage is not boosted in this version",
-            "launchFileLocation" | "launchDelaySeconds" | "customTerminateFileLocation" | "recordFileLocation" => {
-                "how a simulator is started is said in its own line"
-            }
-            "res" => "the values of a metric are in the results",
-            "execStrategy" => "workers are a matter of each run",
-            "includeInTiming" => "every operation counts",
-            "customProcessClass" => "its code is to be written in Rust",
-            _ => "there is nothing like it",
-        }
+        LEFT_OUT.iter().find(|left| left.names.contains(&name)).map_or(UNKNOWN, |left| left.why)
     }
 
     fn count(&mut self, name: &str) {

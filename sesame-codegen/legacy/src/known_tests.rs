@@ -14,6 +14,9 @@ use crate::parts::{Effect, matching};
 use crate::writer::{Writer, called_before, meant};
 use crate::xml::{cleaned, printable};
 
+/// Why a condition that compares a time with something else is not imported.
+pub(crate) const NO_SECONDS: &str = "its condition compares seconds with a plain number";
+
 /// Levels of a condition that the language permits.
 const MOST_LEVELS: u32 = 40;
 
@@ -242,7 +245,9 @@ fn choices<'e>(
                             None => return Err("it chooses no text that its template offers".to_owned()),
                         }
                     }
-                    Domain::Other(_) => return Err("it chooses something that nothing is like".to_owned()),
+                    Domain::Other(_) => {
+                        return Err("it chooses a kind of value that the original never read".to_owned());
+                    }
                 };
                 all.push((name.as_str(), chosen));
             }
@@ -368,7 +373,7 @@ fn settled_at(writer: &Writer<'_>, condition: &Condition, level: u32) -> Result<
                     other if other == variable && *by == Comparison::Equal => Truth::Always,
                     other if other == variable => Truth::Never,
                     other if is_timed(writer, other) != timed => {
-                        return Err("its condition compares seconds with a plain number".to_owned());
+                        return Err(NO_SECONDS.to_owned());
                     }
                     other => comparison(operand(other)),
                 },

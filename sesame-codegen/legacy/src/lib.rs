@@ -2,13 +2,17 @@
 //! `.sesame` file and results.
 //!
 //! A file is read into an [`Original`] (`xml`, `dialect`, `read`), which is mapped to the text of a space that passes
-//! `check` (`space`, `campaigns`, `known_tests`, `monitors`, all with `writer`; `parts`, `types`, `naming`), and its
-//! performed tests to records (`results`). Everything that changes on the way is listed in [`Notes`]. No name or text
-//! of the file becomes anything but a name, a quoted text or a comment.
+//! `check` (`space`, `campaigns`, `boosting`, `known_tests`, `monitors`, with `writer`, `parts`, `types`, `naming`),
+//! and its performed tests to records (`results`, `extents`). Everything that changes on the way is listed in
+//! [`Notes`]; what these say of the language is listed in `lacks`, for a test. No name or text of the file becomes
+//! anything but a name, a quoted text or a comment.
 
+mod boosting;
 mod campaigns;
 mod dialect;
+mod extents;
 mod known_tests;
+mod lacks;
 mod monitors;
 mod naming;
 mod notes;
@@ -27,7 +31,8 @@ use std::path::Path;
 use sesame_plan::CampaignPlan;
 use sesame_results::record::RecordError;
 
-pub use dialect::Dialect;
+pub use dialect::{Dialect, LEFT_OUT, LeftOut};
+pub use lacks::{LACKS, Lack};
 pub use naming::Names;
 pub use notes::{Counted, Kind, Notes};
 pub use original::Original;

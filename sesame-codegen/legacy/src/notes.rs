@@ -65,6 +65,16 @@ impl Notes {
         *self.notes.entry((kind, text.into())).or_default() += times;
     }
 
+    /// Takes all notes of others.
+    pub(crate) fn take_in(&mut self, others: Notes) {
+        for ((kind, text), times) in others.notes {
+            self.times(kind, text, times);
+        }
+        for (what, times) in others.lost {
+            *self.lost.entry(what).or_default() += times;
+        }
+    }
+
     /// Takes a note of so many things that are not in the results.
     pub(crate) fn lose(&mut self, what: Counted, text: impl Into<String>, times: usize) {
         if times > 0 {

@@ -211,6 +211,8 @@ pub struct Operation {
     pub priority: i32,
     /// The probability that a fresh test holds it.
     pub inclusion: f64,
+    /// Whether the time in which it is active counts.
+    pub timed: bool,
     /// What its start conditions contain.
     pub constraints: Vec<Constraint>,
 }
@@ -386,6 +388,8 @@ pub enum Approach {
         evaluations: u32,
         /// The cells that it counts.
         coverage: Option<Coverage>,
+        /// How it boosts coverage, if it does.
+        boosting: Option<Boosting>,
     },
     /// One test again and again.
     Repeat {
@@ -394,6 +398,34 @@ pub enum Approach {
         /// How often.
         times: u32,
     },
+}
+
+/// How a search mutates children until they lie in cells that need tests. A number that the file does not state is the
+/// original's default.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Boosting {
+    /// The file says that it does and nothing more: `useMutationEnhancingCoverage`.
+    Unstated,
+    /// In every so many generations, the children of every so many parents.
+    Fixed {
+        /// From one boosted generation to the next.
+        generations: u32,
+        /// From one boosted parent to the next.
+        parents: u32,
+    },
+    /// In every so many generations the first children, fewer each time.
+    Linear {
+        /// From one boosted generation to the next.
+        generations: u32,
+        /// Children at the beginning.
+        first: u32,
+        /// Children at least.
+        last: u32,
+        /// How many fewer each time.
+        drop: u32,
+    },
+    /// By a strategy of this kind, which the original does not have.
+    Other(Box<str>),
 }
 
 /// Cells of the reduced parameter space.

@@ -4,9 +4,9 @@ use std::fs::File;
 use std::path::Path;
 
 use crate::original::{
-    Activation, ActivationMode, Approach, Campaign, Comparison, Condition, Constraint, Coverage, Domain, FieldOfType,
-    Measured, Metric, MetricSource, Node, Operand, Operation, OperationKind, Original, Reference, ResultSet, Simulator,
-    Target, Test, TypeOfValue, ValueSet,
+    Activation, ActivationMode, Approach, Boosting, Campaign, Comparison, Condition, Constraint, Coverage, Domain,
+    FieldOfType, Measured, Metric, MetricSource, Node, Operand, Operation, OperationKind, Original, Reference,
+    ResultSet, Simulator, Target, Test, TypeOfValue, ValueSet,
 };
 use crate::xml::{Broken, Element, Source, Step, printable};
 
@@ -208,10 +208,32 @@ fn approach(original: &mut Original, element: &Element) -> Result<Approach, Stri
                 None
             };
             let (population, evaluations) = (count(element, "populationSize")?, count(element, "iterations")?);
-            Approach::Nsga { population, evaluations, coverage }
+            Approach::Nsga { population, evaluations, coverage, boosting: boosting(element)? }
         }
         _ => Approach::Missing,
     })
+}
+
+/// How an approach boosts coverage. Older files only say that it does.
+fn boosting(element: &Element) -> Result<Option<Boosting>, String> {
+    let Some(strategy) = element.children.iter().find(|child| child.tag == "coverageBoostingStrategy") else {
+        let boosts = element.get("useMutationEnhancingCoverage") == Some("true");
+        return Ok(boosts.then_some(Boosting::Unstated));
+    };
+    let every = |name: &str| if strategy.get(name).is_some() { count(strategy, name) } else { Ok(2) };
+    let generations = every("useBoostingOnceEveryGenerations")?;
+    Ok(Some(match strategy.kind.as_deref().unwrap_or_default() {
+        "FixedNSGACoverageBoostingStrategy" => {
+            Boosting::Fixed { generations, parents: every("useBoostingOnceEveryIterations")? }
+        }
+        "LinearNSGACoverageBoostingStrategy" => Boosting::Linear {
+            generations,
+            first: count(strategy, "startingBoostingCount")?,
+            last: count(strategy, "endingBoostingCount")?,
+            drop: count(strategy, "countDropEveryGeneration")?,
+        },
+        other => Boosting::Other(other.into()),
+    }))
 }
 
 fn test(original: &mut Original, element: &Element) -> Result<Test, String> {
@@ -316,6 +338,7 @@ fn operation(original: &mut Original, element: &Element) -> Result<Operation, St
         seed: integer(element, "seed")?,
         priority: i32::try_from(integer(element, "priority")?).unwrap_or(0),
         inclusion: number(element, "inclusionProbability", 1.0)?,
+        timed: element.get("includeInTiming") != Some("false"),
         constraints,
     })
 }

@@ -6,8 +6,11 @@ use std::path::Path;
 
 use sesame_base::observation::{MetricObservation, Observation, OperationEffect, Outcome, WallTime};
 use sesame_plan::{CampaignPlan, Choice, MetricId, OperationId, Span, TestOperation, condition as plan_condition};
-use sesame_results::record::{Origin, RecordError, Recorder, ResultSet, SplitOperation, Status, TestRecord};
+use sesame_results::record::{
+    LeftOutOperations, Origin, RecordError, Recorder, ResultSet, SplitOperation, Status, TestRecord,
+};
 
+use crate::extents;
 use crate::notes::{Counted, Kind, Notes};
 use crate::original::{Activation, Campaign, Condition, Domain, Operand, Operation, OperationKind, Original, Test};
 use crate::parts::{Effect, Part, called, matching};
@@ -42,16 +45,19 @@ pub(crate) fn record(
     notes: &mut Notes,
 ) -> Result<Recorded, RecordError> {
     let campaign = &original.campaigns[at];
+    let plan = &with_objectives(plan, mapped.objectives.get(&at));
     let metrics = (0..).zip(&plan.metrics).map(|(id, metric)| (metric.name.as_str(), MetricId(id))).collect();
     let operations =
         (0..).zip(&plan.operations).map(|(id, operation)| (operation.name.as_str(), OperationId(id))).collect();
     let importer = Importer { original, mapped, plan, metrics, operations };
     let mut recorder = Recorder::create(folder, plan, plan.campaign.seed, 0)?;
-    let mut split = Vec::new();
+    let mut beside = Beside::default();
     // In one transaction: to wait for the disk after each test would take longer than everything else.
     let tests = campaign.tests.iter().enumerate();
-    recorder.commit_all(tests.map(|(index, test)| importer.test(at, index, test, &mut split, notes)))?;
-    recorder.put_split_operations(&split)?;
+    recorder.commit_all(tests.map(|(index, test)| importer.test(at, index, test, &mut beside, notes)))?;
+    recorder.put_split_operations(&beside.split)?;
+    recorder.put_left_out_operations(&beside.left_out)?;
+    recorder.put_original_extents(&extents::original(mapped, plan, &importer.operations))?;
     let names: Vec<(u32, String)> =
         campaign.tests.iter().enumerate().map(|(index, test)| (number_of(index), printable(&test.name))).collect();
     recorder.put_original_names(names.iter().map(|(number, name)| (*number, name.as_str())))?;
@@ -63,32 +69,56 @@ pub(crate) fn record(
     Ok(Recorded { tests: campaign.tests.len(), sets: sets.len() })
 }
 
+/// What is recorded beside tests, for those that are not in the results as they are in the file.
+#[derive(Debug, Default)]
+struct Beside {
+    split: Vec<SplitOperation>,
+    left_out: Vec<LeftOutOperations>,
+}
+
+/// The plan of results: that of the campaign in the space, with objectives where only the original has them.
+fn with_objectives(plan: &CampaignPlan, names: Option<&Vec<String>>) -> CampaignPlan {
+    let mut plan = plan.clone();
+    let Some(names) = names else { return plan };
+    let position = |name: &String| plan.metrics.iter().position(|metric| metric.name == *name);
+    let ids = names.iter().filter_map(position).filter_map(|at| u32::try_from(at).ok().map(MetricId));
+    plan.campaign.objectives = ids.collect();
+    plan
+}
+
 /// The number of a performed test: T0 is the reference run, which the original never made.
 fn number_of(index: usize) -> u32 {
     u32::try_from(index + 1).expect("a file holds fewer than 2^32 tests")
 }
 
 impl Importer<'_> {
-    fn test(
-        &self,
-        campaign: usize,
-        index: usize,
-        test: &Test,
-        split: &mut Vec<SplitOperation>,
-        notes: &mut Notes,
-    ) -> TestRecord {
+    fn test(&self, campaign: usize, index: usize, test: &Test, beside: &mut Beside, notes: &mut Notes) -> TestRecord {
         let mut operations = Vec::new();
         let mut effects = Vec::new();
+        let mut left_out = LeftOutOperations { test: number_of(index), operations: 0 };
+        let mut reasons: Vec<String> = Vec::new();
         for operation in &test.operations {
             let first = operations.len();
-            for (held, effect) in self.operations(operation, notes) {
+            let found = self.operations(operation, notes).unwrap_or_else(|why| {
+                left_out.operations += 1;
+                if !reasons.contains(&why) {
+                    reasons.push(why);
+                }
+                Vec::new()
+            });
+            for (held, effect) in found {
                 let position = operations.len();
                 if position > first {
-                    split.push(SplitOperation { test: number_of(index), position, first });
+                    beside.split.push(SplitOperation { test: number_of(index), position, first });
                 }
                 operations.push(held);
                 effects.push(effect);
             }
+        }
+        let mut warnings = Vec::new();
+        if left_out.operations > 0 {
+            beside.left_out.push(left_out);
+            warnings.push(left_out.warning(&reasons));
         }
         let metrics = self.values(test, notes);
         let mut parents = Vec::new();
@@ -111,10 +141,12 @@ impl Importer<'_> {
                 end: self.plan.campaign.end_after,
                 operations: effects,
                 unheard: Vec::new(),
+                unreached: Vec::new(),
+                traffic: Vec::new(),
                 metrics,
                 monitors: Vec::new(),
                 messages: 0,
-                warnings: Vec::new(),
+                warnings,
                 wall: WallTime::default(),
             },
         }
@@ -154,13 +186,18 @@ impl Importer<'_> {
         metrics
     }
 
-    /// What an operation of a test became: one for each part that can be said.
-    fn operations(&self, operation: &Operation, notes: &mut Notes) -> Vec<(TestOperation, OperationEffect)> {
+    /// What an operation of a test became: one for each part that can be said, or why there is none.
+    fn operations(
+        &self,
+        operation: &Operation,
+        notes: &mut Notes,
+    ) -> Result<Vec<(TestOperation, OperationEffect)>, String> {
         let at = self.mapped.holders.find(self.original, operation);
         let Some(at) = at.filter(|&at| !self.mapped.parts[at].is_empty()) else {
             let text = "operations of performed tests whose operation of the space was left out";
             notes.lose(Counted::Operation, text, 1);
-            return Vec::new();
+            let called = called(operation);
+            return Err(format!("{called} of the space was left out"));
         };
         let template = &self.mapped.holders.operations[at];
         let mut held = Vec::new();
@@ -168,20 +205,20 @@ impl Importer<'_> {
         for part in &self.mapped.parts[at] {
             match self.part(operation, template, part, notes) {
                 Ok(done) => held.push(done),
-                Err(why) => left_out.push(format!("`{}` in performed tests where {why}", part.name)),
+                Err(why) => left_out.push((&part.name, why)),
             }
         }
+        let text = |name: &str, why: &str| format!("`{name}` in performed tests where {why}");
         if held.is_empty() {
             // As one operation, whatever number of parts it has.
-            for text in left_out.into_iter().take(1) {
-                notes.lose(Counted::Operation, text, 1);
-            }
-        } else {
-            for text in left_out {
-                notes.say(Kind::LeftOut, text);
-            }
+            let (name, why) = left_out.into_iter().next().expect("an operation has at least one part");
+            notes.lose(Counted::Operation, text(name, &why), 1);
+            return Err(format!("`{name}`: {why}"));
         }
-        held
+        for (name, why) in left_out {
+            notes.say(Kind::LeftOut, text(name, &why));
+        }
+        Ok(held)
     }
 
     fn part(
@@ -196,6 +233,10 @@ impl Importer<'_> {
         let offline = matches!(part.effect, Effect::Custom { offline: true, .. });
         let (activation, planned) =
             if offline { (sesame_plan::Activation::Offline, None) } else { self.activation(operation, notes)? };
+        if offline && !matches!(operation.activation, Activation::Missing) {
+            let text = format!("when `{}` was active in performed tests: it acts before the start here", part.name);
+            notes.say(Kind::LeftOut, text);
+        }
         // Activity by time was never measured: the original switched by the clock alone.
         let active = operation.recorded.filter(|_| !offline).or(planned);
         // An activation of length 0 was one: it has a point, as it had for the original.
@@ -356,7 +397,9 @@ fn choices(operation: &Operation, template: &Operation, effect: &Effect) -> Resu
                         Some(text) => Choice::Text { text: cleaned(text) },
                         None => return Err("it chooses no text".to_owned()),
                     },
-                    Domain::Other(_) => return Err("it chooses something that nothing is like".to_owned()),
+                    Domain::Other(_) => {
+                        return Err("it chooses a kind of value that the original never read".to_owned());
+                    }
                 });
             }
             chosen

@@ -9,6 +9,7 @@ use sesame_plan::{self as plan, Shape};
 
 use crate::campaigns;
 use crate::dialect::Dialect;
+use crate::lacks::NO_NEGATIVE_DELAY;
 use crate::naming::Names;
 use crate::notes::{Kind, Notes};
 use crate::original::{
@@ -237,8 +238,21 @@ impl Writer<'_> {
 
     fn operation(&mut self, at: usize, operation: &Operation, text: &mut String) -> Vec<Part> {
         let called = called(operation);
-        let topic = operation.variable.and_then(|it| self.topic(it)).cloned();
+        let others = std::mem::take(self.notes);
         let clauses = self.clauses(at, operation, &called);
+        let of_clauses = std::mem::replace(self.notes, others);
+        let parts = self.parts(operation, &called, &clauses, text);
+        // Lines about clauses are true only where the clauses are written.
+        let has_none = |part: &Part| matches!(part.effect, Effect::Custom { offline: true, .. });
+        if !parts.iter().all(has_none) {
+            self.notes.take_in(of_clauses);
+        }
+        parts
+    }
+
+    /// The operations that one of the original becomes, with these clauses.
+    fn parts(&mut self, operation: &Operation, called: &str, clauses: &str, text: &mut String) -> Vec<Part> {
+        let topic = operation.variable.and_then(|it| self.topic(it)).cloned();
         let wanted = if operation.name.is_empty() {
             let topic = topic.as_ref().map_or("", |(name, _)| name);
             format!("{}_{topic}", kind_word(&operation.kind))
@@ -246,13 +260,13 @@ impl Writer<'_> {
             operation.name.to_string()
         };
         if let OperationKind::Custom { parameters } = &operation.kind {
-            return self.custom(operation, parameters, topic, &wanted, &clauses, text);
+            return self.custom(operation, parameters, topic, &wanted, clauses, text);
         }
         let Some((topic, ty)) = topic else {
             self.notes.say(Kind::LeftOut, format!("{called}: it names no variable"));
             return Vec::new();
         };
-        self.note_unpublished(operation, &called, &topic);
+        self.note_unpublished(operation, called, &topic);
         let mut parts = Vec::new();
         match &operation.kind {
             OperationKind::RandomValue { relative, values } => {
@@ -262,14 +276,14 @@ impl Writer<'_> {
                 let mode = if *relative { "offset" } else { "absolute" };
                 for (set, value) in values.iter().enumerate() {
                     let (low, high) = match value.domain {
-                        Domain::Reals(low, high) => ordered(low, high, &called, self.notes),
+                        Domain::Reals(low, high) => ordered(low, high, called, self.notes),
                         Domain::Integers(low, high) => {
-                            let (low, high) = ordered(low, high, &called, self.notes);
+                            let (low, high) = ordered(low, high, called, self.notes);
                             (low as f64, high as f64)
                         }
                         _ => {
-                            self.notes
-                                .say(Kind::LeftOut, format!("{called}: only numbers can be drawn, not what it has"));
+                            let text = format!("{called}: the original drew numbers only, and not what it has");
+                            self.notes.say(Kind::LeftOut, text);
                             continue;
                         }
                     };
@@ -303,7 +317,7 @@ impl Writer<'_> {
                 }
             }
             OperationKind::PacketLoss { keep } => {
-                let (low, high) = ordered(keep.0, keep.1, &called, self.notes);
+                let (low, high) = ordered(keep.0, keep.1, called, self.notes);
                 if low < 0.0 || high > 1.0 {
                     let text = format!("{called}: its probability [{low}, {high}] is cut to what lies between 0 and 1");
                     self.notes.say(Kind::Changed, text);
@@ -324,9 +338,10 @@ impl Writer<'_> {
                     self.notes.say(Kind::Noted, text);
                 }
                 if delay.0.min(delay.1) < 0.0 {
-                    self.notes.say(Kind::Changed, format!("{called}: no delay is negative, so its range begins at 0s"));
+                    let text = format!("{called}: {}, so its range begins at 0s", NO_NEGATIVE_DELAY.says);
+                    self.notes.say(Kind::Changed, text);
                 }
-                let (low, high) = ordered(delay.0.max(0.0), delay.1.max(0.0), &called, self.notes);
+                let (low, high) = ordered(delay.0.max(0.0), delay.1.max(0.0), called, self.notes);
                 let uniform = if *randomised { " uniform" } else { "" };
                 let name = self.declared_name(&wanted, operation, text);
                 let range = Unit::SECONDS.range(low, high);
@@ -393,7 +408,7 @@ impl Writer<'_> {
                     plan::Domain::Texts { texts: offered }
                 }
                 Domain::Other(kind) => {
-                    self.notes.say(Kind::LeftOut, format!("{of}: nothing is like a `{}`", printable(kind)));
+                    self.notes.say(Kind::LeftOut, format!("{of}: the original never read a `{}`", printable(kind)));
                     continue;
                 }
             };
@@ -452,6 +467,7 @@ impl Writer<'_> {
         if operation.priority != 0 {
             clauses.priority = Some(operation.priority);
         }
+        clauses.untimed = !operation.timed;
         if (0.0..1.0).contains(&operation.inclusion) {
             clauses.inclusion = Some(meant(operation.inclusion));
         }

@@ -1,5 +1,7 @@
 //! What the parts of a space share while they are written: names that were given, and what of the original became what.
 
+use std::collections::BTreeMap;
+
 use sesame_plan::Span;
 
 use crate::monitors::Consert;
@@ -23,6 +25,9 @@ pub(crate) struct Mapped {
     pub(crate) parts: Vec<Vec<Part>>,
     /// Names of campaigns, by position in the original.
     pub(crate) campaigns: Vec<Option<String>>,
+    /// Names of the objectives of searches that became campaigns which only observe, by position in the original. Such
+    /// campaigns have none in the `.sesame` file, and their results have them.
+    pub(crate) objectives: BTreeMap<usize, Vec<String>>,
 }
 
 /// What is known while the text is written.

@@ -4,8 +4,10 @@ use std::path::PathBuf;
 
 use anyhow::bail;
 
+use super::owner;
 use super::shell::Format;
 use crate::environment::{self, Options, RuntimeChoice};
+use crate::names;
 
 /// Which diagnostics fail the command besides errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -70,16 +72,26 @@ pub(super) enum Purpose {
 }
 
 impl Generation {
-    /// The folder of the runners.
-    pub(super) fn runners(&self) -> PathBuf {
-        self.out.clone().unwrap_or_else(|| self.file.with_file_name(environment::RUNNERS))
+    /// The folder of the runners of these campaigns. Two spaces in one folder may have campaigns of one name, as when a
+    /// variant imports the other: the first one has `runners`, the other a folder in it that is called like its file.
+    pub(super) fn runners(&self, campaigns: &[&str]) -> PathBuf {
+        let shared = || self.file.with_file_name(environment::RUNNERS);
+        self.out.clone().unwrap_or_else(|| {
+            let own = self.file.file_name().map_or_else(shared, |name| shared().join(name));
+            let folders = || campaigns.iter().map(|campaign| names::campaign_folder(campaign));
+            let has_own = folders().any(|folder| own.join(folder).is_dir());
+            let taken = || folders().any(|folder| owner::other_than(&self.file, &shared().join(folder)).is_some());
+            if has_own || taken() { own } else { shared() }
+        })
     }
 
-    /// The folder of the runners, to be written in: unless the user names it, it must not lead elsewhere.
-    pub(super) fn own_runners(&self) -> anyhow::Result<PathBuf> {
-        let runners = self.runners();
-        if self.out.is_none() && runners.is_symlink() {
-            bail!("{} is a link; choose the folder for the runners with `-o`", runners.display());
+    /// The folder of the runners of these campaigns, to be written in: unless the user names it, it must not lead
+    /// elsewhere.
+    pub(super) fn own_runners(&self, campaigns: &[&str]) -> anyhow::Result<PathBuf> {
+        let runners = self.runners(campaigns);
+        let default = [self.file.with_file_name(environment::RUNNERS), runners.clone()];
+        if let Some(link) = default.iter().find(|path| self.out.is_none() && path.is_symlink()) {
+            bail!("{} is a link; choose the folder for the runners with `-o`", link.display());
         }
         Ok(runners)
     }

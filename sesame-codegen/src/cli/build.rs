@@ -7,6 +7,7 @@ use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, bail};
+use sesame_runtime::cli::RUNNER;
 
 use super::progress::{Crates, Message, Metadata};
 use super::shell::Shell;
@@ -35,6 +36,7 @@ enum Event {
 pub(super) fn build(shell: Shell, folder: &Path, campaign: &str) -> anyhow::Result<PathBuf> {
     let start = Instant::now();
     let mut cargo = cargo(folder)
+        .env(RUNNER, folder.canonicalize().unwrap_or_else(|_| folder.to_owned()))
         .args(["build", "--quiet", "--message-format=json-render-diagnostics"])
         .args(["--color", if shell.colour() { "always" } else { "never" }])
         .stdout(Stdio::piped())

@@ -9,6 +9,7 @@ use sesame_dsl::diagnostic::visible;
 use sesame_plan::Transport;
 
 use super::arguments::{Deny, ExplainFormat, Generation, Purpose};
+use super::owner;
 use super::shell::{self, Format, Shell};
 use crate::emit::Templates;
 use crate::environment::{self, Options, RuntimeChoice, environment};
@@ -17,7 +18,7 @@ use crate::frontend::{Checked, Language};
 use crate::input;
 use crate::output::{self, Change, Mode, Orphan, Report};
 use crate::plan::{OperationPlan, RunnerPlan};
-use crate::{emit, project, unfilled};
+use crate::{emit, names, project, unfilled};
 
 /// `sesamec new`
 pub(super) fn new(
@@ -295,7 +296,11 @@ pub(super) fn write(
     chosen: &[usize],
     mode: Mode,
 ) -> anyhow::Result<(PathBuf, Report)> {
-    let out = generation.own_runners()?;
+    let campaigns: Vec<&str> = chosen.iter().map(|&at| checked.plans[at].plan.campaign.name.as_str()).collect();
+    let out = generation.own_runners(&campaigns)?;
+    for campaign in &campaigns {
+        owner::check(&generation.file, &out.join(names::campaign_folder(campaign)))?;
+    }
     let environment = environment(&generation.file, &out, &checked.plans, options).map_err(|errors| all(&errors))?;
     let trees = emit::emit(&checked.plans, &environment).map_err(|problems| all(&problems))?;
     let (shared, runners) = trees.split_first().expect("there is a tree for what runners share");

@@ -30,7 +30,7 @@ pub(super) fn generate(
     if let Some(same) = campaigns.into_iter().find(|campaign| names::campaign_folder(campaign) == folder) {
         bail!("the runner of campaign `{same}` would be in the same folder, `{folder}`: rename one of them");
     }
-    let out = generation.own_runners()?;
+    let out = generation.own_runners(&[])?;
     // A monitor needs neither the simulator nor hooks.
     let environment = environment(&generation.file, &out, &[], options).map_err(|errors| all(&errors))?;
     let tree = emit::monitor(plan, &environment).map_err(|problems| all(&problems))?;

@@ -238,6 +238,7 @@ pub(super) fn results(shell: Shell, asked: Results) -> anyhow::Result<ExitCode> 
         Results::Sspr { input, dims, compat, output } => {
             let (repository, selection) = open(&input)?;
             let dimensions = if dims.is_empty() { Dimension::ALL.to_vec() } else { dims };
+            say_without_point(shell, &repository, &selection, compat.convention())?;
             print(&analysis::sspr(&repository, &selection, &dimensions, compat.convention())?, &output)
         }
         Results::Regions { input, requirement, depth, svg, output } => {
@@ -282,6 +283,7 @@ pub(super) fn results(shell: Shell, asked: Results) -> anyhow::Result<ExitCode> 
             if !analysis.feasible_is_exact() {
                 shell.warning("not all feasible cells are known: some of these cells may be unreachable");
             }
+            say_without_point(shell, &repository, &selection, compat.convention())?;
             print(&if cells { analysis.cells() } else { analysis.curve() }, &output)
         }
         Results::Indicators { file, reference, against, unscaled, output } => {
@@ -326,6 +328,19 @@ pub(super) fn results(shell: Shell, asked: Results) -> anyhow::Result<ExitCode> 
             print(&shown, &output)
         }
     }
+}
+
+/// Says which imported tests have no point and why, aside, so that tables stay tables.
+fn say_without_point(
+    shell: Shell,
+    repository: &Repository,
+    selection: &Selection,
+    convention: Convention,
+) -> anyhow::Result<()> {
+    for sentence in analysis::without_point(repository, selection, convention)? {
+        shell.note(sentence);
+    }
+    Ok(())
 }
 
 /// Says where hypervolumes begin, aside, so that tables stay tables.

@@ -4,17 +4,18 @@
 //! and its plan says everything. The runner of any other campaign is a crate, which is generated and built first.
 
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, ExitCode};
 
 use anyhow::{Context as _, bail};
 use clap::{Arg, ArgAction, ArgMatches};
 use sesame_runtime::Interpreted;
-use sesame_runtime::cli::{CALLER, Caller, EXIT_CODES, Running, Showing};
+use sesame_runtime::cli::{CALLER, Caller, EXIT_CODES, RUNNER, Running, Showing};
 
 use super::arguments::Generation;
 use super::build;
 use super::commands::{all, check, choose, write};
+use super::owner;
 use super::shell::{self, Shell};
 use crate::emit;
 use crate::environment;
@@ -103,30 +104,16 @@ impl<'a> Found<'a> {
             return Ok(None);
         }
         let (space, simulator) = environment::program_folders(file, self.plan())?;
-        let folder = self.generation.own_runners()?.join(names::campaign_folder(&self.plan().plan.campaign.name));
+        let campaign = &self.plan().plan.campaign.name;
+        let folder = self.generation.own_runners(&[campaign])?.join(names::campaign_folder(campaign));
         let results = folder.join("results");
         if let Some(link) = [&folder, &results].into_iter().find(|path| path.is_symlink()) {
             bail!("{} is a link, and results are never written through links", link.display());
         }
-        refuse_others(self.generation, &results)?;
+        owner::check(file, &folder)?;
         let directory = std::path::absolute(&folder).with_context(|| format!("cannot find {}", folder.display()))?;
         Ok(Some(Interpreted { plan: emit::plan_json(self.plan()), directory, space, simulator }))
     }
-}
-
-/// Fails if results are of another space in the same folder, which has a campaign of the same name.
-fn refuse_others(generation: &Generation, results: &Path) -> anyhow::Result<()> {
-    let Some(source) = sesame_runtime::cli::recorded_source(results) else { return Ok(()) };
-    let (file, other) = (&generation.file, generation.file.with_file_name(&source));
-    // A space that was renamed still owns its results.
-    if file.file_name().is_some_and(|name| name == source.as_str()) || !other.is_file() {
-        return Ok(());
-    }
-    bail!(
-        "{} contains results of `{source}`, not of `{}`: choose another folder for the runners of one of them with `-o`",
-        results.display(),
-        file.display()
-    )
 }
 
 /// `sesamec run`
@@ -176,14 +163,14 @@ pub(super) fn showing(
         // It says which campaign it is of.
         return Ok(sesame_runtime::cli::show(command, run));
     }
-    let results = |name: &str| generation.runners().join(names::campaign_folder(name)).join("results");
-    let named = generation.campaign.as_deref().map(results).filter(|results| results.is_dir());
-    let results = match named {
-        Some(results) => results,
-        None => results(&Found::find(shell, language, &generation)?.plan().plan.campaign.name),
+    let folder = |name: &str| generation.runners(&[name]).join(names::campaign_folder(name));
+    let named = generation.campaign.as_deref().map(folder).filter(|folder| folder.join("results").is_dir());
+    let folder = match named {
+        Some(folder) => folder,
+        None => folder(&Found::find(shell, language, &generation)?.plan().plan.campaign.name),
     };
-    refuse_others(&generation, &results)?;
-    Ok(sesame_runtime::cli::show(command, &results))
+    owner::check(&generation.file, &folder)?;
+    Ok(sesame_runtime::cli::show(command, &folder.join("results")))
 }
 
 /// The arguments of a runner's command, as a runner's own command line takes them.
@@ -234,9 +221,10 @@ fn compiled(shell: Shell, found: &Found<'_>, arguments: &[OsString], allow_unfil
             return Err(all(&said));
         }
     }
-    let program = build::build(shell, &out.join(names::campaign_folder(campaign)), campaign)?;
+    let folder = out.join(names::campaign_folder(campaign));
+    let program = build::build(shell, &folder, campaign)?;
     let mut runner = Command::new(&program);
-    runner.args(arguments).env(CALLER, serde_json::to_string(caller)?);
+    runner.args(arguments).env(CALLER, serde_json::to_string(caller)?).env(RUNNER, folder.canonicalize()?);
     start(runner).with_context(|| format!("cannot run {}", program.display()))
 }
 

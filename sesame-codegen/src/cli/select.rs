@@ -10,7 +10,7 @@ use clap::Args;
 
 use sesame_plan::{CampaignPlan, Dimension, Lab, LabBudget, LabCost, MetricId, RankKey, RankOrder};
 use sesame_results::analysis::choice::{Choice, Choosing};
-use sesame_results::analysis::{Selection, Terms, candidates};
+use sesame_results::analysis::{Selection, Terms, TestNumber, candidates, first_of};
 use sesame_results::record::Repository;
 
 use super::results::{Compat, Format, Output, dimension, print};
@@ -165,8 +165,17 @@ pub(super) fn selected(shell: Shell, asked: &Selected) -> anyhow::Result<ExitCod
     } else {
         shell.note(said);
     }
+    let mut reasons: Vec<(String, Vec<TestNumber>)> = Vec::new();
     for (number, reason) in &found.left_out {
-        shell.note(format!("T{number} is not a candidate: {}", reason.words(plan)));
+        let words = reason.words(plan);
+        match reasons.iter_mut().find(|(known, _)| *known == words) {
+            Some((_, tests)) => tests.push(TestNumber(*number)),
+            None => reasons.push((words, vec![TestNumber(*number)])),
+        }
+    }
+    for (words, tests) in &reasons {
+        let are = if tests.len() == 1 { "is not a candidate" } else { "are not candidates" };
+        shell.note(format!("{} {are}: {words}", first_of(tests)));
     }
     if let Some(more) = choosing.next_budget(&choice, &mut stop) {
         let names: Vec<String> = more.tests.iter().map(|number| format!("T{number}")).collect();

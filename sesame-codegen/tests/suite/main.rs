@@ -15,5 +15,6 @@ mod placed;
 mod plans;
 mod random_originals;
 mod regeneration;
+mod said_of_originals;
 mod scan;
 mod surroundings;

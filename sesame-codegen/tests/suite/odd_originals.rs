@@ -9,7 +9,7 @@ use tempfile::TempDir;
 use crate::originals::{CAMPAIGN, METRICS, NUMBERED, OPERATIONS, SYSTEM, imported, plan, space, whole};
 
 /// A file with something else in the place of words that it holds.
-fn with(changes: &[(&str, &str)]) -> String {
+pub(crate) fn with(changes: &[(&str, &str)]) -> String {
     changes.iter().fold(whole(), |text, (from, to)| {
         assert!(text.contains(from), "{from}");
         text.replace(from, to)
@@ -17,7 +17,7 @@ fn with(changes: &[(&str, &str)]) -> String {
 }
 
 /// The results of the campaign at a position.
-fn recorded(imported: &mut Imported, at: usize) -> (TempDir, Repository) {
+pub(crate) fn recorded(imported: &mut Imported, at: usize) -> (TempDir, Repository) {
     let (_, name) = imported.performed().find(|(found, _)| *found == at).expect("the campaign performed tests");
     let plan = plan(imported, name);
     let folder = tempfile::tempdir().unwrap();
@@ -26,20 +26,20 @@ fn recorded(imported: &mut Imported, at: usize) -> (TempDir, Repository) {
     (folder, repository)
 }
 
-fn scanned(repository: &Repository) -> Vec<ScannedTest> {
+pub(crate) fn scanned(repository: &Repository) -> Vec<ScannedTest> {
     let mut tests = Vec::new();
     repository.scan(&mut |test| tests.push(test)).unwrap();
     tests
 }
 
 /// All that an import says, one note a line.
-fn said(imported: &Imported) -> String {
+pub(crate) fn said(imported: &Imported) -> String {
     let notes: Vec<String> = imported.notes.iter().map(|(kind, text)| format!("{} {text}", kind.word())).collect();
     notes.join("\n")
 }
 
 /// A coordinate of a test.
-fn at(test: &ScannedTest, repository: &Repository, convention: Convention, dimension: &str) -> Option<f64> {
+pub(crate) fn at(test: &ScannedTest, repository: &Repository, convention: Convention, dimension: &str) -> Option<f64> {
     test.point(repository.plan(), convention)?.get(Dimension::named(dimension).unwrap())
 }
 

@@ -286,6 +286,33 @@ impl Maker {
         self.say("    </performedTests>\n");
     }
 
+    /// How a search boosts coverage: an attribute of older files, or an element.
+    fn boosting(&mut self) -> (&'static str, String) {
+        let number = |maker: &mut Maker, name: &str| match maker.draws.below(3) {
+            0 => String::new(),
+            _ => format!(" {name}=\"{}\"", maker.draws.below(12)),
+        };
+        let kind = match self.draws.below(5) {
+            0 => return ("", String::new()),
+            1 => return (" useMutationEnhancingCoverage=\"true\"", String::new()),
+            2 => "Fixed",
+            3 => "Linear",
+            _ => "Odd",
+        };
+        let numbers: Vec<String> = [
+            "useBoostingOnceEveryGenerations",
+            "useBoostingOnceEveryIterations",
+            "startingBoostingCount",
+            "endingBoostingCount",
+            "countDropEveryGeneration",
+        ]
+        .iter()
+        .map(|name| number(self, name))
+        .collect();
+        let numbers = numbers.concat();
+        ("", format!("<coverageBoostingStrategy xsi:type=\"T:{kind}NSGACoverageBoostingStrategy\"{numbers}/>"))
+    }
+
     fn campaign(&mut self, at: usize, templates: &[Template]) {
         let list = |maker: &mut Maker, id: &str, path: &str, count: usize| -> String {
             let chosen: Vec<usize> = (0..count).filter(|_| !maker.chance(3)).collect();
@@ -305,11 +332,21 @@ impl Maker {
         let tests = self.draws.below(6);
         match self.draws.below(5) {
             0 => self.say("    <approach xsi:type=\"T:RandomTestGeneration\"/>\n"),
-            1 => self.say("    <approach xsi:type=\"T:NSGAEvolutionaryAlgorithm\" populationSize=\"7\" iterations=\"20\"/>\n"),
-            2 => self.say(
-                "    <approach xsi:type=\"T:NSGAWithCoverageCells\" populationSize=\"4\" iterations=\"20\">\
-                 <dimensionRecords maxValue=\"1.0\" count=\"4\"/><dimensionRecords dimID=\"O2_DELAY_COUNT\" maxValue=\"3.0\" count=\"3\"/></approach>\n",
+            1 => self.say(
+                "    <approach xsi:type=\"T:NSGAEvolutionaryAlgorithm\" populationSize=\"7\" iterations=\"20\"/>\n",
             ),
+            2 => {
+                let cells = self.one(&[
+                    "<dimensionRecords maxValue=\"1.0\" count=\"4\"/><dimensionRecords dimID=\"O2_DELAY_COUNT\" maxValue=\"3.0\" count=\"3\"/>",
+                    "<dimensionRecords maxValue=\"1.0\" count=\"4\"/>",
+                    "",
+                ]);
+                let (older, boosting) = self.boosting();
+                let _ = writeln!(
+                    self.text,
+                    "    <approach xsi:type=\"T:NSGAWithCoverageCells\" populationSize=\"4\" iterations=\"20\"{older}>{cells}{boosting}</approach>"
+                );
+            }
             3 => {
                 let repeated = if self.chance(4) {
                     String::new()
@@ -319,7 +356,8 @@ impl Maker {
                     let path = format!("//@campaigns.{of}/@performedTests.{which}");
                     format!(" testToRepeat=\"{}\"", if self.paths { path } else { format!("_p{of}_{which}") })
                 };
-                let _ = writeln!(self.text, "    <approach xsi:type=\"T:RepeatedExecution\"{repeated} repeatCount=\"3\"/>");
+                let _ =
+                    writeln!(self.text, "    <approach xsi:type=\"T:RepeatedExecution\"{repeated} repeatCount=\"3\"/>");
             }
             _ => {}
         }

@@ -14,7 +14,9 @@ pub(super) fn misnamed_operations(space: &Space, diagnostics: &mut Vec<Diagnosti
         // The endings of a name, the longest first.
         let ends = || name.match_indices('_').map(|(at, _)| &name[at + 1..]);
         let Some(own) = operation.topic().map(|topic| &space.topics[topic].declaration) else { continue };
-        if name == &own.name || ends().any(|end| end == own.name) {
+        // `command_lost` is named after `command`, even if there is a topic `lost`.
+        let begins = name.strip_prefix(own.name.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with('_'));
+        if begins || ends().any(|end| end == own.name) {
             continue;
         }
         // The longest is meant: `cut_link_speed` is named after `link_speed` even if there is a `speed` too.

@@ -477,7 +477,12 @@ impl<'a> Indexer<'a> {
             }
         }
         for expectation in expectations {
-            self.mention_metric(&expectation.metric, id);
+            match expectation {
+                ast::Expectation::Metric { metric, bound: _ } => self.mention_metric(metric, id),
+                ast::Expectation::Requirement(name) => {
+                    self.mention(name, id);
+                }
+            }
         }
     }
 

@@ -116,7 +116,8 @@ impl<'a> Resolver<'a> {
     fn end(&mut self, campaign: &'a ast::Campaign) -> Option<f64> {
         let Some(EndOfTest { after: end, .. }) = self.single(&campaign.ends, "end after") else {
             if !campaign.has_errors {
-                self.missing(&campaign.head.name, "the time at which its tests end", "end after 70s");
+                let name = &campaign.head.name;
+                self.missing(name.span, &name.text, "the time at which its tests end", "end after 70s");
             }
             return None;
         };
@@ -136,7 +137,8 @@ impl<'a> Resolver<'a> {
                 && !campaign.searches.is_empty()
                 && !campaign.has_errors
             {
-                self.missing(&campaign.head.name, "its objectives", "objectives fuzzing_time, collision_occurrence");
+                let (name, example) = (&campaign.head.name, self.example_of_objectives());
+                self.missing(name.span, &name.text, "its objectives", &example);
             }
             return Some(vec![]);
         };
@@ -181,7 +183,9 @@ impl<'a> Resolver<'a> {
                 && !campaign.searches.is_empty()
                 && !campaign.has_errors
             {
-                self.missing(&campaign.head.name, "the operations of its tests", "operations jitter 1..5 per test");
+                let name = &campaign.head.name;
+                let example = format!("operations {} 1..5 per test", self.declared_or(Kind::Operation, "jitter"));
+                self.missing(name.span, &name.text, "the operations of its tests", &example);
             }
             return None;
         };
@@ -292,7 +296,7 @@ impl<'a> Resolver<'a> {
         let kind = search.strategy?;
         let evaluations = self.single(&search.evaluations, "evaluations").copied();
         if evaluations.is_none() && !search.has_errors {
-            self.missing(&campaign.head.name, "its number of evaluations", "evaluations 200");
+            self.missing(search.span, &campaign.head.name.text, "its number of evaluations", "evaluations 200");
         }
         let found = evaluations.and_then(|count| self.count(count, 1, "the number of evaluations"));
         if self.foreign_setting(search, kind) {
@@ -375,7 +379,7 @@ impl<'a> Resolver<'a> {
         let Some(&(_, count)) = self.single(&search.own, keyword) else {
             if own.default.is_none() && !search.has_errors {
                 let example = format!("{keyword} {}", own.example);
-                self.missing(&campaign.head.name, &format!("its {noun}"), &example);
+                self.missing(search.span, &campaign.head.name.text, &format!("its {noun}"), &example);
             }
             return own.default;
         };

@@ -35,6 +35,13 @@ impl<'a> Resolver<'a> {
                 self.needs_a_node(target, *rule, body.kind_word);
                 None
             }
+            ast::OperationKind::Plain { rule: Rule::packet_loss, amounts: Some(ast::Amounts::Range(range)) }
+                if is_of_times(range) =>
+            {
+                self.whole_messages(target, "packet loss drops");
+                self.loss_of_times(range, body.kind_word);
+                None
+            }
             ast::OperationKind::Plain { rule, amounts } => self.plain(target, *rule, amounts.as_ref()),
             ast::OperationKind::Random { absolute, amounts } => self.random_value(target, *absolute, amounts),
             ast::OperationKind::RandomText(texts) => {
@@ -139,15 +146,6 @@ impl<'a> Resolver<'a> {
             (Rule::clock_skew, Some(ast::Amounts::Range(range))) => self.clock_skew(target, range),
             (Rule::packet_loss, Some(ast::Amounts::Range(range))) => {
                 let target = self.whole_messages(target, "packet loss drops");
-                if is_of_times(range) {
-                    let written = self.text(range.span);
-                    let title = format!("`{written}` is a range of times, but the loss is a percentage in `%`");
-                    let diagnostic = Diagnostic::new(Code::WRONG_UNIT, range.span, title)
-                        .label("expected percentages such as `[0%, 100%]`")
-                        .note(format!("to lose every message for a time, use `blackhole for {written}`"));
-                    self.report(diagnostic);
-                    return None;
-                }
                 let loss = self.probabilities(range, "the loss")?;
                 Some((target?, OperationKind::PacketLoss, vec![number("loss", None, loss)]))
             }
@@ -179,6 +177,17 @@ impl<'a> Resolver<'a> {
             }
             (rule, _) => unreachable!("the grammar has no operation that is {rule:?} with this amount"),
         }
+    }
+
+    /// Reports a packet loss that is given as a time.
+    fn loss_of_times(&mut self, range: &ast::Range, word: Span) {
+        let written = self.text(range.span);
+        let title = format!("`{written}` is a range of times, but the loss is a percentage in `%`");
+        let meant = format!("blackhole for {written}");
+        let diagnostic = Diagnostic::new(Code::WRONG_UNIT, range.span, title)
+            .label("expected percentages such as `[0%, 100%]`")
+            .suggest(format!("use `{meant}` to lose every message for a time"), word.to(range.span), meant);
+        self.report(diagnostic);
     }
 
     /// The values of an operation that adds normally distributed numbers, and their standard deviation, which is in the

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Kind, Resolver};
+use super::{Kind, Resolver, examples};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::eddi::{Demand, Eddi, Mitigation, MitigationValue, Otherwise};
 use crate::model::{EddiId, Id as _, TopicId, Type};
@@ -55,12 +55,19 @@ impl<'a> Resolver<'a> {
         };
         let mut guarantees = self.guarantees(eddi, &members, said_by);
         if eddi.otherwise.is_empty() && !eddi.has_errors {
-            self.missing(name, "its state when no guarantee holds", "otherwise not_safe");
+            self.missing(name.span, &name.text, "its state when no guarantee holds", "otherwise not_safe");
         }
         let otherwise = self.single(&eddi.otherwise, "otherwise").and_then(|otherwise| self.otherwise(otherwise));
         self.nothing_is_sent(eddi);
         if eddi.guarantees.is_empty() && !eddi.has_errors {
-            self.missing(name, "a guarantee", "guarantee safe  integrity 1 = brakes_ok");
+            match examples::of_guarantee(eddi) {
+                Some(example) => self.missing(name.span, &name.text, "a guarantee", &example),
+                None => self.report(
+                    Diagnostic::new(Code::CLAUSE_MISSING, name.span, format!("`{}` is missing a guarantee", name.text))
+                        .label("add a guarantee")
+                        .note("declare a condition on messages as `evidence` first, which a guarantee then needs"),
+                ),
+            }
             return None;
         }
         if let Some(guarantees) = &mut guarantees {

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::Resolver;
 use super::depth;
 use super::eddi::{Member, Members};
+use super::examples;
 use super::formula::MAX_DEPTH;
 use super::parts::first_part;
 use super::words::{list, type_in_words};
@@ -33,9 +34,11 @@ impl<'a> Resolver<'a> {
             None => Some(0.0),
         };
         let stale = match self.single(&evidence.stale, "stale after") {
-            Some((after, unknown)) => self
-                .positive(after, &seconds, "the age of evidence")
-                .map(|after| Some(Stale { after, is: if *unknown { StaleIs::Unknown } else { StaleIs::False } })),
+            Some(written::Stale { after, unknown, all }) => {
+                let is = if *unknown { StaleIs::Unknown } else { StaleIs::False };
+                let after = self.positive(after, &seconds, "the age of evidence");
+                after.map(|after| Some(Stale { after, is, all: *all }))
+            }
             None => Some(None),
         };
         let condition = condition?;
@@ -222,7 +225,17 @@ impl<'a> Resolver<'a> {
                 return None;
             }
             (None, None) => {
-                self.missing(&guarantee.head.name, "what it needs", "guarantee safe  integrity 1 = brakes_ok");
+                let name = &guarantee.head.name;
+                let title = format!("`{}` is missing what it needs", name.text);
+                let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, name.span, title).label("add what it needs");
+                self.report(match examples::of_evidence(eddi) {
+                    Some(evidence) => {
+                        let needs = format!("= {evidence}");
+                        let after = guarantee.integrity.span.end();
+                        diagnostic.suggest(format!("add `{needs}`"), after, format!(" {needs}"))
+                    }
+                    None => diagnostic.note("declare a condition on messages as `evidence`, and name it after a `=`"),
+                });
                 return None;
             }
             (Some(gate), None) => gate,

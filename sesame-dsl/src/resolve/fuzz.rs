@@ -2,6 +2,7 @@
 
 use sesame_notation::quoted;
 
+use super::examples;
 use super::quantity::percent;
 use super::words::list;
 use super::{Kind, Resolver};
@@ -10,7 +11,7 @@ use crate::model::{self, Activation, Choice, Domain, Id as _, OperationId, Opera
 
 use crate::span::Span;
 use crate::syntax::ast;
-use crate::units::{Unit, convert};
+use crate::units::Unit;
 
 impl<'a> Resolver<'a> {
     pub(super) fn operations(&mut self) {
@@ -79,7 +80,7 @@ impl<'a> Resolver<'a> {
             (None, None) => unreachable!("only custom operations can act on nothing"),
         };
         let mut said: Vec<Span> = Vec::new();
-        for parameter in &parameters {
+        for parameter in parameters.iter().filter(|_| !is_constant(&kind)) {
             let (Domain::Number { range, .. }, Some(span)) = (&parameter.domain, body.kind.written(&parameter.name))
             else {
                 continue;
@@ -135,17 +136,18 @@ impl<'a> Resolver<'a> {
 
     // ----- tests
 
-    pub(super) fn tests(&mut self) {
+    pub(super) fn tests(&mut self, requirements: &[Option<model::Requirement>]) {
         for test in &self.file.tests {
-            let resolved = self.test(test);
+            let resolved = self.test(test, requirements);
             self.tests.push(resolved);
         }
     }
 
-    fn test(&mut self, test: &'a ast::Test) -> Option<model::Test> {
+    fn test(&mut self, test: &'a ast::Test, requirements: &[Option<model::Requirement>]) -> Option<model::Test> {
         let mut complete = !test.has_errors;
         if test.operations.is_empty() && !test.has_errors {
-            self.missing(&test.head.name, "an operation", "jitter offset [0.1rad, 0.2rad] from 8s to 57s");
+            let example = self.example_of_use();
+            self.missing(test.head.name.span, &test.head.name.text, "an operation", &example);
             complete = false;
         }
         let mut operations = Vec::new();
@@ -166,7 +168,14 @@ impl<'a> Resolver<'a> {
         self.copies_in_test(test, &operations);
         let mut expectations = Vec::new();
         for expectation in &test.expectations {
-            match self.bound(&expectation.metric, &expectation.bound) {
+            let expected = match expectation {
+                ast::Expectation::Metric { metric, bound } => self.bound(metric, bound),
+                ast::Expectation::Requirement(name) => {
+                    let found = self.find(name, Kind::Requirement).and_then(|index| requirements[index].as_ref());
+                    found.map(|requirement| (requirement.metric, requirement.bound))
+                }
+            };
+            match expected {
                 Some((metric, bound)) => expectations.push(model::Expectation { metric, bound }),
                 None => complete = false,
             }
@@ -299,21 +308,11 @@ impl<'a> Resolver<'a> {
         let mut unknown = test.choices.iter().filter(|(word, _)| !named(&word.text));
         let mut choices = Vec::new();
         for parameter in parameters {
-            let example = example(parameter, &operation.kind);
+            let example = examples::choice(parameter, &operation.kind);
             let mut written = test.choices.iter().filter(|(word, _)| word.text == parameter.name);
             let Some((first, choice)) = written.next() else {
                 // An unknown name was meant for this one.
-                let meant = unknown.next().map(|(word, _)| word);
-                let (span, title) = match meant {
-                    Some(word) => (word.span, format!("`{name}` has no parameter named `{}`", word.text)),
-                    None => (test.operation.span, format!("`{name}` is missing a value for `{}`", parameter.name)),
-                };
-                let mut diagnostic = Diagnostic::new(Code::WRONG_CHOICE, span, title)
-                    .label(format!("expected, for example, `{example}`"));
-                if meant.is_some() {
-                    diagnostic = diagnostic.did_you_mean(span, &parameter.name);
-                }
-                self.report(diagnostic);
+                self.report(not_chosen(&test.operation, unknown.next(), parameter, &example));
                 continue;
             };
             for (again, _) in written {
@@ -321,6 +320,7 @@ impl<'a> Resolver<'a> {
                 let diagnostic = Diagnostic::new(Code::CLAUSE_TWICE, again.span, title).label("remove one of the two");
                 self.report(diagnostic.secondary(first.span, "first given here"));
             }
+            let example = examples::value(parameter, &operation.kind);
             choices.extend(self.chosen(choice, index, operation, parameter, &example));
         }
         for (other, _) in unknown {
@@ -425,12 +425,17 @@ impl<'a> Resolver<'a> {
                 return None;
             }
             (_, Shape::Value) => {
-                let diagnostic = Diagnostic::new(
+                let mut diagnostic = Diagnostic::new(
                     Code::WRONG_CHOICE,
                     span,
                     format!("{what} must be a single value in a test, not a range"),
                 )
                 .label(format!("expected one value, for example `{example}`"));
+                if let ast::Choice::Range(range) = choice
+                    && self.text(range.low.span) == self.text(range.high.span)
+                {
+                    diagnostic = diagnostic.suggest("use this value alone", span, self.text(range.low.span));
+                }
                 self.report(diagnostic);
                 return None;
             }
@@ -457,20 +462,32 @@ impl<'a> Resolver<'a> {
     }
 }
 
-/// A choice in the notation of the language.
-fn example(parameter: &Parameter, kind: &OperationKind) -> String {
-    let probability = kind.has_probabilities();
-    let unit = parameter.unit.as_ref().map_or("", Unit::text);
-    let number = |value: f64| {
-        if probability { format!("{}%", convert(value, None, Some(&percent()))) } else { format!("{value}{unit}") }
-    };
-    let chosen = match &parameter.domain {
-        Domain::Number { range, shape: Shape::Value, .. } => number(range.low),
-        Domain::Number { range, shape: Shape::Range, .. } => format!("[{}, {}]", number(range.low), number(range.high)),
-        Domain::Point { low: [x, y, z], .. } => format!("({x}, {y}, {z}){unit}"),
-        Domain::Texts(items) | Domain::Files(items) => quoted(items.first().map_or("", String::as_str)),
-    };
-    format!("{} {chosen}", parameter.name)
+/// What is wrong where a test chooses nothing for a parameter, but perhaps for another that does not exist.
+fn not_chosen(
+    operation: &ast::Name,
+    instead: Option<&(ast::Name, ast::Choice)>,
+    parameter: &Parameter,
+    example: &str,
+) -> Diagnostic {
+    let (name, span) = (&operation.text, operation.span);
+    if let Some((word, choice)) = instead {
+        let title = format!("`{name}` has no parameter named `{}`", word.text);
+        return Diagnostic::new(Code::WRONG_CHOICE, word.span.to(choice.span()), title)
+            .label(format!("expected, for example, `{example}`"))
+            .did_you_mean(word.span, &parameter.name);
+    }
+    let title = format!("`{name}` is missing a value for `{}`", parameter.name);
+    let diagnostic =
+        Diagnostic::new(Code::WRONG_CHOICE, span, title).label(format!("add one, for example `{example}`"));
+    if examples::is_fixed(parameter) {
+        return diagnostic.suggest(format!("add `{example}`"), span.end(), format!(" {example}"));
+    }
+    diagnostic
+}
+
+/// Whether an operation is there to hold something at one value.
+fn is_constant(kind: &OperationKind) -> bool {
+    matches!(kind, OperationKind::StuckAt { .. } | OperationKind::Set { .. })
 }
 
 /// Whether there are campaigns that search, and all of them permit copies of one operation to act at the same time.

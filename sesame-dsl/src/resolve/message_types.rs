@@ -167,7 +167,8 @@ impl<'a> Resolver<'a> {
             }
         };
         if message.fields.is_empty() && message.block && !message.has_errors && interface.is_none() {
-            self.missing(&message.head.name, "a field", "level: real[mm]");
+            let name = &message.head.name;
+            self.missing(name.span, &name.text, "a field", "level: real[mm]");
             complete = false;
         }
         let declared = fields.into_iter();

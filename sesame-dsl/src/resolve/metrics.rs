@@ -113,7 +113,8 @@ impl<'a> Resolver<'a> {
     ) -> Option<MetricSource> {
         let Some(topics) = self.single(hooks, "hook on") else {
             if !has_errors {
-                self.missing(name, "the topics that its hook reads", "hook on zones");
+                let example = format!("hook on {}", self.declared_or(Kind::Topic, "zones"));
+                self.missing(name.span, &name.text, "the topics that its hook reads", &example);
             }
             return None;
         };

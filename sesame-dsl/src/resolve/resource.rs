@@ -33,11 +33,14 @@ impl<'a> Resolver<'a> {
             (rule, Some(_)) => unreachable!("the grammar has no operation on a node that is {rule:?} with this amount"),
         };
         let node = found?;
+        if !has_nodes {
+            return None;
+        }
         let can = match rule {
             Rule::set_parameter => true,
             rule => self.is_launched(resource, node, body.kind_word) & (rule != Rule::slow || self.runs_freely(body)),
         };
-        if !has_nodes || !can {
+        if !can {
             return None;
         }
         let node = sesame_plan::NodeId(u32::try_from(node).expect("a file has fewer than 2^32 declarations"));
@@ -115,12 +118,14 @@ impl<'a> Resolver<'a> {
         let topic = &target.topic.text;
         let is_node = self.names.get(topic.as_str()).is_some_and(|named| named.kind == Kind::Node);
         let (title, label) = if rule == Rule::set_parameter {
+            let node = self.declared_or(Kind::Node, "controller");
             (
                 "`set` acts on a parameter of a node, not on messages".to_owned(),
-                "expected a parameter, for example `parameter \"gain\" of controller`",
+                format!("expected a parameter, for example `parameter \"gain\" of {node}`"),
             )
         } else {
-            (format!("`{word}` acts on a node, not on messages"), "expected `node` and the name of a node")
+            let label = "expected `node` and the name of a node";
+            (format!("`{word}` acts on a node, not on messages"), label.to_owned())
         };
         let mut diagnostic = Diagnostic::new(Code::WRONG_TYPE, target.span, title).label(label);
         if rule == Rule::set_parameter {

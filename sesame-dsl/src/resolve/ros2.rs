@@ -150,7 +150,7 @@ impl<'a> Resolver<'a> {
             let title = format!("the step of `{}` does not say what takes it", name.text);
             let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, step.time.span, title)
                 .label("add a service or a topic")
-                .note(format!("for example `step {} by service \"/step\"`", self.text(step.time.span)))
+                .suggest("add `by service \"/step\"`", step.time.span.end(), " by service \"/step\"")
                 .note("without `step`, the simulator runs freely");
             self.report(diagnostic);
             return None;

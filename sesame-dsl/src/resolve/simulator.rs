@@ -64,7 +64,7 @@ impl<'a> Resolver<'a> {
     pub(super) fn step_of(&mut self, name: &Name, steps: &'a [(Span, ast::Quantity)], has_errors: bool) -> Option<u64> {
         let step = self.single(steps, "step");
         if step.is_none() && !has_errors {
-            self.missing(name, "its step size", "step 20ms");
+            self.missing(name.span, &name.text, "its step size", "step 20ms");
         }
         self.step(step?)
     }

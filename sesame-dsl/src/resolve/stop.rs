@@ -40,7 +40,7 @@ impl<'a> Resolver<'a> {
         if none && !written.has_errors {
             let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, written.span, "`stop` needs at least one rule")
                 .label("add a rule that says when the search stops")
-                .note("for example `stop { time 2h  stagnation 10 generations below 1% }`");
+                .note("for example `time 2h  stagnation 10 generations below 1%`");
             self.report(diagnostic);
             return None;
         }

@@ -62,7 +62,12 @@ impl<'a> Resolver<'a> {
         let diagnostic = Diagnostic::new(Code::SAME_PATH, again, format!("two {what} have the path `{path}`"))
             .label("used again here")
             .secondary(first, "first used here");
-        self.report(diagnostic);
+        let of_a_group = [again, first].iter().any(|path| self.text(*path).contains('{'));
+        self.report(if of_a_group {
+            diagnostic.note("each path belongs to one topic: remove it from the group, or use the group instead")
+        } else {
+            diagnostic
+        });
     }
 
     /// Whether a topic carries what its simulator can: in ROS a message with a ROS type.

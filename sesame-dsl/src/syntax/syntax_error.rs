@@ -14,6 +14,7 @@ use super::foreign::{self, Expected, Rewrite};
 use super::limits::parse_bounded;
 use super::phrases::{keyword_of, phrases_of, rule_name};
 use super::token::{Token, TokenKind, is_keyword, token_at, tokens};
+use super::values;
 use crate::diagnostic::{Applicability, Code, Diagnostic, Suggestion};
 use crate::span::{FileId, Span};
 use crate::synonyms::{self, Synonym};
@@ -221,13 +222,16 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
             .note(format!("the direction is declared as in `metric {} {} = …`", next.text, found.text));
     }
     if wants_name && found.kind == TokenKind::Word && is_keyword(found.text) && !declares {
-        return Diagnostic::new(
-            Code::KEYWORD_AS_NAME,
-            span,
-            format!("`{}` is a keyword and cannot be a name", found.text),
-        )
-        .label("choose another name")
-        .suggest(format!("use `{}_1`", found.text), span, format!("{}_1", found.text));
+        let title = format!("`{}` is a keyword and cannot be a name", found.text);
+        let diagnostic = Diagnostic::new(Code::KEYWORD_AS_NAME, span, title);
+        let before = tokens(text, first.lo, found.lo).last().map_or("", |word| word.text);
+        let named = [Rule::file, Rule::system, Rule::eddi].iter().any(|&rule| blocks::block(rule).begins_with(before));
+        return if named {
+            let other = format!("{}_1", found.text);
+            diagnostic.label("choose another name").suggest(format!("use `{other}`"), span, other)
+        } else {
+            diagnostic.label("nothing that is declared has this name")
+        };
     }
 
     let title = match found.kind {
@@ -285,6 +289,12 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
              the name alone for the least",
         );
     }
+    if counts(Rule::each_element) && found.kind == TokenKind::Word {
+        diagnostic = diagnostic.note(
+            "brackets choose elements of a list; to disturb one member of a group, remove it from the group and declare \
+             it as a topic of its own",
+        );
+    }
     let mut region = tokens(text, from, found.lo).skip_while(|token| token.text != "signed_distance");
     let otherwise = region.find_map(|token| synonyms::region_otherwise(token.text));
     diagnostic.notes.extend(otherwise.map(str::to_owned));
@@ -294,7 +304,13 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
         diagnostic = rewritten(diagnostic, bounds::both(text, previous.lo as usize, found));
     }
     if counts(Rule::range) || counts(Rule::bracket_open) {
-        diagnostic = rewritten(diagnostic, one_value(text, found));
+        diagnostic = rewritten(diagnostic, values::one_value(text, from, found));
+    }
+    if counts(Rule::text) || counts(Rule::texts) {
+        diagnostic = rewritten(diagnostic, values::without_brackets(text, from, found));
+        diagnostic.notes.extend(values::numbers_are_not_listed(text, from, found).map(str::to_owned));
+    } else if matches!(found.text, "true" | "false") {
+        diagnostic = rewritten(diagnostic, values::without_brackets(text, from, found));
     }
     if found.kind == TokenKind::Sign && found.text == "=" && failure.expected.contains(&Rule::equal_to) {
         // A number may be what is needed, not a condition.
@@ -321,18 +337,6 @@ fn rewritten(mut diagnostic: Diagnostic, rewrites: impl IntoIterator<Item = Rewr
         diagnostic.suggestions.push(suggestion);
     }
     diagnostic
-}
-
-/// One value where a range is expected: `packet loss 50%`.
-fn one_value(text: &str, found: Token<'_>) -> Option<Rewrite> {
-    let number = if found.text == "-" { token_at(text, found.hi()) } else { found };
-    let place = found.lo..number.hi();
-    let range = format!("[{0}, {0}]", &text[place.clone()]);
-    (number.kind == TokenKind::Number).then(|| Rewrite {
-        message: format!("use the range `{range}`, which has one value"),
-        edits: vec![(place, range)],
-        same: false,
-    })
 }
 
 /// What foreign words at a token mean, of what can stand there, and where they end: two words that belong together,
@@ -392,13 +396,16 @@ fn counted_in_brackets(text: &str, open: Token<'_>) -> Option<Counted> {
 fn fitting(expected: &[Rule], block: &Block, at_start: bool) -> Vec<String> {
     let mut phrases: Vec<String> = Vec::new();
     let mut members = false;
+    let value = phrases_of(Rule::truth);
+    let only_words = expected.iter().filter(|&&rule| phrases_of(rule) == value).eq([&Rule::truth]);
     for &rule in expected {
         let begins_member = keyword_of(rule).is_some_and(|word| block.begins_with(word));
         if rule == Rule::EOI || rule == block.one || (at_start && begins_member) {
             members = true;
             continue;
         }
-        for phrase in phrases_of(rule) {
+        let words = || vec!["`true`".to_owned(), "`false`".to_owned()];
+        for phrase in if only_words && rule == Rule::truth { words() } else { phrases_of(rule) } {
             if !phrases.contains(&phrase) {
                 phrases.push(phrase);
             }

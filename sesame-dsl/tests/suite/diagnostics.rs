@@ -7,6 +7,7 @@ use sesame_dsl::diagnostic::{CODES, page, render};
 use sesame_dsl::source::SourceMap;
 
 use crate::files::{analyse_text, corpus};
+use crate::fixes::diagnostics_after;
 
 #[test]
 fn nothing_in_a_file_becomes_a_command_of_github() {
@@ -76,8 +77,7 @@ fn every_code_occurs_in_the_corpus_file_named_after_it() {
         let own: Vec<_> = files.iter().filter(|(name, _)| name.starts_with(&prefix)).collect();
         assert!(!own.is_empty(), "no file tests/bad/{prefix}….sesame");
         for (name, text) in own {
-            let (_, analysis) = analyse_text(name, text);
-            let found: BTreeSet<_> = analysis.diagnostics.iter().map(|diagnostic| diagnostic.code).collect();
+            let found: BTreeSet<_> = diagnostics_after(text).iter().map(|diagnostic| diagnostic.code).collect();
             assert!(found.contains(code), "{name} gives {found:?}");
         }
         assert!(page.starts_with(&format!("# {code}: ")), "the page of {code} begins with its heading");

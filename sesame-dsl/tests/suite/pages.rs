@@ -66,6 +66,11 @@ fn codes(example: &str) -> (Vec<&'static str>, String) {
     (codes, render::human(&analysis.diagnostics, &sources, false))
 }
 
+/// The wrong examples of all pages as files, with their codes.
+pub(crate) fn wrong_examples() -> impl Iterator<Item = (String, String)> {
+    CODES.iter().map(|(code, page)| (format!("page of {code}"), file_of(example(page, "Wrong"))))
+}
+
 /// The example of a page after a line such as `Wrong:`.
 fn example<'a>(page: &'a str, heading: &str) -> &'a str {
     let (_, after) = page.split_once(&format!("\n{heading}:\n\n```sesame\n")).expect("each page has both examples");

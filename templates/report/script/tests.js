@@ -27,7 +27,7 @@ const tests = (() => {
       data.uses[row].forEach(operation => counts.set(operation, (counts.get(operation) || 0) + 1));
       const names = [...counts].sort((a, b) => a[0] - b[0])
         .map(([operation, count]) => data.operations[operation] + (count > 1 ? " ×" + count : ""));
-      return names.join(", ") || "without disturbance";
+      return names.concat((data.not_imported && data.not_imported[row]) || []).join(", ") || "without disturbance";
     },
     violates(row) { return data.violates[row].map(at => data.requirements[at].name).join(" "); },
     command(number) { return data.command[0] + "T" + number + data.command[1]; },

@@ -51,6 +51,8 @@ fn record(permitted: &TestSpace, metrics: usize, number: u32) -> TestRecord {
             end: 1000.0,
             operations,
             unheard: Vec::new(),
+            unreached: Vec::new(),
+            traffic: Vec::new(),
             metrics,
             monitors: Vec::new(),
             messages: 10_000,

@@ -23,6 +23,8 @@ fn test(number: u32, points: u32) -> TestRecord {
             end: 70.0,
             operations: Vec::new(),
             unheard: Vec::new(),
+            unreached: Vec::new(),
+            traffic: Vec::new(),
             metrics: vec![metric.clone(), metric],
             monitors: Vec::new(),
             messages: 10_000,

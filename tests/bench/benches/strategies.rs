@@ -84,6 +84,8 @@ fn observe(plan: &CampaignPlan, number: u32, operations: &[sesame_plan::TestOper
         end: plan.campaign.end_after,
         operations: effects,
         unheard: Vec::new(),
+        unreached: Vec::new(),
+        traffic: Vec::new(),
         metrics: vec![
             MetricObservation::whole(Some(touched), true, Vec::new()),
             MetricObservation::whole(Some(-level), true, series),

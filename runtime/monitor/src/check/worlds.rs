@@ -119,18 +119,22 @@ impl<'a> Worlds<'a> {
     }
 
     /// Adds that evidence is true when other evidence is that says more, reads all that it reads, must be held at least
-    /// as long, and is stale at least as early.
+    /// as long, is stale at least as early, and does not change later in an instant: what reads several topics changes
+    /// at its end.
     pub(super) fn add_implications(&mut self) {
         for more in 0..self.evidence.len() {
             for less in 0..self.evidence.len() {
                 let (a, b) = (self.evidence[more], self.evidence[less]);
                 let early = match (a.stale, b.stale) {
                     (_, None) => true,
-                    (Some(a), Some(b)) => a.after <= b.after && self.reads[more].1 == self.reads[less].1,
+                    (Some(a), Some(b)) => {
+                        a.after <= b.after && (a.all <= b.all) && self.reads[more].1 == self.reads[less].1
+                    }
                     (None, Some(_)) => false,
                 };
                 let free_to_fall = b.held > 0.0 || b.stale.is_some();
-                if more == less || !free_to_fall || !early || a.held < b.held {
+                let together = self.reads[less].1.len() > 1 || self.reads[more].1 == self.reads[less].1;
+                if more == less || !free_to_fall || !early || !together || a.held < b.held {
                     continue;
                 }
                 if !self.reads[less].0.is_subset(&self.reads[more].0)

@@ -21,6 +21,24 @@ pub struct EvidenceChange {
     pub at: SimTime,
 }
 
+/// What the condition of evidence says when something that it reads had a message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Reading {
+    /// Which evidence.
+    pub evidence: EvidenceId,
+    /// What its condition says.
+    pub truth: Truth,
+    /// The last message of the source, a topic or a member of a group, that has been silent longest.
+    pub oldest: SimTime,
+}
+
+impl Reading {
+    /// All sources of the evidence had a message now, as when it has only one.
+    pub fn now(at: SimTime, evidence: EvidenceId, truth: Truth) -> Self {
+        Reading { evidence, truth, oldest: at }
+    }
+}
+
 /// What a run came to, in the order of time. Callers clear and reuse it, so that a run allocates nothing.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Changes {
@@ -74,18 +92,18 @@ impl Run {
     }
 
     /// A message: what the conditions of all evidence that listens to its topic say now, each piece of evidence at most
-    /// once. A condition that reads a topic without a message, or a number that is not finite, is unknown. Evidence
-    /// whose condition says the same as before must be listed too, because it is fresh again.
+    /// once. A condition with a number that is not finite is unknown. Evidence whose condition says the same as before
+    /// must be listed too, because it is fresh again, and evidence of which a source had no message yet must not.
     ///
     /// What was due until then comes first.
-    pub fn observe(&mut self, at: SimTime, heard: &[(EvidenceId, Truth)], changes: &mut Changes) {
+    pub fn observe(&mut self, at: SimTime, heard: &[Reading], changes: &mut Changes) {
         self.advance(at, changes);
         let at = self.now;
-        for &(evidence, raw) in heard {
+        for &Reading { evidence, truth, oldest } in heard {
             let rule = &self.network.rules[evidence.index()];
             let automaton = &mut self.automata[evidence.index()];
             let before = automaton.value();
-            automaton.observe(rule, at, raw);
+            automaton.observe(rule, at, truth, oldest);
             self.timers.by(evidence.0, automaton.due(rule));
             let truth = automaton.value();
             if truth != before {

@@ -11,17 +11,26 @@ use crate::truth::Truth;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Change {
     pub(super) at: SimTime,
-    /// The position in the recording of the first message of the event; `None` for a timer.
-    pub(super) message: Option<usize>,
+    pub(super) part: Part,
     pub(super) evidence: EvidenceId,
     pub(super) truth: Truth,
 }
 
+/// The parts of an instant, in their order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Part {
+    /// All its timers.
+    Timers,
+    /// An event, by the position in the recording of its first message.
+    Event(usize),
+    /// After all its messages: evidence that hears several streams changes.
+    End,
+}
+
 impl Change {
-    /// What happened. Events are in the order in which they happen: timers of an instant are one event, which comes
-    /// before its messages.
-    pub(super) fn event(&self) -> (SimTime, Option<usize>) {
-        (self.at, self.message)
+    /// When it happened: changes of one moment are decided on together.
+    pub(super) fn moment(&self) -> (SimTime, Part) {
+        (self.at, self.part)
     }
 }
 
@@ -70,28 +79,35 @@ pub(super) fn timeline(
     conditions: &mut dyn Conditions,
     changes: &mut Vec<Change>,
 ) {
-    let mut latest = vec![None; streams];
+    let mut latest: Vec<Option<(usize, SimTime)>> = vec![None; streams];
     let mut automaton = Automaton::new();
     let mut last = Truth::Unknown;
-    let mut add = |at, message, truth| {
+    let mut add = |at, part, truth| {
         if std::mem::replace(&mut last, truth) != truth {
-            changes.push(Change { at, message, evidence, truth });
+            changes.push(Change { at, part, evidence, truth });
         }
     };
-    for &Heard { at, message, event, place } in heard.iter().take_while(|heard| heard.at <= end) {
+    let together = |a: &Heard, b: &Heard| streams > 1 && a.at == b.at;
+    for instant in heard.chunk_by(together).take_while(|instant| instant[0].at <= end) {
+        let Heard { at, message, event, .. } = instant[instant.len() - 1];
         while automaton.due(rule) <= at.nanos() {
             let due = SimTime::from_nanos(automaton.due(rule));
             automaton.pass(rule, due);
-            add(due, None, automaton.value());
+            add(due, Part::Timers, automaton.value());
         }
-        latest[place] = Some(message);
-        automaton.observe(rule, at, conditions.truth(evidence, message, &latest));
-        add(at, Some(event), automaton.value());
+        for heard in instant {
+            latest[heard.place] = Some((heard.message, at));
+        }
+        let Some(latest) = latest.iter().copied().collect::<Option<Vec<_>>>() else { continue };
+        let oldest = latest.iter().map(|&(_, at)| at).min().expect("evidence hears a stream");
+        let latest: Vec<usize> = latest.into_iter().map(|(message, _)| message).collect();
+        automaton.observe(rule, at, conditions.truth(evidence, message, &latest), oldest);
+        add(at, if streams > 1 { Part::End } else { Part::Event(event) }, automaton.value());
     }
     while automaton.due(rule) <= end.nanos() {
         let due = automaton.due(rule);
         automaton.pass(rule, SimTime::from_nanos(due));
-        add(SimTime::from_nanos(due), None, automaton.value());
+        add(SimTime::from_nanos(due), Part::Timers, automaton.value());
         if due == i64::MAX {
             break;
         }

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use sesame_base::time::SimTime;
 use sesame_monitor::check::{self, Finding, Question, Report, Value, Values, When, check};
 use sesame_monitor::why::Moment;
-use sesame_monitor::{Changes, EvidenceId, Network, Run, State, Truth};
+use sesame_monitor::{Changes, EvidenceId, Network, Reading, Run, State, Truth};
 use sesame_plan::{
     Comparison, Condition, Evidence, Expression, FieldRef, Input, Members, Monitor, MonitorId, Side, Stale, StaleIs,
     TextTest, TopicId,
@@ -461,11 +461,12 @@ proptest! {
                 _ => { latest.text = value.text; true }
             };
             known = if finite { known | 1 << topic } else { known & !(1 << topic) };
-            let heard: Vec<(EvidenceId, Truth)> = (0..).map(EvidenceId).zip(&all).zip(&reads)
+            let heard: Vec<Reading> = (0..).map(EvidenceId).zip(&all).zip(&reads)
                 .filter(|(_, reads)| *reads >> topic & 1 == 1)
                 .map(|((id, evidence), &reads)| {
                     let known = reads & !known == 0;
-                    (id, if known { Truth::from(holds(&evidence.condition, &latest)) } else { Truth::Unknown })
+                    let truth = if known { holds(&evidence.condition, &latest).into() } else { Truth::Unknown };
+                    Reading::now(SimTime::from_nanos(now), id, truth)
                 })
                 .collect();
             run.observe(SimTime::from_nanos(now), &heard, &mut changes);
@@ -578,7 +579,7 @@ fn what_must_be_held_may_come_later_than_what_need_not() {
 fn silence_may_take_the_weaker_guarantee_only() {
     let high = compare(input(X), Comparison::Above, 1.0);
     let mut certificate = monitor(vec![high.clone(), high], vec![E(0), E(1)]);
-    certificate.evidence[1].stale = Some(Stale { after: 1.0, is: StaleIs::False });
+    certificate.evidence[1].stale = Some(Stale { after: 1.0, is: StaleIs::False, all: false });
     let found = findings(certificate);
     let Finding::Order { witness, .. } = &found[1] else { panic!("{found:?}") };
     assert_eq!((witness.when, &witness.evidence[..]), (When::Silent, &[Truth::True, Truth::False][..]));

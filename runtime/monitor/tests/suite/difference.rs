@@ -9,7 +9,8 @@ use sesame_monitor::why::Moment;
 use sesame_monitor::{Changes, EvidenceId, Network, Run, State, Truth};
 use sesame_plan::{Gate, MonitorId};
 
-use crate::random::{self, END, Message};
+use crate::random::{self, END, Heard, Message};
+use crate::run::heard;
 
 const T: fn(i64) -> SimTime = SimTime::from_nanos;
 
@@ -17,8 +18,7 @@ fn course(network: &Arc<Network>, messages: &[Message]) -> Course {
     let (mut changes, mut course) = (Changes::default(), Course { end: T(END), ..Course::default() });
     let mut run = Run::start(Arc::clone(network), &mut changes);
     for message in messages {
-        let heard = message.heard.iter().map(|&(monitor, at, truth)| (network.evidence(monitor, at), truth));
-        run.observe(T(message.at), &heard.collect::<Vec<_>>(), &mut changes);
+        run.observe(T(message.at), &heard(network, message), &mut changes);
     }
     run.advance(course.end, &mut changes);
     course.take(&mut changes);
@@ -100,7 +100,10 @@ proptest! {
 fn evidence_that_is_late_is_named_with_its_delay() {
     let monitor = random::monitor(random::plain(2), vec![Gate::All(vec![Gate::Evidence(0), Gate::Evidence(1)])]);
     let network = Arc::new(Network::new(&[monitor]).unwrap());
-    let message = |at, evidence, truth| Message { at, heard: vec![(MonitorId(0), evidence, truth)] };
+    let message = |when: i64, at: u32, truth| Message {
+        at: when,
+        heard: vec![Heard { monitor: MonitorId(0), at, truth, oldest: when }],
+    };
     let other = [message(1, 1, Truth::True), message(20, 1, Truth::False)];
     let run = |at| {
         let mut messages = vec![message(at, 0, Truth::True)];

@@ -3,7 +3,7 @@
 use sesame_monitor::{State, Truth};
 use sesame_plan::{Gate, Monitor, MonitorId, StaleIs};
 
-use crate::random::Message;
+use crate::random::{Heard, Message};
 
 /// A decision: when, and for what.
 pub(crate) type Step = (i64, State);
@@ -31,27 +31,32 @@ pub(crate) struct Moment<'a> {
 impl Moment<'_> {
     pub(crate) fn evidence(&self, monitor: MonitorId, at: u32) -> Truth {
         let evidence = &self.monitors[monitor.index()].evidence[at as usize];
-        let messages: Vec<(i64, Truth)> = self
+        let messages: Vec<(i64, Heard)> = self
             .heard
             .iter()
-            .flat_map(|message| message.heard.iter().map(|heard| (message.at, heard)))
-            .filter(|(_, heard)| (heard.0, heard.1) == (monitor, at))
-            .map(|(when, heard)| (when, heard.2))
+            .flat_map(|message| message.heard.iter().map(|heard| (message.at, *heard)))
+            .filter(|(_, heard)| (heard.monitor, heard.at) == (monitor, at))
             .collect();
-        let Some(&(last, raw)) = messages.last() else { return Truth::Unknown };
+        let Some(&(last, Heard { truth: raw, .. })) = messages.last() else { return Truth::Unknown };
         let longest = evidence.stale.map_or(i64::MAX, |stale| nanos(stale.after));
-        if self.now - last > longest {
+        // Since when it is silent, after a message.
+        let silent = |&(when, heard): &(i64, Heard)| match evidence.stale {
+            Some(stale) if !stale.all => heard.oldest,
+            _ => when,
+        };
+        let is_fresh = |message: &(i64, Heard), at: i64| at - silent(message) <= longest;
+        if !messages.last().is_some_and(|message| is_fresh(message, self.now)) {
             return if evidence.stale.unwrap().is == StaleIs::False { Truth::False } else { Truth::Unknown };
         }
         if raw != Truth::True {
             return raw;
         }
         let mut since = last;
-        for &(at, raw) in messages.iter().rev() {
-            if raw != Truth::True || since - at > longest {
+        for message in messages.iter().rev() {
+            if message.1.truth != Truth::True || !is_fresh(message, since) {
                 break;
             }
-            since = at;
+            since = message.0;
         }
         Truth::from(self.now - since >= nanos(evidence.held))
     }

@@ -1,6 +1,8 @@
 //! Certificates and messages at random. Times are whole nanoseconds, few and small, so that messages and timers often
 //! fall on one instant.
 
+use std::collections::BTreeMap;
+
 use proptest::prelude::*;
 use sesame_monitor::Truth;
 use sesame_plan::{
@@ -15,7 +17,16 @@ pub(crate) const END: i64 = 40;
 #[derive(Debug, Clone)]
 pub(crate) struct Message {
     pub(crate) at: i64,
-    pub(crate) heard: Vec<(MonitorId, u32, Truth)>,
+    pub(crate) heard: Vec<Heard>,
+}
+
+/// What the condition of a piece of evidence says, and when the source of it spoke that has been silent longest.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Heard {
+    pub(crate) monitor: MonitorId,
+    pub(crate) at: u32,
+    pub(crate) truth: Truth,
+    pub(crate) oldest: i64,
 }
 
 fn seconds(nanos: i64) -> f64 {
@@ -60,12 +71,13 @@ pub(crate) fn plain(count: usize) -> Vec<Evidence> {
 
 fn any_evidence() -> impl Strategy<Value = Evidence> {
     let held = prop_oneof![2 => Just(0), 1 => 1..6_i64];
-    let stale = prop::option::of((1..7_i64, any::<bool>()));
+    let stale = prop::option::of((1..7_i64, any::<bool>(), any::<bool>()));
     (held, stale).prop_map(|(held, stale)| evidence(held, stale))
 }
 
-/// Evidence that must be held this long, and is false or unknown after this long, in nanoseconds.
-fn evidence(held: i64, stale: Option<(i64, bool)>) -> Evidence {
+/// Evidence that must be held this long, and is false or unknown after this long, in nanoseconds, if any or all of its
+/// sources are silent.
+fn evidence(held: i64, stale: Option<(i64, bool, bool)>) -> Evidence {
     Evidence {
         name: "evidence".into(),
         doc: String::new(),
@@ -76,9 +88,10 @@ fn evidence(held: i64, stale: Option<(i64, bool)>) -> Evidence {
         }],
         condition: Condition::Input(0),
         held: seconds(held),
-        stale: stale.map(|(after, is_false)| Stale {
+        stale: stale.map(|(after, is_false, all)| Stale {
             after: seconds(after),
             is: if is_false { StaleIs::False } else { StaleIs::Unknown },
+            all,
         }),
         side: Side::Outbound,
     }
@@ -138,6 +151,11 @@ pub(crate) fn any_truth() -> impl Strategy<Value = Truth> {
     prop_oneof![3 => Just(Truth::True), 2 => Just(Truth::False), 1 => Just(Truth::Unknown)]
 }
 
+/// How long the source has been silent that has been silent longest: most often it is the one that speaks.
+fn any_age() -> impl Strategy<Value = i64> {
+    prop_oneof![2 => Just(0), 1 => 0..9_i64]
+}
+
 /// Monitors and messages to some of their evidence.
 pub(crate) fn any_run() -> impl Strategy<Value = (Vec<Monitor>, Vec<Message>)> {
     any_monitors().prop_flat_map(|monitors| {
@@ -148,15 +166,23 @@ pub(crate) fn any_run() -> impl Strategy<Value = (Vec<Monitor>, Vec<Message>)> {
         let count = evidence.len();
         let heard = prop::sample::subsequence(evidence, 1..=count.min(3))
             .prop_flat_map(|heard| {
-                let truths = prop::collection::vec(any_truth(), heard.len());
+                let truths = prop::collection::vec((any_truth(), any_age()), heard.len());
                 (Just(heard), truths)
             })
-            .prop_map(|(heard, truths)| {
-                heard.into_iter().zip(truths).map(|((monitor, at), truth)| (monitor, at, truth)).collect()
-            });
+            .prop_map(|(heard, truths)| heard.into_iter().zip(truths).collect::<Vec<_>>());
         let messages = prop::collection::vec((0..=END, heard), 0..30).prop_map(|mut messages| {
             messages.sort_by_key(|(at, _)| *at);
-            messages.into_iter().map(|(at, heard)| Message { at, heard }).collect()
+            // The source that has been silent longest never spoke earlier than it was known to have spoken.
+            let mut oldest = BTreeMap::new();
+            let message = |(at, heard): (i64, Vec<_>)| {
+                let heard = heard.into_iter().map(|((monitor, position), (truth, age)): ((_, u32), (_, i64))| {
+                    let oldest: &mut i64 = oldest.entry((monitor, position)).or_default();
+                    *oldest = (at - age).max(*oldest);
+                    Heard { monitor, at: position, truth, oldest: *oldest }
+                });
+                Message { at, heard: heard.collect() }
+            };
+            messages.into_iter().map(message).collect()
         });
         (Just(monitors), messages)
     })

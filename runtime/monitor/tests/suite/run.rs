@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 use sesame_base::time::SimTime;
-use sesame_monitor::{Changes, EvidenceId, Invalid, Network, Run, State, Truth};
+use sesame_monitor::{Changes, EvidenceId, Invalid, Network, Reading, Run, State, Truth};
 use sesame_plan::{Demand, Gate, Monitor, MonitorId};
 
 use crate::naive::{self, Moment, Step};
@@ -12,8 +12,11 @@ use crate::random::{self, END, Message};
 
 const T: fn(i64) -> SimTime = SimTime::from_nanos;
 
-fn heard(network: &Network, message: &Message) -> Vec<(EvidenceId, Truth)> {
-    message.heard.iter().map(|&(monitor, at, truth)| (network.evidence(monitor, at), truth)).collect()
+pub(crate) fn heard(network: &Network, message: &Message) -> Vec<Reading> {
+    let heard = message.heard.iter();
+    heard
+        .map(|it| Reading { evidence: network.evidence(it.monitor, it.at), truth: it.truth, oldest: T(it.oldest) })
+        .collect()
 }
 
 /// The decisions of each monitor.
@@ -115,7 +118,7 @@ proptest! {
         }).collect();
         let mut told = messages.clone();
         for message in &mut told {
-            message.heard.iter_mut().for_each(|heard| heard.0 = moved(heard.0));
+            message.heard.iter_mut().for_each(|heard| heard.monitor = moved(heard.monitor));
             message.heard.reverse();
         }
         let mut expected = decisions(&monitors, &messages, END);
@@ -159,6 +162,6 @@ fn time_does_not_go_back() {
     let mut changes = Changes::default();
     let mut run = Run::start(Arc::new(Network::new(&[monitor]).unwrap()), &mut changes);
     run.advance(T(10), &mut changes);
-    run.observe(T(5), &[(EvidenceId(0), Truth::True)], &mut changes);
+    run.observe(T(5), &[Reading::now(T(5), EvidenceId(0), Truth::True)], &mut changes);
     assert_eq!(changes.decisions.last().unwrap().at, T(10));
 }

@@ -40,7 +40,8 @@ fn naive(guarantees: u32, horizon: Option<i64>, steps: &[(i64, State)], hazards:
     let is_false = |(at, &(state, from, to, first)): (usize, &(State, i64, i64, bool))| {
         let inside = |hazard: i64| from <= hazard && (hazard < to || at == last);
         let near = |hazard: i64| from <= hazard && horizon.is_some_and(|horizon| hazard <= from + horizon);
-        state == State::Safe && !first && !hazards.iter().any(|&(_, hazard)| inside(hazard) || near(hazard))
+        let counts = !first || stays.len() == 1;
+        state == State::Safe && counts && !hazards.iter().any(|&(_, hazard)| inside(hazard) || near(hazard))
     };
     let mut time_in = vec![0; guarantees as usize + 1];
     for &(state, from, to, _) in &stays {

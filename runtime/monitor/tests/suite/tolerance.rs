@@ -1,12 +1,13 @@
 //! Tolerances compared with all delays.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use proptest::prelude::*;
 use sesame_base::time::SimTime;
 use sesame_monitor::compare::{Step, steps};
 use sesame_monitor::tolerance::{Limit, Message, Recording, tolerance, tolerances};
-use sesame_monitor::{Changes, EvidenceId, Network, Run, State, Truth};
+use sesame_monitor::{Changes, EvidenceId, Network, Reading, Run, State, Truth};
 use sesame_plan::{Gate, Monitor, MonitorId};
 
 use crate::random::{self, END};
@@ -14,11 +15,8 @@ use crate::random::{self, END};
 const T: fn(i64) -> SimTime = SimTime::from_nanos;
 
 /// A condition made from numbers: of what is the latest in each stream, and which of them was heard.
-fn truth(values: &[u8], evidence: EvidenceId, heard: usize, latest: &[Option<usize>]) -> Truth {
-    if latest.contains(&None) {
-        return Truth::Unknown;
-    }
-    let sum: usize = latest.iter().flatten().map(|&at| values[at] as usize).sum();
+fn truth(values: &[u8], evidence: EvidenceId, heard: usize, latest: &[usize]) -> Truth {
+    let sum: usize = latest.iter().map(|&at| values[at] as usize).sum();
     match (sum + evidence.index() + values[heard] as usize / 4) % 5 {
         0 | 1 => Truth::False,
         2 => Truth::Unknown,
@@ -44,25 +42,38 @@ fn delayed(
         })
         .collect();
     messages.sort_unstable();
-    let mut latest: Vec<Option<usize>> = vec![None; 8];
+    let mut latest: Vec<Option<(usize, i64)>> = vec![None; 8];
     let mut changes = Changes::default();
     let mut run = Run::start(Arc::clone(network), &mut changes);
     messages.retain(|(at, _)| *at <= recording.end.nanos());
     // Messages that are joined are one event as long as nothing comes between them.
     let is_joined =
         |a: &(i64, usize), b: &(i64, usize)| a.0 == b.0 && (a.1 + 1..=b.1).all(|at| recording.messages[at].joined);
-    for event in messages.chunk_by(is_joined) {
-        let mut heard: Vec<(EvidenceId, Truth)> = Vec::new();
-        for &(_, message) in event {
-            let stream = recording.messages[message].stream;
-            latest[stream as usize] = Some(message);
-            let by = (0..).map(EvidenceId).zip(&recording.streams).filter(|(_, streams)| streams.contains(&stream));
-            heard.extend(by.map(|(evidence, streams)| {
-                let latest: Vec<_> = streams.iter().map(|&stream| latest[stream as usize]).collect();
-                (evidence, truth(values, evidence, message, &latest))
-            }));
+    for instant in messages.chunk_by(|one, next| one.0 == next.0) {
+        let at = instant[0].0;
+        // What hears several streams changes after all messages of the instant.
+        let mut settled: BTreeMap<EvidenceId, Reading> = BTreeMap::new();
+        for event in instant.chunk_by(is_joined) {
+            let mut heard: Vec<Reading> = Vec::new();
+            for &(_, message) in event {
+                let stream = recording.messages[message].stream;
+                latest[stream as usize] = Some((message, at));
+                for (evidence, streams) in (0..).map(EvidenceId).zip(&recording.streams) {
+                    let latest: Option<Vec<_>> = streams.iter().map(|&stream| latest[stream as usize]).collect();
+                    let Some(latest) = latest.filter(|_| streams.contains(&stream)) else { continue };
+                    let oldest = T(latest.iter().map(|it| it.1).min().unwrap());
+                    let latest: Vec<usize> = latest.iter().map(|it| it.0).collect();
+                    let reading = Reading { evidence, truth: truth(values, evidence, message, &latest), oldest };
+                    if streams.len() > 1 {
+                        settled.insert(evidence, reading);
+                    } else {
+                        heard.push(reading);
+                    }
+                }
+            }
+            run.observe(T(at), &heard, &mut changes);
         }
-        run.observe(T(event[0].0), &heard, &mut changes);
+        run.observe(T(at), &settled.into_values().collect::<Vec<_>>(), &mut changes);
     }
     run.advance(recording.end, &mut changes);
     network.order().iter().map(|&monitor| steps(&changes.decisions, monitor)).collect()
@@ -110,7 +121,7 @@ proptest! {
         streams in prop::sample::subsequence(vec![0_u32, 1, 2, 3], 1..=3),
     ) {
         let network = Arc::new(Network::new(&monitors).unwrap());
-        let mut conditions = |evidence, heard, latest: &[Option<usize>]| truth(&values, evidence, heard, latest);
+        let mut conditions = |evidence, heard, latest: &[usize]| truth(&values, evidence, heard, latest);
         let found = tolerance(&network, &recording, &mut conditions, &streams, network.order());
         let recorded = delayed(&network, &recording, &values, &streams, 0);
         let first_broken = (1..=END + 8).find(|&delay| {
@@ -140,7 +151,7 @@ fn a_pulse_that_comes_too_late_is_found() {
     let messages = at.iter().map(|&(at, stream)| Message { at: T(at), stream, joined: false }).collect();
     let recording = Recording { messages, streams: vec![vec![0], vec![1]], end: T(1000) };
     // The first is true from 100 to 150, the second from 0 to 200.
-    let mut conditions = |_, heard: usize, _: &[Option<usize>]| Truth::from(heard < 2);
+    let mut conditions = |_, heard: usize, _: &[usize]| Truth::from(heard < 2);
     let each = tolerances(&network, &recording, &mut conditions, &[&[0], &[1]], &[MonitorId(0)]);
     assert_eq!(each[0].delay, T(100), "the first begins as the second ends, and was recorded before it");
     assert_eq!(each[1].delay, T(150), "the second begins as the first ends");

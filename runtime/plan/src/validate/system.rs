@@ -17,14 +17,7 @@ const MILLISECOND: u64 = 1_000_000;
 impl CampaignPlan {
     pub(super) fn sound_simulator(&self, simulator: &Simulator) -> Checked {
         at("name", name(&simulator.name))?;
-        let step_ns = match &simulator.transport {
-            Transport::InProcess { step_ns, .. } => Some(*step_ns),
-            Transport::Process { step_ns, .. } => *step_ns,
-            Transport::Ros2(ros2) => ros2.step.as_ref().map(|step| step.step_ns),
-            Transport::Rosbridge(_) | Transport::Ros1(_) | Transport::Mqtt(_) => None,
-            Transport::Simlog(simlog) => Some(simlog.step_ns),
-        };
-        at("transport.step_ns", require(step_ns != Some(0), || "must be positive".to_owned()))?;
+        at("transport.step_ns", require(simulator.transport.step_ns() != Some(0), || "must be positive".to_owned()))?;
         match &simulator.transport {
             Transport::InProcess { .. } | Transport::Process { .. } => {}
             Transport::Ros2(Ros2 { domain, interfaces, .. }) => {

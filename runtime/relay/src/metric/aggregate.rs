@@ -4,19 +4,29 @@
 //! A formula over one topic, or over each member of one group, is evaluated at each message. A formula that combines
 //! several topics, or several members of a group, is evaluated once per instant of simulation time at which one of them
 //! had a message, when all messages of that instant are known: so it never combines the new value of one with the old
-//! value of another that changes in the same instant. A minimum, maximum or duration that contains the time is
-//! evaluated at every instant. While the last value of an input is not finite, the formula is not evaluated.
+//! value of another that changes in the same instant. While the last value of an input is not finite, the formula is
+//! not evaluated.
 //!
-//! A duration over each member has a tally for each of them, since what holds of one says nothing about another.
+//! A formula over each member of a group is evaluated for those that had a message. If another topic had one, the value
+//! of every member has changed, and all of them count. Each member, each pair and each key has a state of its own,
+//! since what holds of one says nothing about another.
+//!
+//! A minimum, maximum or duration that contains the time is evaluated at each step of the simulation too. Where nobody
+//! steps, time passes continuously: it is evaluated just before each message of its topics, and whenever one of its
+//! comparisons changes. Nothing else that happens in a run causes an evaluation.
 
 use std::collections::BTreeMap;
 
+use sesame_base::activation::TICK;
 use sesame_base::time::SimTime;
 use sesame_plan::{Aggregate, CampaignPlan, Condition, Formula, Input, Members, TopicId};
 
 use crate::metric::Context;
-use crate::metric::expression::{Held, Moment, greatest, holds, least, number};
+use crate::metric::attendance::Attendance;
+use crate::metric::expression::{Held, greatest, least};
+use crate::metric::growth::{next_change, next_crossing};
 use crate::metric::held::{HeldInputs, hear};
+use crate::metric::tally::{Tally, step};
 use crate::value::{Text, Value};
 
 /// The most keys of one metric; messages with further keys are ignored, with a warning of the run.
@@ -25,20 +35,41 @@ const KEY_LIMIT: usize = 1_000;
 /// A formula in one run.
 pub(super) struct FormulaState<'p> {
     formula: &'p Formula,
-    /// Whether it combines several topics or several members, so that it is evaluated once per instant.
+    /// Whether it is evaluated once per instant, since it combines several topics or several members.
     several: bool,
-    /// Whether it is evaluated at every instant, with a message or without.
+    /// Whether it changes while time passes.
     timed: bool,
-    /// The whole state without keys; with keys, the initial state of a new one. Of pairs it holds the values.
+    of: Of,
+    /// The whole state without keys; with keys, the initial state of a new one.
     common: Stream,
     keys: BTreeMap<Key, Stream>,
-    /// One for each pair of a group's members, if the formula is of pairs; one for each member, paired with itself, if
-    /// members have tallies of their own.
-    pairs: Vec<Pair>,
-    /// Per member of that group: whether it had a message in the instant that is over. Kept to be used again.
-    spoke: Vec<bool>,
+    /// Who had a message in an instant, for a formula that is evaluated once per instant.
+    attendance: Option<Attendance>,
+    /// When it was evaluated last.
+    evaluated: Option<SimTime>,
     /// The values of the current message, per input.
     heard: Vec<(usize, Held)>,
+}
+
+/// What a formula is evaluated for.
+enum Of {
+    /// The values of its inputs.
+    Inputs,
+    /// Each of so many members of its groups.
+    Members(usize),
+    /// Each pair of different members of its group.
+    Pairs(Vec<(usize, usize)>),
+}
+
+impl Of {
+    /// How many states there are.
+    fn count(&self) -> usize {
+        match self {
+            Of::Inputs => 1,
+            Of::Members(count) => *count,
+            Of::Pairs(pairs) => pairs.len(),
+        }
+    }
 }
 
 /// The value that distinguishes the messages of a topic.
@@ -51,41 +82,44 @@ enum Key {
 impl<'p> FormulaState<'p> {
     /// Before the first message.
     pub(super) fn new(formula: &'p Formula, plan: &CampaignPlan) -> Self {
-        let held = HeldInputs::new(&formula.inputs, plan);
-        let each = || formula.inputs.iter().filter(|input| input.members == Members::Each);
-        let paired = each().any(|input| each().any(|other| other.field.topic != input.field.topic));
-        let common = Stream {
-            held,
-            tally: Tally::default(),
-            heard: false,
-            others: false,
-            members: Vec::new(),
-            paired,
-            latest: None,
+        let each = formula.inputs.iter().find(|input| input.members == Members::Each);
+        let pairs: Vec<(usize, usize)> = pairs_of(&formula.inputs, plan).collect();
+        let of = match each {
+            _ if !pairs.is_empty() => Of::Pairs(pairs),
+            Some(input) => Of::Members(plan.topic(input.field.topic).paths.len()),
+            None => Of::Inputs,
         };
-        let timed = evaluated_at_every_instant(formula);
-        let mut pairs: Vec<(usize, usize)> = pairs_of(&formula.inputs, plan).collect();
-        if formula.per.is_none() && (timed || matches!(formula.aggregate, Aggregate::Duration { .. })) {
-            let members = each().map(|input| plan.topic(input.field.topic).paths.len()).next().unwrap_or(0);
-            pairs.extend((0..members).map(|member| (member, member)));
-        }
-        let pairs: Vec<Pair> = pairs.into_iter().map(|members| Pair { members, tally: Tally::default() }).collect();
+        let timed = changes_with_time(formula);
         let topics = || formula.inputs.iter().map(|input| input.field.topic);
-        let combined = |input: &Input| {
-            matches!(input.members, Members::Min | Members::Max | Members::Sum)
-                && plan.topic(input.field.topic).paths.len() > 1
+        let combined =
+            |input: &Input| !matches!(input.members, Members::Each) && plan.topic(input.field.topic).paths.len() > 1;
+        let several =
+            timed || topics().any(|topic| Some(topic) != topics().next()) || formula.inputs.iter().any(combined);
+        // Without these, one state for the values of all members gives the same count, extreme, mean and last value.
+        let apart = match of {
+            Of::Inputs => false,
+            Of::Members(_) => formula.every.is_some() || matches!(formula.aggregate, Aggregate::Duration { .. }),
+            Of::Pairs(_) => true,
         };
-        let several = timed
-            || !pairs.is_empty()
-            || topics().any(|topic| Some(topic) != topics().next())
-            || formula.inputs.iter().any(combined);
-        let (keys, spoke, heard) = (BTreeMap::new(), Vec::new(), Vec::new());
-        FormulaState { formula, several, timed, common, keys, pairs, spoke, heard }
+        FormulaState {
+            formula,
+            several,
+            timed,
+            common: Stream::new(HeldInputs::new(&formula.inputs, plan), if apart { of.count() } else { 1 }),
+            of,
+            keys: BTreeMap::new(),
+            attendance: several.then(|| Attendance::new(&formula.inputs, plan)),
+            evaluated: None,
+            heard: Vec::new(),
+        }
     }
 
     /// A message on the `member`th path of a topic, at the context's time. Returns whether the formula waits for the
     /// end of the instant, for which [`FormulaState::settle`] is called.
     pub(super) fn message(&mut self, topic: TopicId, member: usize, value: &Value, context: &mut Context) -> bool {
+        if let Some(attendance) = &mut self.attendance {
+            attendance.heard(context.now, topic, member);
+        }
         match hear(&self.formula.inputs, topic, value, &mut self.heard) {
             Ok(true) => {}
             Ok(false) => context.read_not_finite(),
@@ -94,11 +128,13 @@ impl<'p> FormulaState<'p> {
                 return false;
             }
         }
-        let wire = (topic, member);
+        let of_members = |input: &Input| matches!(input.members, Members::Each | Members::First | Members::Second);
+        let mut read = self.formula.inputs.iter().filter(|input| input.field.topic == topic);
+        let spoken = Spoken { member: read.clone().any(of_members).then_some(member), all: !read.all(of_members) };
         match &self.formula.per {
             None => {
                 self.common.held.hold(&self.formula.inputs, &self.heard, member);
-                self.common.take(self.formula, wire, self.several, context);
+                self.common.hear(spoken);
             }
             Some(per) if per.topic == topic => {
                 let key = match value.at(&per.path) {
@@ -116,51 +152,91 @@ impl<'p> FormulaState<'p> {
                     ));
                     return false;
                 }
+                // A key that begins in this instant includes earlier messages of the same instant.
                 let stream = self.keys.entry(key).or_insert_with(|| self.common.clone());
                 stream.held.hold(&self.formula.inputs, &self.heard, member);
-                stream.take(self.formula, wire, self.several, context);
+                stream.hear(spoken);
             }
             Some(_) => {
-                self.common.held.hold(&self.formula.inputs, &self.heard, member);
-                if self.several {
-                    // A key that begins in this instant includes earlier messages of the same instant.
-                    self.common.take(self.formula, wire, true, context);
-                }
-                for stream in self.keys.values_mut() {
+                for stream in std::iter::once(&mut self.common).chain(self.keys.values_mut()) {
                     stream.held.hold(&self.formula.inputs, &self.heard, member);
-                    stream.take(self.formula, wire, self.several, context);
+                    stream.hear(spoken);
                 }
             }
         }
         if !self.several {
-            self.set(context);
+            self.settle(context);
         }
         self.several
     }
 
-    /// Whether it is evaluated at every instant; then [`FormulaState::settle`] is called for all of them.
+    /// Whether it changes while time passes.
     pub(super) fn is_timed(&self) -> bool {
         self.timed
     }
 
+    /// Whether its value grows while time passes.
+    pub(super) fn grows(&self) -> bool {
+        matches!(self.formula.aggregate, Aggregate::Duration { .. })
+    }
+
     /// All messages of the instant at the context's time are known.
     pub(super) fn settle(&mut self, context: &mut Context) {
-        if self.timed {
-            // Time concerns all members, with a message or without.
-            for stream in std::iter::once(&mut self.common).chain(self.keys.values_mut()) {
-                (stream.heard, stream.others) = (true, true);
-            }
+        if self.formula.per.is_none() {
+            self.common.settle(self.formula, &self.of, context);
+        } else {
+            self.common.forget();
         }
-        if !self.pairs.is_empty() {
-            self.common.settle_pairs(self.formula, &mut self.pairs, &mut self.spoke, context);
-        } else if self.formula.per.is_none() {
-            self.common.settle(self.formula, context);
-        }
-        self.common.forget();
         for stream in self.keys.values_mut() {
-            stream.settle(self.formula, context);
+            stream.settle(self.formula, &self.of, context);
         }
+        self.evaluated = Some(context.now);
         self.set(context);
+    }
+
+    /// Evaluates all of it at the context's time, which concerns all members, with a message or without.
+    pub(super) fn at_time(&mut self, context: &mut Context) {
+        for stream in std::iter::once(&mut self.common).chain(self.keys.values_mut()) {
+            (stream.heard, stream.others) = (true, true);
+        }
+        self.settle(context);
+    }
+
+    /// A message comes at the context's time, in a system without steps: what time has made of the values until then.
+    pub(super) fn just_before(&mut self, context: &mut Context) {
+        let now = context.now;
+        let before = SimTime::from_nanos(now.nanos() - TICK.nanos());
+        if self.evaluated.is_some_and(|last| last < before) {
+            context.now = before;
+            self.at_time(context);
+            context.now = now;
+        }
+    }
+
+    /// When one of its comparisons changes, if nothing but time passes after `now`.
+    pub(super) fn next_change(&self, now: SimTime) -> Option<SimTime> {
+        self.held().filter_map(|inputs| next_change(self.formula, &inputs, now)).min()
+    }
+
+    /// When its value goes beyond a number or reaches it, if nothing but time passes after `now`.
+    pub(super) fn next_crossing(&self, bound: f64, value: Option<f64>, now: SimTime) -> Option<SimTime> {
+        let (of, beyond): (_, fn(f64, f64) -> bool) = match &self.formula.aggregate {
+            Aggregate::Min { of } => (of, |value, bound| value < bound),
+            Aggregate::Max { of } => (of, |value, bound| value > bound),
+            _ => return None,
+        };
+        // What was reached stays reached.
+        if value.is_some_and(|value| beyond(value, bound)) {
+            return None;
+        }
+        self.held().filter_map(|inputs| next_crossing(of, bound, &inputs, now)).min()
+    }
+
+    /// The values of the inputs, for each of what is aggregated apart.
+    fn held(&self) -> impl Iterator<Item = Vec<Held>> {
+        // The initial state of new keys aggregates nothing.
+        let streams = self.streams().skip(usize::from(self.formula.per.is_some()));
+        streams.flat_map(|stream| (0..self.of.count()).filter_map(|at| stream.turned_to(self.formula, &self.of, at)))
     }
 
     /// The value that would have been reached if every number had been finite: messages after the first number that was
@@ -174,34 +250,69 @@ impl<'p> FormulaState<'p> {
 
     /// The run has ended, at the context's time: what holds has held until now.
     pub(super) fn end(&mut self, context: &mut Context) {
-        if !matches!(self.formula.aggregate, Aggregate::Duration { .. }) {
-            return;
-        }
-        let keyed = self.keys.values_mut().map(|keyed| &mut keyed.tally);
-        let of_pairs = self.pairs.iter_mut().map(|pair| &mut pair.tally);
-        for tally in std::iter::once(&mut self.common.tally).chain(keyed).chain(of_pairs) {
-            if tally.holds_since.is_some() {
-                tally.hold(context.now, false);
+        if self.grows() {
+            self.set(context);
+            for tally in self.streams_mut().flat_map(|stream| &mut stream.tallies) {
+                tally.stop(context.now);
             }
         }
-        self.set(context);
     }
 
-    /// The value over all keys and pairs: counts are added, of maxima it is the greatest, of all others the least.
+    /// The run broke off at the context's time, in an instant of which `waits` says whether the formula waited for its
+    /// end: that instant counts if it is complete. What time has made of the values counts until the last instant that
+    /// was observed.
+    pub(super) fn break_off(&mut self, waits: bool, observed: SimTime, context: &mut Context) {
+        if waits && self.attendance.as_ref().is_some_and(Attendance::is_complete) {
+            self.settle(context);
+        }
+        if self.evaluated.is_some_and(|last| last < observed) {
+            context.now = observed;
+            self.grow(context);
+        }
+    }
+
+    /// What has held until now is part of the value of a duration.
+    pub(super) fn grow(&mut self, context: &mut Context) {
+        if self.grows() {
+            self.set(context);
+        }
+    }
+
+    /// How long it has held until `now`, and how many times as fast as time passes that grows; `None` if it is no
+    /// duration, or has not begun.
+    pub(super) fn growth(&self, now: SimTime) -> Option<(SimTime, i64)> {
+        if !self.grows() {
+            return None;
+        }
+        let tallies = || self.streams().flat_map(|stream| &stream.tallies).filter(|tally| tally.value.is_some());
+        let total = tallies().map(|tally| tally.held_until(now)).reduce(|a, b| a + b)?;
+        Some((total, tallies().map(|tally| i64::from(tally.holds())).sum()))
+    }
+
+    fn streams(&self) -> impl Iterator<Item = &Stream> {
+        std::iter::once(&self.common).chain(self.keys.values())
+    }
+
+    fn streams_mut(&mut self) -> impl Iterator<Item = &mut Stream> {
+        std::iter::once(&mut self.common).chain(self.keys.values_mut())
+    }
+
+    /// The value over all keys, members and pairs: counts and durations are added, of maxima it is the greatest, of all
+    /// others the least. Means and last values of the members of a key are those of all their messages.
     fn set(&self, context: &mut Context) {
-        let streams = || std::iter::once(&self.common).chain(self.keys.values()).map(|stream| &stream.tally);
-        let tallies = || streams().chain(self.pairs.iter().map(|pair| &pair.tally));
-        let values = tallies().filter_map(|tally| tally.value);
+        let values = || self.streams().flat_map(|stream| &stream.tallies).filter_map(|tally| tally.value);
+        let of_messages = |of: fn(&Stream) -> Option<f64>| match self.of {
+            Of::Pairs(_) => values().reduce(least),
+            Of::Inputs | Of::Members(_) => self.streams().filter_map(of).reduce(least),
+        };
         let value = match self.formula.aggregate {
             // In whole nanoseconds, so that equal durations have equal values.
-            Aggregate::Duration { .. } => tallies()
-                .filter(|tally| tally.value.is_some())
-                .map(|tally| tally.held)
-                .reduce(|a, b| a + b)
-                .map(SimTime::seconds),
-            Aggregate::Count { .. } => values.reduce(|a, b| a + b),
-            Aggregate::Max { .. } => values.reduce(greatest),
-            Aggregate::Last { .. } | Aggregate::Min { .. } | Aggregate::Mean { .. } => values.reduce(least),
+            Aggregate::Duration { .. } => self.growth(context.now).map(|(total, _)| total.seconds()),
+            Aggregate::Count { .. } => values().reduce(|a, b| a + b),
+            Aggregate::Max { .. } => values().reduce(greatest),
+            Aggregate::Min { .. } => values().reduce(least),
+            Aggregate::Mean { .. } => of_messages(Stream::mean),
+            Aggregate::Last { .. } => of_messages(|stream| stream.last),
         };
         if let Some(value) = value {
             context.set(value);
@@ -211,7 +322,7 @@ impl<'p> FormulaState<'p> {
 
 /// Whether a formula changes while time passes, and its aggregate sees that: a message more or less counts in all
 /// others.
-fn evaluated_at_every_instant(formula: &Formula) -> bool {
+fn changes_with_time(formula: &Formula) -> bool {
     let reads_time = match &formula.aggregate {
         Aggregate::Min { of } | Aggregate::Max { of } => of.reads_time(),
         Aggregate::Duration { of } => of.reads_time(),
@@ -227,185 +338,116 @@ pub(super) fn pairs_of(inputs: &[Input], plan: &CampaignPlan) -> impl Iterator<I
     (0..count).flat_map(move |first| (first + 1..count).map(move |second| (first, second)))
 }
 
-/// The aggregated values of a pair of members, or of one member, paired with itself.
-struct Pair {
-    members: (usize, usize),
-    tally: Tally,
+/// Whose values a message changed.
+#[derive(Debug, Clone, Copy)]
+struct Spoken {
+    /// Those of this member.
+    member: Option<usize>,
+    /// Those of every member.
+    all: bool,
 }
 
-/// The held inputs and the aggregated values; one for each key.
+/// The held inputs and what is aggregated; one for each key.
 #[derive(Clone)]
 struct Stream {
     held: HeldInputs,
-    tally: Tally,
-    /// Whether a message of the current instant has not been aggregated yet.
+    /// One for each member or pair, if they have states of their own.
+    tallies: Vec<Tally>,
+    /// The sum and number of the values that counted in a mean, of all members.
+    sum: (f64, f64),
+    /// The value that counted last, of whatever member.
+    last: Option<f64>,
+    /// Whether there was a message of the current instant.
     heard: bool,
-    /// Whether it changed a value that concerns all members of the groups below.
+    /// Whether one of them changed the values of every member.
     others: bool,
-    /// The members of groups from which it came, if each member or pair has a formula: each once, the latest last.
-    members: Vec<usize>,
-    /// Whether members of several groups belong together.
-    paired: bool,
-    /// The last member that was aggregated, of groups that belong together.
-    latest: Option<usize>,
+    /// The members from which one came, each once, the latest last.
+    spoke: Vec<usize>,
 }
 
 impl Stream {
-    /// Aggregates a message whose values are held: now, or when its instant is over.
-    fn take(&mut self, formula: &Formula, wire: (TopicId, usize), wait: bool, context: &mut Context) {
-        if !wait {
-            return step(formula, &self.held, &mut self.tally, context);
-        }
+    fn new(held: HeldInputs, tallies: usize) -> Self {
+        let tallies = vec![Tally::default(); tallies];
+        Stream { held, tallies, sum: (0.0, 0.0), last: None, heard: false, others: false, spoke: Vec::new() }
+    }
+
+    /// Remembers a message whose values are held.
+    fn hear(&mut self, Spoken { member, all }: Spoken) {
         self.heard = true;
-        let (topic, member) = wire;
-        let of_members = |input: &Input| matches!(input.members, Members::Each | Members::First);
-        if formula.inputs.iter().any(|input| of_members(input) && input.field.topic == topic) {
-            self.members.retain(|&heard| heard != member);
-            self.members.push(member);
+        self.others |= all;
+        if let Some(member) = member {
+            self.spoke.retain(|&heard| heard != member);
+            self.spoke.push(member);
         }
-        // What is computed of all members concerns each of them.
-        let of_all = |input: &Input| matches!(input.members, Members::Min | Members::Max | Members::Sum);
-        self.others |= formula.inputs.iter().any(|input| of_all(input) && input.field.topic == topic);
     }
 
     /// The instant is over, and nothing in it is left to aggregate.
     fn forget(&mut self) {
         self.heard = false;
         self.others = false;
-        self.members.clear();
+        self.spoke.clear();
     }
 
-    /// The instant is over: aggregates each member of a group that had a message, or the held values if none had one.
-    fn settle(&mut self, formula: &Formula, context: &mut Context) {
-        if !std::mem::take(&mut self.heard) {
+    /// The instant is over: aggregates what it changed.
+    fn settle(&mut self, formula: &Formula, of: &Of, context: &mut Context) {
+        if !self.heard {
             return;
         }
-        if self.members.is_empty() {
-            // The values of one member, and not the last one of each group.
-            let one = !self.paired || self.latest.is_some_and(|member| self.held.turn_to(&formula.inputs, member));
-            if one {
-                step(formula, &self.held, &mut self.tally, context);
-            }
-            return;
-        }
-        let mut members = std::mem::take(&mut self.members);
-        for member in members.drain(..) {
-            if self.held.turn_to(&formula.inputs, member) {
-                self.latest = Some(member);
-                step(formula, &self.held, &mut self.tally, context);
-            }
-        }
-        self.members = members;
-    }
-
-    /// The instant is over: aggregates each pair of which a member had a message, or all pairs if another topic had
-    /// one.
-    fn settle_pairs(&mut self, formula: &Formula, pairs: &mut [Pair], spoke: &mut Vec<bool>, context: &mut Context) {
-        // The last pair has the last member.
-        let count = pairs.last().map_or(0, |pair| pair.members.1 + 1);
-        spoke.clear();
-        spoke.resize(count, self.others);
-        for &member in &self.members {
-            spoke[member] = true;
-        }
-        for Pair { members, tally } in pairs {
-            let concerned = spoke[members.0] || spoke[members.1];
-            if concerned && self.held.turn_to_pair(&formula.inputs, *members) {
-                step(formula, &self.held, tally, context);
-            } else if tally.holds_since.is_some() {
-                // Of a silent member it holds on, and conditions over the duration need to see that.
-                tally.hold(context.now, true);
-            }
-        }
-    }
-}
-
-/// Aggregates the values as they are now, once all are known.
-fn step(formula: &Formula, held: &HeldInputs, tally: &mut Tally, context: &mut Context) {
-    let now = context.now;
-    let Some(inputs) = held.values() else {
-        // While a value is not finite, it is not known what holds.
-        if tally.holds_since.is_some() {
-            tally.hold(now, false);
-        }
-        return;
-    };
-    let moment = Moment::new(inputs, now.seconds());
-    tally.take(formula, &moment, now, context);
-    if let Some(undefined) = moment.undefined() {
-        context.note(format!("{undefined} at {now}"));
-    }
-}
-
-/// The aggregate of a formula's values.
-#[derive(Debug, Clone, Default)]
-struct Tally {
-    value: Option<f64>,
-    /// For a mean.
-    messages: f64,
-    sum: f64,
-    /// When the last message counted.
-    counted: Option<SimTime>,
-    /// For a duration: how long it has held, and since when it holds.
-    held: SimTime,
-    holds_since: Option<SimTime>,
-}
-
-impl Tally {
-    /// Aggregates the values of a moment.
-    fn take(&mut self, formula: &Formula, moment: &Moment<'_>, now: SimTime, context: &mut Context) {
-        let due = |tally: &mut Tally| formula.every.is_none_or(|period| tally.due(now, SimTime::from_seconds(period)));
-        let counts = formula.when.as_ref().is_none_or(|when| holds(when, moment));
-        let of = match &formula.aggregate {
-            Aggregate::Duration { of } => {
-                return self.hold(now, counts && holds(of, moment));
-            }
-            Aggregate::Count { of } => {
-                let before = *self.value.get_or_insert(0.0);
-                if counts && holds(of, moment) && due(self) {
-                    self.value = Some(before + 1.0);
+        match of {
+            Of::Inputs => self.step(formula, 0, context),
+            Of::Members(count) => {
+                if self.others {
+                    let mut silent = vec![true; *count];
+                    self.spoke.iter().for_each(|&member| silent[member] = false);
+                    for member in (0..*count).filter(|&member| silent[member]) {
+                        self.step_of_member(formula, member, context);
+                    }
                 }
-                return;
+                for at in 0..self.spoke.len() {
+                    self.step_of_member(formula, self.spoke[at], context);
+                }
             }
-            Aggregate::Last { of } | Aggregate::Min { of } | Aggregate::Max { of } | Aggregate::Mean { of } => of,
+            Of::Pairs(pairs) => {
+                // The last pair has the last member.
+                let mut concerned = vec![self.others; pairs.last().map_or(0, |pair| pair.1 + 1)];
+                self.spoke.iter().for_each(|&member| concerned[member] = true);
+                for (at, &pair) in pairs.iter().enumerate().filter(|(_, pair)| concerned[pair.0] || concerned[pair.1]) {
+                    if self.held.turn_to_pair(&formula.inputs, pair) {
+                        self.step(formula, at, context);
+                    }
+                }
+            }
+        }
+        self.forget();
+    }
+
+    fn step_of_member(&mut self, formula: &Formula, member: usize, context: &mut Context) {
+        if self.held.turn_to(&formula.inputs, member) {
+            self.step(formula, if self.tallies.len() == 1 { 0 } else { member }, context);
+        }
+    }
+
+    /// Aggregates the values that are held now.
+    fn step(&mut self, formula: &Formula, at: usize, context: &mut Context) {
+        if let Some(value) = step(formula, &self.held, &mut self.tallies[at], context) {
+            self.sum = (self.sum.0 + value, self.sum.1 + 1.0);
+            self.last = Some(value);
+        }
+    }
+
+    fn mean(&self) -> Option<f64> {
+        let (sum, count) = self.sum;
+        (count > 0.0).then(|| sum / count)
+    }
+
+    /// The values of all inputs for one of those that the formula is of, once all are known and finite.
+    fn turned_to(&self, formula: &Formula, of: &Of, at: usize) -> Option<Vec<Held>> {
+        let mut held = self.held.clone();
+        let known = match of {
+            Of::Inputs => true,
+            Of::Members(_) => held.turn_to(&formula.inputs, at),
+            Of::Pairs(pairs) => held.turn_to_pair(&formula.inputs, pairs[at]),
         };
-        if !counts {
-            return;
-        }
-        let value = number(of, moment);
-        if !value.is_finite() {
-            if moment.undefined().is_none() {
-                context.note(format!("refused the value {value} at {now}"));
-            }
-            return;
-        }
-        if due(self) {
-            self.messages += 1.0;
-            self.sum += value;
-            self.value = Some(match (&formula.aggregate, self.value) {
-                (Aggregate::Min { .. }, Some(before)) => least(before, value),
-                (Aggregate::Max { .. }, Some(before)) => greatest(before, value),
-                (Aggregate::Mean { .. }, _) => self.sum / self.messages,
-                _ => value,
-            });
-        }
-    }
-
-    /// Whether a message at this time counts.
-    fn due(&mut self, now: SimTime, period: SimTime) -> bool {
-        let due = self.counted.is_none_or(|counted| now - counted >= period);
-        if due {
-            self.counted = Some(now);
-        }
-        due
-    }
-
-    /// What held before has held until now; sets whether it holds from now on.
-    fn hold(&mut self, now: SimTime, holds: bool) {
-        if let Some(since) = self.holds_since {
-            self.held = self.held + (now - since);
-        }
-        self.holds_since = holds.then_some(now);
-        self.value = Some(self.held.seconds());
+        known.then(|| held.values().map(<[Held]>::to_vec)).flatten()
     }
 }

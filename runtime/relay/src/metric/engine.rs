@@ -2,18 +2,18 @@
 
 use std::sync::Arc;
 
-use sesame_base::activation::TICK;
 use sesame_base::observation::{MetricObservation, Reach};
 use sesame_base::time::SimTime;
 use sesame_base::verdict::ends;
 use sesame_monitor::{Invalid, Network};
+use sesame_plan::condition::Operand;
 use sesame_plan::stl::Robustness;
-use sesame_plan::{CampaignPlan, Formula, Members, MetricId, MetricSource, Side, Span, TopicId};
+use sesame_plan::{CampaignPlan, Formula, Members, MetricId, MetricSource, Side, Span, TopicId, Trend};
 
 use crate::metric::aggregate::FormulaState;
 use crate::metric::robustness::RobustnessState;
 use crate::metric::{Context, Hook, HookEntry};
-
+use crate::relay::{beyond, reaching};
 use crate::stl::FormulaError;
 use crate::value::{Text, Value};
 use crate::wire::{Wire, WireTable};
@@ -31,6 +31,8 @@ pub struct MetricTable<'p> {
     wires: Vec<(Text, TopicId, usize)>,
     /// The monitors, whose scores are metrics; `None` for a plan without monitors.
     network: Option<Arc<Network>>,
+    /// Simulation time of one step; `None` for a system that nobody steps.
+    step: Option<SimTime>,
 }
 
 /// Why a runner cannot compute the metrics of its plan.
@@ -115,16 +117,16 @@ impl<'p> MetricTable<'p> {
         });
         let network = (!plan.monitors.is_empty()).then(|| Network::new(&plan.monitors));
         let network = network.transpose().map_err(MetricError::Monitors)?.map(Arc::new);
-        Ok(MetricTable { plan, hooks: found, taps, delivered, wires: wires.collect(), network })
+        Ok(MetricTable { plan, hooks: found, taps, delivered, wires: wires.collect(), network, step: step_of(plan) })
     }
 
     /// Fresh metrics for one run.
     pub fn start(&self) -> Metrics<'_> {
-        let states: Vec<State<'_>> = self
-            .hooks
-            .iter()
+        let states: Vec<State<'_>> = (0..)
+            .zip(&self.hooks)
             .zip(&self.plan.metrics)
-            .map(|(hook, metric)| State {
+            .map(|((at, hook), metric)| State {
+                compared: bounds_on(self.plan, MetricId(at)).map(Operand::Number).collect(),
                 hook: hook.map(|hook| (hook.build)()),
                 formula: match &metric.source {
                     MetricSource::Formula { formula } => Some(FormulaState::new(formula, self.plan)),
@@ -143,8 +145,19 @@ impl<'p> MetricTable<'p> {
                 unknown: false,
             })
             .collect();
-        let timed = states.iter().enumerate().filter(|(_, state)| state.is_timed()).map(|(at, _)| at).collect();
-        Metrics { table: self, states, now: SimTime::ZERO, waiting: Vec::new(), timed, timed_until: None }
+        let timed = (0..states.len()).filter(|&at| states[at].is_timed()).collect();
+        let changes = |state: &State<'_>| state.grows() || (self.step.is_none() && state.is_timed());
+        let changing = (0..states.len()).filter(|&at| changes(&states[at])).collect();
+        Metrics {
+            table: self,
+            now: SimTime::ZERO,
+            waiting: Vec::new(),
+            timed,
+            stepped: None,
+            changing,
+            heard: None,
+            states,
+        }
     }
 }
 
@@ -156,10 +169,14 @@ pub struct Metrics<'p> {
     now: SimTime,
     /// The metrics whose formulas wait for the end of the current instant.
     waiting: Vec<usize>,
-    /// The metrics whose formulas are evaluated at the end of every instant.
+    /// The metrics whose formulas change while time passes.
     timed: Vec<usize>,
-    /// The last instant of which they were.
-    timed_until: Option<SimTime>,
+    /// The last step at which they were evaluated.
+    stepped: Option<SimTime>,
+    /// The metrics whose values may change between messages and steps.
+    changing: Vec<usize>,
+    /// When the last message was heard, on whatever wire.
+    heard: Option<SimTime>,
 }
 
 struct State<'p> {
@@ -167,6 +184,8 @@ struct State<'p> {
     formula: Option<FormulaState<'p>>,
     robustness: Option<RobustnessState<'p>>,
     context: Context,
+    /// With what its value is compared by requirements and conditions.
+    compared: Vec<Operand>,
     /// Whether it is among those that wait.
     waits: bool,
     /// Whether it knows the end of the run.
@@ -193,6 +212,11 @@ impl State<'_> {
         self.formula.as_ref().is_some_and(FormulaState::is_timed)
             || self.robustness.as_ref().is_some_and(RobustnessState::is_timed)
     }
+
+    /// Whether its value grows while time passes.
+    fn grows(&self) -> bool {
+        self.formula.as_ref().is_some_and(FormulaState::grows)
+    }
 }
 
 impl<'p> Metrics<'p> {
@@ -217,13 +241,91 @@ impl Metrics<'_> {
         }
     }
 
+    /// The value of this metric is compared with this in conditions.
+    pub(crate) fn compare(&mut self, metric: MetricId, with: Operand) {
+        self.states[metric.index()].compared.push(with);
+    }
+
     /// Simulation time is `now` from here on: all messages of earlier instants are known, and formulas over several
     /// topics have their values of those instants, also for conditions. A message includes this call; call it before
     /// conditions are evaluated, and when time passes without a message.
+    #[inline]
     pub fn advance_to(&mut self, now: SimTime) {
         if now > self.now {
             self.settle();
+            if !(self.timed.is_empty() && self.changing.is_empty()) {
+                self.pass_to(now);
+            }
             self.now = now;
+        }
+    }
+
+    /// What happens while time passes without a message: steps, comparisons that change, and values that cross a number
+    /// with which they are compared. Most runs have nothing of the kind, and do not pay for it with each message.
+    #[inline(never)]
+    fn pass_to(&mut self, now: SimTime) {
+        loop {
+            let step = self.next_step().filter(|&step| step < now);
+            let Some(next) = step.into_iter().chain(self.next_change()).min().filter(|&next| next <= now) else {
+                return;
+            };
+            let changing: Vec<usize> =
+                self.changing.iter().copied().filter(|&at| self.next_change_of(at) == Some(next)).collect();
+            self.now = next;
+            for at in changing {
+                let State { formula: Some(formula), context, .. } = &mut self.states[at] else { continue };
+                context.now = next;
+                if formula.is_timed() && self.table.step.is_none() {
+                    formula.at_time(context);
+                } else {
+                    formula.grow(context);
+                }
+            }
+            if step == Some(next) {
+                self.settle();
+            }
+        }
+    }
+
+    /// The next step of the system that a formula sees.
+    fn next_step(&self) -> Option<SimTime> {
+        let step = self.table.step?.nanos();
+        // Nothing is evaluated after the end that was planned.
+        let end = SimTime::from_seconds(self.table.plan.campaign.end_after);
+        let next = SimTime::from_nanos((self.now.nanos() / step + 1).saturating_mul(step));
+        (!self.timed.is_empty() && next <= end).then_some(next)
+    }
+
+    /// The next moment at which, if nothing but time passes, the value of a metric crosses a number with which it is
+    /// compared, or a comparison in its formula changes.
+    #[inline]
+    pub(crate) fn next_change(&self) -> Option<SimTime> {
+        if self.changing.is_empty() { None } else { self.first_change() }
+    }
+
+    #[inline(never)]
+    fn first_change(&self) -> Option<SimTime> {
+        self.changing.iter().filter_map(|&at| self.next_change_of(at)).min()
+    }
+
+    fn next_change_of(&self, at: usize) -> Option<SimTime> {
+        let State { formula, context, compared, .. } = &self.states[at];
+        let formula = formula.as_ref()?;
+        let numbers = || compared.iter().filter_map(|&with| self.number(with));
+        let growth = if compared.is_empty() { None } else { formula.growth(self.now) };
+        let grown = growth.filter(|&(_, pace)| pace > 0);
+        let mark = grown.and_then(|(total, pace)| next_mark(numbers(), total, pace)).map(|after| self.now + after);
+        if self.table.step.is_some() || !formula.is_timed() {
+            return mark;
+        }
+        let crossings = numbers().filter_map(|number| formula.next_crossing(number, context.value, self.now));
+        mark.into_iter().chain(crossings).chain(formula.next_change(self.now)).min()
+    }
+
+    fn number(&self, with: Operand) -> Option<f64> {
+        match with {
+            Operand::Number(number) => Some(number),
+            Operand::Variable(metric) => self.value(metric, 0.0),
         }
     }
 
@@ -234,11 +336,12 @@ impl Metrics<'_> {
 
     /// The current instant is over: all its messages are known. Returns whether a formula waited for that.
     pub fn settle(&mut self) -> bool {
-        let waited = !self.waiting.is_empty();
-        // The time right after an instant, at which its values switch operations, still belongs to it.
-        if self.timed_until.is_none_or(|last| self.now > last + TICK) {
-            self.timed_until = Some(self.now);
-            self.wake_timed();
+        let mut waited = !self.waiting.is_empty();
+        let is_step = || self.table.step.is_some_and(|step| self.now.nanos() % step.nanos() == 0);
+        // A division for each message would be felt, so where nothing needs it there is none.
+        if !self.timed.is_empty() && is_step() && self.stepped.replace(self.now) != Some(self.now) {
+            waited = true;
+            self.evaluate_timed();
         }
         for at in self.waiting.drain(..) {
             let State { formula, context, waits, .. } = &mut self.states[at];
@@ -251,15 +354,17 @@ impl Metrics<'_> {
         waited
     }
 
-    /// Lets those metrics wait that change while time passes.
-    fn wake_timed(&mut self) {
+    /// Evaluates the formulas that change while time passes.
+    #[inline(never)]
+    fn evaluate_timed(&mut self) {
         for &at in &self.timed {
-            let State { robustness, context, waits, .. } = &mut self.states[at];
+            let State { formula, robustness, context, .. } = &mut self.states[at];
+            context.now = self.now;
             if let Some(robustness) = robustness {
-                context.now = self.now;
                 robustness.tick(context);
-            } else if !std::mem::replace(waits, true) {
-                self.waiting.push(at);
+            }
+            if let Some(formula) = formula {
+                formula.at_time(context);
             }
         }
     }
@@ -268,6 +373,9 @@ impl Metrics<'_> {
     pub fn end(&mut self, now: SimTime) {
         self.advance_to(now);
         self.settle();
+        if self.table.step.is_none() {
+            self.evaluate_timed();
+        }
         for State { hook, formula, robustness, context, ended, .. } in &mut self.states {
             context.now = now;
             if let Some(formula) = formula {
@@ -286,12 +394,17 @@ impl Metrics<'_> {
     /// A message, as the simulator sent it.
     pub fn message(&mut self, now: SimTime, wire: Wire, value: &Value) {
         self.advance_to(now);
+        self.heard = Some(now);
+        let dense = self.table.step.is_none();
         for &(at, input) in &self.table.taps[wire.index()] {
             let State { hook, formula, robustness, context, waits, .. } = &mut self.states[at];
             if let Some(robustness) = robustness {
                 let (path, topic, member) = &self.table.wires[wire.index()];
                 context.now = now;
                 context.topic.clone_from(path);
+                if dense && robustness.is_timed() {
+                    robustness.just_before(context);
+                }
                 robustness.message(*topic, *member, value, context);
                 continue;
             }
@@ -307,6 +420,9 @@ impl Metrics<'_> {
                     hook.on_message(input, value, context);
                 }
                 (MetricSource::Formula { .. }, _, Some(formula)) => {
+                    if dense && formula.is_timed() {
+                        formula.just_before(context);
+                    }
                     let wait = formula.message(*topic, *member, value, context);
                     if wait && !std::mem::replace(waits, true) {
                         self.waiting.push(at);
@@ -333,13 +449,37 @@ impl Metrics<'_> {
         if matches!(declared.source, MetricSource::FuzzingTime) {
             return Some(fuzzing_time);
         }
-        let State { context, unknown, .. } = &self.states[metric.index()];
-        if *unknown && context.value.is_some() { None } else { context.value.or(declared.initial) }
+        let State { context, formula, unknown, .. } = &self.states[metric.index()];
+        let grown = formula.as_ref().and_then(|formula| formula.growth(self.now)).map(|(total, _)| total.seconds());
+        if *unknown && context.value.is_some() { None } else { grown.or(context.value).or(declared.initial) }
     }
 
-    /// The value that a metric was set to last.
+    /// How long the condition of a duration has held until now, and how many times as fast as time passes that grows;
+    /// `None` of other metrics, and before it has begun.
+    pub(crate) fn growth(&self, metric: MetricId) -> Option<(SimTime, i64)> {
+        self.states[metric.index()].formula.as_ref()?.growth(self.now)
+    }
+
+    /// The value that a metric was set to last; after it has read a number that was not finite, as far as that is
+    /// certain all the same.
     pub(crate) fn set_value(&self, metric: MetricId) -> Option<f64> {
-        self.states[metric.index()].context.value
+        let State { context, formula, .. } = &self.states[metric.index()];
+        match (context.not_finite, formula) {
+            (None, _) => context.value,
+            (Some(_), Some(formula)) => formula.certain(context),
+            (Some((_, before)), None) => before,
+        }
+    }
+
+    /// The only direction in which a metric changes, if that was declared and is true so far.
+    pub(crate) fn trend(&self, metric: MetricId) -> Option<Trend> {
+        let context = &self.states[metric.index()].context;
+        context.trend.filter(|_| !context.turned)
+    }
+
+    /// Whether everything that a metric has read was finite.
+    pub(crate) fn is_finite(&self, metric: MetricId) -> bool {
+        self.states[metric.index()].context.not_finite.is_none()
     }
 
     /// Says what a score of a monitor is now.
@@ -375,19 +515,42 @@ impl Metrics<'_> {
     /// A message as it is delivered.
     pub fn delivery(&mut self, now: SimTime, wire: Wire, value: &Value) {
         self.advance_to(now);
+        self.heard = Some(now);
+        let dense = self.table.step.is_none();
         for &at in &self.table.delivered[wire.index()] {
             let State { formula, robustness, context, waits, .. } = &mut self.states[at];
             let (path, topic, member) = &self.table.wires[wire.index()];
             context.now = now;
             context.topic.clone_from(path);
-            if let Some(formula) = formula
-                && formula.message(*topic, *member, value, context)
-                && !std::mem::replace(waits, true)
-            {
-                self.waiting.push(at);
+            if let Some(formula) = formula {
+                if dense && formula.is_timed() {
+                    formula.just_before(context);
+                }
+                if formula.message(*topic, *member, value, context) && !std::mem::replace(waits, true) {
+                    self.waiting.push(at);
+                }
             }
             if let Some(robustness) = robustness {
+                if dense && robustness.is_timed() {
+                    robustness.just_before(context);
+                }
                 robustness.message(*topic, *member, value, context);
+            }
+        }
+    }
+
+    /// Nothing more will be heard. If the run has not ended, formulas learn that it broke off, and their values are
+    /// those up to then. Another call changes nothing.
+    pub(crate) fn break_off(&mut self) {
+        let observed = self.observed();
+        for state in &mut self.states {
+            let context = &mut state.context;
+            if let Some(robustness) = &mut state.robustness {
+                robustness.break_off(self.now, context);
+            }
+            if let Some(formula) = state.formula.as_mut().filter(|_| !state.ended) {
+                context.now = self.now;
+                formula.break_off(state.waits, observed, context);
             }
         }
     }
@@ -400,14 +563,12 @@ impl Metrics<'_> {
     pub fn finish(mut self, busy: &[Span]) -> (Vec<MetricObservation>, Vec<String>) {
         let mut warnings = Vec::new();
         let mut observations = Vec::with_capacity(self.states.len());
-        let requirements = &self.table.plan.requirements;
-        for (at, (state, metric)) in self.states.iter_mut().zip(&self.table.plan.metrics).enumerate() {
+        self.break_off();
+        for (at, (state, metric)) in (0..).zip(self.states.iter_mut().zip(&self.table.plan.metrics)) {
             let context = &mut state.context;
-            if let Some(robustness) = &mut state.robustness {
-                robustness.break_off(self.now, context);
-            }
+            let bounds: Vec<f64> = bounds_on(self.table.plan, MetricId(at)).collect();
             if matches!(metric.source, MetricSource::FuzzingTime) {
-                for (time, total) in fuzzing_time(busy) {
+                for (time, total) in fuzzing_time(busy, &bounds) {
                     context.now = time;
                     context.set(total.seconds());
                 }
@@ -418,8 +579,10 @@ impl Metrics<'_> {
             let set = set && value.is_some();
             let reach = match (&state.robustness, &state.formula) {
                 _ if context.unimplemented => Reach::ANY,
+                // Its default stands for no moment of the run, and decides nothing.
+                (Some(_), _) if !set && state.ended => Reach::ANY,
                 _ if state.ended && context.not_finite.is_none() => Reach::of_whole_run(value),
-                (Some(robustness), _) => robustness.reach(metric.default),
+                (Some(robustness), _) => robustness.reach(),
                 (_, Some(formula)) => context.onwards(formula.certain(context)),
                 _ => context.onwards(context.not_finite.map_or(context.value, |(_, before)| before)),
             };
@@ -429,33 +592,68 @@ impl Metrics<'_> {
                 reach,
                 not_finite: context.not_finite.map(|(time, _)| time.seconds()),
                 series: std::mem::take(&mut context.series),
-                robustness: state.robustness.as_mut().map_or_else(Vec::new, |robustness| {
-                    let bounds = requirements.iter().filter(|requirement| requirement.metric.index() == at);
-                    let bounds = bounds.flat_map(|requirement| {
-                        let (low, _, high, _) = ends(requirement.bound);
-                        [low, high].into_iter().flatten()
-                    });
-                    robustness.signal(&bounds.collect::<Vec<f64>>())
-                }),
+                robustness: state.robustness.as_mut().map_or_else(Vec::new, |robustness| robustness.signal(&bounds)),
             });
         }
         (observations, warnings)
     }
 }
 
-/// The fuzzing time so far, at the end of each interval. It is summed in whole nanoseconds, so tests with equal fuzzing
-/// times have equal values, wherever their intervals are.
-fn fuzzing_time(busy: &[Span]) -> Vec<(SimTime, SimTime)> {
-    let mut intervals: Vec<(SimTime, SimTime)> =
-        busy.iter().map(|span| (SimTime::from_seconds(span.start), SimTime::from_seconds(span.end))).collect();
-    intervals.sort_by_key(|&(_, end)| end);
-    let mut total = SimTime::ZERO;
-    std::iter::once((SimTime::ZERO, total))
-        .chain(intervals.into_iter().map(|(start, end)| {
-            total = total + (end - start);
-            (end, total)
-        }))
-        .collect()
+impl Metrics<'_> {
+    /// The last instant that was observed. In a system that is stepped, it is the present one, whoever spoke in it:
+    /// what was heard last holds until then. Elsewhere it is that of the last message, since nobody knows when it
+    /// stopped.
+    fn observed(&self) -> SimTime {
+        if self.table.step.is_some() { self.now } else { self.heard.unwrap_or(SimTime::ZERO) }
+    }
+}
+
+/// Simulation time of one step of a system that is stepped.
+fn step_of(plan: &CampaignPlan) -> Option<SimTime> {
+    let step = plan.simulator.transport.step_ns()?;
+    i64::try_from(step).ok().filter(|&step| step > 0).map(SimTime::from_nanos)
+}
+
+/// The ends of the bounds of requirements on a metric.
+fn bounds_on(plan: &CampaignPlan, metric: MetricId) -> impl Iterator<Item = f64> {
+    let requirements = plan.requirements.iter().filter(move |requirement| requirement.metric == metric);
+    requirements.flat_map(|requirement| {
+        let (low, _, high, _) = ends(requirement.bound);
+        [low, high].into_iter().flatten()
+    })
+}
+
+/// After how long a total that grows so many times as fast as time passes reaches one of these numbers of seconds, or
+/// exceeds it, whichever is next: the least number of nanoseconds after which it has added up enough.
+pub(crate) fn next_mark(numbers: impl Iterator<Item = f64>, total: SimTime, pace: i64) -> Option<SimTime> {
+    let total = total.nanos();
+    let marks = numbers.flat_map(|number| [reaching(number), beyond(number)]).filter(|&mark| mark > total);
+    marks.min().map(|mark| SimTime::from_nanos((mark - total - 1) / pace + 1))
+}
+
+/// The fuzzing time so far, at the end of each interval and where it reaches one of these numbers of seconds or exceeds
+/// it. It is summed in whole nanoseconds, so tests with equal fuzzing times have equal values, wherever their intervals
+/// are.
+fn fuzzing_time(busy: &[Span], numbers: &[f64]) -> Vec<(SimTime, SimTime)> {
+    let edges = busy.iter().flat_map(|span| [(span.start, 1), (span.end, -1)]);
+    let mut edges: Vec<(SimTime, i64)> = edges.map(|(time, edge)| (SimTime::from_seconds(time), edge)).collect();
+    edges.sort_unstable();
+    let (mut now, mut total, mut pace) = (SimTime::ZERO, SimTime::ZERO, 0);
+    let mut points = vec![(now, total)];
+    for (time, edge) in edges {
+        while pace > 0
+            && let Some(after) = next_mark(numbers.iter().copied(), total, pace).filter(|&after| now + after <= time)
+        {
+            (now, total) = (now + after, total + SimTime::from_nanos(pace * after.nanos()));
+            points.push((now, total));
+        }
+        total = total + SimTime::from_nanos(pace * (time - now).nanos());
+        (now, pace) = (time, pace + edge);
+        if edge < 0 {
+            points.push((now, total));
+        }
+    }
+    points
 }
 
 #[cfg(test)]
@@ -466,7 +664,7 @@ mod tests {
 
     /// The last of it, in seconds.
     fn total(intervals: &[(f64, f64)]) -> f64 {
-        fuzzing_time(&spans(intervals)).last().unwrap().1.seconds()
+        fuzzing_time(&spans(intervals), &[]).last().unwrap().1.seconds()
     }
 
     fn spans(intervals: &[(f64, f64)]) -> Vec<Span> {
@@ -475,9 +673,12 @@ mod tests {
 
     #[test]
     fn fuzzing_time_adds_up_over_operations_even_where_they_overlap() {
-        let points = fuzzing_time(&spans(&[(1.0, 5.0), (6.0, 7.0), (2.0, 3.5)]));
+        let points = fuzzing_time(&spans(&[(1.0, 5.0), (6.0, 7.0), (2.0, 3.5)]), &[]);
         let points: Vec<(f64, f64)> = points.iter().map(|(time, total)| (time.seconds(), total.seconds())).collect();
-        assert_eq!(points, [(0.0, 0.0), (3.5, 1.5), (5.0, 5.5), (7.0, 6.5)]);
+        assert_eq!(points, [(0.0, 0.0), (3.5, 4.0), (5.0, 5.5), (7.0, 6.5)]);
+        let points = super::fuzzing_time(&spans(&[(1.0, 5.0), (2.0, 3.5)]), &[2.0]);
+        let near: Vec<(i64, i64)> = points.iter().map(|(time, total)| (time.nanos(), total.nanos())).collect();
+        assert_eq!(near[1..3], [(2_500_000_000, 2_000_000_000), (2_500_000_001, 2_000_000_002)], "and at the bound");
     }
 
     proptest! {

@@ -3,12 +3,13 @@
 
 use proptest::prelude::*;
 
+use sesame_base::observation::MetricObservation;
 use sesame_base::time::SimTime;
 use sesame_plan::stl::{self, Interval, Robustness};
 use sesame_plan::testing::plan;
 use sesame_plan::{
     Aggregate, CampaignPlan, Comparison, Condition, Distance, Expression, FieldRef, Formula, Input, Members,
-    MetricSource, Point, Region, Side, SignedDistance, TextTest, TopicId, Type, UnaryFunction,
+    MetricSource, Point, Region, Side, SignedDistance, TextTest, TopicId, Transport, Type, UnaryFunction,
 };
 
 use crate::metric::{MetricError, MetricTable};
@@ -170,7 +171,7 @@ fn a_duration_over_each_member_grows_while_those_that_it_holds_of_are_silent() {
     let x = || vec![input(POSES, &["at", "x"], Members::Each)];
     let source = formula(x(), Aggregate::Duration { of: out });
     let sent = [(0, "poses/a", 9.0), (1_000, "poses/b", 8.0), (3_000, "poses/c", 0.0), (4_000, "poses/c", 0.0)];
-    assert_eq!(until(None, source, &sent).0, Some(3.0 + 2.0), "the instant of the last message is not over");
+    assert_eq!(until(None, source, &sent).0, Some(4.0 + 3.0), "until the last message");
 }
 
 #[test]
@@ -210,6 +211,65 @@ fn the_age_of_a_silent_topic_grows_until_its_next_message() {
     let MetricSource::Robustness { mut robustness } = always_above(x(), 0.0) else { unreachable!("it is one") };
     robustness.signals = vec![Expression::Sum(vec![Expression::Constant(1.0), Expression::Negate(Box::new(age()))])];
     near(value(MetricSource::Robustness { robustness }, &sent), -4.9);
+}
+
+/// What a metric of a stream shows, in a system with steps of a tenth of a second or without steps, while time is
+/// looked at at these moments too, in nanoseconds.
+fn looked_at(source: MetricSource, steps: bool, sent: &[Sent], moments: &[i64]) -> MetricObservation {
+    let mut plan = system();
+    plan.metrics.truncate(1);
+    plan.metrics[0].source = source;
+    plan.campaign.end_after = 10.0;
+    plan.simulator.transport = if steps {
+        Transport::InProcess { path: "a::Cell".to_owned(), step_ns: 100_000_000 }
+    } else {
+        Transport::Process { program: "sim".to_owned(), arguments: Vec::new(), step_ns: None }
+    };
+    let wires = WireTable::new(&plan);
+    let table = MetricTable::new(&plan, &wires, &[]).unwrap();
+    let mut metrics = table.start();
+    metrics.begin();
+    let messages = sent.iter().map(|message| (message.0 * 1_000_000, Some(message)));
+    let mut all: Vec<(i64, Option<&Sent>)> = moments.iter().map(|&moment| (moment, None)).chain(messages).collect();
+    all.sort_by_key(|it| it.0);
+    for (time, message) in all {
+        let now = SimTime::from_nanos(time);
+        metrics.advance_to(now);
+        match message {
+            Some((_, path, x)) => metrics.message(now, wires.find(path).unwrap(), &payload(*x)),
+            None => drop(metrics.settle()),
+        }
+    }
+    metrics.end(SimTime::from_seconds(10.0));
+    metrics.finish(&[]).0.remove(0)
+}
+
+/// How old the last value of the tower is that it said of itself.
+fn age() -> Expression {
+    Expression::Sum(vec![Expression::Time, Expression::Negate(Box::new(Expression::Input(0)))])
+}
+
+fn older_than(seconds: f64) -> Condition {
+    Condition::Compare { left: age(), by: Comparison::Above, right: Expression::Constant(seconds) }
+}
+
+#[test]
+fn an_age_is_that_at_steps_or_just_before_the_next_message_whatever_else_happens() {
+    let of_tower = || vec![input(TOWER, &["at", "x"], Members::Min)];
+    let stamped: Vec<Sent> = (0..10).map(|second| (second * 1000, "tower", second as f64)).collect();
+    let greatest = |steps, moments: &[i64]| {
+        looked_at(formula(of_tower(), Aggregate::Max { of: age() }), steps, &stamped, moments).value.unwrap()
+    };
+    for moments in [&[][..], &[1_350_000_000, 2_999_999_999]] {
+        assert!((greatest(true, moments) - 1.0).abs() < 1e-9, "at 10 s it is one second old");
+        assert!((greatest(false, moments) - 1.0).abs() < 1e-8);
+        let late = |steps| {
+            let source = formula(of_tower(), Aggregate::Duration { of: older_than(0.25) });
+            looked_at(source, steps, &stamped, moments).value.unwrap()
+        };
+        assert_eq!(late(true), 10.0 * 0.7, "from the third step of each second on");
+        assert!((late(false) - 10.0 * 0.75).abs() < 1e-7, "{}", late(false));
+    }
 }
 
 #[test]
@@ -276,13 +336,55 @@ fn members_of_two_groups_are_read_together_and_only_once_both_had_a_message() {
 }
 
 #[test]
-fn with_a_third_topic_the_last_member_is_read_again_and_no_mixture() {
-    let mut inputs = to_goals();
-    inputs.push(input(TOWER, &["at", "x"], Members::Min));
+fn with_a_third_topic_every_member_that_is_known_is_read_again_and_no_mixture() {
+    let inputs = || [to_goals(), vec![input(TOWER, &["at", "x"], Members::Min)]].concat();
     // The message of goals/b pairs with nothing; what the tower says then is of a.
     let sent =
         [(0, "tower", 0.0), (0, "poses/a", 0.0), (0, "goals/a", 1.0), (1000, "goals/b", 50.0), (2000, "tower", 0.0)];
-    assert_eq!(value(formula(inputs, Aggregate::Max { of: apart() }), &sent), Some(1.0));
+    assert_eq!(value(formula(inputs(), Aggregate::Max { of: apart() }), &sent), Some(1.0));
+    let all = || Aggregate::Count { of: Condition::Constant(true) };
+    assert_eq!(value(formula(inputs(), all()), &sent), Some(2.0));
+    let both = [&sent[..], &[(3000, "poses/b", 49.0), (4000, "tower", 0.0)]].concat();
+    assert_eq!(value(formula(inputs(), all()), &both), Some(2.0 + 1.0 + 2.0));
+}
+
+/// Each pose, and the tower.
+fn to_tower() -> Vec<Input> {
+    vec![input(POSES, &["at"], Members::Each), input(TOWER, &["at"], Members::Min)]
+}
+
+#[test]
+fn what_moves_among_members_that_stand_still_is_seen_by_all_of_them() {
+    // The drones said once where they are; the crane drives through two of them.
+    let mut sent: Vec<Sent> = vec![(0, "poses/a", 100.0), (0, "poses/b", 300.0), (0, "poses/c", 950.0)];
+    sent.extend((0..=20).map(|step| (step * 100, "tower", 20.0 * step as f64)));
+    let of = |aggregate| value(formula(to_tower(), aggregate), &sent);
+    assert_eq!(of(Aggregate::Min { of: apart() }), Some(0.0));
+    assert_eq!(of(Aggregate::Max { of: apart() }), Some(950.0));
+    assert_eq!(of(Aggregate::Count { of: near(5.0) }), Some(2.0));
+    assert_eq!(of(Aggregate::Duration { of: near(5.0) }), Some(0.2));
+    assert_eq!(value(always_above(to_tower(), 3.0), &sent), Some(-3.0));
+    let MetricSource::Formula { formula: limited } = formula(to_tower(), Aggregate::Count { of: near(1e6) }) else {
+        unreachable!("it is one")
+    };
+    let limited = MetricSource::Formula { formula: Formula { every: Some(1.0), ..limited } };
+    assert_eq!(value(limited, &sent), Some(3.0 * 3.0), "at 0, 1 and 2 s, each of them");
+}
+
+#[test]
+fn members_of_one_key_have_states_of_their_own() {
+    // Both are in the same place; one is ahead all the time, the other says once that it is not.
+    let per = FieldRef { topic: POSES, path: vec!["mode".into()] };
+    let ahead =
+        Condition::Compare { left: Expression::Input(0), by: Comparison::Above, right: Expression::Constant(3.0) };
+    let MetricSource::Formula { formula } =
+        formula(vec![input(POSES, &["at", "x"], Members::Each)], Aggregate::Duration { of: ahead })
+    else {
+        unreachable!("it is one")
+    };
+    let keyed = MetricSource::Formula { formula: Formula { per: Some(per), ..formula } };
+    let sent = [(0, "poses/a", 5.0), (1000, "poses/b", 1.0), (2000, "poses/b", 2.0)];
+    assert_eq!(value(keyed, &sent), Some(10.0));
 }
 
 #[test]
@@ -365,8 +467,8 @@ fn held(distances: &[(i64, f64)], limit: f64) -> i64 {
 }
 
 fn stream() -> impl Strategy<Value = Vec<Sent>> {
-    const PATHS: [&str; 6] = ["poses/a", "poses/b", "poses/c", "goals/a", "goals/b", "goals/c"];
-    prop::collection::vec((0i64..3, 0usize..6, -8i32..8), 0..40).prop_map(|steps| {
+    const PATHS: [&str; 7] = ["poses/a", "poses/b", "poses/c", "goals/a", "goals/b", "goals/c", "tower"];
+    prop::collection::vec((0i64..3, 0usize..7, -8i32..8), 0..40).prop_map(|steps| {
         let mut time = 0;
         let sent = steps.into_iter().map(|(pause, path, x)| {
             time += pause * 250;
@@ -378,10 +480,32 @@ fn stream() -> impl Strategy<Value = Vec<Sent>> {
 
 proptest! {
     #[test]
+    fn moments_at_which_nothing_is_said_change_nothing(
+        sent in stream(), moments in prop::collection::vec(0i64..10_000_000_000, 0..20), steps: bool,
+    ) {
+        let of_tower = || vec![input(TOWER, &["at", "x"], Members::Min)];
+        let of_each = || vec![input(POSES, &["at", "x"], Members::Each)];
+        let MetricSource::Robustness { robustness } = always_above(of_tower(), 0.0) else { unreachable!("it is one") };
+        let signals = vec![Expression::Negate(Box::new(age()))];
+        let sources = [
+            formula(of_tower(), Aggregate::Max { of: age() }),
+            formula(of_each(), Aggregate::Min { of: age() }),
+            formula(of_each(), Aggregate::Duration { of: older_than(1.5) }),
+            formula(to_tower(), Aggregate::Duration { of: near(3.0) }),
+            MetricSource::Robustness { robustness: Robustness { signals, ..robustness } },
+        ];
+        for source in sources {
+            let alone = looked_at(source.clone(), steps, &sent, &[]);
+            prop_assert_eq!(looked_at(source, steps, &sent, &moments), alone);
+        }
+    }
+
+    #[test]
     fn members_and_pairs_are_as_if_each_had_been_looked_at_alone(sent in stream()) {
         let among = [("poses/a", "poses/b"), ("poses/a", "poses/c"), ("poses/b", "poses/c")];
         let own = [("poses/a", "goals/a"), ("poses/b", "goals/b"), ("poses/c", "goals/c")];
-        for (inputs, belong, of_pairs) in [(pairs as fn() -> Vec<Input>, among, true), (to_goals, own, false)] {
+        let outside = [("poses/a", "tower"), ("poses/b", "tower"), ("poses/c", "tower")];
+        for (inputs, belong) in [(pairs as fn() -> Vec<Input>, among), (to_goals, own), (to_tower, outside)] {
             let each: Vec<Vec<(i64, f64)>> =
                 belong.iter().map(|(one, other)| distances(&sent, one, other)).filter(|of| !of.is_empty()).collect();
             let all = || each.iter().flatten().map(|distance| distance.1);
@@ -393,11 +517,9 @@ proptest! {
             let counted = all().filter(|&distance| distance < 3.0).count() as f64;
             prop_assert_eq!(count, (!each.is_empty()).then_some(counted));
             prop_assert_eq!(value(always_above(inputs(), 1.0), &sent), all().map(|distance| distance - 1.0).reduce(f64::min));
-            if of_pairs {
-                let time = value(formula(inputs(), Aggregate::Duration { of: near(3.0) }), &sent);
-                let nanos: i64 = each.iter().map(|of| held(of, 3.0)).sum();
-                prop_assert_eq!(time, (!each.is_empty()).then_some(nanos as f64 / 1e3));
-            }
+            let time = value(formula(inputs(), Aggregate::Duration { of: near(3.0) }), &sent);
+            let nanos: i64 = each.iter().map(|of| held(of, 3.0)).sum();
+            prop_assert_eq!(time, (!each.is_empty()).then_some(nanos as f64 / 1e3));
         }
     }
 }

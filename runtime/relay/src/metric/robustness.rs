@@ -1,14 +1,16 @@
 //! Metrics that are the robustness of a temporal formula: a monitor gets the held values of its signals, and gives its
 //! result at the end of the run.
 
+use sesame_base::activation::TICK;
 use sesame_base::observation::Reach;
 use sesame_base::robustness::quantifier;
 use sesame_base::time::SimTime;
-use sesame_plan::stl::{Formula, Interval, Robustness};
+use sesame_plan::stl::Robustness;
 use sesame_plan::{CampaignPlan, Expression, Members, TopicId};
 
 use crate::metric::Context;
 use crate::metric::aggregate::pairs_of;
+use crate::metric::attendance::Attendance;
 use crate::metric::expression::{Held, Moment, least, number};
 use crate::metric::held::{HeldInputs, hear};
 use crate::stl::{FormulaError, Monitor, Signal};
@@ -20,8 +22,10 @@ pub(super) struct RobustnessState<'p> {
     /// One for each member of the groups, or each pair of the group, of which each has a formula of its own; one for a
     /// formula without.
     instances: Vec<Instance>,
-    /// When the last message came.
+    /// When the last message came, and when the last one of an earlier instant did.
     last: SimTime,
+    previous: SimTime,
+    attendance: Attendance,
     heard: Vec<(usize, Held)>,
 }
 
@@ -29,6 +33,8 @@ struct Instance {
     /// The member that it is of, twice, or the pair.
     of: (usize, usize),
     held: HeldInputs,
+    /// When its signals were evaluated last.
+    pushed: SimTime,
     /// `None` once the run is over, or a number was not finite: then there is an outcome.
     monitor: Option<Monitor>,
     /// `None` as long as there is a monitor, and if the formula was never evaluated.
@@ -50,6 +56,7 @@ impl Instance {
     /// Gives the monitor the values of the signals at the context's time, once there are values.
     fn push(&mut self, signals: &[Expression], context: &mut Context) {
         let (Some(values), Some(monitor)) = (self.held.values(), &mut self.monitor) else { return };
+        self.pushed = context.now;
         for (at, signal) in signals.iter().enumerate() {
             let moment = Moment::new(values, context.now());
             let value = number(signal, &moment);
@@ -65,11 +72,12 @@ impl Instance {
         }
     }
 
-    /// Nothing is known from `now` on: the trace is evaluated up to the `last` message before.
+    /// Nothing is known from `now` on: the trace is evaluated up to the `last` message before, or to a later one of its
+    /// own.
     fn break_off(&mut self, now: SimTime, last: SimTime) {
         if let Some(monitor) = self.monitor.take() {
             let reach = monitor.reach(now);
-            self.signal = monitor.finish_with_signal(last);
+            self.signal = monitor.finish_with_signal(last.max(self.pushed));
             self.said = Some(Said { robustness: self.signal.as_ref().map(|signal| signal.0), reach });
         }
     }
@@ -84,6 +92,7 @@ impl<'p> RobustnessState<'p> {
         let instance = |of: (usize, usize)| Instance {
             of,
             held: HeldInputs::of_one(&robustness.inputs, plan),
+            pushed: SimTime::ZERO,
             monitor: Some(monitor.clone()),
             said: None,
             signal: None,
@@ -93,12 +102,21 @@ impl<'p> RobustnessState<'p> {
             let count = each.map_or(1, |topic| plan.topic(topic).paths.len());
             instances = (0..count).map(|member| instance((member, member))).collect();
         }
-        Ok(RobustnessState { robustness, instances, last: SimTime::ZERO, heard: Vec::new() })
+        let attendance = Attendance::new(&robustness.inputs, plan);
+        Ok(RobustnessState {
+            robustness,
+            instances,
+            last: SimTime::ZERO,
+            previous: SimTime::ZERO,
+            attendance,
+            heard: Vec::new(),
+        })
     }
 
     /// A message on the `member`th path of a topic, at the context's time.
     pub(super) fn message(&mut self, topic: TopicId, member: usize, value: &Value, context: &mut Context) {
         let Robustness { inputs, signals, .. } = self.robustness;
+        self.attendance.heard(context.now, topic, member);
         match hear(inputs, topic, value, &mut self.heard) {
             Ok(true) => {}
             Ok(false) => context.read_not_finite(),
@@ -107,13 +125,15 @@ impl<'p> RobustnessState<'p> {
                 return;
             }
         }
-        let before = std::mem::replace(&mut self.last, context.now);
+        if context.now > self.last {
+            self.previous = std::mem::replace(&mut self.last, context.now);
+        }
         for instance in &mut self.instances {
             let Instance { of, held, .. } = instance;
             // If each member or pair has a formula, values of all members go to all formulas, and those of one member
             // to its own.
             let mut finite = true;
-            let mut concerned = of.0 == of.1;
+            let mut concerned = false;
             for &(input, value) in &self.heard {
                 let own = match inputs[input].members {
                     Members::Min | Members::Max | Members::Sum => true,
@@ -126,12 +146,13 @@ impl<'p> RobustnessState<'p> {
                     held.hold(inputs, &[(input, value)], member);
                 }
             }
-            // There may be many pairs, so those of other members are left alone.
+            // What another member says tells nothing about this one.
             if !concerned {
                 continue;
             }
             if !finite {
-                instance.break_off(context.now, before);
+                // Another member may have spoken in this instant before.
+                instance.break_off(context.now, self.previous);
                 continue;
             }
             instance.push(signals, context);
@@ -141,6 +162,17 @@ impl<'p> RobustnessState<'p> {
     /// Whether its signals change while time passes; then [`RobustnessState::tick`] is called for every instant.
     pub(super) fn is_timed(&self) -> bool {
         self.robustness.signals.iter().any(Expression::reads_time)
+    }
+
+    /// A message comes at the context's time, in a system without steps: what time has made of the signals until then.
+    pub(super) fn just_before(&mut self, context: &mut Context) {
+        let now = context.now;
+        let before = SimTime::from_nanos(now.nanos() - TICK.nanos());
+        if self.attendance.has_begun() && self.last < before {
+            context.now = before;
+            self.tick(context);
+            context.now = now;
+        }
     }
 
     /// The instant at the context's time is over, with a message or without.
@@ -174,11 +206,19 @@ impl<'p> RobustnessState<'p> {
         }
     }
 
-    /// The run broke off at `now`, without its end: it is evaluated up to its last message.
+    /// The run broke off at `now`, without its end: it is evaluated up to its last message. Nothing is known of the
+    /// instant of that, if it is not over, unless it is complete as far as can be told.
     pub(super) fn break_off(&mut self, now: SimTime, context: &mut Context) {
         if self.instances.iter().any(|instance| instance.monitor.is_some()) {
+            let complete = self.attendance.is_complete();
+            if complete && self.is_timed() {
+                // Time has gone on for those that did not speak in this instant, too.
+                context.now = self.last;
+                self.tick(context);
+            }
+            let known = if complete { self.last + TICK } else { self.last };
             for instance in &mut self.instances {
-                instance.break_off(now.max(self.last), self.last);
+                instance.break_off(now.max(known), self.last);
             }
             context.now = self.last;
             self.set(context);
@@ -191,37 +231,13 @@ impl<'p> RobustnessState<'p> {
         Signal::of_least(signals, quantifier(&self.robustness.formula)).thinned(bounds)
     }
 
-    /// The values that it may have at the end of the run, once the run is over: the least of all instances counts. If
-    /// nothing may be left to evaluate, its default is one of them.
-    pub(super) fn reach(&self, default: Option<f64>) -> Reach {
-        let unset = default.filter(|_| looks_ahead(&self.robustness.formula, self.robustness.whole_windows));
+    /// The values that it may have at the end of the run, once the run is over: the least of all instances counts.
+    pub(super) fn reach(&self) -> Reach {
         let ends = |end: fn((f64, f64)) -> f64| {
             let ends = self.instances.iter().filter_map(|instance| instance.said).map(|said| end(said.reach));
             ends.reduce(least).filter(|end| end.is_finite())
         };
-        let (low, high) = (ends(|reach| reach.0), ends(|reach| reach.1));
-        let with_unset =
-            |end: Option<f64>, join: fn(f64, f64) -> f64| end.map(|end| unset.map_or(end, |value| join(end, value)));
-        Reach { low: with_unset(low, f64::min), high: with_unset(high, f64::max) }
-    }
-}
-
-/// Whether a formula has an interval that may be completely beyond the end of a run, or, if only whole windows count,
-/// may be cut by it, so that nothing is left to evaluate.
-fn looks_ahead(formula: &Formula, whole: bool) -> bool {
-    let ahead = |interval: &Interval| interval.from > 0.0 || (whole && interval.to.is_some());
-    match formula {
-        Formula::Predicate { .. } => false,
-        Formula::Not { of } => looks_ahead(of, whole),
-        Formula::And { left, right } | Formula::Or { left, right } | Formula::Implies { left, right } => {
-            looks_ahead(left, whole) || looks_ahead(right, whole)
-        }
-        Formula::Always { interval, of } | Formula::Eventually { interval, of } => {
-            ahead(interval) || looks_ahead(of, whole)
-        }
-        Formula::Until { interval, left, right } => {
-            ahead(interval) || looks_ahead(left, whole) || looks_ahead(right, whole)
-        }
+        Reach { low: ends(|reach| reach.0), high: ends(|reach| reach.1) }
     }
 }
 
@@ -230,6 +246,7 @@ mod tests {
     use proptest::prelude::*;
 
     use sesame_base::observation::MetricObservation;
+    use sesame_plan::stl::{Formula, Interval};
     use sesame_plan::testing::plan;
     use sesame_plan::{Comparison, FieldRef, Input, MetricSource, Side};
 
@@ -374,6 +391,19 @@ mod tests {
     }
 
     #[test]
+    fn moments_whose_interval_lies_after_the_end_are_not_judged_and_a_default_decides_nothing() {
+        let never: Vec<Sent> = (0..50).map(|tenth| (tenth * 100, 1, -5.0)).collect();
+        let within = |from| of(vec![level(Members::Min)], always(eventually(from, 1.0, above(0))));
+        for from in [0.0, 0.1] {
+            assert_eq!(measured(within(from), &never, Some(5000)).0, Some(-5.0));
+        }
+        let granted: Vec<Sent> = (0..50).map(|tenth| (tenth * 100, 1, 1.0)).collect();
+        assert_eq!(measured(within(0.1), &granted, Some(5000)).0, Some(1.0), "the last tenth asks for nothing");
+        let late = observed(of(vec![level(Members::Min)], eventually(20.0, 30.0, above(0))), &granted, Some(5000)).0;
+        assert_eq!((late.value, late.set, late.reach), (None, false, Reach::ANY));
+    }
+
+    #[test]
     fn what_the_run_was_too_short_for_is_not_set_and_said() {
         let late = of(vec![level(Members::Min)], eventually(20.0, 30.0, above(0)));
         let (value, warnings) = measured(late, &[(0, 1, 4.0)], Some(10_000));
@@ -397,13 +427,22 @@ mod tests {
     }
 
     #[test]
+    fn members_that_say_at_one_instant_what_is_not_finite_are_judged_alike() {
+        let late = |members| of(vec![level(members)], eventually(1.0, 2.0, above(0)));
+        let one = [(0, 1, 4.0), (500, 1, 5.0), (1_000, 1, f64::NAN)];
+        let both = [(0, 1, 4.0), (0, 2, 4.0), (500, 1, 5.0), (500, 2, 5.0), (1_000, 1, f64::NAN), (1_000, 2, f64::NAN)];
+        let value = |members, sent: &[Sent]| observed(late(members), sent, Some(3_000)).0.value;
+        assert_eq!(value(Members::Each, &one), None, "up to the message before, nothing was asked for");
+        assert_eq!(value(Members::Each, &both), None);
+    }
+
+    #[test]
     fn after_a_run_that_broke_off_the_reach_is_what_no_continuation_can_leave() {
         let reach = |formula, end| {
             observed(of(vec![level(Members::Min)], formula), &[(0, 1, 4.0), (100, 1, -2.0)], end).0.reach
         };
         assert_eq!(reach(always(above(0)), Some(300)), Reach::only(-2.0));
-        // The instant of the last message is not over as long as nobody says so.
-        assert_eq!(reach(always(above(0)), None), Reach { low: None, high: Some(4.0) });
+        assert_eq!(reach(always(above(0)), None), Reach { low: None, high: Some(-2.0) });
         assert_eq!(reach(eventually(0.0, 5.0, above(0)), None), Reach { low: Some(4.0), high: None });
         assert_eq!(reach(eventually(2.0, 5.0, above(0)), None), Reach::ANY);
     }

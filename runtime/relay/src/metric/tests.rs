@@ -4,10 +4,10 @@ use proptest::prelude::*;
 
 use sesame_base::observation::{MetricObservation, Reach};
 use sesame_base::time::SimTime;
-use sesame_plan::testing::plan;
+use sesame_plan::testing::{plan, requirement};
 use sesame_plan::{
-    Aggregate, CampaignPlan, Comparison, Condition, Expression, FieldRef, Formula, Input, Members, Metric, MetricId,
-    MetricSource, Side, TopicId, Trend,
+    Aggregate, Bound, CampaignPlan, Comparison, Condition, Expression, FieldRef, Formula, Input, Members, Metric,
+    MetricId, MetricSource, Side, TopicId, Trend,
 };
 
 use crate::metric::{Context, Hook, HookEntry, MetricTable};
@@ -64,8 +64,7 @@ fn measured_by(plan: &CampaignPlan, stream: &[Sent], end: Option<i64>) -> (Metri
         let wire = wires.find(PATHS[path]).unwrap();
         metrics.message(SimTime::from_nanos(time * 1_000_000), wire, &payload(path, number));
     }
-    let last = stream.last().map_or(0, |sent| sent.0);
-    metrics.advance_to(SimTime::from_nanos(last * 1_000_000 + 1));
+    metrics.settle();
     if let Some(end) = end {
         metrics.end(SimTime::from_nanos(end * 1_000_000));
     }
@@ -111,7 +110,67 @@ fn of_each_member_of_a_group_every_last_message_of_an_instant_counts_beside_othe
     let counted = formula(vec![level(Members::Each), command()], Aggregate::Count { of: above(0) });
     // Both zones are above the command of their instant, which comes last; Z1 corrects itself.
     let stream = [(0, 1, 1.0), (0, 2, 4.0), (0, 1, 5.0), (0, 0, 3.0), (100, 0, 0.0)];
-    assert_eq!(value(counted, &stream), Some(3.0), "two members, then the latest one");
+    assert_eq!(value(counted, &stream), Some(4.0), "both members, twice");
+}
+
+#[test]
+fn the_last_instant_before_a_crash_counts_if_all_spoke_who_always_did() {
+    let difference = || Expression::Sum(vec![Expression::Input(1), Expression::Negate(Box::new(Expression::Input(0)))]);
+    let of = |aggregate| formula(vec![command(), level(Members::Each)], aggregate);
+    // Two robots come closer and touch at 200 ms; the simulator dies of it.
+    let apart = [(0, 0, 0.0), (0, 1, 2.0), (100, 0, 0.0), (100, 1, 1.0)];
+    let broken = |aggregate, last: &[Sent]| {
+        let plan = plan_with(of(aggregate));
+        let wires = WireTable::new(&plan);
+        let table = MetricTable::new(&plan, &wires, &[]).unwrap();
+        let mut metrics = table.start();
+        metrics.begin();
+        for &(time, path, number) in apart.iter().chain(last) {
+            metrics.message(
+                SimTime::from_nanos(time * 1_000_000),
+                wires.find(PATHS[path]).unwrap(),
+                &payload(path, number),
+            );
+        }
+        metrics.finish(&[]).0.remove(0)
+    };
+    let least = || Aggregate::Min { of: difference() };
+    let touch = broken(least(), &[(200, 0, 0.0), (200, 1, -0.5)]);
+    assert_eq!(touch.value, Some(-0.5));
+    // Where the other was at 200 ms nobody knows.
+    assert_eq!(broken(least(), &[(200, 0, 5.0)]).value, Some(1.0));
+    let touching = Condition::Compare { left: difference(), by: Comparison::Below, right: Expression::Constant(0.0) };
+    assert_eq!(broken(Aggregate::Count { of: touching }, &[(200, 1, -0.5), (200, 0, 0.0)]).value, Some(1.0));
+}
+
+#[test]
+fn a_duration_grows_between_messages_and_its_bound_is_crossed_at_its_moment() {
+    let mut plan = plan_with(formula(vec![command()], Aggregate::Duration { of: below(0.0) }));
+    plan.requirements = vec![requirement("short", 0, Bound::AtMost { value: 1.0 })];
+    let wires = WireTable::new(&plan);
+    let table = MetricTable::new(&plan, &wires, &[]).unwrap();
+    let at = |seconds: f64| SimTime::from_seconds(seconds);
+    let run = |end: Option<f64>| {
+        let mut metrics = table.start();
+        metrics.begin();
+        metrics.message(at(0.1), wires.find(PATHS[0]).unwrap(), &payload(0, -1.0));
+        metrics.advance_to(at(0.5));
+        assert_eq!(metrics.value(MetricId(0), 0.0), Some(0.4), "conditions see it grow");
+        assert_eq!(metrics.next_change(), Some(at(1.1)));
+        metrics.advance_to(at(2.5));
+        if let Some(end) = end {
+            metrics.message(at(2.8), wires.find(PATHS[0]).unwrap(), &payload(0, 1.0));
+            metrics.end(at(end));
+        } else {
+            // Something else was heard, and then nothing more.
+            metrics.message(at(2.5), wires.find(PATHS[1]).unwrap(), &payload(1, 1.0));
+        }
+        metrics.finish(&[]).0.remove(0)
+    };
+    let whole = run(Some(5.0));
+    assert_eq!(whole.value, Some(2.7));
+    assert_eq!(&whole.series[..3], [(0.1, 0.0), (1.1, 1.0), (1.100_000_001, 1.000_000_001)]);
+    assert_eq!(run(None).value, Some(2.4), "until the last instant that was observed");
 }
 
 #[test]
@@ -289,6 +348,25 @@ fn a_count_is_zero_once_its_inputs_are_known_and_unknown_before() {
     assert_eq!(value(count(), &[(0, 1, -1.0)]), None);
     assert_eq!(value(count(), &[(0, 0, 1.0)]), Some(0.0));
     assert_eq!(value(count(), &[(0, 0, -1.0), (1, 0, 1.0), (2, 0, -1.0)]), Some(2.0));
+}
+
+#[test]
+fn what_a_duration_is_when_a_run_breaks_off_does_not_depend_on_who_else_spoke() {
+    let duration = || formula(vec![command()], Aggregate::Duration { of: below(0.0) });
+    let broken_off = |others: &[Sent]| {
+        let (plan, mut now) = (plan_with(duration()), SimTime::ZERO);
+        let wires = WireTable::new(&plan);
+        let table = MetricTable::new(&plan, &wires, &[]).unwrap();
+        let mut metrics = table.start();
+        metrics.begin();
+        for &(time, path, number) in [(1000, 0, -1.0)].iter().chain(others) {
+            now = SimTime::from_nanos(time * 1_000_000);
+            metrics.message(now, wires.find(PATHS[path]).unwrap(), &payload(path, number));
+        }
+        metrics.advance_to(now.max(SimTime::from_nanos(2_000_000_000)));
+        metrics.finish(&[]).0[0].value
+    };
+    assert_eq!((broken_off(&[]), broken_off(&[(2000, 1, 0.0)])), (Some(1.0), Some(1.0)));
 }
 
 #[test]

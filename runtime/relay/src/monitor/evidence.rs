@@ -6,6 +6,7 @@ use sesame_plan::{CampaignPlan, Evidence, TopicId};
 
 use crate::metric::{Held, HeldInputs, Moment, hear, holds};
 use crate::value::Value;
+use crate::wire::Wire;
 
 /// What is held of the messages that a condition reads.
 pub(super) struct EvidenceState<'p> {
@@ -13,27 +14,75 @@ pub(super) struct EvidenceState<'p> {
     held: HeldInputs,
     /// The values of the current message, per input.
     heard: Vec<(usize, Held)>,
+    sources: Sources,
 }
 
 impl<'p> EvidenceState<'p> {
-    /// Before the first message.
-    pub(super) fn new(evidence: &'p Evidence, plan: &CampaignPlan) -> Self {
-        EvidenceState { evidence, held: HeldInputs::new(&evidence.inputs, plan), heard: Vec::new() }
+    /// Before the first message. `sources` are the wires of all topics that it reads.
+    pub(super) fn new(evidence: &'p Evidence, plan: &CampaignPlan, sources: impl Iterator<Item = Wire>) -> Self {
+        EvidenceState {
+            evidence,
+            held: HeldInputs::new(&evidence.inputs, plan),
+            heard: Vec::new(),
+            sources: Sources::new(sources),
+        }
     }
 
-    /// What the condition comes to after a message on the `member`th path of a topic. It is unknown before all inputs
-    /// had a message, while a number that was read last is not finite, and where a function has no value. The error is
-    /// a missing field; such a message is not heard.
-    pub(super) fn message(
+    /// Takes a message on the `member`th path of a topic. The error is a missing field; such a message is not heard.
+    pub(super) fn hear(
         &mut self,
-        topic: TopicId,
-        member: usize,
+        wire: Wire,
+        (topic, member): (TopicId, usize),
         now: SimTime,
         value: &Value,
-    ) -> Result<Truth, String> {
+    ) -> Result<(), String> {
         hear(&self.evidence.inputs, topic, value, &mut self.heard)?;
         self.held.hold(&self.evidence.inputs, &self.heard, member);
-        Ok(truth_of(self.evidence, &self.held, now))
+        if self.sources.are_several() {
+            self.sources.spoke(wire, now);
+        }
+        Ok(())
+    }
+
+    /// What the condition comes to now. It is unknown while a number that was read last is not finite, and where a
+    /// function has no value.
+    pub(super) fn truth(&self, now: SimTime) -> Truth {
+        truth_of(self.evidence, &self.held, now)
+    }
+
+    /// When the topics and members that it reads had messages.
+    pub(super) fn sources(&self) -> &Sources {
+        &self.sources
+    }
+}
+
+/// When each source of evidence, a topic or a member of a group, had its last message. It is kept only if there are
+/// several.
+#[derive(Debug, Clone)]
+pub(super) struct Sources(Vec<(Wire, Option<SimTime>)>);
+
+impl Sources {
+    /// Before the first message.
+    pub(super) fn new(wires: impl Iterator<Item = Wire>) -> Self {
+        Sources(wires.map(|wire| (wire, None)).collect())
+    }
+
+    /// Whether there are several, so that the condition is evaluated at the end of an instant: between its messages
+    /// the values do not belong together.
+    pub(super) fn are_several(&self) -> bool {
+        self.0.len() > 1
+    }
+
+    /// A source had a message.
+    pub(super) fn spoke(&mut self, wire: Wire, now: SimTime) {
+        for (_, last) in self.0.iter_mut().filter(|(of, _)| *of == wire) {
+            *last = Some(now);
+        }
+    }
+
+    /// The last message of the source that has been silent longest; `None` until each had one.
+    pub(super) fn oldest(&self) -> Option<SimTime> {
+        self.0.iter().map(|(_, last)| *last).min().flatten()
     }
 }
 

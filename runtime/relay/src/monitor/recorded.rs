@@ -1,15 +1,16 @@
 //! What monitors hear in a recording, kept so that they can decide on it again: as it was recorded, or with delays.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use sesame_base::observation::ChangeCause;
 use sesame_base::time::SimTime;
 use sesame_monitor::difference::Course;
 use sesame_monitor::tolerance::{Conditions, Message, Recording, Tolerance, tolerances};
-use sesame_monitor::{Changes, EvidenceId, Network, Run, Truth};
+use sesame_monitor::{Changes, EvidenceChange, EvidenceId, Network, Reading, Run, Truth};
 use sesame_plan::{CampaignPlan, MonitorId, Side};
 
-use super::evidence::truth_of;
+use super::evidence::{Sources, truth_of};
 use crate::metric::{Held, HeldInputs, hear};
 use crate::value::Value;
 use crate::wire::{Wire, WireTable};
@@ -188,25 +189,46 @@ impl<'p> RecordedMonitors<'p> {
             .take(self.network.evidence_count())
             .map(|id| HeldInputs::new(&evidence_of(self.plan, &self.network, id).inputs, self.plan))
             .collect();
+        let wire_of = |stream: &u32| self.streams[*stream as usize].wire;
+        let sources = self.recording.streams.iter().map(|streams| Sources::new(streams.iter().map(wire_of)));
+        let mut sources: Vec<Sources> = sources.collect();
+        // Per evidence: the position of the last message that it heard.
+        let mut latest: Vec<usize> = vec![0; self.network.evidence_count()];
+        let by = |latest: &[usize], change: &EvidenceChange| {
+            let position = latest[change.evidence.index()];
+            let wire = wire_of(&self.recording.messages[position].stream);
+            ChangeCause::Message { topic: self.wires.path(wire).to_owned(), index: self.indices[position] }
+        };
         let numbered: Vec<(usize, &Message)> = self.recording.messages.iter().enumerate().collect();
-        for event in numbered.chunk_by(|_, (_, next)| next.joined) {
-            let mut heard: Vec<(EvidenceId, Truth)> = Vec::new();
-            let (first, at) = (event[0].0, event[0].1.at);
-            let wire = self.streams[event[0].1.stream as usize].wire;
-            for (position, _) in event {
-                for (id, content) in &self.contents[*position] {
-                    let evidence = evidence_of(self.plan, &self.network, *id);
-                    held[id.index()].hold(&evidence.inputs, content, self.members[wire.index()]);
-                    heard.push((*id, truth_of(evidence, &held[id.index()], at)));
-                }
-            }
+        for instant in numbered.chunk_by(|(_, one), (_, next)| one.at == next.at) {
+            let at = instant[0].1.at;
             found.pass(&mut run, at, &mut changes);
-            run.observe(at, &heard, &mut changes);
-            let path = self.wires.path(wire);
-            found.take(
-                &mut changes,
-                Some(&|| ChangeCause::Message { topic: path.to_owned(), index: self.indices[first] }),
-            );
+            let mut waiting = BTreeSet::new();
+            for event in instant.chunk_by(|_, (_, next)| next.joined) {
+                let mut heard: Vec<Reading> = Vec::new();
+                for (position, message) in event {
+                    let wire = wire_of(&message.stream);
+                    for (id, content) in &self.contents[*position] {
+                        let evidence = evidence_of(self.plan, &self.network, *id);
+                        held[id.index()].hold(&evidence.inputs, content, self.members[wire.index()]);
+                        sources[id.index()].spoke(wire, at);
+                        latest[id.index()] = event[0].0;
+                        if sources[id.index()].are_several() {
+                            waiting.insert(*id);
+                        } else {
+                            heard.push(Reading::now(at, *id, truth_of(evidence, &held[id.index()], at)));
+                        }
+                    }
+                }
+                run.observe(at, &heard, &mut changes);
+                found.take(&mut changes, Some(&|change| by(&latest, change)));
+            }
+            let settled = waiting.iter().filter_map(|&evidence| {
+                let truth = truth_of(evidence_of(self.plan, &self.network, evidence), &held[evidence.index()], at);
+                Some(Reading { evidence, truth, oldest: sources[evidence.index()].oldest()? })
+            });
+            run.observe(at, &settled.collect::<Vec<_>>(), &mut changes);
+            found.take(&mut changes, Some(&|change| by(&latest, change)));
         }
         found.pass(&mut run, self.recording.end, &mut changes);
         found.course.end = self.recording.end;
@@ -221,9 +243,9 @@ impl Heard {
         self.take(changes, None);
     }
 
-    fn take(&mut self, changes: &mut Changes, message: Option<&dyn Fn() -> ChangeCause>) {
+    fn take(&mut self, changes: &mut Changes, message: Option<&dyn Fn(&EvidenceChange) -> ChangeCause>) {
         self.causes.extend(changes.evidence.iter().map(|change| match message {
-            Some(message) => message(),
+            Some(message) => message(change),
             None if change.truth == Truth::True => ChangeCause::Held,
             None => ChangeCause::Stale,
         }));
@@ -248,11 +270,11 @@ fn evidence_of<'p>(plan: &'p CampaignPlan, network: &Network, id: EvidenceId) ->
 struct Contents<'a>(&'a RecordedMonitors<'a>);
 
 impl Conditions for Contents<'_> {
-    fn truth(&mut self, id: EvidenceId, heard: usize, latest: &[Option<usize>]) -> Truth {
+    fn truth(&mut self, id: EvidenceId, heard: usize, latest: &[usize]) -> Truth {
         let RecordedMonitors { plan, network, members, streams, recording, contents, .. } = self.0;
         let evidence = evidence_of(plan, network, id);
         let mut held = HeldInputs::new(&evidence.inputs, plan);
-        for &message in latest.iter().flatten() {
+        for &message in latest {
             let wire = streams[recording.messages[message].stream as usize].wire;
             for (_, content) in contents[message].iter().filter(|(of, _)| *of == id) {
                 held.hold(&evidence.inputs, content, members[wire.index()]);

@@ -1,13 +1,14 @@
 //! Scores of monitors as metrics, while a run goes on.
 //!
-//! A hazard is a fact of an instant: the metric of a requirement is outside of its bound when the instant is over, for
-//! the first time. So a value that a metric has only between two messages of one instant is not a hazard. The
-//! robustness of a temporal formula is known when the run is over, and its signal says when the formula was violated:
-//! scores of such requirements are computed then.
+//! A hazard is the moment from which no continuation of the run can satisfy a requirement. It is a fact of an instant:
+//! a value that a metric has only between two messages of one instant is not a hazard. For a metric that may
+//! recover, only the end decides. The robustness of a temporal formula is known when the run is over, and its
+//! signal says when the formula was lost: scores of such requirements are computed then.
 
 use sesame_base::hazard;
-use sesame_base::observation::{MetricObservation, MonitorHazard, Outcome, Reach};
+use sesame_base::observation::{MetricObservation, MetricValue, MonitorHazard, Outcome, Reach};
 use sesame_base::time::SimTime;
+use sesame_base::verdict::{Verdict, breaks, verdict};
 use sesame_monitor::compare::Step;
 use sesame_monitor::score::{Score as Scored, Scorer, score};
 use sesame_monitor::{Decision, Run, State, Truth};
@@ -67,7 +68,15 @@ struct Watched {
 impl Watched {
     fn is_violated(&self, metrics: &Metrics<'_>, fuzzing_time: SimTime) -> bool {
         let value = if self.fuzzing_time { Some(fuzzing_time.seconds()) } else { metrics.set_value(self.metric) };
-        !self.found && value.is_some_and(|value| !self.bound.holds(value))
+        !self.found && breaks(self.bound, Reach::onwards(metrics.trend(self.metric), value))
+    }
+
+    /// Whether it is violated in a run that is over.
+    fn ends_violated(&self, plan: &CampaignPlan, metrics: &Metrics<'_>, fuzzing_time: SimTime) -> bool {
+        let set = if self.fuzzing_time { Some(fuzzing_time.seconds()) } else { metrics.set_value(self.metric) };
+        let value = set.or(plan.metric(self.metric).default);
+        let violated = metrics.is_finite(self.metric) && value.is_some_and(|value| !self.bound.holds(value));
+        !self.found && violated
     }
 }
 
@@ -221,9 +230,7 @@ impl<'p> Scores<'p> {
     pub(super) fn end(&mut self, now: SimTime, run: &Run, metrics: &mut Metrics<'_>, fuzzing_time: SimTime) {
         let plan = self.plan;
         self.find(now, |watched| {
-            let default = plan.metric(watched.metric).default.filter(|_| metrics.set_value(watched.metric).is_none());
-            let by_default = default.is_some_and(|value| !watched.bound.holds(value));
-            watched.is_violated(metrics, fuzzing_time) || (!watched.found && !watched.fuzzing_time && by_default)
+            watched.is_violated(metrics, fuzzing_time) || watched.ends_violated(plan, metrics, fuzzing_time)
         });
         self.set(now, run, metrics, Scorer::end);
         self.ended = true;
@@ -243,21 +250,23 @@ impl<'p> Scores<'p> {
         whole: bool,
     ) -> Vec<Vec<MonitorHazard>> {
         let hazards = self.hazards(end, metrics);
+        let undecided = self.undecided(metrics, whole);
+        let plan = self.plan;
         for MetricScore { metric, monitor, score: of, late, .. } in self.metrics {
             let (Some(steps), Some(requirement)) = (late, of.requirement()) else { continue };
-            let hazard = hazard_of_formula(self.plan, requirement, metrics);
+            let hazard = hazard_of_formula(plan, requirement, metrics);
             let RequirementId(number) = requirement;
             let hazards: Vec<(u32, SimTime)> = hazard.map(|at| (number, at.min(end))).into_iter().collect();
             let horizon = match of {
                 Score::FalseAlarms { within, .. } => within.map(SimTime::from_seconds),
                 _ => None,
             };
-            let mut scored = score(guarantees(self.plan, monitor), horizon, &steps, &hazards, end);
+            let mut scored = score(guarantees(plan, monitor), horizon, &steps, &hazards, end);
             if !whole {
                 // Which alarms were false is not known of a run that broke off.
                 scored.false_alarms = 0;
             }
-            let declared = self.plan.metric(metric);
+            let declared = plan.metric(metric);
             let observed = &mut metrics[metric.index()];
             let value = value(of, &scored);
             observed.set = value.is_some();
@@ -268,7 +277,25 @@ impl<'p> Scores<'p> {
             let changes = value.filter(|&value| observed.series.last().is_none_or(|last| last.1 != value));
             observed.series.extend(changes.map(|value| (at.seconds(), value)));
         }
+        for metric in undecided {
+            let default = plan.metric(metric).default;
+            let observed = &mut metrics[metric.index()];
+            (observed.value, observed.set, observed.reach) = (default, false, Reach::ANY);
+        }
         hazards
+    }
+
+    /// The scores of hazards of which nobody can tell whether there were any.
+    fn undecided(&self, metrics: &[MetricObservation], whole: bool) -> Vec<MetricId> {
+        let outcome = if whole { Outcome::Completed } else { Outcome::crash(String::new()) };
+        let scores = self.metrics.iter().filter(|it| {
+            it.score.requirement().is_some_and(|requirement| {
+                let declared = self.plan.requirement(requirement);
+                let observed = &metrics[declared.metric.index()];
+                verdict(declared.bound, &outcome, MetricValue::from(observed)) == Verdict::Inconclusive
+            })
+        });
+        scores.map(|it| it.metric).collect()
     }
 
     /// Per monitor the hazards that it was to foresee, in the order of time.

@@ -419,6 +419,45 @@ fn a_condition_over_the_fuzzing_time_sees_the_tail() {
 }
 
 #[test]
+fn times_that_grow_are_compared_where_they_meet_and_not_at_every_nanosecond() {
+    let always = Formula {
+        inputs: vec![Input {
+            field: FieldRef { topic: TopicId(0), path: Vec::new() },
+            members: Members::Min,
+            text: None,
+        }],
+        aggregate: Aggregate::Duration { of: Holds::Constant(true) },
+        when: None,
+        every: None,
+        per: None,
+        side: Side::Inbound,
+    };
+    let mut plan = plan((0..3).map(|_| operation(1, OperationKind::Blackhole)).collect());
+    plan.metrics[1].source = MetricSource::Formula { formula: always };
+    plan.operations[2].timed = false;
+    // The fuzzing time is beyond the time of the run.
+    let [fuzzing_time, duration] = [0, 1].map(|metric| Operand::Variable(MetricId(metric)));
+    let start = Condition::Compare { left: fuzzing_time, by: Comparison::Above, right: duration };
+    let after = used(2, Activation::ConditionFor { start, length: 0.5, times: 1 }, vec![]);
+    let twice = [0, 1].map(|operation| use_of(operation, 1.0, 4.0, vec![], 1));
+    let faster = commanded(&plan, twice.into_iter().chain([after.clone()]).collect(), None);
+    assert_eq!(seconds(&faster.operations[2].intervals), [(2.000_000_001, 2.500_000_001)]);
+    let alike = commanded(&plan, vec![use_of(0, 0.0, 10.0, vec![], 1), after], None);
+    assert!(alike.operations[1].intervals.is_empty());
+}
+
+#[test]
+fn what_an_operation_makes_of_a_copy_does_not_depend_on_other_operations() {
+    let loss = || operation(0, OperationKind::PacketLoss);
+    let plan = plan(vec![operation(0, OperationKind::Duplicate), loss(), operation(1, OperationKind::Blackhole)]);
+    let doubled = || use_of(0, 0.0, 10.0, vec![Choice::Value { value: 1.0 }], 7);
+    let lost = || use_of(1, 0.0, 10.0, vec![Choice::Value { value: 0.5 }], 8);
+    let alone = commanded(&plan, vec![doubled(), lost()], Some(0));
+    let beside = commanded(&plan, vec![use_of(2, 0.0, 10.0, vec![], 9), doubled(), lost()], Some(0));
+    assert_eq!(alone.operations[..], beside.operations[1..]);
+}
+
+#[test]
 fn what_nobody_hears_is_no_effect() {
     let plan = plan(vec![operation(0, OperationKind::Blackhole), operation(1, OperationKind::Blackhole)]);
     let cut = || vec![use_of(0, 1.0, 2.0, vec![], 1)];

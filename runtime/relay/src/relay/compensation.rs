@@ -1,6 +1,8 @@
 //! Compensation for a reality gap: what the relay does to messages so that a simulation is closer to a lab
 //! [SESAME 2023, Section 4.7].
 
+use std::collections::BTreeMap;
+
 use sesame_base::activation::Activity;
 use sesame_base::observation::Counters;
 use sesame_base::time::SimTime;
@@ -72,6 +74,7 @@ impl Relay<'_> {
             counters: Counters::default(),
             first_touch: None,
             last_touch: None,
+            unheard: BTreeMap::new(),
         });
         let wires = self.wires;
         let mut members = vec![0; plan.topics.len()];

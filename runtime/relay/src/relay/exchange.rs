@@ -31,6 +31,10 @@ pub trait Exchange {
     fn intercepts(&self, wire: Wire) -> bool;
     /// From now on the simulator subscribes to this wire, so changes of its messages are effects.
     fn subscribed(&mut self, wire: Wire);
+    /// Somebody subscribes to this wire and was found only now, so changes of its messages were effects all the time.
+    fn found(&mut self, wire: Wire) {
+        self.subscribed(wire);
+    }
     /// Simulation time is `now` from here on; it never goes back.
     fn advance(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>);
     /// A message was published at `now`, by this node if the transport can tell. It gets the next number of its wire,

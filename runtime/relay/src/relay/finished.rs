@@ -1,6 +1,6 @@
 //! The end of a run, and what is left of it.
 
-use sesame_base::observation::{MetricObservation, MonitorObservation, OperationEffect};
+use sesame_base::observation::{MetricObservation, MonitorObservation, OperationEffect, Traffic, Unreached};
 use sesame_base::time::SimTime;
 use sesame_plan::Span;
 
@@ -13,6 +13,10 @@ pub struct Finished {
     pub operations: Vec<OperationEffect>,
     /// Names on the wire that operations of the plan act on and that had no receiver, in order of declaration.
     pub unheard: Vec<String>,
+    /// In a run without operations: those of the plan that would have found no message.
+    pub unreached: Vec<Unreached>,
+    /// What nodes published on each wire that spoke.
+    pub traffic: Vec<Traffic>,
     /// Per metric of the plan.
     pub metrics: Vec<MetricObservation>,
     /// Per monitor of the plan.
@@ -31,6 +35,8 @@ impl Relay<'_> {
         self.advance_to(end, &mut Vec::new());
         // Even if no message came at the end: the reach of metrics is asked for this time.
         self.tell_time(end);
+        // What a run that broke off makes of the values of its last instant may be a hazard.
+        self.metrics.break_off();
         self.monitors_break_off();
         let operations: Vec<OperationEffect> = self
             .operations
@@ -74,6 +80,7 @@ impl Relay<'_> {
         }
         let unheard = self.acted_on.iter().filter(|wire| !self.heard[wire.index()]);
         let unheard = unheard.map(|&wire| self.wires.path(wire).to_owned()).collect();
-        Finished { operations, unheard, metrics, monitors, warnings, messages: self.messages }
+        let (unreached, traffic) = (self.traffic.unreached(), self.traffic.traffic());
+        Finished { operations, unheard, unreached, traffic, metrics, monitors, warnings, messages: self.messages }
     }
 }

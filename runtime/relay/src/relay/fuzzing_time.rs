@@ -1,15 +1,17 @@
-//! The fuzzing time: how much of it has passed, and when it reaches the numbers with which conditions compare it.
+//! Times that grow while nothing happens: the fuzzing time, times in states of monitors, and durations. When do they
+//! reach what conditions compare them with?
 //!
-//! It grows while an operation is active and while it still holds messages back. A condition over it changes between
-//! events, so the relay computes the moment, to the nanosecond, instead of checking at every event.
+//! The fuzzing time grows while an operation is active and while it still holds messages back. A condition over a time
+//! that grows changes between events, so the relay computes the moment, to the nanosecond, instead of checking at every
+//! event. Two times that grow alike never meet.
 
 use sesame_base::time::SimTime;
 use sesame_base::verdict::ends;
 use sesame_plan::condition::{Condition, Operand};
-use sesame_plan::{Activation, CampaignPlan, MetricId, MetricSource, Score, Span, Test};
+use sesame_plan::{Activation, Aggregate, CampaignPlan, MetricId, MetricSource, Score, Span, Test};
 
+use crate::metric::next_mark;
 use crate::relay::Relay;
-use crate::relay::marks::{beyond, reaching};
 use crate::relay::stage::Stage;
 
 impl Stage {
@@ -46,23 +48,55 @@ impl Relay<'_> {
         timed.fold(SimTime::ZERO, |sum, stage| sum + stage.busy_time(self.now))
     }
 
-    /// When the fuzzing time next reaches or exceeds a number with which a condition compares it, if nothing else
-    /// happens before.
+    /// When a time that grows next reaches or exceeds what a condition compares it with, if nothing else happens
+    /// before.
+    #[inline]
     pub(super) fn next_comparison(&self) -> Option<SimTime> {
-        if self.conditions.compared.is_empty() {
-            return None;
-        }
-        let busy = self.operations.iter().filter(|stage| stage.timed && stage.is_busy()).count();
-        let pace = i64::try_from(busy).ok().filter(|&pace| pace > 0)?;
-        let total = self.fuzzing_time().nanos();
-        let numbers = self.conditions.compared.iter().filter_map(|operand| match *operand {
-            Operand::Number(number) => Some(number),
-            Operand::Variable(metric) => self.metrics.value(metric, 0.0),
-        });
-        let marks = numbers.flat_map(|number| [reaching(number), beyond(number)]).filter(|&mark| mark > total);
-        // The least number of nanoseconds after which this many operations have added up enough.
-        marks.min().map(|mark| self.now + SimTime::from_nanos((mark - total - 1) / pace + 1))
+        if self.conditions.growing.is_empty() { None } else { self.first_comparison() }
     }
+
+    #[inline(never)]
+    fn first_comparison(&self) -> Option<SimTime> {
+        let after = self.conditions.growing.iter().filter_map(|&(metric, with)| {
+            let (total, pace) = self.growth(metric)?;
+            let number = match with {
+                Operand::Number(number) => Some(number),
+                Operand::Variable(other) => match self.growth(other) {
+                    Some(other) => return next_meeting((total, pace), other),
+                    None => self.metrics.value(other, 0.0),
+                },
+            };
+            if pace > 0 { next_mark(number.into_iter(), total, pace) } else { None }
+        });
+        after.min().map(|after| self.now + after)
+    }
+
+    /// What a time has grown to, and how many times as fast as time passes it grows now; `None` of other metrics, and
+    /// of a duration that has not begun.
+    fn growth(&self, metric: MetricId) -> Option<(SimTime, i64)> {
+        match &self.metrics.plan().metric(metric).source {
+            MetricSource::FuzzingTime => {
+                let busy = self.operations.iter().filter(|stage| stage.timed && stage.is_busy()).count();
+                Some((self.fuzzing_time(), i64::try_from(busy).unwrap_or(i64::MAX)))
+            }
+            MetricSource::Monitor { score: Score::TimeIn { .. }, .. } => {
+                let spent = SimTime::from_seconds(self.metrics.value(metric, 0.0)?);
+                let grows = self.monitors.as_ref().is_some_and(|monitors| monitors.grows(metric));
+                Some((spent, i64::from(grows)))
+            }
+            MetricSource::Formula { .. } => self.metrics.growth(metric),
+            _ => None,
+        }
+    }
+}
+
+/// After how long a time reaches another one, or exceeds it, whichever is next; both as what they are now, and how many
+/// times as fast as time passes they grow.
+fn next_meeting((total, pace): (SimTime, i64), (other, other_pace): (SimTime, i64)) -> Option<SimTime> {
+    let nearer = pace.checked_sub(other_pace).filter(|&nearer| nearer > 0)?;
+    let gap = (other - total).nanos();
+    let mark = [gap, gap + 1].into_iter().find(|&mark| mark > 0)?;
+    Some(SimTime::from_nanos((mark - 1) / nearer + 1))
 }
 
 /// What conditions and hazards read.
@@ -70,10 +104,10 @@ impl Relay<'_> {
 pub(super) struct Read {
     /// The metrics that the conditions of the test read.
     pub(super) variables: Vec<MetricId>,
-    /// With what the fuzzing time is compared.
-    pub(super) compared: Vec<Operand>,
-    /// The metrics that are times in states of monitors, each with what it is compared with.
-    pub(super) stays: Vec<(MetricId, Operand)>,
+    /// The times that grow, each with what it is compared with.
+    pub(super) growing: Vec<(MetricId, Operand)>,
+    /// The metrics of formulas, each with what it is compared with and what does not grow.
+    pub(super) formulas: Vec<(MetricId, Operand)>,
 }
 
 impl Read {
@@ -120,12 +154,39 @@ impl Read {
     }
 
     fn compare(&mut self, plan: &CampaignPlan, metric: MetricId, with: Operand) {
-        let source = |metric| &plan.metric(metric).source;
-        let is_fuzzing_time = |operand| matches!(operand, Operand::Variable(metric) if matches!(source(metric), MetricSource::FuzzingTime));
-        match source(metric) {
-            MetricSource::FuzzingTime if !is_fuzzing_time(with) => self.compared.push(with),
-            MetricSource::Monitor { score: Score::TimeIn { .. }, .. } => self.stays.push((metric, with)),
-            _ => {}
+        let grows = |metric| match &plan.metric(metric).source {
+            MetricSource::FuzzingTime => true,
+            MetricSource::Monitor { score, .. } => matches!(score, Score::TimeIn { .. }),
+            MetricSource::Formula { formula } => matches!(formula.aggregate, Aggregate::Duration { .. }),
+            _ => false,
+        };
+        if grows(metric) && !self.growing.contains(&(metric, with)) {
+            self.growing.push((metric, with));
+        }
+        let is_fixed = !matches!(with, Operand::Variable(other) if grows(other));
+        if is_fixed && matches!(plan.metric(metric).source, MetricSource::Formula { .. }) {
+            self.formulas.push((metric, with));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        // Times are so small that every nanosecond can be looked at.
+        #[test]
+        fn times_that_grow_meet_at_their_nanosecond(
+            total in 0..40i64, pace in 0..4i64, other in 0..40i64, other_pace in 0..4i64,
+        ) {
+            let stands = |after: i64| (total + pace * after).cmp(&(other + other_pace * after));
+            // One that falls behind is the other one's to look at.
+            let expected = (1..200).find(|&after| stands(after) > stands(after - 1)).map(SimTime::from_nanos);
+            let now = |total, pace| (SimTime::from_nanos(total), pace);
+            prop_assert_eq!(next_meeting(now(total, pace), now(other, other_pace)), expected);
         }
     }
 }

@@ -4,7 +4,7 @@ mod trace;
 
 use std::cell::RefCell;
 
-use sesame_base::observation::{CHANGES_KEPT, ChangeCause};
+use sesame_base::observation::{CHANGES_KEPT, ChangeCause, Reach};
 use sesame_base::time::SimTime;
 use sesame_plan::condition::{Comparison, Condition, Operand};
 use sesame_plan::stl::{Formula as Temporal, Interval, Robustness};
@@ -13,9 +13,9 @@ use sesame_plan::testing::{
     test_of, topic, use_of,
 };
 use sesame_plan::{
-    Activation, Bound, CampaignPlan, Choice, Evidence, Expression, FieldRef, Gate, Input, Members, MessageId, MetricId,
-    MetricSource, Mitigation, MitigationValue, Monitor, MonitorPart, MonitorState, Operation, OperationKind,
-    RequirementId, SafeState, Score, Side, Stale, StaleIs, Test, TestOperation, TopicId, Type,
+    Activation, Bound, CampaignPlan, Choice, Evidence, Expression, FieldRef, Gate, Input, Members, MessageId, Metric,
+    MetricId, MetricSource, Mitigation, MitigationValue, Monitor, MonitorPart, MonitorState, Operation, OperationKind,
+    RequirementId, SafeState, Score, Side, Stale, StaleIs, Test, TestOperation, TopicId, Trend, Type,
 };
 
 use crate::metric::MetricTable;
@@ -40,7 +40,7 @@ fn watched(monitors: Vec<Monitor>) -> CampaignPlan {
             topic("drive", &["drive"], Type::Message { id: MessageId(0) }),
             topic("gap", &["gap"], real()),
         ],
-        metrics: vec![metric("gap", last)],
+        metrics: vec![Metric { trend: Some(Trend::Falling), ..metric("gap", last) }],
         requirements: vec![requirement("apart", 0, Bound::AtLeast { value: 1.0 })],
         monitors,
         ..minimal()
@@ -169,7 +169,7 @@ fn a_monitor_publishes_its_state_at_time_zero_and_at_each_change() {
 
 #[test]
 fn timers_are_exact_between_two_steps_and_come_before_messages_of_the_same_instant() {
-    let held = Evidence { held: 0.3, stale: Some(Stale { after: 0.5, is: StaleIs::False }), ..ok() };
+    let held = Evidence { held: 0.3, stale: Some(Stale { after: 0.5, is: StaleIs::False, all: false }), ..ok() };
     let plan = watched(vec![cell(held)]);
     let ms = SECOND / 1000;
     let sent = [a(100 * ms, 1.0), a(400 * ms, -1.0), a(1100 * ms, 1.0), a(1200 * ms, 1.0)];
@@ -190,6 +190,55 @@ fn evidence_is_unknown_until_each_topic_had_a_message_and_while_a_number_is_not_
     let ran = run(&plan, vec![], &[a(10, 1.0), b(20, 5.0), b(30, f64::NAN), b(40, 5.0)], SECOND);
     assert_eq!(ran.decisions(0), [(0, None), (20, Some(0)), (30, None), (40, Some(0))]);
     assert_eq!(ran.finished.monitors[0].evidence[1].holds, None);
+}
+
+/// `a` and `b` are of two robots that keep a distance, and whose messages of one instant come one after the other.
+#[test]
+fn evidence_over_several_topics_sees_no_state_that_never_was() {
+    let apart = Evidence { inputs: [ok().inputs, evidence_above("b", 1, 0.0).inputs].concat(), ..ok() };
+    let distance = Expression::Sum(vec![Expression::Input(1), Expression::Negate(Box::new(Expression::Input(0)))]);
+    let condition = sesame_plan::Condition::Compare {
+        left: distance,
+        by: sesame_plan::Comparison::Above,
+        right: Expression::Constant(0.5),
+    };
+    let plan = watched(vec![cell(Evidence { condition, ..apart })]);
+    let b = |at, value| (at, "b", Value::Real(value));
+    let moved = |at: i64, to: f64| [a(at, to), b(at, to + 1.0)];
+    let ran = run(&plan, vec![], &[moved(10, 0.0), moved(20, 5.0), moved(30, 9.0)].concat(), SECOND);
+    assert_eq!(ran.decisions(0), [(0, None), (10, Some(0))]);
+    assert_eq!(ran.delivered("drive"), [], "nothing is mitigated");
+    let close = [moved(10, 0.0).to_vec(), vec![a(20, 0.8), b(20, 1.0)], moved(30, 9.0).to_vec()].concat();
+    let ran = run(&plan, vec![], &close, SECOND);
+    assert_eq!(ran.decisions(0), [(0, None), (10, Some(0)), (20, None), (30, Some(0))], "in the instant itself");
+    assert_eq!(ran.states("state"), [(0, 0.0), (10, 2.0), (20, 0.0), (30, 2.0)]);
+    assert_eq!(ran.delivered("drive"), [(20, drive(0.0, 0))]);
+    let of = |index| ChangeCause::Message { topic: "b".to_owned(), index };
+    let changes: Vec<_> = ran.finished.monitors[0].evidence.iter().map(|it| (it.holds, it.cause.clone())).collect();
+    assert_eq!(changes, [(Some(true), of(0)), (Some(false), of(1)), (Some(true), of(2))]);
+}
+
+#[test]
+fn evidence_is_stale_when_one_of_its_topics_is_silent_or_with_all_when_each_is() {
+    let both = |all| Evidence {
+        inputs: [ok().inputs, evidence_above("b", 1, 0.0).inputs].concat(),
+        stale: Some(Stale { after: 2.0, is: StaleIs::False, all }),
+        ..ok()
+    };
+    let b = |second: i64| (second * SECOND, "b", Value::Real(1.0));
+    let messages: Vec<_> = [b(1)].into_iter().chain((1..7).map(|second| a(second * SECOND, 1.0))).collect();
+    let of = |all| run(&watched(vec![cell(both(all))]), vec![], &messages, 10 * SECOND).decisions(0);
+    assert_eq!(of(false), [(0, None), (SECOND, Some(0)), (3 * SECOND + 1, None)]);
+    assert_eq!(of(true), [(0, None), (SECOND, Some(0)), (8 * SECOND + 1, None)]);
+}
+
+#[test]
+fn evidence_over_a_group_is_unknown_until_each_member_has_spoken() {
+    let mut plan = watched(vec![cell(ok())]);
+    plan.topics[0].paths.push("second".to_owned());
+    let second = |at, value| (at, "second", Value::Real(value));
+    let ran = run(&plan, vec![], &[a(10, 1.0), a(20, 1.0), second(30, 1.0), second(40, -1.0)], SECOND);
+    assert_eq!(ran.decisions(0), [(0, None), (30, Some(0)), (40, None)]);
 }
 
 #[test]
@@ -369,6 +418,30 @@ fn hazards_are_recorded_whether_or_not_a_metric_scores_them() {
     growing.metrics.push(score("missed", 0, Score::MissedHazards { requirement: RequirementId(1) }));
     let ran = run(&growing, vec![], &missed, second(8));
     assert_eq!((hazards(&ran), ran.value(2)), (vec![(0, 1, 3.000_000_001, None)], Some(1.0)));
+}
+
+#[test]
+fn where_a_metric_may_recover_only_the_end_decides_whether_there_was_a_hazard() {
+    let mut plan = scored(ok(), &[Score::MissedHazards { requirement: RequirementId(0) }]);
+    plan.metrics[0].trend = None;
+    let gap = |at, value| (at, "gap", Value::Real(value));
+    let of = |messages: &[(i64, &str, Value)]| {
+        let ran = run(&plan, vec![], messages, 8 * SECOND);
+        (hazards(&ran), ran.value(1))
+    };
+    assert_eq!(of(&[a(1, 1.0), gap(5, 0.0), gap(6, 2.0)]), (vec![], Some(0.0)), "it is satisfied");
+    assert_eq!(of(&[a(1, 1.0), gap(5, 2.0), gap(6, 0.0)]), (vec![(0, 0, 8.0, None)], Some(1.0)));
+}
+
+#[test]
+fn of_a_requirement_that_is_inconclusive_hazards_have_no_score() {
+    let plan = scored(ok(), &[Score::MissedHazards { requirement: RequirementId(0) }]);
+    let gap = |at, value| (at, "gap", Value::Real(value));
+    let blind = run(&plan, vec![], &[a(1, 1.0), gap(5, 2.0), gap(6, f64::NAN)], 8 * SECOND);
+    let observed = &blind.finished.metrics[1];
+    assert_eq!((observed.value, observed.set, observed.reach), (None, false, Reach::ANY));
+    let too_late = run(&plan, vec![], &[a(1, 1.0), gap(5, 0.5), gap(6, f64::NAN)], 8 * SECOND);
+    assert_eq!(too_late.value(1), Some(1.0), "what was known before is known");
 }
 
 #[test]

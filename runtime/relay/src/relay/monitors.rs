@@ -8,12 +8,11 @@
 //! Monitors begin with the run, but what they publish at time zero waits until the transport advances time: before
 //! that, not all subscribers may be there.
 
+use sesame_base::activation::TICK;
 use sesame_base::time::SimTime;
-use sesame_plan::condition::Operand;
 use sesame_plan::{MonitorId, NodeId, Side};
 
 use crate::monitor::Monitors;
-use crate::relay::marks::{beyond, reaching};
 use crate::relay::release::Held;
 use crate::relay::{Delivery, Listener as _, PUBLISHED_LIMIT, Phase, Relay};
 use crate::value::Value;
@@ -100,6 +99,12 @@ impl Relay<'_> {
         self.messages += 1;
         let index = self.published[wire.index()];
         self.published[wire.index()] += 1;
+        if self.traffic.is_awaited(wire) {
+            self.traffic.meets(now, self.wires, wire, publisher);
+        }
+        if !by_monitor {
+            self.traffic.heard(now, wire);
+        }
         for tap in &mut self.taps {
             tap.published(now, wire, index, &value);
         }
@@ -131,6 +136,33 @@ impl Relay<'_> {
         self.end_event(deliveries);
     }
 
+    /// Ends an instant for evidence that reads several topics: monitors decide on it, and what they publish is of this
+    /// instant too.
+    #[inline]
+    pub(super) fn settle_monitors(&mut self, deliveries: &mut Vec<Delivery>) {
+        if self.monitors.as_ref().is_some_and(Monitors::wait) {
+            self.settle_all_monitors(deliveries);
+        }
+    }
+
+    #[inline(never)]
+    fn settle_all_monitors(&mut self, deliveries: &mut Vec<Delivery>) {
+        for _ in 0..PUBLISHED_LIMIT {
+            let Some(monitors) = &mut self.monitors else { return };
+            if !monitors.settle(self.now) {
+                return;
+            }
+            if self.phase == Phase::Over {
+                monitors.give_up();
+            }
+            self.end_event(deliveries);
+        }
+        if let Some(monitors) = &mut self.monitors {
+            monitors.stop_waiting();
+            self.publishing.endless = true;
+        }
+    }
+
     /// Monitors learn that an instant is over. Returns whether that made values known.
     pub(super) fn monitors_leave(&mut self) -> bool {
         if self.monitors.is_none() {
@@ -146,24 +178,16 @@ impl Relay<'_> {
         self.monitors.as_ref().is_some_and(|monitors| monitors.sees_hazard(&self.metrics, self.fuzzing_time()))
     }
 
-    /// When monitors have something to do next without a message, or a time in a state reaches a number with which a
-    /// condition compares it.
+    /// When monitors have something to do next without a message.
     pub(super) fn monitors_due(&self) -> Option<SimTime> {
         let monitors = self.monitors.as_ref()?;
+        if monitors.wait() {
+            return Some(self.now + TICK);
+        }
         if self.phase == Phase::Running && !self.publishing.open && monitors.has_publication() {
             return Some(self.now);
         }
-        let stays = self.conditions.stays.iter().filter(|(metric, _)| monitors.grows(*metric));
-        let reached = stays.filter_map(|&(metric, operand)| {
-            let spent = SimTime::from_seconds(self.metrics.value(metric, 0.0)?).nanos();
-            let number = match operand {
-                Operand::Number(number) => number,
-                Operand::Variable(other) => self.metrics.value(other, self.fuzzing_time().seconds())?,
-            };
-            let marks = [reaching(number), beyond(number)].into_iter().filter(|&mark| mark > spent);
-            marks.min().map(|mark| self.now + SimTime::from_nanos(mark - spent))
-        });
-        monitors.next_due().into_iter().chain(reached).min()
+        monitors.next_due()
     }
 
     /// The run has come to its end.
@@ -177,6 +201,12 @@ impl Relay<'_> {
 
     /// The run broke off.
     pub(super) fn monitors_break_off(&mut self) {
+        if let Some(monitors) = &mut self.monitors {
+            monitors.settle_whole(self.now);
+            monitors.stop_waiting();
+        }
+        self.tell_decided();
+        self.show_scores();
         self.monitors_leave();
         if let Some(monitors) = &mut self.monitors {
             monitors.break_off(self.now, &mut self.metrics);

@@ -48,27 +48,24 @@ impl Relay<'_> {
             }
             .max(queued_until.unwrap_or(now));
             if action == Action::Dropped {
-                stage.count(heard, now, 1, |counters| &mut counters.dropped);
+                stage.count(message.wire, heard, now, 1, |counters| &mut counters.dropped);
                 self.tell(now, at, OperationEvent::Dropped(message.message_ref()));
                 return;
             }
             if action == Action::Changed {
-                stage.count(heard, now, 1, |counters| &mut counters.changed);
+                stage.count(message.wire, heard, now, 1, |counters| &mut counters.changed);
                 self.tell(now, at, OperationEvent::Changed(message.message_ref()));
             }
             if release > now {
                 let stage = &mut self.operations[at];
                 let why = match (heard, active) {
-                    (false, _) => Why::Unheard,
+                    (false, active) => Why::Unheard { active },
                     (true, true) => Why::Delayed,
                     (true, false) => Why::Queued,
                 };
-                stage.count(
-                    heard,
-                    now,
-                    1,
-                    |counters| if active { &mut counters.delayed } else { &mut counters.queued },
-                );
+                stage.count(message.wire, heard, now, 1, |counters| {
+                    if active { &mut counters.delayed } else { &mut counters.queued }
+                });
                 self.tell(now, at, OperationEvent::Delayed(message.message_ref(), release));
                 self.queue.push(release, at, why, message);
                 if self.queue.len() > HELD_LIMIT {
@@ -116,9 +113,11 @@ impl Relay<'_> {
         };
         let draws = KeyedRng::new(stage.operation_seed, member, message.index);
         let call = custom.on_message(now, self.wires.path(message.wire), draws, &mut message.value);
-        stage.count(heard, now, call.injected.len() as u64, |counters| &mut counters.injected);
-        stage.count(heard, now, u64::from(call.changed && !call.dropped), |counters| &mut counters.changed);
-        stage.count(heard, now, u64::from(call.dropped), |counters| &mut counters.dropped);
+        stage.count(message.wire, heard, now, call.injected.len() as u64, |counters| &mut counters.injected);
+        stage.count(message.wire, heard, now, u64::from(call.changed && !call.dropped), |counters| {
+            &mut counters.changed
+        });
+        stage.count(message.wire, heard, now, u64::from(call.dropped), |counters| &mut counters.dropped);
         if call.dropped {
             self.tell(now, at, OperationEvent::Dropped(message.message_ref()));
         } else if call.changed {
@@ -127,8 +126,9 @@ impl Relay<'_> {
         for _ in &call.injected {
             self.tell(now, at, OperationEvent::Injected(message.message_ref()));
         }
+        let seed = self.operations[at].operation_seed;
         let injected = (0u64..).zip(call.injected);
-        let injected: Vec<Held> = injected.map(|(number, value)| message.beside(at, number, value)).collect();
+        let injected: Vec<Held> = injected.map(|(number, value)| message.beside(seed, number, value)).collect();
         if !call.dropped {
             self.pass(now, message, deliveries);
         }
@@ -144,9 +144,10 @@ impl Relay<'_> {
         let copies = copies.min(room);
         self.copies += copies;
         let heard = self.heard[message.wire.index()];
-        self.operations[at].count(heard, now, u64::from(copies), |counters| &mut counters.injected);
+        self.operations[at].count(message.wire, heard, now, u64::from(copies), |counters| &mut counters.injected);
+        let seed = self.operations[at].operation_seed;
         let made: Vec<Held> =
-            (0..u64::from(copies)).map(|number| message.beside(at, number, message.value.clone())).collect();
+            (0..u64::from(copies)).map(|number| message.beside(seed, number, message.value.clone())).collect();
         for copy in &made {
             self.tell(now, at, OperationEvent::Injected(copy.message_ref()));
         }

@@ -35,10 +35,11 @@ impl Held {
         MessageRef { wire: self.wire, index: self.published }
     }
 
-    /// The `number`th message that an operation injects with this one. It continues at the same position, with a key of
-    /// its own, so later operations draw other random numbers for it.
-    pub(super) fn beside(&self, operation: usize, number: u64, value: Value) -> Held {
-        let index = derive_seed(self.index, "injected", &[operation as u64, number]);
+    /// The `number`th message that an operation with this seed injects with this one. It continues at the same
+    /// position, with a key of its own, so later operations draw other random numbers for it: the same ones whichever
+    /// other operations the test has.
+    pub(super) fn beside(&self, operation_seed: u64, number: u64, value: Value) -> Held {
+        let index = derive_seed(self.index, "injected", &[operation_seed, number]);
         Held { index, value, ..*self }
     }
 }
@@ -51,7 +52,10 @@ pub(super) enum Why {
     /// The operation is inactive, and the message waits behind held ones.
     Queued,
     /// Either, on a wire without a receiver.
-    Unheard,
+    Unheard {
+        /// Whether the operation is active.
+        active: bool,
+    },
 }
 
 struct Entry {

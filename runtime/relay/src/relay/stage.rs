@@ -1,11 +1,15 @@
 //! One operation of the test that runs: its state, and what it has done.
 
+use std::collections::BTreeMap;
+
 use sesame_base::activation::Activity;
 use sesame_base::observation::Counters;
 use sesame_base::time::SimTime;
 use sesame_plan::{NodeId, OperationId};
 
 use crate::fuzz::Disturbance;
+use crate::relay::release::Why;
+use crate::wire::Wire;
 
 /// One operation of the test.
 pub(super) struct Stage {
@@ -30,6 +34,16 @@ pub(super) struct Stage {
     pub(super) counters: Counters,
     pub(super) first_touch: Option<SimTime>,
     pub(super) last_touch: Option<SimTime>,
+    /// What it did on wires without a receiver, which may yet be found.
+    pub(super) unheard: BTreeMap<Wire, Unheard>,
+}
+
+/// What an operation did on a wire without a receiver.
+pub(super) struct Unheard {
+    pub(super) counters: Counters,
+    messages: u64,
+    first: SimTime,
+    last: SimTime,
 }
 
 impl Stage {
@@ -41,6 +55,7 @@ impl Stage {
     /// Counts an action on this many messages on a wire with or without a receiver.
     pub(super) fn count(
         &mut self,
+        wire: Wire,
         heard: bool,
         now: SimTime,
         messages: u64,
@@ -51,10 +66,52 @@ impl Stage {
         }
         if !heard {
             self.counters.unheard += messages;
+            let nothing = Unheard { counters: Counters::default(), messages: 0, first: now, last: now };
+            let unheard = self.unheard.entry(wire).or_insert(nothing);
+            *count(&mut unheard.counters) += messages;
+            unheard.messages += messages;
+            unheard.last = now;
             return;
         }
-        *count(&mut self.counters) += messages;
+        self.acted(now, messages, count);
+    }
+
+    /// Counts an action that had an effect.
+    pub(super) fn acted(&mut self, now: SimTime, times: u64, count: impl FnOnce(&mut Counters) -> &mut u64) {
+        *count(&mut self.counters) += times;
         self.first_touch.get_or_insert(now);
         self.last_touch = Some(now);
+    }
+
+    /// A message that it held back is lost.
+    pub(super) fn lost(&mut self, wire: Wire, why: Why) {
+        let (counters, active) = match why {
+            Why::Delayed => (&mut self.counters, true),
+            Why::Queued => (&mut self.counters, false),
+            Why::Unheard { active } => match self.unheard.get_mut(&wire) {
+                Some(unheard) => (&mut unheard.counters, active),
+                // Its receiver was found meanwhile.
+                None => (&mut self.counters, active),
+            },
+        };
+        let held = if active { &mut counters.delayed } else { &mut counters.queued };
+        *held = held.saturating_sub(1);
+        counters.dropped += 1;
+    }
+
+    /// A receiver of this wire was found that was there all the time: what was done there had an effect.
+    pub(super) fn found(&mut self, wire: Wire) {
+        let Some(Unheard { counters: found, messages, first, last }) = self.unheard.remove(&wire) else { return };
+        let Counters { seen: _, changed, dropped, delayed, queued, injected, side_effects, unheard } =
+            &mut self.counters;
+        *unheard -= messages;
+        *changed += found.changed;
+        *dropped += found.dropped;
+        *delayed += found.delayed;
+        *queued += found.queued;
+        *injected += found.injected;
+        *side_effects += found.side_effects;
+        self.first_touch = Some(self.first_touch.map_or(first, |touch| touch.min(first)));
+        self.last_touch = Some(self.last_touch.map_or(last, |touch| touch.max(last)));
     }
 }

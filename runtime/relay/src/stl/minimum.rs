@@ -39,22 +39,19 @@ impl SlidingMinimum {
         }
     }
 
-    /// Tells the rest for a trace of this length.
-    pub(super) fn finish(&mut self, length: i64, out: &mut VecDeque<Piece>) {
-        self.tell(length, out);
-    }
-
     /// Whether the window has an end.
     pub(super) fn is_bounded(&self) -> bool {
         self.window.to.is_some()
     }
 
-    /// Tells the rest of the times whose windows are not empty, of a signal that ends here. A window that has an end is
-    /// whole, and told, or does not count.
-    pub(super) fn finish_whole(&mut self, end: i64, out: &mut VecDeque<Piece>) {
-        if !self.is_bounded() {
-            self.tell(end.saturating_sub(self.window.from), out);
-        }
+    /// Tells the rest of the times whose windows begin before the signal ends, which is here.
+    pub(super) fn finish(&mut self, end: i64, out: &mut VecDeque<Piece>) {
+        self.tell(end.saturating_sub(self.window.from), out);
+    }
+
+    /// How far behind the end of the signal the times end that have a minimum.
+    pub(super) fn reaches_ahead(&self, whole: bool) -> i64 {
+        if whole { self.window.to.unwrap_or(self.window.from) } else { self.window.from }
     }
 
     /// Tells the minimum for the times before `end`, the windows of which are known.

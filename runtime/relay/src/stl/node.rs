@@ -20,28 +20,39 @@ pub(super) struct Stretch {
     pub(super) end: i64,
     /// Whether the trace ends there too.
     pub(super) last: bool,
-    /// Where nothing is known of the signals: what stands for the robustness of their predicates, negative or positive
-    /// infinity.
-    pub(super) unknown: Option<f64>,
+    /// What stands for everything of which nothing is known.
+    pub(super) unknown: Option<Unknown>,
     /// Whether only windows count that are completely within the trace.
     pub(super) whole: bool,
+}
+
+/// What stands for the robustness where nothing is known of the signals, and maybe not even whether there is a trace.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Unknown {
+    /// Up to where signals are known, excluded; the trace may end there or at any later time.
+    pub(super) known: i64,
+    /// For predicates: negative or positive infinity.
+    pub(super) extreme: f64,
+}
+
+impl Unknown {
+    /// For what has a robustness only if the trace goes on. It differs from the infinity of what has one that is
+    /// unknown.
+    fn undecided(self) -> f64 {
+        f64::MAX.copysign(self.extreme)
+    }
 }
 
 impl Stretch {
     /// The same for what is negated.
     fn negated(self) -> Self {
-        Stretch { unknown: self.unknown.map(|extreme| -extreme), ..self }
+        let unknown = self.unknown.map(|unknown| Unknown { extreme: -unknown.extreme, ..unknown });
+        Stretch { unknown, ..self }
     }
 
     /// Whether windows are cut here. Where nothing is known the trace goes on for ever, and has no end to cut them.
     fn cuts(self) -> bool {
         self.last && !self.whole && self.unknown.is_none()
-    }
-
-    /// What stands for all that depends on where the trace will end, where only whole windows count and nothing is
-    /// known: the end decides what belongs to the formula at all.
-    fn undecided(self) -> Option<f64> {
-        self.unknown.filter(|_| self.whole)
     }
 }
 
@@ -173,7 +184,7 @@ impl Node {
             &mut Operator::Predicate { signal, comparison, constant } => {
                 if stretch.end > self.told {
                     let known = || margin(values[signal], comparison, constant);
-                    put(out, stretch.end, stretch.unknown.unwrap_or_else(known));
+                    put(out, stretch.end, stretch.unknown.map_or_else(known, |unknown| unknown.extreme));
                 }
             }
             Operator::Not { of, input } => {
@@ -185,33 +196,44 @@ impl Node {
             Operator::And { left, right, input } => {
                 left.extend(stretch, values, &mut input.left);
                 right.extend(stretch, values, &mut input.right);
-                let undecided = |value: &f64| Some(*value) == stretch.undecided();
+                let undecided = |value: &f64| stretch.unknown.is_some_and(|unknown| *value == unknown.undecided());
                 while let Some((end, left, right)) = input.pop() {
                     put(out, end, [left, right].into_iter().find(undecided).unwrap_or(left.min(right)));
                 }
             }
             Operator::Always { of, input, minimum, kept } => {
-                if let Some(extreme) = stretch.undecided().filter(|_| minimum.is_bounded()) {
-                    put(out, stretch.end, extreme);
-                } else {
-                    of.extend(stretch, values, input);
-                    for piece in input.drain(..) {
-                        if let Some(kept) = kept {
-                            put(kept, piece.end, piece.value);
-                        }
-                        minimum.push(piece, out);
+                of.extend(stretch, values, input);
+                let defined = stretch.unknown.map(|unknown| {
+                    let ahead = minimum.reaches_ahead(stretch.whole);
+                    (unknown, of.defined(unknown.known, stretch.whole).saturating_sub(ahead))
+                });
+                let mut minima = VecDeque::new();
+                for piece in input.drain(..) {
+                    if let Some(kept) = kept {
+                        put(kept, piece.end, piece.value);
                     }
-                    if stretch.cuts() {
-                        minimum.finish(stretch.end, out);
-                    } else if stretch.last {
-                        minimum.finish_whole(of.told, out);
-                    }
+                    minimum.push(piece, &mut minima);
                 }
+                if stretch.cuts() || stretch.last && !minimum.is_bounded() {
+                    minimum.finish(of.told, &mut minima);
+                }
+                put_decided(defined, self.told, minima, out);
             }
-            Operator::Until(until) => until.extend(stretch, values, out),
+            Operator::Until(until) => until.extend(stretch, values, self.told, out),
         }
         if let Some(last) = out.back() {
             self.told = self.told.max(last.end);
+        }
+    }
+
+    /// Up to where it has a robustness, excluded, on a trace that ends here.
+    fn defined(&self, end: i64, whole: bool) -> i64 {
+        match &self.operator {
+            Operator::Predicate { .. } => end,
+            Operator::Not { of, .. } => of.defined(end, whole),
+            Operator::And { left, right, .. } => left.defined(end, whole).min(right.defined(end, whole)),
+            Operator::Always { of, minimum, .. } => of.defined(end, whole).saturating_sub(minimum.reaches_ahead(whole)),
+            Operator::Until(until) => until.defined(end, whole),
         }
     }
 
@@ -264,11 +286,8 @@ impl Node {
 }
 
 impl Until {
-    fn extend(&mut self, stretch: Stretch, values: &[f64], out: &mut VecDeque<Piece>) {
-        // Even without an end of its window it has no robustness before something is known of both sides.
-        if let Some(extreme) = stretch.undecided() {
-            return put(out, stretch.end, extreme);
-        }
+    /// `told` is the time up to which its robustness is known.
+    fn extend(&mut self, stretch: Stretch, values: &[f64], told: i64, out: &mut VecDeque<Piece>) {
         self.left.extend(stretch, values, &mut self.lead);
         for piece in self.lead.drain(..) {
             self.before.push(piece, &mut self.parts.left);
@@ -280,18 +299,42 @@ impl Until {
         while let Some((end, left, right)) = self.input.pop() {
             self.within.push(end, left, right, &mut self.ahead);
         }
-        if stretch.cuts() {
-            self.before.finish(stretch.end, &mut self.parts.left);
-            self.within.finish(stretch.end.saturating_add(self.delay), &mut self.ahead);
-        } else if stretch.last && !self.within.is_bounded() {
+        if stretch.cuts() || stretch.last && !self.within.is_bounded() {
             self.within.finish(self.left.told.min(self.right.told), &mut self.ahead);
         }
         for piece in self.ahead.drain(..) {
             put(&mut self.parts.right, piece.end - self.delay, piece.value);
         }
+        let mut both = VecDeque::new();
         while let Some((end, before, within)) = self.parts.pop() {
-            put(out, end, before.min(within));
+            put(&mut both, end, before.min(within));
         }
+        let defined = stretch.unknown.map(|unknown| (unknown, self.defined(unknown.known, stretch.whole)));
+        put_decided(defined, told, both, out);
+    }
+
+    /// As [`Node::defined`].
+    fn defined(&self, end: i64, whole: bool) -> i64 {
+        let ahead = if whole { self.delay + self.within.length().unwrap_or(0) } else { self.delay };
+        self.left.defined(end, whole).min(self.right.defined(end, whole)).saturating_sub(ahead)
+    }
+}
+
+/// Passes on what an operator says. From `defined` on it has a robustness only if the trace goes on, so what it says
+/// there is undecided. It has spoken of times before `told`.
+fn put_decided(defined: Option<(Unknown, i64)>, told: i64, pieces: VecDeque<Piece>, out: &mut VecDeque<Piece>) {
+    let mut told = told;
+    for piece in pieces {
+        match defined {
+            Some((unknown, defined)) if piece.end > defined => {
+                if told < defined {
+                    put(out, defined, piece.value);
+                }
+                put(out, piece.end, unknown.undecided());
+            }
+            _ => put(out, piece.end, piece.value),
+        }
+        told = piece.end;
     }
 }
 

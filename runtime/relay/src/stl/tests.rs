@@ -112,7 +112,7 @@ fn by_definition(formula: &Formula, trace: &Trace, start: i64, whole: bool) -> V
     };
     // The instants at which there is a robustness, of an operator on what has this many.
     let defined = |interval: &Interval, length: usize| {
-        if whole { length.saturating_sub(ticks(interval.to.unwrap_or(interval.from))) } else { length }
+        length.saturating_sub(ticks(if whole { interval.to.unwrap_or(interval.from) } else { interval.from }))
     };
     let least = |values: &[f64]| values.iter().copied().fold(f64::INFINITY, f64::min);
     let greatest = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -480,11 +480,13 @@ fn over_whole_windows_a_request_shortly_before_the_end_asks_for_nothing() {
 }
 
 #[test]
-fn a_window_behind_the_end_of_the_trace_is_empty() {
+fn a_window_behind_the_end_of_the_trace_asks_for_nothing() {
     let trace = sampled(&[3.0, 2.0, 4.0], &[1.0]);
     assert_eq!(robustness(&always(seconds(3, 5), x()), &trace, SECOND), Some(f64::INFINITY));
-    assert_eq!(robustness(&eventually(seconds(3, 5), x()), &trace, SECOND), Some(f64::NEG_INFINITY));
-    assert_eq!(robustness(&until(seconds(3, 5), x(), y()), &trace, SECOND), Some(f64::NEG_INFINITY));
+    assert_eq!(robustness(&eventually(seconds(3, 5), x()), &trace, SECOND), Some(f64::INFINITY));
+    assert_eq!(robustness(&until(seconds(3, 5), x(), y()), &trace, SECOND), Some(f64::INFINITY));
+    let often = always(Interval::UNBOUNDED, eventually(seconds(1, 2), x()));
+    assert_eq!(robustness(&often, &trace, SECOND), Some(4.0), "the last second asks for nothing");
 }
 
 #[test]

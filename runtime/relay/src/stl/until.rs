@@ -63,6 +63,11 @@ impl SlidingUntil {
         self.length.is_some()
     }
 
+    /// How long the window is, if it has an end.
+    pub(super) fn length(&self) -> Option<i64> {
+        self.length
+    }
+
     /// Whether a piece that ends there is in any window still to be told.
     pub(super) fn asks(&self, end: i64) -> bool {
         end > self.asked.start
@@ -86,7 +91,7 @@ impl SlidingUntil {
         }
     }
 
-    /// Tells the rest up to this time; behind the end of the trace there is nothing to arrive at.
+    /// Tells the rest, for signals that end here.
     pub(super) fn finish(&mut self, end: i64, out: &mut VecDeque<Piece>) {
         self.tell(end, out);
     }

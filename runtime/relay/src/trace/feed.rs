@@ -112,6 +112,7 @@ impl Feeder<'_, '_> {
         let mut now = self.now;
         while now < time {
             monitors.decide(now);
+            monitors.settle(now);
             monitors.show(now, &mut self.metrics);
             self.metrics.settle();
             monitors.end_instant(now, &mut self.metrics, self.fuzzing_time.at(now));
@@ -158,6 +159,8 @@ impl Feeder<'_, '_> {
                 }
                 if let Some(monitors) = &mut self.monitors {
                     monitors.decide(self.now);
+                    monitors.settle_whole(self.now);
+                    monitors.show(self.now, &mut self.metrics);
                     monitors.break_off(self.now, &mut self.metrics);
                 }
             }

@@ -11,6 +11,8 @@
 #![expect(clippy::disallowed_methods, reason = "an adapter: it waits for other processes")]
 
 pub mod echo;
+#[cfg(test)]
+mod faults;
 pub mod secret;
 mod system;
 #[cfg(test)]
@@ -53,6 +55,11 @@ pub trait Bus {
     /// The next thing that happened, waited for at most this long. A connection that is lost and found again within
     /// [`FOUND_AGAIN_WITHIN`] is a note; everything is listened to again.
     fn receive(&mut self, timeout: Duration) -> Result<Option<Event>, TransportError>;
+
+    /// Whether the connection stands at this moment. A run that ends without one is not one that came to its end.
+    fn is_connected(&self) -> bool {
+        true
+    }
 
     /// Publishes a message on a sink of a line, by their positions. `call` is that of the message from which it comes.
     fn publish(&mut self, line: usize, sink: usize, value: &Value, call: Option<u64>) -> Result<(), TransportError>;

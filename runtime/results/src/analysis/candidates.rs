@@ -163,13 +163,49 @@ pub fn candidates(repository: &Repository, selection: &Selection, terms: &Terms)
     Ok(found)
 }
 
+/// Those of these tests that a lab excludes, each with the reason: the tests that must not be run in it, whatever else
+/// speaks for them. One that has no value of a metric by which the lab excludes is among them, since nobody knows.
+pub fn excluded(repository: &Repository, lab: &Lab, tests: &[u32]) -> Result<Vec<(u32, LeftOut)>, RecordError> {
+    if lab.exclude.is_empty() {
+        return Ok(Vec::new());
+    }
+    let judge = repository.judge()?;
+    let mut found = Vec::new();
+    repository.scan(&mut |test| {
+        if tests.contains(&test.number) {
+            found.extend(exclusion(&judge, &lab.exclude, &test).map(|reason| (test.number, reason)));
+        }
+    })?;
+    Ok(found)
+}
+
+/// Why these tests are not run in a lab, in words; `None` if it excludes none of them.
+pub fn exclusions(repository: &Repository, lab: &Lab, tests: &[u32]) -> Result<Option<String>, RecordError> {
+    let metric = |metric| &repository.plan().metric(metric).name;
+    let each = excluded(repository, lab, tests)?.into_iter().map(|(number, reason)| match reason {
+        LeftOut::Excluded { by, value } => format!("{} (`{}` is {value})", TestNumber(number), metric(by.metric)),
+        other => format!("{} ({})", TestNumber(number), other.words(repository.plan())),
+    });
+    let each = each.collect::<Vec<_>>().join(", ");
+    Ok((!each.is_empty()).then(|| format!("lab `{}` excludes {each} as too dangerous", lab.name)))
+}
+
+/// Why a test is excluded, if it is.
+fn exclusion(judge: &Judge<'_>, exclude: &[LabExclusion], test: &ScannedTest) -> Option<LeftOut> {
+    exclude.iter().find_map(|&by| match value(judge, test, by.metric) {
+        None => Some(LeftOut::Unmeasured { metric: by.metric }),
+        Some(value) => by.bound.holds(value).then_some(LeftOut::Excluded { by, value }),
+    })
+}
+
 /// How interesting each measured test is, from 0 to 1: its [rank](sesame_select::ranking) among all of them, by the
 /// keys of [`Candidates::measured`]. Of none, if tests are ranked by nothing.
 pub fn qualities(measured: &BTreeMap<u32, Vec<f64>>, convention: Convention) -> BTreeMap<u32, f64> {
     let count = measured.values().next().map_or(0, Vec::len);
     let columns: Vec<Vec<f64>> = (0..count).map(|key| measured.values().map(|keys| keys[key]).collect()).collect();
     let keys: Vec<Key<'_>> = columns.iter().map(|values| Key { values, better: Better::Lower }).collect();
-    let scale = if convention == Convention::Paper { Scale::Paper } else { Scale::Average };
+    // The paper and its platform count positions.
+    let scale = if convention == Convention::Ours { Scale::Average } else { Scale::Paper };
     let qualities = ranking::qualities(&keys, scale).unwrap_or_default();
     measured.keys().copied().zip(qualities).collect()
 }
@@ -202,11 +238,8 @@ fn candidate(
     if test.outcome == Outcome::NoEffect {
         return Err(LeftOut::NoEffect);
     }
-    for &by in &terms.exclude {
-        let value = measured(by.metric)?;
-        if by.bound.holds(value) {
-            return Err(LeftOut::Excluded { by, value });
-        }
+    if let Some(reason) = exclusion(judge, &terms.exclude, test) {
+        return Err(reason);
     }
     let cost = terms.costs.get(&test.number).copied().unwrap_or_else(|| terms.cost.of(test.operations.len()));
     if cost > terms.budget {

@@ -57,7 +57,7 @@ pub struct FindingAgain {
 
 impl FindingAgain {
     /// A finding according to fresh runs; `None` if neither they nor the first run show it.
-    fn of(finding: &str, tally: Tally, first: Verdict) -> Option<FindingAgain> {
+    pub(crate) fn of(finding: &str, tally: Tally, first: Verdict) -> Option<FindingAgain> {
         (first == Verdict::Violated || tally.violated > 0).then(|| FindingAgain {
             finding: finding.to_owned(),
             first: first == Verdict::Violated,

@@ -35,6 +35,32 @@ pub(crate) fn number(x: f64) -> String {
     fixed(x, decimals([x]))
 }
 
+/// A time in seconds: to the millisecond, or to the nanosecond where that makes a difference. Times of a run are whole
+/// nanoseconds, and differences of them are not further from that than arithmetic makes them.
+pub(crate) fn time(seconds: f64) -> String {
+    let nanoseconds = libm::rint(seconds * 1e9);
+    if !nanoseconds.is_finite() || nanoseconds.abs() >= 1e18 || nanoseconds % 1e6 == 0.0 {
+        return with_unit(fixed(seconds, 3), Some("s"));
+    }
+    let text = format!("{:.9}", nanoseconds / 1e9);
+    with_unit(text.trim_end_matches('0').to_owned(), Some("s"))
+}
+
+/// A number next to bounds: with as many more digits as show on which side of each it is.
+pub(crate) fn beside(x: f64, bounds: &[Bound], unit: Option<&str>) -> String {
+    let tells = |text: &str| {
+        text.parse::<f64>().is_ok_and(|read| bounds.iter().all(|bound| bound.holds(read) == bound.holds(x)))
+    };
+    let usual = number(x);
+    let text = if tells(&usual) {
+        usual
+    } else {
+        let longer = (decimals([x]) + 1..=17).map(|decimals| format!("{x:.decimals$}"));
+        longer.into_iter().find(|text| tells(text)).unwrap_or_else(|| exact(x))
+    };
+    with_unit(text, unit)
+}
+
 /// A number as people read it, with its unit: at most four significant digits or three decimals, `-7.393 m`.
 pub fn quantity(x: f64, unit: Option<&str>) -> String {
     with_unit(number(x), unit)
@@ -92,6 +118,17 @@ fn range(low: f64, high: f64) -> String {
     format!("{}…{}", fixed(low, decimals), fixed(high, decimals))
 }
 
+/// The unit in which a parameter's values up to this one are written, and by what they are multiplied for that.
+pub(crate) fn scale<'p>(kind: &OperationKind, parameter: &'p Parameter, highest: f64) -> (f64, Option<&'p str>) {
+    match kind {
+        kind if kind.has_probabilities() => (100.0, Some("%")),
+        OperationKind::Latency { .. } | OperationKind::Reorder { .. } | OperationKind::Stale if highest < 1.0 => {
+            (1000.0, Some("ms"))
+        }
+        _ => (1.0, parameter.unit.as_deref()),
+    }
+}
+
 /// What a test chose, as in `offset 0.27…0.29 rad`, `loss 40 %`, `delay 20…100 ms`.
 pub(crate) fn choice(kind: &OperationKind, parameter: &Parameter, choice: &Choice) -> String {
     let (low, high) = match choice {
@@ -104,13 +141,7 @@ pub(crate) fn choice(kind: &OperationKind, parameter: &Parameter, choice: &Choic
         }
         Choice::Text { text } => return format!("{} {text}", parameter.name),
     };
-    let (factor, unit) = match kind {
-        kind if kind.has_probabilities() => (100.0, Some("%")),
-        OperationKind::Latency { .. } | OperationKind::Reorder { .. } | OperationKind::Stale if high < 1.0 => {
-            (1000.0, Some("ms"))
-        }
-        _ => (1.0, parameter.unit.as_deref()),
-    };
+    let (factor, unit) = scale(kind, parameter, high);
     let text = match choice {
         Choice::Value { .. } => number(low * factor),
         _ => range(low * factor, high * factor),
@@ -132,9 +163,24 @@ pub(crate) fn join_words(words: &[String]) -> String {
     }
 }
 
+/// For counts that are left out of JSON where they count nothing.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+pub(crate) fn is_zero(count: &usize) -> bool {
+    *count == 0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn times_have_the_digits_that_tell_two_instants_apart() {
+        assert_eq!([0.9, 0.9 + 1e-9, 1.270_000_000_999_999_9].map(time), ["0.900 s", "0.900000001 s", "1.270000001 s"]);
+        // As differences come out.
+        assert_eq!(time(-0.300_000_000_000_000_04), "-0.300 s");
+        assert_eq!(time(2.5 - 10.1), "-7.600 s");
+        assert_eq!([0.0, -0.0, 70.0, 1e12].map(time), ["0.000 s", "0.000 s", "70.000 s", "1.00e12 s"]);
+    }
 
     #[test]
     fn a_column_shows_four_digits_of_its_largest_value() {
@@ -155,6 +201,12 @@ mod tests {
         assert_eq!(fixed(-0.001, 2), "0.00");
         assert_eq!(number(1.5e12), "1.50e12");
         assert_eq!(quantity(49.238, Some("s")), "49.24 s");
+        let at_most = |value| [Bound::AtMost { value }];
+        assert_eq!(beside(1.0, &at_most(1.0), Some("m")), "1 m");
+        assert_eq!(beside(1.000_000_000_000_000_2, &at_most(1.0), Some("m")), "1.0000000000000002 m");
+        assert_eq!(beside(0.999_999_999, &[Bound::AtLeast { value: 1.0 }], None), "0.999999999");
+        assert_eq!(beside(0.999_5, &[Bound::AtLeast { value: 1.0 }], None), "0.9995");
+        assert_eq!(beside(6.4e-14, &at_most(0.0), None), "6.40e-14");
         assert_eq!(bound(Bound::Within { low: 1.0, high: 40.0 }, None), "1…40");
     }
 

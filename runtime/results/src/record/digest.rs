@@ -8,7 +8,7 @@ use sesame_plan::{CampaignPlan, Test};
 use sha2::{Digest as _, Sha256};
 
 use crate::record::schema::{self, MEANING_SINCE, PIECES_SINCE, STANDARD_WORDS_SINCE};
-use crate::record::{lab_runs, split_operations};
+use crate::record::{lab_runs, left_out_operations, original_extents, split_operations};
 
 /// What is hashed, in this order: a name, and a query whose order of rows depends on nothing but the content. The
 /// meaning of the plan is `?1`.
@@ -118,8 +118,9 @@ const PORTION: usize = 1 << 16;
 ///
 /// The task of a run that is not the campaign is hashed with the plan, which it follows.
 ///
-/// Operations that were one operation in an imported file are hashed last, if there are any, and so are runs of a lab
-/// that were entered by hand: which run of its test each is, but not who made it.
+/// Operations that were one operation in an imported file are hashed last, if there are any, then operations that could
+/// not be imported, and windows and ranges of the file that are others in the plan. So are runs of a lab that were
+/// entered by hand: which run of its test each is, but not who made it.
 ///
 /// Results of an earlier schema have the digest that their release computed, over all of the plan's JSON, the sentences
 /// of requirements, and the name of the `.sesame` file. Names of columns and verdicts are not hashed.
@@ -131,9 +132,13 @@ pub(super) fn of_connection(connection: &Connection, version: i64, plan: &Campai
     let mut portion = Vec::with_capacity(2 * PORTION);
     let split = version >= STANDARD_WORDS_SINCE && split_operations::are_in(&transaction)?;
     let split = split.then_some((split_operations::TABLE, split_operations::QUERY));
+    let left_out = version >= STANDARD_WORDS_SINCE && left_out_operations::are_in(&transaction)?;
+    let left_out = left_out.then_some((left_out_operations::TABLE, left_out_operations::QUERY));
+    let extents = version >= STANDARD_WORDS_SINCE && original_extents::are_in(&transaction)?;
+    let extents = extents.then_some((original_extents::TABLE, original_extents::QUERY));
     let entered = version >= STANDARD_WORDS_SINCE && lab_runs::are_in(&transaction)?;
     let entered = entered.then_some((lab_runs::TABLE, lab_runs::QUERY));
-    for content in CONTENT.iter().copied().chain(split).chain(entered) {
+    for content in CONTENT.iter().copied().chain(split).chain(left_out).chain(extents).chain(entered) {
         let earlier = EARLIER.iter().find(|(since, name, _)| version < *since && *name == content.0);
         let (name, sql) = earlier.map_or(content, |&(.., earlier)| earlier);
         feed(&mut portion, ValueRef::Text(name.as_bytes()));

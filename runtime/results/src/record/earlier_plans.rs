@@ -127,7 +127,7 @@ mod tests {
         let expected = Shrinking {
             name: "known_jitter".to_owned(),
             test: plan.tests[0].test.clone(),
-            failing: Failing::Violation { requirements: vec![RequirementId(1)] },
+            failing: Failing::Violation { requirements: vec![RequirementId(1)], margins: Vec::new() },
             simulator_seed: u64::MAX,
             runs: 2,
             evaluations: 90,

@@ -78,13 +78,23 @@ fn holds_nothing(folder: &Path) -> Result<bool, RecordError> {
 ///
 /// Its name is its seed, perhaps with a number after it, such as `42-2`. What else was run on the side (regression
 /// tests, repetitions, runs in a lab such as `42-hall`) is looked at when it is asked for, or when there is nothing
-/// else.
+/// else. The same holds for runs that ended before any test did, perhaps because the simulator was missing: they do not
+/// hide those that found something.
 pub fn latest_folder(results: &Path) -> Result<Option<PathBuf>, RecordError> {
     let folders = latest_first(results)?;
-    let search = folders.iter().find(|folder| {
-        folder.file_name().is_some_and(|name| name.to_string_lossy().chars().all(|c| c.is_ascii_digit() || c == '-'))
-    });
-    Ok(search.or(folders.first()).cloned())
+    let searches: Vec<&PathBuf> = folders.iter().filter(|folder| is_search(folder)).collect();
+    let tested = searches.iter().find(|folder| has_tests(folder));
+    Ok(tested.or(searches.first()).copied().or(folders.first()).cloned())
+}
+
+fn is_search(folder: &Path) -> bool {
+    folder.file_name().is_some_and(|name| name.to_string_lossy().chars().all(|c| c.is_ascii_digit() || c == '-'))
+}
+
+/// Whether a run has tests besides reference runs. Results that cannot be read may have some, and opening
+/// them says what is wrong.
+fn has_tests(folder: &Path) -> bool {
+    Repository::open(folder).and_then(|repository| repository.evaluated()).map_or(true, |tests| tests > 0)
 }
 
 /// The folder of the campaign's run whose results were written last, of those that are not finished and that no process

@@ -24,10 +24,13 @@ pub(super) const OBJECTS: [&str; 8] = [
     "evidence",
 ];
 
-/// The table of hazards, and the view of it: the first results with monitors have none.
+/// The tables of hazards, and the view of them: the first results with monitors have none.
 pub(super) const HAZARDS: &str = include_str!("hazards.sql");
 
-pub(super) const HAZARD_OBJECTS: [&str; 2] = ["monitor_hazards", "hazards"];
+/// Those of schema 7, which knows the hazards of first runs only.
+pub(super) const HAZARDS_7: &str = include_str!("hazards_7.sql");
+
+pub(super) const HAZARD_OBJECTS: [&str; 3] = ["monitor_hazards", "repetition_hazards", "hazards"];
 
 /// Whether results have the tables, which were [recognised](super::recognise).
 pub(super) fn are_in(connection: &Connection) -> rusqlite::Result<bool> {
@@ -37,6 +40,11 @@ pub(super) fn are_in(connection: &Connection) -> rusqlite::Result<bool> {
 /// Whether they have the table of hazards.
 pub(super) fn have_hazards(connection: &Connection) -> rusqlite::Result<bool> {
     is_in(connection, "monitor_hazards")
+}
+
+/// Whether they have the table of hazards in repetitions.
+pub(super) fn have_hazards_of_repetitions(connection: &Connection) -> rusqlite::Result<bool> {
+    is_in(connection, "repetition_hazards")
 }
 
 fn is_in(connection: &Connection, table: &str) -> rusqlite::Result<bool> {
@@ -114,6 +122,28 @@ pub(super) fn write(
             transaction
                 .prepare_cached("INSERT INTO monitor_omissions (test, monitor, omitted) VALUES (?1, ?2, ?3)")?
                 .execute(params![test, id, i64::try_from(*omitted).unwrap_or(i64::MAX)])?;
+        }
+    }
+    Ok(())
+}
+
+/// Writes the hazards in a repetition, per monitor of a plan.
+pub(super) fn write_hazards(
+    transaction: &Transaction<'_>,
+    (test, position): (u32, u32),
+    hazards: &[Vec<MonitorHazard>],
+) -> rusqlite::Result<()> {
+    if hazards.iter().all(Vec::is_empty) || !have_hazards_of_repetitions(transaction)? {
+        return Ok(());
+    }
+    for (id, hazards) in hazards.iter().enumerate() {
+        for MonitorHazard { requirement, time, lead } in hazards {
+            transaction
+                .prepare_cached(
+                    "INSERT INTO repetition_hazards (test, position, monitor, requirement, time_s, lead_s) \
+                     VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
+                )?
+                .execute(params![test, position, index(id), requirement.0, time, lead])?;
         }
     }
     Ok(())

@@ -10,11 +10,14 @@ use sesame_base::test_number::TestNumber;
 use sesame_plan::{MonitorState, RequirementId};
 
 use crate::record::columns::{finite, perhaps_finite, position, unsigned};
-use crate::record::monitors::{are_in, have_hazards};
+use crate::record::monitors::{are_in, have_hazards, have_hazards_of_repetitions};
 use crate::record::{RecordError, Repository};
 
 /// What each monitor of the plan did, per test.
 type ByTest = BTreeMap<u32, Vec<MonitorObservation>>;
+
+/// The hazards of each monitor of the plan, by test and position of a repetition.
+type ByRepetition = BTreeMap<(u32, u32), Vec<Vec<MonitorHazard>>>;
 
 impl Repository {
     /// What the monitors of the plan did in a test; nothing in results that were recorded without it.
@@ -117,6 +120,34 @@ impl Repository {
         Ok(())
     }
 
+    /// The hazards in repetitions, by test and position: per monitor of the plan.
+    pub(super) fn repeated_hazards(&self) -> Result<ByRepetition, RecordError> {
+        let plan = self.plan();
+        let mut found = BTreeMap::new();
+        let there = have_hazards_of_repetitions(&self.connection);
+        if !there.map_err(|e| RecordError::database("read the results", &self.path, e))? {
+            return Ok(found);
+        }
+        let rows = self.read(
+            "SELECT test, position, monitor, requirement, time_s, lead_s FROM repetition_hazards \
+             ORDER BY test, position, monitor, time_s, requirement",
+            [],
+            |row| {
+                let (at, requirement): ((u32, u32), u32) = ((row.get(0)?, row.get(1)?), row.get(3)?);
+                Ok((at, position(row, 2)?, requirement, finite(row, 4)?, perhaps_finite(row, 5)?))
+            },
+        )?;
+        for (at, monitor, requirement, time, lead) in rows {
+            let requirement = RequirementId(requirement);
+            let of_run = found.entry(at).or_insert_with(|| vec![Vec::new(); plan.monitors.len()]);
+            match of_run.get_mut(monitor).filter(|_| requirement.index() < plan.requirements.len()) {
+                Some(hazards) => hazards.push(MonitorHazard { requirement, time, lead }),
+                None => return Err(self.odd(at.0, "a hazard in a repetition that cannot be read")),
+            }
+        }
+        Ok(found)
+    }
+
     /// Where what a monitor did in a test is collected.
     fn of<'a>(
         &self,
@@ -129,7 +160,7 @@ impl Repository {
         of_test.get_mut(monitor).ok_or_else(|| self.odd(test, "decisions of a monitor that is not there"))
     }
 
-    fn odd(&self, test: u32, what: &str) -> RecordError {
+    pub(super) fn odd(&self, test: u32, what: &str) -> RecordError {
         RecordError::damaged(&self.path, format!("{} has {what}", TestNumber(test)))
     }
 }

@@ -17,7 +17,7 @@ use crate::record::schema::{self, STANDARD_WORDS_SINCE};
 use crate::record::{MetricValue, Origin, RecordError, Repository, TestRecord, TestRow};
 
 /// A recorded operation: position, name, seed of its draws, window and conditions.
-type OperationColumns = (usize, String, String, Window, Conditions);
+type OperationColumns = (usize, String, String, Window, Conditions, bool);
 
 /// Start and end of a planned window.
 type Window = (Option<f64>, Option<f64>);
@@ -45,6 +45,15 @@ pub(super) struct Head {
     pub(super) duplicate_of: Option<u32>,
 }
 
+/// How often an operation was used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Uses {
+    /// In all.
+    pub all: usize,
+    /// With an effect.
+    pub effective: usize,
+}
+
 /// Which intervals of an operation a table has.
 type SpansOf = fn(&mut OperationEffect) -> &mut Vec<Span>;
 
@@ -64,6 +73,29 @@ impl Repository {
     pub fn test(&self, number: u32) -> Result<TestRecord, RecordError> {
         let missing = || RecordError::NoSuchTest { name: TestNumber(number).to_string(), path: self.path.clone() };
         self.records(number..=number, true)?.pop().ok_or_else(missing)
+    }
+
+    /// How often each operation was used in tests that ran to their end, and in how many of them it had an effect, by
+    /// name. Reference runs, duplicates, and tests whose effects were not counted are left out.
+    pub fn uses(&self) -> Result<BTreeMap<String, Uses>, RecordError> {
+        let uses = self.read(
+            "SELECT operation, count(*), sum(changed + dropped + delayed + queued + injected + side_effects > 0) \
+             FROM operations JOIN tests ON number = test \
+             WHERE outcome IN ('completed', 'no_effect') AND duplicate_of IS NULL AND changed IS NOT NULL \
+             GROUP BY operation",
+            [],
+            |row| Ok((row.get(0)?, Uses { all: position(row, 1)?, effective: position(row, 2)? })),
+        )?;
+        Ok(uses.into_iter().collect())
+    }
+
+    /// The first reference run, with which all tests are compared; `None` where no test is one.
+    pub fn reference_run(&self) -> Result<Option<TestRecord>, RecordError> {
+        let first =
+            self.read("SELECT number FROM tests WHERE origin = 'reference' ORDER BY number LIMIT 1", [], |row| {
+                row.get::<_, u32>(0)
+            })?;
+        first.first().map(|&number| self.test(number)).transpose()
     }
 
     /// The seed that the simulator had in each test.
@@ -100,6 +132,8 @@ impl Repository {
             &numbers,
             |row| row.get(1),
         )?;
+        let mut unreached = self.unreached(&numbers)?;
+        let mut traffic = self.traffic(&numbers)?;
         let rows = self.rows(numbers.clone())?;
         let mut effects = self.effects(&numbers, &rows)?;
         let mut records = Vec::with_capacity(rows.len());
@@ -145,6 +179,8 @@ impl Repository {
                 observation: Observation {
                     operations: effects.remove(&number).unwrap_or_default(),
                     unheard: unheard.remove(&number).unwrap_or_default(),
+                    unreached: unreached.remove(&number).unwrap_or_default(),
+                    traffic: traffic.remove(&number).unwrap_or_default(),
                     outcome: row.outcome,
                     end: row.end,
                     metrics,
@@ -170,7 +206,8 @@ impl Repository {
         let prepare = |sql: &str| self.connection.prepare_cached(&schema::query(sql, self.schema)).map_err(failed);
         let within = params![numbers.start(), numbers.end()];
         let mut operations = prepare(
-            "SELECT test, position, operation, operation_seed, start_s, end_s, start_condition, end_condition, length_s, times \
+            "SELECT test, position, operation, operation_seed, start_s, end_s, start_condition, end_condition, length_s, times, \
+             coalesce(changed + dropped + delayed + queued + injected + side_effects = 0, FALSE) \
              FROM operations WHERE test BETWEEN ?1 AND ?2 ORDER BY test, position",
         )?;
         let mut choices = prepare(
@@ -187,7 +224,7 @@ impl Repository {
             Cursor::over(operations.query(within).map_err(failed)?, |row| -> rusqlite::Result<OperationColumns> {
                 let window = (perhaps_finite(row, 4)?, perhaps_finite(row, 5)?);
                 let conditions = (row.get(6)?, row.get(7)?, perhaps_finite(row, 8)?, row.get(9)?);
-                Ok((position(row, 1)?, row.get(2)?, row.get(3)?, window, conditions))
+                Ok((position(row, 1)?, row.get(2)?, row.get(3)?, window, conditions, row.get(10)?))
             })
             .map_err(failed)?;
         let mut choices = Cursor::over(choices.query(within).map_err(failed)?, |row| -> rusqlite::Result<_> {
@@ -198,6 +235,7 @@ impl Repository {
             Cursor::over(values.query(within).map_err(failed)?, |row| Ok((position(row, 1)?, metric_value(row, 2)?)))
                 .map_err(failed)?;
         let ids = self.operation_ids();
+        let left_out = self.left_out_operations(numbers.clone())?;
 
         let mut found = Vec::new();
         let mut rows = tests.query(within).map_err(failed)?;
@@ -214,12 +252,15 @@ impl Repository {
                 self.in_order(number, "choices", position, of.len())?;
                 of.push(choice);
             }
-            let mut used = Vec::new();
-            for (at, name, operation_seed, window, conditions) in operations.of(number).map_err(failed)? {
+            let (mut used, mut idle) = (Vec::new(), Vec::new());
+            for (at, name, operation_seed, window, conditions, had_no_effect) in
+                operations.of(number).map_err(failed)?
+            {
                 self.in_order(number, "operations", at, used.len())?;
                 let operation = *ids
                     .get(name.as_str())
                     .ok_or_else(|| damaged(format!("{this} has an operation `{name}` that the plan lacks")))?;
+                idle.push(had_no_effect);
                 let mut parameters = chosen.remove(&at).unwrap_or_default();
                 parameters.shrink_to_fit();
                 used.push(TestOperation {
@@ -240,9 +281,21 @@ impl Repository {
             // Room to grow would be a third of what all tests take in memory.
             measured.shrink_to_fit();
             used.shrink_to_fit();
+            idle.shrink_to_fit();
             let test = Test { operations: used };
             self.fitting(number, &test, measured.len())?;
-            found.push(TestRow { number, origin, generation, test, outcome, end, duplicate_of, values: measured });
+            found.push(TestRow {
+                number,
+                origin,
+                generation,
+                test,
+                idle,
+                outcome,
+                end,
+                duplicate_of,
+                values: measured,
+                left_out: left_out.get(&number).copied().unwrap_or_default(),
+            });
         }
         let orphans = [operations.orphan(), choices.orphan(), values.orphan()];
         match orphans.into_iter().flatten().min() {
@@ -447,7 +500,7 @@ impl Repository {
     }
 
     /// Rows of the tests in this range, by test, which is their first column.
-    fn by_test<T>(
+    pub(super) fn by_test<T>(
         &self,
         sql: &str,
         numbers: &RangeInclusive<u32>,

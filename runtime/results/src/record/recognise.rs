@@ -13,11 +13,27 @@ use rusqlite::Connection;
 
 use sesame_plan::CampaignPlan;
 
-use crate::record::schema::{DDL, PIECES_SINCE, ROBUSTNESS, STANDARD_WORDS_SINCE, has_robustness, wide_views};
-use crate::record::{RecordError, lab_runs, monitors, relay_latencies, series_views, split_operations};
+use crate::record::schema::{
+    DDL, PIECES_SINCE, ROBUSTNESS, STANDARD_WORDS_SINCE, TRAFFIC, TRAFFIC_SINCE, has_robustness, wide_views,
+};
+use crate::record::{
+    RecordError, lab_runs, left_out_operations, monitors, original_extents, relay_latencies, series_views,
+    split_operations,
+};
 
 /// The objects of a schema by name: the kind of each, and the words of the statement that creates it.
 type Objects = BTreeMap<String, (String, String)>;
+
+/// When a test satisfies a requirement: in schema 8, and in schema 7.
+const SATISFIED: [&str; 2] = [
+    "WHEN (r.low IS NULL OR v.reach_low > r.low OR (v.reach_low = r.low AND NOT r.low_excluded))
+                    AND (r.high IS NULL OR v.reach_high < r.high OR (v.reach_high = r.high AND NOT r.high_excluded))
+                    THEN 'satisfied'
+               ELSE 'inconclusive'",
+    "WHEN v.value < r.low OR v.value > r.high OR (r.low_excluded AND v.value = r.low)
+                    OR (r.high_excluded AND v.value = r.high) THEN 'inconclusive'
+               ELSE 'satisfied'",
+];
 
 /// The tables and views of schema 6, which differ from those of this release in their words.
 const DDL_6: &str = include_str!("schema_6.sql");
@@ -43,11 +59,18 @@ CREATE VIEW series AS
       FROM tests t JOIN change_points c ON c.test = coalesce(t.duplicate_of, t.number) JOIN metrics m ON m.id = c.metric;
 ";
 
+/// The tables and views of schema 7.
+fn ddl_7() -> String {
+    let [now, before] = SATISFIED;
+    DDL.replace(now, before)
+}
+
 /// Checks all tables and views that do not depend on the campaign, and that there are no triggers. Results may be of
 /// any schema that this release reads.
 pub(super) fn tables(connection: &Connection, path: &Path, schema: i64) -> Result<(), RecordError> {
     static CURRENT: OnceLock<Objects> = OnceLock::new();
-    static WITH_ROBUSTNESS: OnceLock<Objects> = OnceLock::new();
+    static SCHEMA_7: OnceLock<Objects> = OnceLock::new();
+    static BEFORE_ROBUSTNESS: OnceLock<Objects> = OnceLock::new();
     static SCHEMA_6: OnceLock<Objects> = OnceLock::new();
     static SCHEMA_5: OnceLock<Objects> = OnceLock::new();
     let sound = |made: rusqlite::Result<Objects>| {
@@ -55,13 +78,16 @@ pub(super) fn tables(connection: &Connection, path: &Path, schema: i64) -> Resul
     };
     let has_robustness =
         has_robustness(connection).map_err(|error| RecordError::database("read the results", path, error))?;
-    let ours = if schema >= STANDARD_WORDS_SINCE && has_robustness {
-        let statements = [DDL, &series_views::views(), ROBUSTNESS, &series_views::robustness_views()];
-        WITH_ROBUSTNESS.get_or_init(|| sound(made_by(&statements)))
+    let (series, robustness) = (series_views::views(), series_views::robustness_views());
+    let ours = if schema >= TRAFFIC_SINCE {
+        let statements = [DDL, TRAFFIC, &series, ROBUSTNESS, &robustness];
+        CURRENT.get_or_init(|| sound(made_by(&statements)))
+    } else if schema >= STANDARD_WORDS_SINCE && has_robustness {
+        SCHEMA_7.get_or_init(|| sound(made_by(&[&ddl_7(), &series, ROBUSTNESS, &robustness])))
     } else if schema >= STANDARD_WORDS_SINCE {
-        CURRENT.get_or_init(|| sound(made_by(&[DDL, &series_views::views()])))
+        BEFORE_ROBUSTNESS.get_or_init(|| sound(made_by(&[&ddl_7(), &series])))
     } else if schema >= PIECES_SINCE {
-        SCHEMA_6.get_or_init(|| sound(made_by(&[DDL_6, &series_views::views()])))
+        SCHEMA_6.get_or_init(|| sound(made_by(&[DDL_6, &series])))
     } else {
         SCHEMA_5.get_or_init(|| sound(made_by(&[DDL_6, TO_SCHEMA_5])))
     };
@@ -73,11 +99,14 @@ pub(super) fn tables(connection: &Connection, path: &Path, schema: i64) -> Resul
     // Tables that are only there if something is in them.
     let at_will = [
         (split_operations::TABLE, split_operations::DDL),
+        (left_out_operations::TABLE, left_out_operations::DDL),
+        (original_extents::TABLE, original_extents::DDL),
         (lab_runs::TABLE, lab_runs::DDL),
         (relay_latencies::TABLE, relay_latencies::DDL),
     ];
     let of_monitors = monitors::OBJECTS.map(|name| (name, monitors::DDL));
-    let of_hazards = monitors::HAZARD_OBJECTS.map(|name| (name, monitors::HAZARDS));
+    let hazards = if schema >= TRAFFIC_SINCE { monitors::HAZARDS } else { monitors::HAZARDS_7 };
+    let of_hazards = monitors::HAZARD_OBJECTS.map(|name| (name, hazards));
     for (name, ddl) in at_will.into_iter().chain(of_monitors).chain(of_hazards) {
         if schema >= STANDARD_WORDS_SINCE && found.contains_key(name) {
             let mut ours = sound(made_by(&["CREATE TABLE tests (number INTEGER PRIMARY KEY)", ddl]));

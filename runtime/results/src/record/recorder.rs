@@ -15,8 +15,8 @@ use crate::record::folder::Lock;
 use crate::record::monitors;
 use crate::record::write_tests::{unrecordable, write_event, write_test};
 use crate::record::{
-    Claim, Event, EventKind, GenerationCoverage, RecordError, Repository, ResultSet, SplitOperation, TestRecord,
-    schema, split_operations,
+    Claim, Event, EventKind, GenerationCoverage, LeftOutOperations, OriginalExtent, RecordError, Repository, ResultSet,
+    SplitOperation, TestRecord, left_out_operations, original_extents, schema, split_operations,
 };
 
 /// Writes the results of one campaign run. There is one per folder: it holds the folder's lock.
@@ -117,22 +117,13 @@ impl Recorder {
         let lock = Lock::acquire(folder)?;
         let connection = schema::open(&path, true)?;
         schema::check_whole(&connection, &path)?;
-        let mut repository = Repository::from_connection(connection, path)?;
+        let repository = Repository::from_connection(connection, path)?;
         match repository.campaign().stop {
             Some(_) if !finished => return Err(RecordError::Finished { path: repository.path }),
             None if finished => return Err(RecordError::Unfinished { path: repository.path }),
             _ => {}
         }
         tune(&repository.connection).map_err(|e| RecordError::database("open the results", &repository.path, e))?;
-        if !repository.has_robustness {
-            let install = || {
-                let transaction = repository.connection.unchecked_transaction()?;
-                schema::install_robustness(&transaction)?;
-                transaction.commit()
-            };
-            install().map_err(|e| RecordError::database("open the results", &repository.path, e))?;
-            repository.has_robustness = true;
-        }
         monitors::install(&repository.connection, repository.plan())
             .map_err(|e| RecordError::database("open the results", &repository.path, e))?;
         Recorder::begin_session(repository, lock, workers)
@@ -193,6 +184,21 @@ impl Recorder {
     pub fn put_split_operations(&mut self, split: &[SplitOperation]) -> Result<(), RecordError> {
         split_operations::write(&mut self.repository.connection, split)
             .map_err(|e| RecordError::database("record the operations of tests", &self.repository.path, e))
+    }
+
+    /// Records the tests of which operations could not be imported.
+    pub fn put_left_out_operations(&mut self, left_out: &[LeftOutOperations]) -> Result<(), RecordError> {
+        left_out_operations::write(&mut self.repository.connection, left_out)
+            .map_err(|e| RecordError::database("record the operations of tests", &self.repository.path, e))
+    }
+
+    /// Records windows and ranges of operations that are others in the file they were imported from.
+    pub fn put_original_extents(&mut self, extents: &[OriginalExtent]) -> Result<(), RecordError> {
+        let Repository { connection, facts, .. } = &mut self.repository;
+        let named: Vec<(&str, OriginalExtent)> =
+            extents.iter().map(|&extent| (facts.plan.operation(extent.operation).name.as_str(), extent)).collect();
+        original_extents::write(connection, &named)
+            .map_err(|e| RecordError::database("record the windows of operations", &self.repository.path, e))
     }
 
     /// The recorded task is another from now on.

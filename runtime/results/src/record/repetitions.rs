@@ -4,14 +4,15 @@ use std::collections::BTreeMap;
 
 use rusqlite::params;
 
-use sesame_base::observation::{MetricObservation, Observation, Outcome};
+use sesame_base::observation::{MetricObservation, MonitorHazard, Observation, Outcome};
 use sesame_base::test_number::TestNumber;
 use sesame_optimise::dominance::Fitness;
-use sesame_plan::{CampaignPlan, Requirement};
+use sesame_plan::{CampaignPlan, MonitorId, Requirement, RequirementId};
 use sesame_search as search;
 use sesame_search::aggregate;
 
 use crate::record::columns::{finite, index, metric_value, perhaps_finite, position, unsigned};
+use crate::record::monitors::write_hazards;
 use crate::record::write_tests::write_event;
 use crate::record::{
     Event, EventKind, MetricValue, RecordError, Recorder, Repetition, Repository, ScannedTest, Tally, TestRow, Verdict,
@@ -57,6 +58,16 @@ impl Repetition {
     }
 }
 
+/// Whether a monitor missed a hazard in a run, as a verdict: violated if it did. Where nothing is known of a hazard,
+/// and the run is inconclusive about its requirement, it is so about the hazard.
+pub fn missed(hazard: Option<MonitorHazard>, of_requirement: Verdict) -> Verdict {
+    match (hazard, of_requirement) {
+        (Some(MonitorHazard { lead: None, .. }), _) => Verdict::Violated,
+        (None, Verdict::Inconclusive) => Verdict::Inconclusive,
+        _ => Verdict::Satisfied,
+    }
+}
+
 /// Judges the tests of a campaign by their fresh runs where they were run again.
 #[derive(Debug)]
 pub struct Judge<'a> {
@@ -89,6 +100,13 @@ impl Judge<'_> {
         Tally::of(self.runs(test).iter().map(|run| run.verdict(requirement)))
     }
 
+    /// Whether a monitor missed the hazard of a requirement, by the verdicts of a test's fresh runs; the test must not
+    /// be a duplicate.
+    pub fn missed(&self, test: u32, monitor: MonitorId, requirement: RequirementId) -> Tally {
+        let declared = self.plan.requirement(requirement);
+        Tally::of(self.runs(test).iter().map(|run| missed(run.hazard(monitor, requirement), run.verdict(declared))))
+    }
+
     /// The fresh runs of a test, in their order; none of one that was run once only.
     pub fn runs(&self, test: u32) -> &[Repetition] {
         self.repetitions.get(&test).map_or(&[], Vec::as_slice)
@@ -105,7 +123,7 @@ impl Recorder {
     /// one transaction, or nothing.
     pub fn put_repetition(&mut self, repetition: &Repetition, warnings: &[String]) -> Result<(), RecordError> {
         self.check_lock()?;
-        let Repetition { test, position, simulator_seed, outcome, end, messages, values } = repetition;
+        let Repetition { test, position, simulator_seed, outcome, end, messages, values, hazards } = repetition;
         let path = self.repository().path().to_owned();
         let unrecordable =
             |what: String| RecordError::Unrecordable { test: TestNumber(*test), what, path: path.clone() };
@@ -114,7 +132,8 @@ impl Recorder {
             outcome => (outcome.message(), None),
         };
         let shown = values.iter().flat_map(|shown| [shown.value, shown.reach.low, shown.reach.high, shown.not_finite]);
-        let numbers = shown.flatten().chain([*end]).chain(limit);
+        let times = hazards.iter().flatten().flat_map(|hazard| [Some(hazard.time), hazard.lead]);
+        let numbers = shown.chain(times).flatten().chain([*end]).chain(limit);
         if let Some(number) = numbers.into_iter().find(|number| !number.is_finite()) {
             return Err(unrecordable(format!("a number of repetition {position} is {number}")));
         }
@@ -153,6 +172,7 @@ impl Recorder {
                         shown.not_finite
                     ])?;
             }
+            write_hazards(&transaction, (*test, *position), hazards)?;
             for warning in warnings {
                 // Of the campaign: a test's own warnings are those of its own run.
                 let text = format!("repetition {position} of {}: {warning}", TestNumber(*test));
@@ -199,6 +219,7 @@ impl Repository {
                 Ok((at, row.get::<_, String>(2)?, ended, outcome))
             },
         )?;
+        let mut hazards = self.repeated_hazards()?;
         let mut repetitions: BTreeMap<u32, Vec<Repetition>> = BTreeMap::new();
         for ((test, position), seed, (end, messages), (word, detail, limit)) in rows {
             repetitions.entry(test).or_default().push(Repetition {
@@ -209,6 +230,7 @@ impl Repository {
                 end,
                 messages,
                 values: of.remove(&(test, position)).unwrap_or_default(),
+                hazards: hazards.remove(&(test, position)).unwrap_or_default(),
             });
         }
         Ok(repetitions)
@@ -229,7 +251,8 @@ mod tests {
         let value = |value: Option<f64>| MetricValue::whole(value, value.is_some());
         let values = [collisions, Some(0.1 + f64::from(position)), Some(1.0), None, Some(-0.25)].map(value).to_vec();
         let seed = u64::MAX - u64::from(position);
-        Repetition { test, position, simulator_seed: seed, outcome, end: 69.98, messages: 12, values }
+        let (end, messages, hazards) = (69.98, 12, Vec::new());
+        Repetition { test, position, simulator_seed: seed, outcome, end, messages, values, hazards }
     }
 
     /// The sample's results with these repetitions, finished again.

@@ -232,6 +232,8 @@ pub fn observe(plan: &CampaignPlan, test: &Test, seed: u64) -> Observation {
         end: 70.0,
         operations: effects,
         unheard: Vec::new(),
+        unreached: Vec::new(),
+        traffic: Vec::new(),
         metrics: vec![
             shown(collisions, Some(0.0)),
             MetricObservation::whole(Some(fuzzing), true, vec![]),
@@ -326,6 +328,8 @@ pub fn records(plan: &CampaignPlan, searched: u32) -> Vec<TestRecord> {
                     end: 0.0,
                     operations: vec![],
                     unheard: vec![],
+                    unreached: Vec::new(),
+                    traffic: Vec::new(),
                     metrics: vec![],
                     monitors: Vec::new(),
                     messages: 0,

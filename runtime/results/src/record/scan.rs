@@ -2,14 +2,14 @@
 
 use sesame_base::observation::Outcome;
 use sesame_base::test_number::TestNumber;
-use sesame_plan::{CampaignPlan, Choice, OperationId, Span};
+use sesame_plan::{CampaignPlan, Choice, Dimension, OperationId, Span};
 use sesame_search::coverage;
 use sesame_search::sspr::{Convention, Disturbance, Point, disturbance};
 
 use crate::record::columns::{choice, metric_value, perhaps_finite, position, span};
 use crate::record::cursor::Cursor;
 use crate::record::read_tests::{HEAD, Head};
-use crate::record::{MetricValue, Origin, RecordError, Repository, split_operations};
+use crate::record::{MetricValue, Origin, OriginalExtent, RecordError, Repository, split_operations};
 
 /// One test as analyses see it: its operations, when they acted, and the results; without time series.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,6 +28,20 @@ pub struct ScannedTest {
     pub operations: Vec<ScannedOperation>,
     /// Per metric of the plan, in its order; empty after a crash of the worker.
     pub values: Vec<MetricValue>,
+    /// How many of its operations could not be imported, so that it did more than its operations say.
+    pub left_out: u32,
+}
+
+/// Why a test has no point in the reduced parameter space.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum NoPoint {
+    /// None of its operations was active with an effect.
+    Inactive,
+    /// Some of its operations could not be imported, so that a part of it is missing.
+    LeftOut,
+    /// It was imported, and acted or chose values beyond the windows and ranges of its operations, so that it lies
+    /// outside of the space.
+    Outside,
 }
 
 /// One operation of a scanned test.
@@ -46,6 +60,8 @@ pub struct ScannedOperation {
     /// The position of the first of the operations that were one with it in the file they were imported from, if it is
     /// not that one.
     pub part_of: Option<usize>,
+    /// Its window and range in that file, where they are others in the plan.
+    pub original: Option<OriginalExtent>,
 }
 
 impl ScannedTest {
@@ -59,13 +75,31 @@ impl ScannedTest {
         super::verdict(requirement.bound, &self.outcome, self.value(requirement.metric))
     }
 
-    /// Where it lies in the reduced parameter space; `None` where no operation was active with an effect.
+    /// Where it lies in the reduced parameter space, if it has a point.
     pub fn point(&self, plan: &CampaignPlan, convention: Convention) -> Option<Point> {
+        self.placed(plan, convention).ok()
+    }
+
+    /// Where it lies in the reduced parameter space, or why it has no point.
+    pub fn placed(&self, plan: &CampaignPlan, convention: Convention) -> Result<Point, NoPoint> {
+        if self.left_out > 0 {
+            return Err(NoPoint::LeftOut);
+        }
         let mut disturbances: Vec<Disturbance> = Vec::with_capacity(self.operations.len());
         let mut places: Vec<usize> = Vec::with_capacity(self.operations.len());
         for operation in &self.operations {
             let intervals = if operation.acted { self.intervals(operation, plan, convention) } else { Vec::new() };
-            let found = disturbance(plan, operation.operation, &operation.choices, intervals);
+            let mut found = disturbance(plan, operation.operation, &operation.choices, intervals);
+            if let Some(original) = operation.original.filter(|_| convention == Convention::Original) {
+                found.window = original.window.unwrap_or(found.window);
+                if let (Some(range), Some(first)) = (original.range, found.parameters.first_mut()) {
+                    first.permitted = range;
+                }
+                // The original divided by the length of the window, which gave NaN for an empty one.
+                if found.window.length() <= 0.0 && !found.intervals.is_empty() {
+                    return Err(NoPoint::Outside);
+                }
+            }
             let whole = operation.part_of.and_then(|first| places.get(first)).copied();
             if let Some(place) = whole {
                 disturbances[place].parameters.extend(found.parameters);
@@ -75,7 +109,12 @@ impl ScannedTest {
                 disturbances.push(found);
             }
         }
-        Point::from_disturbances(&disturbances, convention)
+        let point = Point::from_disturbances(&disturbances, convention).ok_or(NoPoint::Inactive)?;
+        // Runs stay within what their plan permits. Nothing is known of what was imported.
+        if self.outcome == Outcome::Unknown && !is_inside(&point, convention) {
+            return Err(NoPoint::Outside);
+        }
+        Ok(point)
     }
 
     /// When an operation was active. The original platform did not cut windows at the end of a run.
@@ -97,6 +136,21 @@ impl ScannedTest {
         coverage::counts(&self.outcome, self.duplicate_of.is_some()).then(|| self.point(plan, convention)).flatten()
     }
 }
+
+/// Whether each coordinate is in `0..=1`, as far as it has to be: counts may be any, and by the paper's formulas so may
+/// the intensity.
+fn is_inside(point: &Point, convention: Convention) -> bool {
+    let intensity: &[Dimension] = match convention {
+        Convention::Paper => &[],
+        Convention::Ours | Convention::Original => &[Dimension::P1, Dimension::P2],
+    };
+    let shares = [Dimension::T1, Dimension::T2, Dimension::T3].iter().chain(intensity);
+    let mut known = shares.filter_map(|&dimension| point.get(dimension));
+    known.all(|share| (-ROUNDING..=1.0 + ROUNDING).contains(&share))
+}
+
+/// By how much a share may be beyond its ends, since it is a quotient of rounded numbers.
+const ROUNDING: f64 = 1e-9;
 
 /// A row of `operations`: its position, the operation's name, when it was to be active, and whether it had an effect or
 /// effects were not counted.
@@ -159,6 +213,8 @@ impl Repository {
         };
 
         let ids = self.operation_ids();
+        let left_out = self.left_out_operations(0..=u32::MAX)?;
+        let originals = self.original_extents()?;
         let mut rows = tests.query([]).map_err(failed)?;
         while let Some(row) = rows.next().map_err(failed)? {
             let Head { number, origin, generation, outcome, duplicate_of } = self.head(row)?;
@@ -171,6 +227,7 @@ impl Repository {
                 duplicate_of,
                 operations: Vec::new(),
                 values: Vec::new(),
+                left_out: left_out.get(&number).copied().unwrap_or_default(),
             };
             for (metric, value) in values.of(number).map_err(failed)? {
                 self.in_order(number, "values", metric, test.values.len())?;
@@ -188,6 +245,7 @@ impl Repository {
                     intervals: Vec::new(),
                     acted,
                     part_of: None,
+                    original: originals.get(&operation).copied(),
                 });
             }
             let stray = |what: &str| damaged(format!("{this} has {what} without an operation"));
@@ -268,6 +326,7 @@ mod tests {
                         .map_or(Vec::new(), |effect| effect.intervals.clone()),
                     acted: record.observation.operations.get(at).is_none_or(|effect| effect.counters.any_effect()),
                     part_of: None,
+                    original: None,
                 })
                 .collect();
             assert_eq!(test.operations, operations);

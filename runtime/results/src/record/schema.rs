@@ -14,7 +14,7 @@ use crate::record::columns::index;
 use crate::record::{RecordError, monitors, series_views};
 
 /// The schema's version, in the file's `user_version`.
-pub const SCHEMA: i64 = 7;
+pub const SCHEMA: i64 = 8;
 
 /// The earliest schema that is still read. Nothing is written into results of an earlier schema than [`SCHEMA`].
 pub(crate) const EARLIEST: i64 = 5;
@@ -24,7 +24,10 @@ pub(crate) const APPLICATION_ID: i64 = 0x5345_534D;
 
 pub(super) const DDL: &str = include_str!("schema.sql");
 
-/// The table of robustness signals. Results that this schema's first releases wrote have none.
+/// The tables of what was published in tests.
+pub(super) const TRAFFIC: &str = include_str!("traffic.sql");
+
+/// The table of robustness signals. Results that the first releases of schema 7 wrote have none.
 pub(super) const ROBUSTNESS: &str = include_str!("robustness.sql");
 
 /// The first schema with the standard words for outcomes, verdicts and columns: `no_effect`, `satisfied`,
@@ -36,6 +39,9 @@ pub(super) const STANDARD_WORDS_SINCE: i64 = 7;
 pub(super) const PIECES_SINCE: i64 = 6;
 /// The first schema with the column `task`.
 pub(super) const TASK_SINCE: i64 = 7;
+/// The first schema with the traffic of tests, and with verdicts that follow what a metric could have been also where a
+/// run came to its end.
+pub(super) const TRAFFIC_SINCE: i64 = 8;
 /// The first schema whose digest is over the meaning of the plan; before, it was over all of its JSON.
 pub(super) const MEANING_SINCE: i64 = 7;
 
@@ -61,8 +67,10 @@ pub(crate) fn install(
     let text = |value| serde_json::to_string(value).expect("a task is plain data with text keys");
     let transaction = connection.transaction()?;
     transaction.execute_batch(DDL)?;
+    transaction.execute_batch(TRAFFIC)?;
     transaction.execute_batch(&series_views::views())?;
-    install_robustness(&transaction)?;
+    transaction.execute_batch(ROBUSTNESS)?;
+    transaction.execute_batch(&series_views::robustness_views())?;
     monitors::install(&transaction, plan)?;
     transaction.execute_batch(&wide_views(plan))?;
     transaction.execute(
@@ -118,12 +126,6 @@ pub(crate) fn install(
     transaction.pragma_update(None, "application_id", APPLICATION_ID)?;
     transaction.pragma_update(None, "user_version", SCHEMA)?;
     transaction.commit()
-}
-
-/// Makes the table of robustness signals with its views.
-pub(super) fn install_robustness(connection: &Connection) -> rusqlite::Result<()> {
-    connection.execute_batch(ROBUSTNESS)?;
-    connection.execute_batch(&series_views::robustness_views())
 }
 
 /// Whether there is a table of robustness signals.

@@ -153,8 +153,8 @@ CREATE TABLE metric_values (
     metric          INTEGER NOT NULL REFERENCES metrics,
     value           REAL,           -- NULL: neither set nor defaulted
     is_set          INTEGER NOT NULL, -- 0: the value is the default
-    reach_low       REAL,           -- the least value that it could still have taken by the planned end, if the run broke off;
-                                    -- the value itself in a completed run. NULL: there is no least
+    reach_low       REAL,           -- the least value that it could have had at the planned end, if the run broke off or a topic
+                                    -- fell silent; otherwise the value itself. NULL: there is no least
     reach_high      REAL,           -- the greatest; NULL: there is no greatest
     not_finite_s    REAL,           -- when it first read a number that was not finite; NULL: never
     PRIMARY KEY (test, metric)
@@ -196,8 +196,8 @@ CREATE TABLE repetition_values (
     metric          INTEGER NOT NULL REFERENCES metrics,
     value           REAL,           -- NULL: neither set nor defaulted
     is_set          INTEGER NOT NULL, -- 0: the value is the default
-    reach_low       REAL,           -- the least value that it could still have taken by the planned end, if the run broke off;
-                                    -- the value itself in a completed run. NULL: there is no least
+    reach_low       REAL,           -- the least value that it could have had at the planned end, if the run broke off or a topic
+                                    -- fell silent; otherwise the value itself. NULL: there is no least
     reach_high      REAL,           -- the greatest; NULL: there is no greatest
     not_finite_s    REAL,           -- when it first read a number that was not finite; NULL: never
     PRIMARY KEY (test, position, metric)
@@ -276,8 +276,8 @@ CREATE TABLE wall_times (
 ) STRICT;
 
 -- Per test and requirement the verdict of its first run, the one that selected it: violated if no value that the metric could
--- have taken is inside the bound; satisfied if the run ended as planned, everything that the metric read was finite, and its
--- value is inside the bound; otherwise inconclusive.
+-- have had at the planned end is inside the bound; satisfied if the run ended as planned, everything that the metric read was
+-- finite, and all of these values are inside the bound; otherwise inconclusive.
 CREATE VIEW first_verdicts AS
     SELECT t.number AS test, t.name AS test_name, r.name AS requirement, r.text AS requirement_text, v.value AS value,
            CASE
@@ -285,9 +285,10 @@ CREATE VIEW first_verdicts AS
                     OR (r.high_excluded AND v.reach_low = r.high) THEN 'violated'
                WHEN v.value IS NULL OR v.not_finite_s IS NOT NULL OR t.outcome NOT IN ('completed', 'no_effect', 'unknown')
                     THEN 'inconclusive'
-               WHEN v.value < r.low OR v.value > r.high OR (r.low_excluded AND v.value = r.low)
-                    OR (r.high_excluded AND v.value = r.high) THEN 'inconclusive'
-               ELSE 'satisfied'
+               WHEN (r.low IS NULL OR v.reach_low > r.low OR (v.reach_low = r.low AND NOT r.low_excluded))
+                    AND (r.high IS NULL OR v.reach_high < r.high OR (v.reach_high = r.high AND NOT r.high_excluded))
+                    THEN 'satisfied'
+               ELSE 'inconclusive'
            END AS verdict
       FROM tests t CROSS JOIN requirements r LEFT JOIN metric_values v ON v.test = t.number AND v.metric = r.metric;
 
@@ -299,9 +300,10 @@ CREATE VIEW repetition_verdicts AS
                     OR (r.high_excluded AND v.reach_low = r.high) THEN 'violated'
                WHEN v.value IS NULL OR v.not_finite_s IS NOT NULL OR n.outcome NOT IN ('completed', 'no_effect')
                     THEN 'inconclusive'
-               WHEN v.value < r.low OR v.value > r.high OR (r.low_excluded AND v.value = r.low)
-                    OR (r.high_excluded AND v.value = r.high) THEN 'inconclusive'
-               ELSE 'satisfied'
+               WHEN (r.low IS NULL OR v.reach_low > r.low OR (v.reach_low = r.low AND NOT r.low_excluded))
+                    AND (r.high IS NULL OR v.reach_high < r.high OR (v.reach_high = r.high AND NOT r.high_excluded))
+                    THEN 'satisfied'
+               ELSE 'inconclusive'
            END AS verdict
       FROM repetitions n CROSS JOIN requirements r
            LEFT JOIN repetition_values v ON v.test = n.test AND v.position = n.position AND v.metric = r.metric;

@@ -10,12 +10,23 @@ use sesame_plan::{Activation, CampaignPlan, Choice};
 
 use crate::record::columns::index;
 use crate::record::series::{self, Pieces};
-use crate::record::{Event, Origin, TestRecord, monitors};
+use crate::record::{Event, Origin, TestRecord, monitors, traffic};
 
 /// What SQLite could not return as it was written: numbers that are not finite, counts beyond 63 bits.
 pub(super) fn unrecordable(record: &TestRecord) -> Option<String> {
-    let Observation { outcome, end, operations, metrics, monitors, messages, wall, unheard: _, warnings: _ } =
-        &record.observation;
+    let Observation {
+        outcome,
+        end,
+        operations,
+        unheard: _,
+        unreached,
+        traffic,
+        metrics,
+        monitors,
+        messages,
+        warnings: _,
+        wall,
+    } = &record.observation;
     let mut numbers = vec![("the end of the run", *end), ("the wall time", wall.run)];
     if let Outcome::Timeout { limit } = outcome {
         numbers.push(("the time limit", *limit));
@@ -68,6 +79,9 @@ pub(super) fn unrecordable(record: &TestRecord) -> Option<String> {
         let hazards = monitor.hazards.iter().flat_map(|it| [Some(it.time), it.lead]).flatten();
         numbers.extend(hazards.map(|time| ("the time of a hazard", time)));
     }
+    let traffic = traffic.iter().flat_map(|it| [it.first, it.last, it.gap.start, it.gap.end, it.median_gap]);
+    let nearest = unreached.iter().filter_map(|it| it.nearest);
+    numbers.extend(traffic.chain(nearest).map(|time| ("the time of a message", time)));
     if let Some((what, number)) = numbers.into_iter().find(|(_, number)| !number.is_finite()) {
         return Some(format!("{what} is {number}"));
     }
@@ -183,6 +197,7 @@ pub(super) fn write_test(
     }
     if duplicate_of.is_none() {
         monitors::write(transaction, plan, *number, &observation.monitors)?;
+        traffic::write(transaction, plan, *number, observation)?;
     }
     for (position, text) in observation.warnings.iter().enumerate() {
         transaction

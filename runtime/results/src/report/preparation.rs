@@ -55,6 +55,11 @@ impl Preparation {
         null.chain(mitm).chain(known).chain(monitors).map(String::as_str).collect()
     }
 
+    /// Requirements that are not satisfied by regression tests, as these were expected to, as in `R2 by pit`.
+    pub(crate) fn unsatisfied(&self) -> Vec<String> {
+        self.known.iter().flat_map(KnownTesting::unsatisfied).collect()
+    }
+
     /// The steps that were carried out, and whether each passed.
     pub fn steps(&self) -> Vec<(&'static str, bool)> {
         let null = self.null.as_ref().map(|it| ("null", it.objections.is_empty()));

@@ -31,13 +31,20 @@ pub fn headline(summary: &Summary) -> String {
         violated.push(format!("{} by {count}", requirement.requirement));
     }
     let mut parts = Vec::new();
-    if !summary.objectives.is_empty() {
+    let untested = summary.counts.evaluations == 0 && !summary.undisturbed;
+    if untested {
+        parts.push("nothing was tested".to_owned());
+    } else if !summary.objectives.is_empty() {
         parts.push(format!("front of {}", plural(summary.front.len(), "test", "tests")));
     }
-    parts.push(match violated.len() {
-        0 if summary.requirements.is_empty() => "no requirements".to_owned(),
-        0 => "no requirement violated".to_owned(),
-        n => format!("{} violated ({})", plural(n, "requirement", "requirements"), violated.join(", ")),
+    let judged = summary.requirements.iter().any(|requirement| requirement.satisfied > 0);
+    let open = summary.requirements.iter().any(|requirement| requirement.inconclusive > 0);
+    parts.extend(match violated.len() {
+        0 if untested => None,
+        0 if summary.requirements.is_empty() => Some("no requirements".to_owned()),
+        0 if open && !judged => Some("no test is conclusive about any requirement".to_owned()),
+        0 => Some("no requirement violated".to_owned()),
+        n => Some(format!("{} violated ({})", plural(n, "requirement", "requirements"), violated.join(", "))),
     });
     if let Some(monitors) = &summary.monitors {
         parts.extend(missed_words(monitors));
@@ -78,13 +85,37 @@ fn missed_words(monitors: &MonitorsSummary) -> Option<String> {
 pub(crate) fn monitors_sentence(monitors: &MonitorsSummary) -> String {
     let foreseen: usize = monitors.hazards.iter().map(|pair| pair.foreseen).sum();
     let missed: usize = monitors.hazards.iter().map(|pair| pair.missed).sum();
+    let detected: usize = monitors.hazards.iter().map(|pair| pair.detected).sum();
     let of = plural(monitors.tests, "test", "tests");
-    match foreseen + missed {
+    let known = match foreseen + detected + missed {
+        0 if monitors.unknown == monitors.tests && monitors.tests > 0 => {
+            return format!("In {of} nobody can tell whether there was a hazard: requirements are inconclusive");
+        }
         0 => format!("In {of} there was no hazard that a monitor was to foresee"),
         all => {
-            format!("In {of} monitors foresaw {foreseen} of {} and missed {missed}", plural(all, "hazard", "hazards"))
+            let all = plural(all, "hazard", "hazards");
+            match detected {
+                0 => format!("In {of} monitors foresaw {foreseen} of {all} and missed {missed}"),
+                _ => format!(
+                    "In {of} monitors foresaw {foreseen} of {all}, detected {detected} as it happened and missed {missed}"
+                ),
+            }
         }
+    };
+    match monitors.unknown {
+        0 => known,
+        unknown => format!("{known}; in {unknown} nobody can tell about a requirement, as it is inconclusive"),
     }
+}
+
+/// What monitors did in which runs, if tests were run again.
+pub(crate) fn monitors_run_again(monitors: &MonitorsSummary) -> Option<String> {
+    let of = plural(monitors.run_again, "test that was run again", "tests that were run again");
+    (monitors.run_again > 0).then(|| {
+        format!(
+            "The hazards of {of} are those of their fresh runs; alarms, changes and times in states are of first runs"
+        )
+    })
 }
 
 /// What a mend changed, in a sentence.
@@ -102,9 +133,9 @@ pub(crate) fn mend_sentence(mend: &Mend) -> String {
 }
 
 /// What hazards, lead times and alarms are.
-pub(crate) const MONITORS_CAPTION: &str = "A hazard is the first violation of a requirement in a test. It is foreseen if the monitor is in its safe state then; \
-     the lead time is how long it has been. It is missed if it is not. An alarm is the loss of the last guarantee; it is \
-     false if no hazard follows in it, for which mitigation may be the reason.";
+pub(crate) const MONITORS_CAPTION: &str = "A hazard is the first moment of a test from which nothing could satisfy a requirement any more. It is foreseen if the monitor was in its safe state before; \
+     the lead time is for how long. It is detected if the monitor went into its safe state in that instant, and missed if it was not in it. An alarm is the loss of the last guarantee; it is \
+     false if no hazard follows in it, for which mitigation may be the reason. A monitor that never vouched for anything in a test was in its safe state all the time.";
 
 /// What the table of quarantined tests is called.
 pub(crate) const QUARANTINED: &str = "Quarantined: crashed in three runs, and not run again";
@@ -131,6 +162,14 @@ pub(crate) fn counts_sentence(summary: &Summary) -> String {
         sentence.push_str("; the run is unfinished");
     }
     sentence
+}
+
+/// Which operations did nothing, in a sentence; `None` if there is none.
+pub(crate) fn without_effect_sentence(summary: &Summary) -> Option<String> {
+    let operations: Vec<String> =
+        summary.without_effect.iter().map(|it| format!("`{}` in none of its {} uses", it.operation, it.uses)).collect();
+    (!operations.is_empty())
+        .then(|| format!("without effect: {}; these tests say nothing about what it would do", join_words(&operations)))
 }
 
 /// The coverage in words: `54 of 108 cells covered (50 %), 56 % of the 96 that can be reached`.

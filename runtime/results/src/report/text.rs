@@ -17,7 +17,8 @@ use crate::report::facts::shrinking::Shrinking;
 use crate::report::facts::summary::Summary;
 use crate::report::sentences::{
     QUARANTINED, beyond_sentence, confirmation_sentence, counts_sentence, coverage_sentence, headline, mend_sentence,
-    monitors_sentence, once_sentence, outcome_sentence, shrinking_sentence, values_sentence,
+    monitors_run_again, monitors_sentence, once_sentence, outcome_sentence, shrinking_sentence, values_sentence,
+    without_effect_sentence,
 };
 use crate::report::tables;
 
@@ -69,6 +70,9 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
         paragraph(&mut text, &coverage_sentence(coverage), options);
     }
     paragraph(&mut text, &counts_sentence(summary), options);
+    if let Some(sentence) = without_effect_sentence(summary) {
+        paragraph(&mut text, &sentence, options);
+    }
     if let Some(sentence) = confirmation_sentence(&summary.confirmed) {
         paragraph(&mut text, &sentence, options);
     }
@@ -91,7 +95,9 @@ fn monitors(text: &mut String, found: &MonitorsSummary, options: TextOptions) {
     }
     section(text, "Hazards", &tables::monitors::hazards(found), options);
     section(text, "Monitors", &tables::monitors::monitors(found), options);
-    paragraph(text, &format!("{}.", monitors_sentence(found)), options);
+    let sentences = [monitors_sentence(found)].into_iter().chain(monitors_run_again(found));
+    let sentences = sentences.map(|sentence| format!("{sentence}.")).collect::<Vec<_>>().join(" ");
+    paragraph(text, &sentences, options);
 }
 
 /// What the monitors of a test did.

@@ -113,7 +113,7 @@ fn a_system_that_is_not_complete_is_said_to_be() {
     let error = System::new(plan).run(&test_of(Vec::new()), || {}, || true).err().unwrap().to_string();
     assert_eq!(
         error,
-        "the system is not complete after 30 s: nobody publishes on `/peer/undisturbed`; 0 of 1 subscribe to `/peer`: \
+        "the launch failed: the system is not complete after 30 s: nobody publishes on `/peer/undisturbed`; 0 of 1 subscribe to `/peer`: \
          subscriber; topic `/peer` is not cut: `/publisher` publishes on it directly; start it with \
          `/peer:=/peer/undisturbed` (`sesamec explain wiring` lists all remappings)"
     );

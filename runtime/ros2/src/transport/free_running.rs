@@ -51,9 +51,7 @@ impl System {
                 Incoming::Clock(nanos) => {
                     let Zero::Clock(zero) = self.zero else { continue };
                     let time = SimTime::from_nanos(nanos - zero);
-                    if time < self.now {
-                        return Err(TransportError::ClockBack { from: self.now, to: time });
-                    }
+                    self.ticks.tick(self.now, time)?;
                     self.now = time.min(until);
                     relay.advance(self.now, &mut self.deliveries);
                 }

@@ -139,22 +139,22 @@ impl Session {
         None
     }
 
-    /// Tells the relay which wires have subscribers.
+    /// Tells the relay which wires have subscribers, as far as DDS has announced them by now.
     pub(super) fn tell_subscribers(&self, relay: &mut dyn Exchange) {
         let subscribers = self.subscribers();
         for Connected { line, .. } in &self.lines {
             let heard = |path: &str| subscribers.iter().any(|endpoint| endpoint.topic == names::topic(path));
             for sink in line.sinks.iter().filter(|sink| heard(&sink.path)) {
-                relay.subscribed(sink.wire);
+                relay.found(sink.wire);
             }
             if line.sinks.is_empty() && heard(&line.path) {
-                relay.subscribed(line.wire);
+                relay.found(line.wire);
             }
         }
         for service in &self.services {
             for direction in [Direction::Request, Direction::Reply] {
                 if service.heard(direction, &subscribers) {
-                    relay.subscribed(service.wire(direction));
+                    relay.found(service.wire(direction));
                 }
             }
         }

@@ -2,6 +2,9 @@
 //!
 //! Along an axis a test only shrinks: a window gets shorter, a range narrower or nearer to its neutral value, never the
 //! reverse. So shrinking ends, in any order of axes.
+//!
+//! At last, numbers may go to round ones: multiples of the greatest power of ten that is no more than a step, which is
+//! the third significant digit of what is permitted. People read them in reviews.
 
 use sesame_plan::{Activation, Choice, Test};
 
@@ -93,6 +96,19 @@ impl ShrinkAxis {
         };
         self.set(&mut shrunk, number);
         shrunk
+    }
+
+    /// The test with the axis shrunk by less than a step, to the next round number; `None` where it is on one, or none
+    /// is permitted.
+    pub(super) fn rounded(self, space: &ShrinkSpace, test: &Test) -> Option<Test> {
+        let (from, to, step) = self.bounds(space, test)?;
+        let round = on_grid(from, step, if from < to { libm::ceil } else { libm::floor });
+        let is_permitted = (from.min(to)..=from.max(to)).contains(&round);
+        (is_permitted && (round - from).abs() > step * ROUNDING).then(|| {
+            let mut rounded = test.clone();
+            self.set(&mut rounded, round);
+            rounded
+        })
     }
 
     /// From where to where the number can go, and in which steps; `None` where it cannot go anywhere.
@@ -206,6 +222,14 @@ impl ShrinkAxis {
             (Component::Start | Component::End | Component::Length | Component::Times, _) => {}
         }
     }
+}
+
+/// The multiple of the greatest power of ten within a step that is next to a number in this direction.
+fn on_grid(number: f64, step: f64, direction: fn(f64) -> f64) -> f64 {
+    let power = libm::floor(libm::log10(step));
+    let unit = libm::exp10(power.abs());
+    // A division by a power of ten is exact where a multiplication by its inverse is not.
+    if power < 0.0 { direction(number * unit) / unit } else { direction(number / unit) * unit }
 }
 
 /// The number of steps, the last one perhaps shorter. A rest that is only rounding is not a step.

@@ -70,7 +70,8 @@ impl<A: Oracle> Reduction<'_, A> {
         self.shrink_along(Phase::Windows, axis::times(&self.test))?;
         self.simpler_conditions()?;
         self.shrink_along(Phase::Parameters, axis::parameters(&self.test))?;
-        while self.single_steps()? {}
+        self.round_numbers()?;
+        while self.single_steps()? || self.round_numbers()? {}
         Ok(())
     }
 
@@ -213,6 +214,46 @@ impl<A: Oracle> Reduction<'_, A> {
             })
         });
         tests.collect()
+    }
+
+    /// Tries to shrink numbers by less than a step to round ones: all of them, then those that can be alone. Returns
+    /// whether any was; the others keep the digits that they need. What is not tried for want of runs says nothing
+    /// about smaller tests.
+    fn round_numbers(&mut self) -> Result<bool, Pending> {
+        let guessed = self.guessed;
+        let rounded = self.rounded_numbers();
+        self.guessed = guessed;
+        rounded
+    }
+
+    fn rounded_numbers(&mut self) -> Result<bool, Pending> {
+        let axes = [axis::times(&self.test), axis::parameters(&self.test)].concat();
+        let rounded = |test: Test, axis: &ShrinkAxis| axis.rounded(self.space, &test).unwrap_or(test);
+        let alone: Vec<(ShrinkAxis, Test)> =
+            axes.iter().filter_map(|axis| Some((*axis, axis.rounded(self.space, &self.test)?))).collect();
+        if alone.is_empty() {
+            return Ok(false);
+        }
+        let all = axes.iter().fold(self.test.clone(), rounded);
+        let mut tests: Vec<Test> = std::iter::once(all).chain(alone.iter().map(|(_, test)| test.clone())).collect();
+        let found = self.failing(Phase::LocalMinimality, &tests)?;
+        if let Some(index) = found[0] {
+            self.accept(tests.swap_remove(0), index);
+            return Ok(true);
+        }
+        let fail = alone.iter().zip(&found[1..]).filter(|(_, found)| found.is_some());
+        let fail: Vec<ShrinkAxis> = fail.map(|((axis, _), _)| *axis).collect();
+        let together = fail.iter().fold(self.test.clone(), rounded);
+        if fail.len() > 1 && self.first_failing(Phase::LocalMinimality, vec![together])?.is_some() {
+            return Ok(true);
+        }
+        // One after the other: to begin again with all of them after each would take many times as many runs.
+        for axis in &fail {
+            if let Some(test) = axis.rounded(self.space, &self.test) {
+                self.first_failing(Phase::LocalMinimality, vec![test])?;
+            }
+        }
+        Ok(!fail.is_empty())
     }
 
     /// Tries every single step. If one of these tests fails, it is accepted, and the result is true; if none does, the

@@ -1,6 +1,7 @@
 use std::collections::BTreeSet;
 
 use proptest::prelude::*;
+use proptest::test_runner::TestCaseResult;
 
 use sesame_plan::condition::ConditionEnd;
 use sesame_plan::{
@@ -113,50 +114,78 @@ fn one_step_smaller(space: &ShrinkSpace, test: &Test) -> Vec<Test> {
     found
 }
 
+/// Shrinks a test of a plan, of which a share of all tests fails at random.
+fn is_smallest(plan: &CampaignPlan, seed: u64, share: f64) -> TestCaseResult {
+    let test_space = TestSpace::from_plan(plan).unwrap();
+    let mut original = fresh_test(&test_space, &mut Stream::derive(seed, "test", &[]));
+    for (at, used) in (0u64..).zip(&mut original.operations) {
+        used.operation_seed = at;
+    }
+    let fails = |test: &Test, _| *test == original || scattered(test, seed) < share;
+    let mut asked = BTreeSet::new();
+    let mut repeated = false;
+    let shrink = Shrink::with_resolution(plan, shrinking(original.clone(), 1, 100_000), 0.1);
+    let shrink = shrunk(shrink, |test, run| {
+        repeated |= !asked.insert(content(test));
+        fails(test, run)
+    });
+    prop_assert!(!repeated, "no test is run twice");
+    let found = smallest(&shrink).unwrap();
+    prop_assert!(fails(found, 7) && shrink.is_minimal());
+    for smaller in one_step_smaller(&shrink.space, found) {
+        prop_assert!(!fails(&smaller, 7), "{:?} can be shrunk: {:?}", found, smaller);
+    }
+    // A search gives every test as many activations as there may be; fewer are permitted too.
+    let with_all_times = |mut test: Test| {
+        if let ActivationMode::Condition { space } = &plan.campaign.activation {
+            for used in &mut test.operations {
+                if let Activation::Condition { times, .. } | Activation::ConditionFor { times, .. } =
+                    &mut used.activation
+                {
+                    *times = space.times;
+                }
+            }
+        }
+        test
+    };
+    for tried in shrink.tried() {
+        prop_assert_eq!(broken_rule(plan, &with_all_times(tried.test.clone())), None);
+    }
+    for dial in axis::times(found).into_iter().chain(axis::parameters(found)) {
+        let round = dial.rounded(&shrink.space, found);
+        prop_assert!(round.is_none_or(|round| !fails(&round, 7)), "{:?} has more digits than it needs", found);
+    }
+    prop_assert_eq!(grown(&original, found), None);
+    prop_assert!(strength(plan, found) <= strength(plan, &original) + 1e-9);
+    prop_assert!(found.operations.len() <= original.operations.len());
+    Ok(())
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
+    #![proptest_config(ProptestConfig::with_cases(32))]
 
     #[test]
     fn the_smallest_test_fails_is_permitted_and_cannot_be_shrunk_by_one_step(
         plan in any_plan(), seed: u64, share in 0.05..0.95f64,
     ) {
-        let test_space = TestSpace::from_plan(&plan).unwrap();
-        let mut original = fresh_test(&test_space, &mut Stream::derive(seed, "test", &[]));
-        for (at, used) in (0u64..).zip(&mut original.operations) {
-            used.operation_seed = at;
-        }
-        let fails = |test: &Test, _| *test == original || scattered(test, seed) < share;
-        let mut asked = BTreeSet::new();
-        let mut repeated = false;
-        let shrink = Shrink::with_resolution(&plan, shrinking(original.clone(), 1, 100_000), 0.1);
-        let shrink = shrunk(shrink, |test, run| {
-            repeated |= !asked.insert(content(test));
-            fails(test, run)
-        });
-        prop_assert!(!repeated, "no test is run twice");
-        let found = smallest(&shrink).unwrap();
-        prop_assert!(fails(found, 7) && shrink.is_minimal());
-        for smaller in one_step_smaller(&shrink.space, found) {
-            prop_assert!(!fails(&smaller, 7), "{:?} can be shrunk: {:?}", found, smaller);
-        }
-        // A search gives every test as many activations as there may be; fewer are permitted too.
-        let with_all_times = |mut test: Test| {
-            if let ActivationMode::Condition { space } = &plan.campaign.activation {
-                for used in &mut test.operations {
-                    if let Activation::Condition { times, .. } | Activation::ConditionFor { times, .. } = &mut used.activation {
-                        *times = space.times;
-                    }
-                }
-            }
-            test
-        };
-        for tried in shrink.tried() {
-            prop_assert_eq!(broken_rule(&plan, &with_all_times(tried.test.clone())), None);
-        }
-        prop_assert_eq!(grown(&original, found), None);
-        prop_assert!(strength(&plan, found) <= strength(&plan, &original) + 1e-9);
-        prop_assert!(found.operations.len() <= original.operations.len());
+        is_smallest(&plan, seed, share)?;
     }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(1_000))]
+
+    #[test]
+    #[ignore = "long: a thousand plans"]
+    fn the_smallest_test_of_many_plans_cannot_be_shrunk_by_one_step(
+        plan in any_plan(), seed: u64, share in 0.05..0.95f64,
+    ) {
+        is_smallest(&plan, seed, share)?;
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
 
     /// The oracle tries every combination of steps of every operation. What fails here needs some operations, each over
     /// some time and with some loss, so that one test is the smallest.
@@ -205,8 +234,9 @@ proptest! {
             let sizes = all.iter().map(|test| &test.operations[0]).filter(|used| enough(used)).map(size);
             let (shortest, mildest) = sizes.fold((f64::INFINITY, f64::INFINITY), |a, b| (a.0.min(b.0), a.1.min(b.1)));
             let (length, value) = size(used);
-            prop_assert!((length - shortest).abs() < 1e-6, "{:?}: {} s is possible", used, shortest);
-            prop_assert!((value - mildest).abs() < 1e-6, "{:?}: {} is possible", used, mildest);
+            // Round numbers may take it further.
+            prop_assert!(length < shortest + 1e-6, "{:?}: {} s is possible", used, shortest);
+            prop_assert!(value < mildest + 1e-6, "{:?}: {} is possible", used, mildest);
         }
     }
 }

@@ -210,7 +210,7 @@ fn a_campaign_whose_operations_reach_nothing_ends_before_it_searches_and_can_be_
         run_with(&plan, strategy, recorder, &settings, &mut executor, &interrupted, &mut |_, _| {})
     };
     let refused = run(false, Recorder::create(folder.path(), &plan, plan.campaign.seed, 1).unwrap());
-    assert!(matches!(refused, Err(CampaignError::Unheard(_))), "{refused:?}");
+    assert!(matches!(refused, Err(CampaignError::Ineffective(_))), "{refused:?}");
     let resumed = run(true, Recorder::resume(folder.path(), 1).unwrap());
     assert!(matches!(resumed, Ok(CampaignEnd::Finished(_))), "{resumed:?}");
 }

@@ -1,12 +1,14 @@
 //! Random cases, from the draws they are made of to the robot.
 
 mod metrics;
+mod monitors;
 mod operations;
 
 use sesame_plan::testing;
 use sesame_plan::{Metric, Test, TestOperation, Topic};
 use sesame_rng::Stream;
 
+pub(super) use self::monitors::Watching;
 use super::{Case, topics_of, variables};
 use crate::adapter;
 use crate::robot::{Blank, Carries, Line, Script};
@@ -21,7 +23,7 @@ pub(super) struct Maker {
 }
 
 impl Maker {
-    fn chance(&mut self, probability: f64) -> bool {
+    pub(super) fn chance(&mut self, probability: f64) -> bool {
         self.stream.chance(probability)
     }
 
@@ -30,7 +32,7 @@ impl Maker {
     }
 
     /// A whole number between two, both included.
-    fn between(&mut self, low: i32, high: i32) -> i32 {
+    pub(super) fn between(&mut self, low: i32, high: i32) -> i32 {
         low + i32::try_from(self.stream.below(usize::try_from(high - low + 1).unwrap())).unwrap()
     }
 
@@ -69,7 +71,7 @@ impl Maker {
             instances.truncate(1);
         }
         let requirements = self.requirements(&metrics);
-        let mut script = Script { lines, crash: None, over: None, blanks: Vec::new() };
+        let mut script = Script { lines, crash: None, over: None, blanks: Vec::new(), doubled: Vec::new() };
         if self.chance(0.15) {
             script.over = Some(self.between(3, steps).unsigned_abs());
         }

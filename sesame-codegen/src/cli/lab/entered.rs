@@ -22,6 +22,7 @@ use clap::{Args, ValueEnum};
 use sesame_dsl::similar::most_similar;
 use sesame_plan::{CampaignPlan, LabTask, LabTest, Task};
 use sesame_results::analysis::gap::lab_runs;
+use sesame_results::analysis::{excluded, exclusions};
 use sesame_results::record::{DATABASE, Entered, EnteredRun, Provenance, Recorder, Repository};
 use sesame_runtime::cli::Caller;
 
@@ -53,6 +54,9 @@ pub(in super::super) struct Form {
     /// How often each test is run; if omitted, as often as the lab's `physical` block says, or else once.
     #[arg(short = 'n', long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     times: Option<u32>,
+    /// Print rows for tests that the lab excludes as too dangerous, too.
+    #[arg(long)]
+    although_excluded: bool,
     /// Write the form into this file, which must not exist; if omitted, it is printed.
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -102,9 +106,18 @@ pub(in super::super) struct Add {
 pub(super) fn print_form(shell: Shell, asked: &Form) -> anyhow::Result<()> {
     let campaign = Campaign::open(&asked.results)?;
     let name = lab_name(campaign.plan(), asked.lab.as_deref())?;
-    let repeats = || campaign.plan().labs.iter().find(|lab| lab.name == name).map_or(1, |lab| lab.repeats);
-    let times = asked.times.unwrap_or_else(repeats);
-    let tests = campaign.to_run(&asked.tests)?;
+    let lab = campaign.plan().labs.iter().find(|lab| lab.name == name);
+    let times = asked.times.unwrap_or_else(|| lab.map_or(1, |lab| lab.repeats));
+    let mut tests = campaign.to_run(&asked.tests)?;
+    if let Some(lab) = lab.filter(|_| !asked.although_excluded)
+        && let Some(said) = exclusions(campaign.repository(), lab, &tests)?
+    {
+        ensure!(asked.tests.is_empty(), "{said}; leave them out, or pass `--although-excluded`");
+        shell.note(said);
+        let excluded = excluded(campaign.repository(), lab, &tests)?;
+        tests.retain(|test| excluded.iter().all(|(number, _)| number != test));
+        ensure!(!tests.is_empty(), "lab `{name}` excludes every test of the front; name others, for example `T1 T2`");
+    }
     let wanted = Wanted { lab: &name, tests: &tests, times };
     let text = match asked.format {
         Written::Csv => form::csv(&campaign, &wanted),
@@ -164,6 +177,10 @@ pub(super) fn add(shell: Shell, asked: &Add) -> anyhow::Result<()> {
         create(&campaign, &folder, task, &runs)?;
     }
     let tests: BTreeSet<u32> = runs.iter().map(|run| run.of).collect();
+    if let Some(lab) = campaign.plan().labs.iter().find(|lab| lab.name == name) {
+        let tests: Vec<u32> = tests.iter().copied().collect();
+        exclusions(campaign.repository(), lab, &tests)?.into_iter().for_each(|said| shell.note(said));
+    }
     let (runs, tests) = (counted(runs.len(), "run"), counted(tests.len(), "test"));
     shell.did("Recorded", format!("{}: {runs} of {tests} in lab `{name}`", folder.display()));
     if blank > 0 {

@@ -144,12 +144,20 @@ fn sentence((one, other, equivalence): &Pair) -> String {
     let unsafe_tests: Vec<&str> = equivalence.unsafe_motions().map(|motion| motion.name.as_str()).collect();
     let differing: Vec<&str> = equivalence.differing().map(|motion| motion.name.as_str()).collect();
     let lead = equivalence.shortest_lead().map_or_else(String::new, |lead| format!(", {lead:.3} s before it or more"));
-    let early = if unsafe_tests.is_empty() {
+    let contacts = equivalence.motions.iter().filter(|motion| motion.response.entry.is_some()).count();
+    let trips = equivalence.motions.iter().filter(|motion| motion.response.trip.is_some()).count();
+    let early = if contacts == 0 {
+        "no test has a contact, so nothing is known of whether an interlock would act in time".to_owned()
+    } else if unsafe_tests.is_empty() {
         format!("an interlock acts before each contact{lead}")
     } else {
         format!("an interlock acts too late or not at all in {}", names(unsafe_tests))
     };
-    let stands = if differing.is_empty() {
+    let stands = if contacts == 0 && trips == 0 {
+        "No interlock acts in any of them either.".to_owned()
+    } else if contacts == 0 {
+        format!("It acts without a contact in {}.", names(differing))
+    } else if differing.is_empty() {
         "It stands for the contact: it acts in exactly the tests that have one.".to_owned()
     } else {
         format!("It does not stand for the contact: only one of both happens in {}.", names(differing))
@@ -194,6 +202,17 @@ mod tests {
             other => panic!("{other:?}"),
         });
         (words.collect(), sentence(&pairs[0]))
+    }
+
+    #[test]
+    fn of_tests_without_a_contact_nothing_is_concluded() {
+        let (words, sentence) = said(&[flown("T1", 9.0), flown("T2", 9.0)], 0.4);
+        assert_eq!(words, ["idle", "idle"]);
+        assert_eq!(
+            sentence,
+            "`gripper` and `Z1`, 2 tests: no test has a contact, so nothing is known of whether an interlock would act in \
+             time. No interlock acts in any of them either."
+        );
     }
 
     #[test]

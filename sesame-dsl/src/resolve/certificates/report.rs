@@ -89,7 +89,7 @@ impl<'a> Reporter<'a> {
             }
             Finding::Always { monitor, guarantee } => {
                 let follows = self.group.follows((monitor, guarantee), &self.always, Truth::True);
-                (!follows).then(|| self.always(monitor, guarantee))
+                (!follows && !self.may_be_stale(monitor, guarantee)).then(|| self.always(monitor, guarantee))
             }
             Finding::NeverState { monitor, guarantee, ref by } => {
                 let follows = by.iter().any(|&by| self.always.contains(&(monitor, by)));
@@ -163,6 +163,12 @@ impl<'a> Reporter<'a> {
             }
         }
         set
+    }
+
+    /// Whether silence can end a guarantee, which may be all that it is for.
+    fn may_be_stale(&self, monitor: MonitorId, guarantee: u32) -> bool {
+        let evidence = self.group.evidence_of(monitor, guarantee);
+        evidence.iter().any(|&(of, at)| self.group.monitors[of.index()].evidence[at as usize].stale.is_some())
     }
 
     fn always(&self, monitor: MonitorId, at: u32) -> Diagnostic {

@@ -36,10 +36,19 @@ pub(crate) struct Evidence {
     pub(crate) head: Head,
     pub(crate) condition: Expression,
     pub(crate) held: Vec<(Span, Quantity)>,
-    /// When it is stale, and whether it is unknown then; false otherwise.
-    pub(crate) stale: Vec<(Span, (Quantity, bool))>,
+    pub(crate) stale: Vec<(Span, Stale)>,
     /// Whether it hears messages before operations.
     pub(crate) inbound: Vec<Span>,
+}
+
+/// When evidence is too old.
+#[derive(Debug)]
+pub(crate) struct Stale {
+    pub(crate) after: Quantity,
+    /// Whether it is unknown then; false otherwise.
+    pub(crate) unknown: bool,
+    /// Whether all of its topics must be silent.
+    pub(crate) all: bool,
 }
 
 #[derive(Debug)]

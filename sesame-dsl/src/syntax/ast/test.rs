@@ -64,8 +64,13 @@ impl Choice {
     }
 }
 
+/// What a test is expected to come to.
 #[derive(Debug)]
-pub(crate) struct Expectation {
-    pub(crate) metric: Name,
-    pub(crate) bound: Bound,
+pub(crate) enum Expectation {
+    Metric {
+        metric: Name,
+        bound: Bound,
+    },
+    /// It satisfies this requirement.
+    Requirement(Name),
 }

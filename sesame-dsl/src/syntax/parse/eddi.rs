@@ -3,7 +3,7 @@
 use sesame_grammar::Rule;
 
 use super::reader::{Pair, Reader, child, children, expect_child};
-use crate::syntax::ast::eddi::{Demand, Eddi, Evidence, Guarantee, Mitigation, Otherwise, State};
+use crate::syntax::ast::eddi::{Demand, Eddi, Evidence, Guarantee, Mitigation, Otherwise, Stale, State};
 
 impl Reader<'_> {
     pub(super) fn eddi(&mut self, pair: &Pair<'_>) -> Eddi {
@@ -51,7 +51,8 @@ impl Reader<'_> {
             .collect();
         let stale = children(pair, Rule::stale).map(|stale| {
             let after = self.signed(&expect_child(&stale, Rule::signed));
-            (self.keyword_span(&stale), (after, child(&stale, Rule::k_unknown).is_some()))
+            let (unknown, all) = (child(&stale, Rule::k_unknown).is_some(), child(&stale, Rule::k_all).is_some());
+            (self.keyword_span(&stale), Stale { after, unknown, all })
         });
         let stale = stale.collect();
         let condition = self.expression(&expect_child(pair, Rule::expression));

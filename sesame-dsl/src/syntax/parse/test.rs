@@ -13,9 +13,12 @@ impl Reader<'_> {
         let mut test =
             Test { head, operations: vec![], expectations: vec![], simulator_seeds: vec![], has_errors: false };
         test.has_errors = self.members(pair, |reader, member| match member.as_rule() {
-            Rule::expectation => test.expectations.push(Expectation {
-                metric: reader.metric_name(&expect_child(&member, Rule::metric_name)),
-                bound: reader.bound(&expect_child(&member, Rule::bound)),
+            Rule::expectation => test.expectations.push(match child(&member, Rule::bound) {
+                Some(bound) => Expectation::Metric {
+                    metric: reader.metric_name(&expect_child(&member, Rule::metric_name)),
+                    bound: reader.bound(&bound),
+                },
+                None => Expectation::Requirement(reader.name(&expect_child(&member, Rule::name))),
             }),
             Rule::simulator_seed => {
                 let span = reader.keyword_span(&member);

@@ -1,10 +1,11 @@
 //! Decisions in the relay beside those of `sesame_monitor`, fed with the messages of a trace.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use proptest::prelude::*;
 
-use sesame_monitor::{Changes, EvidenceId, Network, Run, State, Truth};
+use sesame_monitor::{Changes, EvidenceId, Network, Reading, Run, State, Truth};
 
 use super::*;
 
@@ -13,9 +14,9 @@ fn any_evidence() -> impl Strategy<Value = Evidence> {
     let held = prop_oneof![Just(0.0), Just(3e-9), Just(7e-9)];
     let stale = prop_oneof![
         Just(None),
-        (1..9_u32, any::<bool>()).prop_map(|(after, is)| {
+        (1..9_u32, any::<bool>(), any::<bool>()).prop_map(|(after, is, all)| {
             let is = if is { StaleIs::False } else { StaleIs::Unknown };
-            Some(Stale { after: f64::from(after) * 1e-9, is })
+            Some(Stale { after: f64::from(after) * 1e-9, is, all })
         })
     ];
     (0..3_u32, -2..3_i32, held, stale, any::<bool>()).prop_map(|(on, limit, held, stale, inbound)| {
@@ -71,8 +72,10 @@ fn fed(plan: &CampaignPlan, ran: &Ran, end: i64) -> [Vec<(i64, Option<u32>)>; 2]
     let network = Arc::new(Network::new(&plan.monitors).unwrap());
     let mut changes = Changes::default();
     let mut run = Run::start(Arc::clone(&network), &mut changes);
-    let mut last: Vec<[Option<f64>; 2]> = vec![[None; 2]; network.evidence_count()];
+    let mut last: Vec<[Option<(f64, i64)>; 2]> = vec![[None; 2]; network.evidence_count()];
     let mut told = ran.told.iter().filter(|told| told.wire.index() < 2).peekable();
+    // What evidence on both topics says in this instant.
+    let mut settled: BTreeMap<EvidenceId, Reading> = BTreeMap::new();
     while let Some(first) = told.next() {
         // A message that is delivered at once follows its publication, but for states that monitors publish.
         let same = |next: &&Told| {
@@ -84,7 +87,7 @@ fn fed(plan: &CampaignPlan, ran: &Ran, end: i64) -> [Vec<(i64, Option<u32>)>; 2]
         };
         let mut event = vec![first];
         event.extend(told.next_if(same));
-        let mut heard: Vec<(EvidenceId, Truth)> = Vec::new();
+        let mut heard: Vec<Reading> = Vec::new();
         for Told { delivered, wire, value, .. } in &event {
             for (at, last) in last.iter_mut().enumerate() {
                 let id = EvidenceId(u32::try_from(at).unwrap());
@@ -92,20 +95,30 @@ fn fed(plan: &CampaignPlan, ran: &Ran, end: i64) -> [Vec<(i64, Option<u32>)>; 2]
                 let evidence = &plan.monitors[monitor.index()].evidence[position as usize];
                 let reads = |topic: usize| evidence.inputs.iter().any(|input| input.field.topic.index() == topic);
                 if reads(wire.index()) && *delivered == (evidence.side == Side::Outbound) {
-                    last[wire.index()] = value.number_at::<&str>(&[]);
-                    let known = (0..2).all(|topic| !reads(topic) || last[topic].is_some());
+                    last[wire.index()] = value.number_at::<&str>(&[]).map(|value| (value, first.at));
+                    let read: Option<Vec<_>> = (0..2).filter(|&topic| reads(topic)).map(|topic| last[topic]).collect();
+                    let Some(read) = read else { continue };
                     let sesame_plan::Condition::Compare { by, right: Expression::Constant(limit), .. } =
                         &evidence.condition
                     else {
                         panic!("evidence is a comparison")
                     };
-                    let first = last[evidence.inputs[0].field.topic.index()];
-                    let holds = first.is_some_and(|value| by.holds(value, *limit));
-                    heard.push((id, if known { Truth::from(holds) } else { Truth::Unknown }));
+                    let holds = last[evidence.inputs[0].field.topic.index()].is_some_and(|it| by.holds(it.0, *limit));
+                    let oldest = SimTime::from_nanos(read.iter().map(|it| it.1).min().unwrap());
+                    let reading = Reading { evidence: id, truth: Truth::from(holds), oldest };
+                    if read.len() > 1 {
+                        settled.insert(id, reading);
+                    } else {
+                        heard.push(reading);
+                    }
                 }
             }
         }
-        run.observe(SimTime::from_nanos(first.at), &heard, &mut changes);
+        let at = SimTime::from_nanos(first.at);
+        run.observe(at, &heard, &mut changes);
+        if told.peek().is_none_or(|next| next.at > first.at) {
+            run.observe(at, &std::mem::take(&mut settled).into_values().collect::<Vec<_>>(), &mut changes);
+        }
     }
     run.advance(SimTime::from_nanos(end), &mut changes);
     let of = |monitor: u32| {

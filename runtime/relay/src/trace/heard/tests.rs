@@ -17,8 +17,8 @@ use sesame_plan::testing::{
     evidence_above, guarantee, metric, minimal, monitor, operation, requirement, score, test_of, topic, use_of,
 };
 use sesame_plan::{
-    Bound, Choice, Distribution, Drain, Evidence, FieldRef, Gate, MetricSource, MonitorId, MonitorState, OperationKind,
-    RequirementId, Score, Stale, StaleIs, Test, TopicId, Type,
+    Bound, Choice, Distribution, Drain, Evidence, FieldRef, Gate, Metric, MetricSource, MonitorId, MonitorState,
+    OperationKind, RequirementId, Score, Stale, StaleIs, Test, TopicId, Trend, Type,
 };
 
 use super::*;
@@ -70,8 +70,11 @@ impl Transport for Script {
 /// `near` is above zero on `a`; `lit` above zero on `b` for 20 ms, and false after 400 ms of silence; `seen` is what is
 /// published on `b`, whatever is made of it. An operation may delay what is on `b`.
 fn plan() -> CampaignPlan {
-    let lit =
-        Evidence { held: 0.02, stale: Some(Stale { after: 0.4, is: StaleIs::False }), ..evidence_above("lit", 1, 0.0) };
+    let lit = Evidence {
+        held: 0.02,
+        stale: Some(Stale { after: 0.4, is: StaleIs::False, all: false }),
+        ..evidence_above("lit", 1, 0.0)
+    };
     let seen = Evidence { side: Side::Inbound, ..evidence_above("seen", 1, 0.0) };
     let all = Gate::All(vec![Gate::Evidence(0), Gate::Evidence(1)]);
     let one = Gate::Any(vec![Gate::Evidence(1), Gate::Evidence(2)]);
@@ -283,7 +286,8 @@ fn tolerances_of_runs_at_random_are_those_of_recordings_that_are_delayed() {
 /// Fuzzing time is at most 300 ms; what is scored is how early the monitor was in its safe state.
 fn with_limit() -> CampaignPlan {
     let mut plan = plan();
-    plan.metrics.push(metric("fuzzing_time", MetricSource::FuzzingTime));
+    let fuzzing_time = metric("fuzzing_time", MetricSource::FuzzingTime);
+    plan.metrics.push(Metric { trend: Some(Trend::Rising), ..fuzzing_time });
     plan.requirements = vec![requirement("briefly", 1, Bound::AtMost { value: 0.3 })];
     let requirement = RequirementId(0);
     for of in [Score::MissedHazards { requirement }, Score::LeadTime { requirement }] {

@@ -12,6 +12,7 @@ use crate::relay::{Delivery, Exchange};
 use crate::simulator::Progress;
 use crate::transport::added::{Added, AddedOnWire, FEWEST, objections};
 use crate::transport::bus::{Bus, Event, Settings};
+use crate::transport::clock::Ticks;
 use crate::transport::{Capabilities, Incidents, Transport, TransportError, wall_time_since};
 use crate::wire::{Line, Wire, WireTable, lines, service_lines};
 
@@ -23,6 +24,9 @@ const SILENCE: Duration = Duration::from_secs(10);
 
 /// How often it is looked whether launched programs still run, while nothing comes in.
 const WATCH: Duration = Duration::from_millis(100);
+
+/// How often it is looked who listens: presence may be found late.
+const LOOK: Duration = Duration::from_millis(500);
 
 /// How many messages that belong to calls are remembered; the oldest are forgotten.
 const CALLS: usize = 10_000;
@@ -39,6 +43,9 @@ pub(super) struct System {
     sinks: BTreeMap<Wire, (usize, usize)>,
     now: SimTime,
     zero: Zero,
+    /// When it was looked last who listens.
+    looked: Instant,
+    ticks: Ticks,
     /// When the clock went on last.
     ticked: Instant,
     /// What the clock showed last, in this run or before it.
@@ -105,6 +112,8 @@ impl System {
             sinks: BTreeMap::new(),
             now: SimTime::ZERO,
             zero: Zero::Wall(Instant::now()),
+            looked: Instant::now(),
+            ticks: Ticks::default(),
             ticked: Instant::now(),
             shown: None,
             deliveries: Vec::new(),
@@ -140,12 +149,7 @@ impl System {
         self.bus.reset(SILENCE)?;
         self.calls.clear();
         self.said.clear();
-        for (at, line) in self.lines.iter().enumerate() {
-            if self.bus.is_heard(at) {
-                relay.subscribed(line.wire);
-                line.sinks.iter().for_each(|sink| relay.subscribed(sink.wire));
-            }
-        }
+        self.look(relay);
         self.zero = if self.settings.has_clock {
             Zero::Clock(self.first_tick()?)
         } else {
@@ -161,6 +165,17 @@ impl System {
                      `ros2`"
                 );
                 Err(TransportError::Wiring(problem))
+            }
+        }
+    }
+
+    /// Tells the relay who listens, as far as the bus knows by now.
+    fn look(&mut self, relay: &mut dyn Exchange) {
+        self.looked = Instant::now();
+        for (at, line) in self.lines.iter().enumerate() {
+            if self.bus.is_heard(at) {
+                relay.found(line.wire);
+                line.sinks.iter().for_each(|sink| relay.found(sink.wire));
             }
         }
     }
@@ -196,8 +211,11 @@ impl System {
                 return Ok(());
             }
             if Instant::now() >= limit && !missing.is_empty() {
-                let problem = format!("the system is not complete after {} s: ", COMPLETE_WITHIN.as_secs());
-                return Err(TransportError::Wiring(problem + &missing.join("; ")));
+                return Err(TransportError::LaunchFailed {
+                    what: "the system".to_owned(),
+                    problem: format!("is not complete after {} s: {}", COMPLETE_WITHIN.as_secs(), missing.join("; ")),
+                    last_lines: String::new(),
+                });
             }
             if !self.connected {
                 std::thread::sleep(Duration::from_millis(20));
@@ -208,8 +226,18 @@ impl System {
     }
 
     fn unreachable(&self) -> String {
+        format!("nothing answers at {}", self.addresses())
+    }
+
+    /// That the connection is lost when a run comes to its end.
+    fn away(&self) -> TransportError {
+        let how = "it was lost before the end of the run, and not found again by then".to_owned();
+        TransportError::ConnectionLost { to: self.addresses(), how }
+    }
+
+    fn addresses(&self) -> String {
         let addresses: Vec<String> = self.settings.addresses.iter().map(|it| self.launched.fill(it)).collect();
-        format!("nothing answers at `{}`", addresses.join("`, `"))
+        format!("`{}`", addresses.join("`, `"))
     }
 
     /// Passes something on that belongs to no run.
@@ -279,6 +307,9 @@ impl System {
         self.now = self.zero.wall_clock(self.now).min(until);
         relay.advance(self.now, &mut self.deliveries);
         self.deliver()?;
+        if self.now >= until || self.looked.elapsed() >= LOOK {
+            self.look(relay);
+        }
         if self.now >= until {
             return Ok(Progress::Ended);
         }
@@ -322,9 +353,7 @@ impl System {
         self.shown = Some(nanos);
         let Zero::Clock(zero) = self.zero else { return Ok(()) };
         let time = SimTime::from_nanos(nanos.saturating_sub(zero));
-        if time < self.now {
-            return Err(TransportError::ClockBack { from: self.now, to: time });
-        }
+        self.ticks.tick(self.now, time)?;
         // A simulator that is paused may go on to publish the time at which it was.
         if time > self.now {
             self.ticked = Instant::now();
@@ -441,6 +470,14 @@ impl Transport for System {
 
     fn now(&self) -> SimTime {
         self.now
+    }
+
+    fn ended(&mut self) -> Result<(), TransportError> {
+        if self.bus.is_connected() {
+            return Ok(());
+        }
+        let away = self.away();
+        Err(self.fail(away))
     }
 
     fn close(&mut self) {

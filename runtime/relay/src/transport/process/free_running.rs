@@ -23,6 +23,7 @@ use crate::lifecycle::{Alarm, Input, Program, Running};
 use crate::relay::Exchange;
 use crate::simulator::Progress;
 use crate::transport::added::{Added, AddedOnWire, join, objections};
+use crate::transport::clock::Ticks;
 use crate::transport::process::fault::{explain, note_restart};
 use crate::transport::process::launched::{health, launch};
 use crate::transport::process::protocol::{LINE_LIMIT, Line, Read, SimulatorMessage, read_line, request};
@@ -62,6 +63,7 @@ struct Connection {
     /// How long messages were kept.
     added: Added,
     clock: Clock,
+    ticks: Ticks,
     resets: bool,
     running: Running,
 }
@@ -156,6 +158,7 @@ impl Connection {
             topics,
             added: Added::default(),
             clock: Clock::Simulator,
+            ticks: Ticks::default(),
             resets: false,
             running,
         })
@@ -291,10 +294,11 @@ impl Connection {
                     let remedy = "say `\"clock\": true` in `ready` if the simulator has a clock of its own";
                     return Err(self.line.wrong("says `time` without a clock".to_owned(), remedy));
                 }
-                if !seconds.is_finite() || time < now {
-                    let problem = format!("sets the time to {seconds} s, which is before {now}");
-                    return Err(self.line.wrong(problem, "send times that never decrease"));
+                if !seconds.is_finite() {
+                    let problem = format!("sets the time to {seconds} s");
+                    return Err(self.line.wrong(problem, "send times that are finite"));
                 }
+                self.ticks.tick(now, time)?;
                 (time, Progress::Running)
             }
             SimulatorMessage::Failed(reason) => return Err(TransportError::Simulator(reason)),

@@ -1,7 +1,7 @@
 //! What is known of a test that may tell whether it fails, in numbers: its point in the reduced space, and of each
 //! operation how often, when, how long and how strong.
 
-use sesame_plan::{CampaignPlan, Dimension, OperationId, Span};
+use sesame_plan::{CampaignPlan, Dimension, Domain, OperationId, Shape, Span};
 use sesame_search::sspr::{Convention, disturbance};
 
 use crate::analysis::regions::tree::Question;
@@ -69,6 +69,20 @@ fn mean(numbers: impl Iterator<Item = f64>) -> Option<f64> {
     (count > 0).then(|| sum / f64::from(count))
 }
 
+/// How strong an operation is, in the name and the unit of its parameter: `skew above 0.2 s`, or of a parameter that is
+/// a sub-range how wide that is. `None` for an operation that has several parameters, or none of numbers.
+fn strength(plan: &CampaignPlan, id: OperationId, share: f64, way: &str) -> Option<String> {
+    let operation = plan.operation(id);
+    let [parameter] = &operation.parameters[..] else { return None };
+    let Domain::Number { low, high, shape, .. } = parameter.domain else { return None };
+    let (factor, unit) = number::scale(&operation.kind, parameter, high);
+    let written = |value: f64| number::with_unit(number::number(value * factor), unit);
+    Some(match shape {
+        Shape::Value => format!("{} {way} {}", parameter.name, written(low + share * (high - low))),
+        Shape::Range => format!("{} {way} {} wide", parameter.name, written(share * (high - low))),
+    })
+}
+
 impl Feature {
     /// What holds of a test of which this question holds, or does not; `missing` says whether tests may be meant that
     /// have no such number. Thresholds have all their digits.
@@ -104,7 +118,10 @@ impl Feature {
                 &format!("lasts {} {at} s", if at_most { "at most" } else { "over" }),
                 missing,
             ),
-            Feature::Share(id) => self.of_operation(plan, id, &format!("has parameters {way} {at}"), missing),
+            Feature::Share(id) => {
+                let what = strength(plan, id, question.threshold, way);
+                self.of_operation(plan, id, &what.unwrap_or_else(|| format!("has parameters {way} {at}")), missing)
+            }
         }
     }
 

@@ -9,7 +9,7 @@ use sesame_base::time::SimTime;
 use sesame_base::verdict::violation_spans;
 use sesame_monitor::compare::Step;
 use sesame_monitor::score::scorer;
-use sesame_monitor::{Changes, EvidenceId, Network, Run, State, Truth};
+use sesame_monitor::{Changes, EvidenceId, Network, Reading, Run, State, Truth};
 use sesame_plan::testing::{demand, evidence_above, guarantee, monitor, score, topic};
 use sesame_plan::{
     CampaignPlan, Evidence, FieldRef, Gate, MetricSource, Mitigation, MitigationValue, Monitor, MonitorId,
@@ -48,7 +48,7 @@ pub fn monitored_plan() -> CampaignPlan {
     let two = Gate::AtLeast { count: 2, of: (0..3).map(Gate::Evidence).collect() };
     let guarantees =
         vec![guarantee("redundant", 2, two), guarantee("single", 1, Gate::Any((0..3).map(Gate::Evidence).collect()))];
-    let stale = Some(Stale { after: 1.0, is: StaleIs::Unknown });
+    let stale = Some(Stale { after: 1.0, is: StaleIs::Unknown, all: false });
     let evidence = vec![
         evidence_above("left", 0, 0.1),
         Evidence { stale, ..evidence_above("right", 1, 0.1) },
@@ -144,7 +144,7 @@ fn run(plan: &CampaignPlan, test: &Test, network: &Arc<Network>, end: f64) -> Ve
                 let inputs = &plan.monitor(monitor).evidence[at as usize].inputs;
                 inputs.iter().any(|input| input.field.topic.index() == topic)
             };
-            let heard: Vec<(EvidenceId, Truth)> = ids.filter(reads).map(|id| (id, truth)).collect();
+            let heard: Vec<Reading> = ids.filter(reads).map(|id| Reading::now(now, id, truth)).collect();
             run.observe(now, &heard, &mut changes);
             let message = ChangeCause::Message { topic: declared.paths[0].clone(), index: tick };
             take(&mut shown, network, &mut changes, Some(&message));

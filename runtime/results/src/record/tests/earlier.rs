@@ -11,6 +11,7 @@ use crate::record::{DATABASE, Recorder, Repository, SCHEMA};
 
 const SCHEMA_5: &str = include_str!("../fixtures/results_of_schema_5.sql");
 const SCHEMA_6: &str = include_str!("../fixtures/results_of_schema_6.sql");
+const SCHEMA_7: &str = include_str!("../fixtures/results_of_schema_7.sql");
 
 /// What a runner of an earlier schema recorded, in a folder of its own.
 fn of_earlier(fixture: &str) -> TempDir {
@@ -122,7 +123,33 @@ fn results_of_schema_6_are_read_with_the_digest_they_were_given_and_nothing_is_a
 }
 
 #[test]
-fn the_same_results_of_schema_7_keep_their_digest_in_later_releases() {
+fn results_of_schema_7_are_read_with_the_digest_they_were_given_and_nothing_is_added_to_them() {
+    // Its first releases recorded no robustness over time.
+    let first = "DROP VIEW robustness; DROP VIEW robustness_points; DROP TABLE robustness_pieces";
+    for of_release in ["", first] {
+        let folder = of_earlier(SCHEMA_7);
+        change(folder.path(), of_release);
+        let before = std::fs::read(folder.path().join(DATABASE)).unwrap();
+        let repository = Repository::open(folder.path()).unwrap();
+        let given = "1b2d60613842ea6fa43f672b75e4fd90b32d2817391d30f8b423c9e50bc3da44";
+        assert_eq!(repository.digest().unwrap(), given);
+        assert!(crate::report::page(&repository).unwrap().contains(given));
+        let record = repository.test(1).unwrap();
+        assert!(record.observation.traffic.is_empty(), "nobody wrote down what was heard");
+        assert_eq!(
+            repository.decisions(0..=20).unwrap().values().flatten().map(|it| it.hazards.len()).sum::<usize>(),
+            8
+        );
+        let (again, _) = recorded_again(&repository);
+        assert_eq!(analyses(folder.path()), analyses(again.path()));
+        drop(repository);
+        refuses_writers(folder.path(), 7);
+        assert_eq!(std::fs::read(folder.path().join(DATABASE)).unwrap(), before);
+    }
+}
+
+#[test]
+fn the_same_results_keep_their_digest_in_later_releases() {
     let folder = of_earlier(SCHEMA_6);
     let (again, _) = recorded_again(&Repository::open(folder.path()).unwrap());
     // The version is part of the content.
@@ -136,6 +163,7 @@ fn a_schema_has_its_own_words_and_no_others() {
     let changes = [
         (SCHEMA_6, "UPDATE tests SET outcome = 'no_effect' WHERE outcome = 'void'", "cannot have ended as `no_effect`"),
         (SCHEMA_6, "PRAGMA user_version = 7", "is not the one that a run makes"),
+        (SCHEMA_7, "PRAGMA user_version = 8", "is not the one that a run makes"),
     ];
     for (fixture, sql, words) in changes {
         let folder = of_earlier(fixture);

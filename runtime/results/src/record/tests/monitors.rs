@@ -76,7 +76,7 @@ fn results_of_before_hazards_were_recorded_are_read_and_go_on() {
     let folder = folder();
     drop(recorded(folder.path(), vec![shown()]));
     let open = Connection::open(folder.path().join(DATABASE)).unwrap();
-    open.execute_batch("DROP VIEW hazards; DROP TABLE monitor_hazards").unwrap();
+    open.execute_batch("DROP VIEW hazards; DROP TABLE repetition_hazards; DROP TABLE monitor_hazards").unwrap();
     let repository = Repository::open(folder.path()).unwrap();
     let read = repository.test(3).unwrap().observation.monitors;
     assert_eq!(read, [MonitorObservation { hazards: Vec::new(), ..shown() }]);

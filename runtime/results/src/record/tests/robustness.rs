@@ -39,29 +39,6 @@ fn the_digest_is_of_what_was_measured_not_of_its_explanation() {
 }
 
 #[test]
-fn results_without_the_table_are_read_and_continued() {
-    let folder = folder();
-    let plan = sample::plan();
-    let mut recorder = Recorder::create(folder.path(), &plan, 1, 1).unwrap();
-    let mut record = sample::record(&plan, 3, Origin::Search, plan.tests[0].test.clone());
-    recorder.commit(&record).unwrap();
-    drop(recorder);
-    let open = Connection::open(folder.path().join(DATABASE)).unwrap();
-    open.execute_batch("DROP VIEW robustness; DROP VIEW robustness_points; DROP TABLE robustness_pieces").unwrap();
-    drop(open);
-    let repository = Repository::open(folder.path()).unwrap();
-    assert!(repository.test(3).unwrap().observation.metrics[4].robustness.is_empty());
-    drop(repository);
-    let mut recorder = Recorder::resume(folder.path(), 1).unwrap();
-    record.number = 4;
-    record.observation.metrics[4].robustness = SIGNAL.to_vec();
-    recorder.commit(&record).unwrap();
-    drop(recorder);
-    let repository = Repository::open(folder.path()).unwrap();
-    assert_eq!(repository.test(4).unwrap().observation.metrics[4].robustness, SIGNAL);
-}
-
-#[test]
 fn another_table_in_its_place_is_refused() {
     let folder = folder();
     drop(recorded(folder.path(), &SIGNAL));

@@ -190,6 +190,20 @@ fn age(folder: &Path, seconds: u64) {
 }
 
 #[test]
+fn a_run_that_ended_before_any_test_did_hides_none_that_found_something() {
+    let results = folder();
+    let [found, failed] = ["7", "8"].map(|name| results.path().join(name));
+    let records = sample::records(&sample::plan(), 3);
+    commit_all(&failed, &records[..1]).finish("the reference run failed").unwrap();
+    assert_eq!(latest_folder(results.path()).unwrap(), Some(failed.clone()), "there is nothing else");
+    commit_all(&found, &records).finish("done").unwrap();
+    age(&found, 500);
+    assert_eq!(latest_folder(results.path()).unwrap(), Some(found));
+    std::fs::write(failed.join(DATABASE), "damaged").unwrap();
+    assert_eq!(latest_folder(results.path()).unwrap(), Some(failed), "what is damaged is not passed over in silence");
+}
+
+#[test]
 fn a_killed_run_whose_log_was_written_last_is_the_latest_and_the_one_to_go_on_with() {
     let (results, elsewhere) = (folder(), folder());
     let [killed, finished] = ["7", "8"].map(|name| results.path().join(name));
@@ -203,7 +217,7 @@ fn a_killed_run_whose_log_was_written_last_is_the_latest_and_the_one_to_go_on_wi
     }
     drop(recorder);
     age(&killed, 500);
-    commit_all(&finished, &[]).finish("done").unwrap();
+    commit_all(&finished, &sample::records(&sample::plan(), 2)).finish("done").unwrap();
     age(&finished, 100);
     assert_eq!(latest_folder(results.path()).unwrap(), Some(finished.clone()), "it was written last");
     assert_eq!(latest_unfinished(results.path()).unwrap(), Some(killed.clone()));

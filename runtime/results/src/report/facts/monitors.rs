@@ -246,5 +246,6 @@ impl EvidenceDeviation {
 
 /// A time with all its digits: it is exact to the nanosecond.
 pub(crate) fn seconds(seconds: f64) -> String {
-    format!("{} s", crate::present::number::exact(seconds))
+    // Times of a run are whole nanoseconds, and a difference of them is not much more than that.
+    format!("{} s", crate::present::number::exact(libm::rint(seconds * 1e9) / 1e9))
 }

@@ -54,7 +54,7 @@ pub struct ListedTest {
     /// Hazards that monitors missed in it, as in `R1 by transport`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub missed: Vec<String>,
-    /// Its operations, as in `jitter_link0 ×2, lose_link0`.
+    /// Its operations, as in `jitter_link0 ×2, lose_link0 (no effect)`.
     pub operations: String,
 }
 
@@ -405,7 +405,7 @@ fn verdicts(plan: &CampaignPlan, record: &TestRecord, fresh: &[Repetition]) -> V
             verdict: tally.verdict(first),
             first,
             fresh: (!fresh.is_empty()).then_some(FreshVerdicts { tally, interval }),
-            value: wording::value_text(value, metric.unit.as_deref()),
+            value: wording::value_text(value, metric.unit.as_deref(), &[requirement.bound]),
             unrecorded: first == Verdict::Violated && outside.is_empty() && formula_of(metric).is_some(),
             outside,
             decided_at: shown.and_then(|shown| decided_at(metric, shown)),

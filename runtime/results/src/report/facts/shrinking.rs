@@ -14,7 +14,7 @@ use sesame_search::{Strategy as _, sspr};
 use crate::present::number::{self, fixed};
 use crate::record::{MetricValue, RecordError, Repository, TestRow, fails};
 use crate::report::export::shrunk_block;
-use crate::report::facts::wording::{operations, value_text};
+use crate::report::facts::wording::{bounds_on, operations, value_text};
 
 /// How a test was shrunk.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -157,7 +157,7 @@ fn words(plan: &CampaignPlan, failing: &Failing) -> String {
     match failing {
         Failing::Crash => "crashes".to_owned(),
         Failing::Timeout => "times out".to_owned(),
-        Failing::Violation { requirements } => {
+        Failing::Violation { requirements, .. } => {
             let names: Vec<String> = requirements.iter().map(|&id| plan.requirement(id).name.clone()).collect();
             format!("violates {}", number::join_words(&names))
         }
@@ -166,7 +166,7 @@ fn words(plan: &CampaignPlan, failing: &Failing) -> String {
 
 /// The metrics that a failing is about, each once.
 fn metrics(plan: &CampaignPlan, failing: &Failing) -> Vec<MetricId> {
-    let Failing::Violation { requirements } = failing else { return Vec::new() };
+    let Failing::Violation { requirements, .. } = failing else { return Vec::new() };
     let mut metrics: Vec<MetricId> =
         requirements.iter().map(|&id: &RequirementId| plan.requirement(id).metric).collect();
     metrics.sort_unstable();
@@ -178,7 +178,7 @@ fn values(plan: &CampaignPlan, metrics: &[MetricId], value: impl Fn(MetricId) ->
     let named = |&id: &MetricId| {
         let metric = plan.metric(id);
         let shown = value(id);
-        let text = value_text(shown, metric.unit.as_deref());
+        let text = value_text(shown, metric.unit.as_deref(), &bounds_on(plan, id));
         NamedValue { metric: metric.name.clone(), value: shown.value, text }
     };
     metrics.iter().map(named).collect()
@@ -273,7 +273,7 @@ mod tests {
             |record: &TestRecord| record.observation.metrics.first().and_then(|metric| metric.value) > Some(0.0);
         let found = found.iter().find(|record| record.number > 20 && fails_r1(record)).unwrap();
         assert!(found.test.operations.len() > 1);
-        let failing = Failing::Violation { requirements: vec![RequirementId(0)] };
+        let failing = Failing::Violation { requirements: vec![RequirementId(0)], margins: Vec::new() };
         let task = Task::Shrink(sesame_plan::Shrinking {
             name: format!("T{}", found.number),
             test: found.test.clone(),

@@ -14,7 +14,8 @@ use crate::analysis::confirmed::{
 use crate::analysis::statistics::Sample;
 use crate::present::number;
 use crate::record::{
-    EventKind, Judge, MetricValue, Origin, RecordError, Repository, Standing, TestRow, Verdict, is_quarantined, verdict,
+    Event, EventKind, Judge, MetricValue, NOT_IMPORTED, Origin, RecordError, Repository, Standing, TestRow, Verdict,
+    is_quarantined, verdict,
 };
 use crate::report::facts::certificate::campaign::{MonitorsSummary, monitors_summary};
 use crate::report::facts::certificate::mend::Mend;
@@ -23,7 +24,13 @@ use crate::report::facts::readable;
 use crate::report::facts::repetition::{Repetition, repetition};
 use crate::report::facts::shrinking::{Shrinking, shrinking};
 use crate::report::facts::stacked::{Stacked, stacked_in};
-use crate::report::facts::wording::{operations, value_text, violated};
+use crate::report::facts::wording::{operations, tests_not_imported, value_text, violated};
+
+/// How the warning begins that the reference run after a campaign is not like the one before it.
+pub const CLOSING_RUN_DIFFERS: &str = "the reference run after the campaign differs from the one before it:";
+
+/// An operation that was used less often may have had no effect by chance.
+const FEWEST_USES: usize = 5;
 
 /// What a campaign found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -69,6 +76,13 @@ pub struct Summary {
     /// Tests in which a metric read a number that was not finite, by test.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub not_finite: Vec<NotFinite>,
+    /// Operations that had no effect in any of their uses, of which there were at least five, in the order of the
+    /// space.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub without_effect: Vec<WithoutEffect>,
+    /// In what the reference run after the campaign differs from the one before it, in a sentence.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub closing_run: Option<String>,
     /// How often requirements were violated, if the campaign repeats one test.
     pub repetition: Option<Repetition>,
     /// How a test was shrunk, if the campaign does that.
@@ -81,6 +95,9 @@ pub struct Summary {
     pub coverage: Option<CoverageSummary>,
     /// Warnings for the user.
     pub warnings: Vec<String>,
+    /// Whether all runs are without disturbance by design.
+    #[serde(skip)]
+    pub(crate) undisturbed: bool,
 }
 
 /// How many tests there are of each kind. Reference runs are not counted.
@@ -100,13 +117,8 @@ pub struct Counts {
     pub timeouts: usize,
     /// Of these, tests that the environment broke off each time they were run: failed launches, disconnects, wrong
     /// clocks. They say nothing about the system.
-    #[serde(skip_serializing_if = "is_zero")]
+    #[serde(skip_serializing_if = "number::is_zero")]
     pub environment: usize,
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
-fn is_zero(count: &usize) -> bool {
-    *count == 0
 }
 
 /// What the search optimised.
@@ -131,7 +143,7 @@ pub struct FrontTest {
     pub number: u32,
     /// A value per objective: that by which it is on the front, of its repetitions where the campaign confirms.
     pub values: Vec<Option<f64>>,
-    /// Its operations, as in `jitter_link0 ×2, lose_link0`.
+    /// Its operations, as in `jitter_link0 ×2, lose_link0 (no effect)`.
     pub operations: String,
     /// The operations whose copies acted at the same time.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -250,6 +262,15 @@ pub struct NotFinite {
     pub metrics: Vec<String>,
 }
 
+/// An operation that did nothing.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct WithoutEffect {
+    /// The operation's name in the space.
+    pub operation: String,
+    /// In how many tests that ran to their end it was used.
+    pub uses: usize,
+}
+
 /// The values of a metric over all tests that have one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Spread {
@@ -290,7 +311,14 @@ pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: &[u3
             Objective { metric: metric.name.clone(), unit: metric.unit.clone(), direction, id }
         })
         .collect();
-    let warnings = repository.events()?.into_iter().filter(|event| event.kind == EventKind::Warning).map(|event| {
+    let events = repository.events()?;
+    let closing_run = events.iter().find(|event| event.text.starts_with(CLOSING_RUN_DIFFERS));
+    let closing_run = closing_run.map(|event| readable::sentence(plan, &event.text));
+    // A line for each such test would hide everything else: they are counted in one.
+    let of_campaign = |event: &Event| {
+        event.kind == EventKind::Warning && !(event.test.is_some() && event.text.starts_with(NOT_IMPORTED))
+    };
+    let warnings = events.into_iter().filter(of_campaign).map(|event| {
         let text = readable::sentence(plan, &event.text);
         match event.test {
             Some(test) => format!("{}: {text}", TestNumber(test)),
@@ -319,6 +347,8 @@ pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: &[u3
         failures: rows.iter().flat_map(|row| failures(&judge, row)).collect(),
         quarantined: rows.iter().filter_map(|row| quarantined(plan, &judge, row)).collect(),
         not_finite: rows.iter().filter_map(|row| not_finite(plan, row)).collect(),
+        without_effect: without_effect(repository)?,
+        closing_run,
         once: rows
             .iter()
             .filter(|row| counts_as_test(row) && judge.runs(row.number).is_empty())
@@ -326,11 +356,23 @@ pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: &[u3
             .count(),
         spreads: spreads(plan, rows),
         coverage: coverage(repository)?,
-        warnings: warnings.collect(),
+        warnings: warnings.chain(tests_not_imported(rows)).collect(),
+        undisturbed: repository.task().undisturbed().is_some(),
         confirmation: plan.campaign.confirm,
         confirmed,
         objectives,
     })
+}
+
+fn without_effect(repository: &Repository) -> Result<Vec<WithoutEffect>, RecordError> {
+    let uses = repository.uses()?;
+    let never = |name: &str| uses.get(name).filter(|uses| uses.effective == 0 && uses.all >= FEWEST_USES).copied();
+    let operations = repository.plan().operations.iter();
+    let found = operations.filter_map(|operation| {
+        let uses = never(&operation.name)?;
+        Some(WithoutEffect { operation: operation.name.clone(), uses: uses.all })
+    });
+    Ok(found.collect())
 }
 
 fn counts(plan: &CampaignPlan, rows: &[TestRow]) -> Counts {
@@ -463,7 +505,7 @@ fn summarise_requirement(
     }
     found.worst = worst.and_then(|(_, row, shown)| {
         let value = shown.value?;
-        Some(Worst { test: TestNumber(row.number), value, text: value_text(shown, unit) })
+        Some(Worst { test: TestNumber(row.number), value, text: value_text(shown, unit, &[requirement.bound]) })
     });
     found
 }

@@ -14,7 +14,7 @@ use sesame_search::sspr::Convention;
 use crate::present::chart::evenly;
 use crate::present::markup::Markup;
 use crate::present::number;
-use crate::record::{Judge, Origin, RecordError, Repository, TestRow, Verdict};
+use crate::record::{Judge, Origin, RecordError, Repository, TestRow, Verdict, not_imported};
 use crate::report::facts::summary::{Summary, shown_value};
 use crate::report::facts::wording::outcome_words;
 use crate::report::html::command;
@@ -151,7 +151,7 @@ fn data(
         .collect();
     let used = |row: &&TestRow| row.test.operations.iter().map(|used| used.operation.0).collect::<Vec<u32>>();
     let (before, after) = command::show(plan, repository.folder());
-    Ok(json!({
+    let mut data = json!({
         "numbers": rows.iter().map(|row| row.number).collect::<Vec<_>>(),
         "generations": rows.iter().map(|row| row.generation).collect::<Vec<_>>(),
         "outcomes": outcomes,
@@ -165,7 +165,11 @@ fn data(
         "uses": rows.iter().map(used).collect::<Vec<_>>(),
         "points": points(repository, rows)?,
         "command": [before, after],
-    }))
+    });
+    if rows.iter().any(|row| row.left_out > 0) {
+        data["not_imported"] = rows.iter().map(|row| not_imported(row.left_out)).collect();
+    }
+    Ok(data)
 }
 
 /// Per dimension of the reduced space its name and the coordinate of each of these tests; only dimensions in which

@@ -93,7 +93,7 @@ fn states(markup: &mut Markup, time: &Axis, monitor: &MonitorReport, (end, broke
         let kind = if monitor.external { "external monitor" } else { "monitor" };
         markup.element("span", &[("class", "quiet")], kind);
         for hazard in &monitor.hazards {
-            let class = if hazard.foreseen { "hazard-of quiet" } else { "hazard-of missed" };
+            let class = if hazard.is_missed() { "hazard-of missed" } else { "hazard-of quiet" };
             let words = format!("{} {} {}", sign(hazard), hazard.requirement, foreseen_text(hazard));
             markup.element("span", &[("class", class), ("title", &hazard_title(monitor, hazard))], &words);
         }
@@ -137,7 +137,7 @@ fn states(markup: &mut Markup, time: &Axis, monitor: &MonitorReport, (end, broke
     }
     hazard_lines(markup, time, monitor);
     for (hazard, line) in above {
-        let class = if hazard.foreseen { "hazard-name" } else { "hazard-name missed" };
+        let class = if hazard.is_missed() { "hazard-name missed" } else { "hazard-name" };
         let at = time.share(hazard.at);
         let class = if at > 0.7 { format!("{class} end") } else { class.to_owned() };
         let (x, y) = (percent(at), coordinate(LINE * line as f64 + 12.0));
@@ -216,7 +216,7 @@ fn tone(monitor: &MonitorReport, decision: &DecisionReport) -> Option<usize> {
 fn hazard_lines(markup: &mut Markup, time: &Axis, monitor: &MonitorReport) {
     for hazard in &monitor.hazards {
         let x = percent(time.share(hazard.at));
-        let class = if hazard.foreseen { "hazard" } else { "hazard missed" };
+        let class = if hazard.is_missed() { "hazard missed" } else { "hazard" };
         markup.open("line", &[("class", class), ("x1", &x), ("x2", &x), ("y1", "0"), ("y2", "100%")]);
         markup.element("title", &[], &hazard_title(monitor, hazard));
         markup.close();
@@ -242,12 +242,13 @@ fn names_above<'a>(time: &Axis, hazards: &'a [HazardReport]) -> Vec<(&'a HazardR
 }
 
 fn sign(hazard: &HazardReport) -> &'static str {
-    if hazard.foreseen { "✓" } else { "✗" }
+    if hazard.is_missed() { "✗" } else { "✓" }
 }
 
 fn hazard_name(hazard: &HazardReport) -> String {
     match hazard.lead {
-        Some(lead) => format!("{} {} foreseen, {}", sign(hazard), hazard.requirement, seconds(lead)),
+        Some(lead) if lead > 0.0 => format!("{} {} foreseen, {}", sign(hazard), hazard.requirement, seconds(lead)),
+        Some(_) => format!("{} {} detected", sign(hazard), hazard.requirement),
         None => format!("{} {} MISSED", sign(hazard), hazard.requirement),
     }
 }
@@ -255,10 +256,11 @@ fn hazard_name(hazard: &HazardReport) -> String {
 fn hazard_title(monitor: &MonitorReport, hazard: &HazardReport) -> String {
     let HazardReport { requirement, text, at, .. } = hazard;
     let how = match hazard.lead {
-        Some(lead) => format!("{} had been in its safe state for {}", monitor.monitor, seconds(lead)),
+        Some(lead) if lead > 0.0 => format!("{} had been in its safe state for {}", monitor.monitor, seconds(lead)),
+        Some(_) => format!("{} went into its safe state in that instant", monitor.monitor),
         None => format!("MISSED: {} was not in its safe state", monitor.monitor),
     };
-    format!("{requirement} ({text}) was first violated at {}. {how}", seconds(*at))
+    format!("{requirement} ({text}) was lost at {}. {how}", seconds(*at))
 }
 
 /// What a decision was, and why.

@@ -2,7 +2,7 @@
 
 use crate::present::markup::Markup;
 use crate::report::facts::summary::Summary;
-use crate::report::sentences::{MONITORS_CAPTION, monitors_sentence};
+use crate::report::sentences::{MONITORS_CAPTION, monitors_run_again, monitors_sentence};
 use crate::report::tables::monitors as tables;
 
 /// Rows of missed hazards shown at most.
@@ -13,7 +13,8 @@ pub(super) fn monitors(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
     let Some(found) = &summary.monitors else { return };
     body.open("section", &[("id", "monitors")]);
     body.element("h2", &[], "Monitors");
-    body.element("p", &[], &format!("{}.", monitors_sentence(found)));
+    let sentences = [monitors_sentence(found)].into_iter().chain(monitors_run_again(found));
+    body.element("p", &[], &sentences.map(|sentence| format!("{sentence}.")).collect::<Vec<_>>().join(" "));
     let mut missed = tables::missed_hazards(found);
     let more = missed.truncate(MISSED);
     if !missed.is_empty() {

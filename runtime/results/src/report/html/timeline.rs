@@ -221,7 +221,7 @@ fn series(
 
     row(markup, |markup| {
         markup.element("b", &[], &metric.name);
-        let mut value = value_text(MetricValue::whole(shown.value, shown.set), unit);
+        let mut value = value_text(MetricValue::whole(shown.value, shown.set), unit, &[]);
         if let Some(at) = decided_at(metric, shown) {
             let _ = write!(value, " at {at:.2} s");
         }

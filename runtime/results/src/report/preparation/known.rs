@@ -6,7 +6,9 @@ use sesame_plan::{CampaignPlan, KnownTestId, Lab};
 
 use crate::present::number::exact_bound;
 use crate::record::{Origin, RecordError, Repository, TestRecord, Verdict, verdict};
-use crate::report::preparation::sides::{MetricSides, RequirementSides, metrics, place, requirements, runs};
+use crate::report::preparation::sides::{
+    MetricSides, RequirementSides, VerdictCounts, metrics, place, requirements, runs,
+};
 
 /// Regression tests on both sides.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -117,7 +119,17 @@ fn sides(
     }
 }
 
-/// Expectations that are not kept on a side, and requirements whose verdicts differ.
+impl KnownTesting {
+    /// Requirements that are not satisfied although the tests ended as they were expected to, as in `R2 by pit`.
+    pub(super) fn unsatisfied(&self) -> Vec<String> {
+        let of_test = self.tests.iter().flat_map(|test| test.requirements.iter().map(move |sides| (test, sides)));
+        let open = |counts: &VerdictCounts| counts.violated + counts.inconclusive > 0;
+        let open = of_test.filter(|(_, sides)| open(&sides.simulation) || sides.lab.as_ref().is_some_and(open));
+        open.map(|(test, sides)| format!("{} by {}", sides.requirement, test.test)).collect()
+    }
+}
+
+/// Expectations that are not kept on a side, violations that nobody expects, and requirements whose verdicts differ.
 fn not_as_expected(sides: &KnownSides, lab: Option<&str>) -> Vec<String> {
     let mut objections = Vec::new();
     let name = &sides.test;
@@ -133,16 +145,19 @@ fn not_as_expected(sides: &KnownSides, lab: Option<&str>) -> Vec<String> {
         }
     }
     for requirement in &sides.requirements {
-        let Some((counts, lab)) = requirement.lab.zip(lab).filter(|(counts, _)| *counts != requirement.simulation)
-        else {
-            continue;
-        };
-        objections.push(format!(
-            "{} in `{name}` is {} in simulation and {} in lab `{lab}`",
-            requirement.requirement,
-            requirement.simulation.words(),
-            counts.words()
-        ));
+        let of = &requirement.requirement;
+        if let Some((counts, lab)) = requirement.lab.zip(lab).filter(|(counts, _)| *counts != requirement.simulation) {
+            let (here, there) = (requirement.simulation.words(), counts.words());
+            objections.push(format!("{of} in `{name}` is {here} in simulation and {there} in lab `{lab}`"));
+        } else if sides.expectations.iter().all(|expectation| expectation.metric != requirement.metric) {
+            let in_lab = requirement.lab.as_ref().is_some_and(|counts| counts.violated > 0);
+            let violated = [(requirement.simulation.violated > 0, place(None)), (in_lab, place(lab))];
+            objections.extend(
+                violated.into_iter().filter(|(violated, _)| *violated).map(|(_, place)| {
+                    format!("{of} is violated by `{name}` in {place}, and the test does not expect it")
+                }),
+            );
+        }
     }
     objections
 }

@@ -55,7 +55,10 @@ fn header(body: &mut Markup, plan: &CampaignPlan, preparation: &Preparation) {
     body.element("h1", &[], "Preparatory testing");
     let objections = preparation.objections();
     let headline = match objections.len() {
-        0 => "Everything is as required.".to_owned(),
+        0 => match preparation.unsatisfied() {
+            open if open.is_empty() => "Everything is as required.".to_owned(),
+            open => format!("Everything is as expected. Not satisfied: {}.", open.join(", ")),
+        },
         count => format!("{} not as required.", plural(count, "thing is", "things are")),
     };
     body.element("p", &[("class", "headline")], &headline);

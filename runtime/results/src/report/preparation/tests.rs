@@ -167,22 +167,27 @@ fn regression_tests_must_be_as_expected_on_both_sides_and_say_the_same() {
     let mut plan = plan(None);
     plan.tests[0].expectations =
         vec![Expectation { metric: MetricId(3), bound: Bound::Within { low: 59.0, high: 75.0 } }];
-    let side = |cycle_time: f64| {
+    // Its jitter is known to violate it.
+    let collisions = Expectation { metric: MetricId(0), bound: Bound::AtLeast { value: 1.0 } };
+    plan.tests[0].expectations.push(collisions);
+    let side = |plan: &CampaignPlan, cycle_time: f64| {
         let folder = tempfile::tempdir().unwrap();
         let task = Task::Known { tests: vec![KnownTestId(0)], lab: None };
-        let mut recorder = Recorder::create_for(folder.path(), &plan, &task, 1, 0).unwrap();
+        let mut recorder = Recorder::create_for(folder.path(), plan, &task, 1, 0).unwrap();
         let mut record = TestRecord {
             test: plan.tests[0].test.clone(),
-            ..sample::record(&plan, 1, Origin::Known(KnownTestId(0)), plan.tests[0].test.clone())
+            ..sample::record(plan, 1, Origin::Known(KnownTestId(0)), plan.tests[0].test.clone())
         };
         record.observation.metrics[3] = MetricObservation::whole(Some(cycle_time), true, vec![(1.0, cycle_time)]);
         recorder.commit(&record).unwrap();
         (folder, recorder.finish("done").unwrap())
     };
-    let said = |simulation: f64, in_lab: f64| {
-        let ((_one, simulation), (_other, in_lab)) = (side(simulation), side(in_lab));
+    let of = |plan: &CampaignPlan, simulation: f64, in_lab: f64| {
+        let ((_one, simulation), (_other, in_lab)) = (side(plan, simulation), side(plan, in_lab));
         known(&simulation, Some((&hall(), &in_lab))).unwrap()
     };
+    let expecting = plan.clone();
+    let said = |simulation: f64, in_lab: f64| of(&expecting, simulation, in_lab);
     assert_eq!(said(60.0, 69.0).objections, [""; 0], "a difference of single runs fails nothing");
     assert!(said(60.0, 69.0).tests[0].metrics[3].beyond);
     assert_eq!(
@@ -191,6 +196,13 @@ fn regression_tests_must_be_as_expected_on_both_sides_and_say_the_same() {
     );
     let both = said(60.0, 50.0).objections;
     assert_eq!(both, ["the expectation of `known_jitter` about cycle_time is violated in lab `hall`"]);
+    // That it is expected does not make it satisfied.
+    assert_eq!(said(60.0, 69.0).unsatisfied(), ["R1 by known_jitter"]);
+    plan.tests[0].expectations.pop();
+    let found = of(&plan, 60.0, 69.0).objections;
+    let unexpected =
+        |place: &str| format!("R1 is violated by `known_jitter` in {place}, and the test does not expect it");
+    assert_eq!(found, [unexpected("the simulation"), unexpected("lab `hall`")]);
 }
 
 #[test]

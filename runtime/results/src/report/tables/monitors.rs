@@ -9,9 +9,9 @@ use crate::report::facts::certificate::mend::Mend;
 use crate::report::facts::certificate::test::{HazardReport, MonitorReport};
 use crate::report::facts::certificate::why::cause_text;
 
-/// A time in seconds, to the millisecond.
+/// A time in seconds.
 pub(in crate::report) fn seconds(time: f64) -> String {
-    number::with_unit(number::fixed(time, 3), Some("s"))
+    number::time(time)
 }
 
 fn at(time: f64) -> Datum {
@@ -25,53 +25,64 @@ fn maybe_at(time: Option<f64>) -> Datum {
 /// What a monitor made of a hazard.
 pub(in crate::report) fn foreseen_text(hazard: &HazardReport) -> String {
     match hazard.lead {
-        Some(lead) => format!("foreseen {} before", seconds(lead)),
+        Some(lead) if lead > 0.0 => format!("foreseen {} before", seconds(lead)),
+        Some(_) => "detected in that instant".to_owned(),
         None => "MISSED".to_owned(),
     }
 }
 
 /// Tests in which hazards were missed.
 pub(in crate::report) fn missed_hazards(summary: &MonitorsSummary) -> Table {
-    let mut table = Table::with([
+    let mut columns = vec![
         Column::heading("test"),
         Column::words("missed by"),
         Column::words("hazard of"),
         Column::number("at"),
         Column::words("state then"),
-    ]);
+    ];
+    let run_again = summary.missed.iter().any(|missed| missed.again.is_some());
+    columns.extend(run_again.then(|| Column::words("seen again")));
+    let mut table = Table::with(columns);
     for missed in &summary.missed {
-        table.row([
+        let again = missed.again.as_ref().map_or(Datum::Missing, |again| Datum::Text(again.words()));
+        let row = [
             Datum::Test(missed.test).into(),
             Datum::text(&missed.monitor).into(),
             Datum::text(&missed.requirement).bad_if(true),
             at(missed.at).into(),
-            Cell::from(Datum::text(&missed.state)),
-        ]);
+            missed.state.as_ref().map_or(Datum::Missing, Datum::text).into(),
+        ];
+        table.row(row.into_iter().chain(run_again.then(|| Cell::from(again))));
     }
     table
 }
 
-/// Hazards foreseen and missed, and alarms without one.
+/// Hazards foreseen, detected and missed, and alarms without one.
 pub(in crate::report) fn hazards(summary: &MonitorsSummary) -> Table {
-    let mut table = Table::with([
+    let unknown = summary.hazards.iter().any(|pair| pair.unknown > 0);
+    let columns = [
         Column::heading("monitor"),
         Column::words("hazards of"),
         Column::number("missed"),
+        Column::number("detected"),
         Column::number("foreseen"),
         Column::number("least lead"),
         Column::number("median lead"),
         Column::number("false alarms"),
-    ]);
+    ];
+    let mut table = Table::with(columns.into_iter().chain(unknown.then(|| Column::number("unknown"))));
     for pair in &summary.hazards {
-        table.row([
+        let row = [
             Datum::text(&pair.monitor).into(),
             Datum::text(&pair.requirement).into(),
             Datum::count(pair.missed).bad_if(pair.missed > 0),
+            Datum::count(pair.detected).into(),
             Datum::count(pair.foreseen).into(),
             maybe_at(pair.least_lead).into(),
             maybe_at(pair.median_lead).into(),
             Cell::from(Datum::Whole(i64::from(pair.false_alarms))),
-        ]);
+        ];
+        table.row(row.into_iter().chain(unknown.then(|| Datum::count(pair.unknown).into())));
     }
     table
 }
@@ -85,6 +96,7 @@ pub(in crate::report) fn monitors(summary: &MonitorsSummary) -> Table {
         Column::number("shortest stay"),
         Column::number("alarms"),
         Column::number("mitigations"),
+        Column::number("never vouched"),
         Column::sentence("time in each state"),
     ]);
     let whole = |count: u64| i64::try_from(count).map_or(Datum::Missing, Datum::Whole);
@@ -97,6 +109,7 @@ pub(in crate::report) fn monitors(summary: &MonitorsSummary) -> Table {
             maybe_at(monitor.shortest_stay),
             whole(monitor.alarms),
             monitor.mitigations.map_or(Datum::Missing, whole),
+            Datum::count(monitor.never_vouched),
             Datum::Text(states.collect::<Vec<_>>().join(", ")),
         ]);
     }
@@ -138,7 +151,7 @@ pub(in crate::report) fn hazards_of_test(monitors: &[MonitorReport]) -> Table {
     ]);
     for missed in [true, false] {
         for monitor in monitors {
-            for hazard in monitor.hazards.iter().filter(|hazard| hazard.foreseen != missed) {
+            for hazard in monitor.hazards.iter().filter(|hazard| hazard.is_missed() == missed) {
                 table.row([
                     Datum::text(&monitor.monitor).into(),
                     Datum::text(&hazard.requirement).into(),

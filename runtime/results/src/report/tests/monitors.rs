@@ -1,7 +1,7 @@
 //! What reports say of monitors: hazards foreseen and missed, decisions with their reasons, certificates.
 
-use sesame_base::observation::MonitorDecision;
-use sesame_plan::MonitorState;
+use sesame_base::observation::{MonitorDecision, MonitorHazard, Outcome};
+use sesame_plan::{MonitorState, RequirementId};
 
 use super::*;
 use crate::report::facts::certificate::moment::MomentError;
@@ -56,6 +56,62 @@ fn the_summary_counts_hazards_and_lists_missed_ones_first() {
     assert!((sum - monitors.hazards[0].missed as f64).abs() < 1e-9, "{sum}");
     let json = serde_json::to_value(&summary).unwrap();
     assert_eq!(json["monitors"]["hazards"][0]["missed"], missed.len());
+}
+
+/// A noisy system: what the run that selected a test showed may have been chance.
+#[test]
+fn the_hazards_of_a_test_that_was_run_again_are_those_of_its_fresh_runs() {
+    use crate::record::{MetricValue, Recorder, Repetition};
+
+    let (folder, repository) = monitored();
+    let [missed, foreseen] = found(&repository);
+    let before = summary(&repository).unwrap().monitors.unwrap();
+    let satisfied = repository.row(0).unwrap().values;
+    let values: Vec<MetricValue> = satisfied.iter().map(|it| MetricValue::whole(it.value, it.set)).collect();
+    drop(repository);
+    let mut recorder = Recorder::reopen(folder.path(), 1).unwrap();
+    let hazard = MonitorHazard { requirement: RequirementId(0), time: 5.0, lead: None };
+    for (test, position, hazards) in
+        [(missed, 1, vec![]), (missed, 2, vec![]), (foreseen, 1, vec![hazard]), (foreseen, 2, vec![])]
+    {
+        recorder
+            .put_repetition(
+                &Repetition {
+                    test,
+                    position,
+                    simulator_seed: u64::from(position),
+                    outcome: Outcome::Completed,
+                    end: 70.0,
+                    messages: 1,
+                    values: values.clone(),
+                    hazards: vec![hazards],
+                },
+                &[],
+            )
+            .unwrap();
+    }
+    let repository = recorder.finish("all evaluations done").unwrap();
+    let summary = summary(&repository).unwrap();
+    let monitors = summary.monitors.as_ref().unwrap();
+    assert_eq!(monitors.run_again, 2);
+    assert_eq!(monitors.missed.len(), before.missed.len(), "one is none, and one is new");
+    assert!(monitors.missed.iter().all(|it| it.test.0 != missed));
+    let new = monitors.missed.iter().find(|it| it.test.0 == foreseen).unwrap();
+    let again = new.again.as_ref().unwrap();
+    assert_eq!((new.at, &new.state, again.again, again.conclusive, again.first), (5.0, &None, 1, 2, false));
+    let [now, then] = [&monitors.hazards[0], &before.hazards[0]];
+    assert_eq!((now.missed, now.foreseen), (then.missed, then.foreseen - 1));
+    let text = summary_text(&summary, WIDE);
+    assert!(text.contains("1 of 2 (0.09–0.91) flaky, not in its first run"), "{text}");
+    assert!(text.contains("The hazards of 2 tests that were run again are those of their fresh runs"), "{text}");
+    let list = list(&repository).unwrap();
+    let of = |number: u32| list.tests.iter().find(|test| test.test.0 == number).unwrap().missed.clone();
+    assert_eq!((of(missed), of(foreseen)), (vec![], vec!["R1 by transport".to_owned()]));
+    // The view of the database follows the same rule.
+    let open = rusqlite::Connection::open(folder.path().join(crate::record::DATABASE)).unwrap();
+    let mut view = open.prepare("SELECT test, repetition FROM hazards WHERE test IN (?1, ?2)").unwrap();
+    let rows = view.query_map([missed, foreseen], |row| Ok((row.get(0)?, row.get(1)?))).unwrap();
+    assert_eq!(rows.collect::<Result<Vec<(u32, Option<u32>)>, _>>().unwrap(), [(foreseen, Some(1))]);
 }
 
 #[test]
@@ -268,4 +324,30 @@ fn very_many_changes_are_drawn_as_a_few() {
     let drawn = html.matches("class=\"state ").count();
     assert!(drawn < 200, "{drawn}");
     assert!(html.contains("transport changes "), "and says so");
+}
+
+#[test]
+fn of_an_inconclusive_requirement_nobody_can_tell_whether_there_was_a_hazard() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = sample::monitored_plan();
+    let foreseen = plan.hazards_to_foresee();
+    let mut recorder = crate::record::Recorder::create(folder.path(), &plan, 42, 1).unwrap();
+    for mut record in sample::records(&plan, 8) {
+        for shown in &mut record.observation.metrics {
+            (shown.not_finite, shown.reach) = (Some(2.0), sesame_base::observation::Reach::ANY);
+        }
+        record.observation.monitors.iter_mut().for_each(|monitor| monitor.hazards.clear());
+        recorder.commit(&record).unwrap();
+    }
+    let summary = summary(&recorder.finish("all evaluations done").unwrap()).unwrap();
+    let monitors = summary.monitors.as_ref().unwrap();
+    assert!(monitors.tests > 0 && monitors.unknown == monitors.tests, "{monitors:?}");
+    assert_eq!(monitors.hazards.len(), foreseen.len());
+    assert!(
+        monitors.hazards.iter().all(|pair| pair.unknown == monitors.tests && pair.false_alarms == 0),
+        "{monitors:?}"
+    );
+    let text = summary_text(&summary, WIDE);
+    assert!(text.contains("nobody can tell whether there was a hazard: requirements are inconclusive"), "{text}");
+    assert!(!text.contains("there was no hazard"), "{text}");
 }

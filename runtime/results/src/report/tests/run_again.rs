@@ -35,15 +35,38 @@ fn confirmed() -> (tempfile::TempDir, Repository) {
                 _ => {}
             }
             let seed = u64::from(position);
-            let run = Repetition { test, position, simulator_seed: seed, outcome, end: 70.0, messages: 1, values };
+            let run = Repetition {
+                test,
+                position,
+                simulator_seed: seed,
+                outcome,
+                end: 70.0,
+                messages: 1,
+                values,
+                hazards: Vec::new(),
+            };
             recorder.put_repetition(&run, &[]).unwrap();
         }
     }
     // A crash is a finding too, whether or not a front has it.
     let crash = || Outcome::Crash { message: "index out of bounds".to_owned() };
     for (position, outcome) in [(4, crash()), (5, Outcome::Completed)] {
-        let values = rows[17].values.clone();
-        let run = Repetition { test: 17, position, simulator_seed: 9, outcome, end: 70.0, messages: 1, values };
+        let mut values = rows[17].values.clone();
+        if outcome.is_whole() {
+            for shown in &mut values {
+                *shown = MetricValue::whole(shown.value, shown.set);
+            }
+        }
+        let run = Repetition {
+            test: 17,
+            position,
+            simulator_seed: 9,
+            outcome,
+            end: 70.0,
+            messages: 1,
+            values,
+            hazards: Vec::new(),
+        };
         recorder.put_repetition(&run, &[]).unwrap();
     }
     let repository = recorder.finish("all evaluations done").unwrap();
@@ -139,7 +162,16 @@ fn run_again(first: bool, fresh: &[Option<bool>]) -> (tempfile::TempDir, Reposit
             outcome = Outcome::Crash { message: "it fell over".to_owned() };
         }
         let seed = u64::from(position);
-        let run = Repetition { test: 1, position, simulator_seed: seed, outcome, end: 70.0, messages: 1, values };
+        let run = Repetition {
+            test: 1,
+            position,
+            simulator_seed: seed,
+            outcome,
+            end: 70.0,
+            messages: 1,
+            values,
+            hazards: Vec::new(),
+        };
         recorder.put_repetition(&run, &[]).unwrap();
     }
     let repository = recorder.finish("all evaluations done").unwrap();

@@ -32,7 +32,7 @@ impl Maker {
     }
 
     /// Inputs of one or two topics, numbers first; how many are numbers. Always at least one number.
-    fn inputs(&mut self, truths: bool) -> Option<(Vec<Input>, usize)> {
+    pub(super) fn inputs(&mut self, truths: bool) -> Option<(Vec<Input>, usize)> {
         let mut topics: Vec<usize> = Vec::new();
         for _ in 0..if self.chance(0.5) { 1 } else { 2 } {
             topics.push(self.stream.below(self.topics.len()));
@@ -42,6 +42,9 @@ impl Maker {
         let mut bools = Vec::new();
         for &topic in &topics {
             numbers.extend(self.input(topic, false));
+            if self.chance(0.25) {
+                numbers.extend(self.input(topic, false));
+            }
             if truths && self.chance(0.5) {
                 bools.extend(self.input(topic, true));
             }
@@ -51,7 +54,7 @@ impl Maker {
         (count > 0).then_some((numbers, count))
     }
 
-    fn side(&mut self) -> Side {
+    pub(super) fn side(&mut self) -> Side {
         if self.chance(0.4) { Side::Outbound } else { Side::Inbound }
     }
 
@@ -61,13 +64,14 @@ impl Maker {
             return input;
         }
         let inner = |maker: &mut Self| maker.expression(numbers, depth - 1);
-        match self.between(0, 7) {
+        match self.between(0, 9) {
             0 => Expression::Sum(vec![inner(self), Expression::Negate(Box::new(inner(self)))]),
             1 => Expression::Absolute(Box::new(inner(self))),
             2 => Expression::Min(vec![inner(self), inner(self)]),
             3 => Expression::Max(vec![inner(self), inner(self)]),
             4 => Expression::Product(vec![inner(self), Expression::Constant(self.quarters(-2, 2))]),
             5 => Expression::Sum(vec![inner(self), Expression::Constant(self.quarters(-2, 2))]),
+            6 if self.chance(0.5) => Expression::Sum(vec![Expression::Time, Expression::Negate(Box::new(inner(self)))]),
             _ => input,
         }
     }
@@ -77,7 +81,7 @@ impl Maker {
         self.one(&[AtLeast, AtMost, Above, Below, Above, Below, Equal, NotEqual])
     }
 
-    fn condition(&mut self, inputs: usize, numbers: usize, depth: u32) -> Condition {
+    pub(super) fn condition(&mut self, inputs: usize, numbers: usize, depth: u32) -> Condition {
         if depth > 0 && self.chance(0.4) {
             let (a, b) = (self.condition(inputs, numbers, depth - 1), self.condition(inputs, numbers, depth - 1));
             return match self.between(0, 3) {
@@ -96,7 +100,7 @@ impl Maker {
 
     fn formula(&mut self) -> Option<Formula> {
         let (mut inputs, numbers) = self.inputs(true)?;
-        of_one_group(&mut inputs);
+        let paired = self.in_groups(&mut inputs);
         let of = self.expression(numbers, 2);
         let held = self.condition(inputs.len(), numbers, 1);
         let aggregate = match self.between(0, 6) {
@@ -113,7 +117,7 @@ impl Maker {
         let zone = inputs.iter().find(|input| self.carries[input.field.topic.index()] == Carries::Zone);
         let zone = zone.map(|input| input.field.topic);
         let per = match zone {
-            Some(topic) if self.chance(0.3) => {
+            Some(topic) if !paired && self.chance(0.3) => {
                 let path = vec![self.one(&["name", "count"]).to_owned()];
                 Some(FieldRef { topic, path })
             }
@@ -151,7 +155,7 @@ impl Maker {
 
     fn robustness(&mut self) -> Option<Robustness> {
         let (mut inputs, numbers) = self.inputs(false)?;
-        of_one_group(&mut inputs);
+        self.in_groups(&mut inputs);
         let count = self.between(1, 2);
         let signals: Vec<Expression> = (0..count).map(|_| self.expression(numbers, 1)).collect();
         let formula = self.temporal(signals.len(), 3);
@@ -217,16 +221,30 @@ impl Maker {
         }
         requirements
     }
-}
 
-/// Lets only one group be read member by member: those of others need not be as many.
-fn of_one_group(inputs: &mut [Input]) {
-    let mut each: Option<TopicId> = None;
-    for input in inputs {
-        if input.members == Members::Each && each.is_some_and(|topic| topic != input.field.topic) {
-            input.members = Members::Max;
-        } else if input.members == Members::Each {
-            each = Some(input.field.topic);
+    /// Lets only groups of one size be read member by member, or the pairs of a single group. Returns whether they are
+    /// pairs.
+    fn in_groups(&mut self, inputs: &mut [Input]) -> bool {
+        let size = |maker: &Self, input: &Input| maker.topics[input.field.topic.index()].paths.len();
+        let Some(first) = inputs.iter().find(|input| input.members == Members::Each).cloned() else { return false };
+        let members = size(self, &first);
+        for input in inputs.iter_mut().filter(|input| input.members == Members::Each) {
+            if size(self, input) != members {
+                input.members = Members::Max;
+            }
         }
+        let own = |input: &&Input| input.members == Members::Each && input.field.topic == first.field.topic;
+        if inputs.iter().filter(own).count() < 2 || !self.chance(0.5) {
+            return false;
+        }
+        let mut next = Members::First;
+        for input in inputs.iter_mut().filter(|input| input.members == Members::Each) {
+            if input.field.topic == first.field.topic {
+                input.members = std::mem::replace(&mut next, Members::Second);
+            } else {
+                input.members = Members::Max;
+            }
+        }
+        true
     }
 }

@@ -38,7 +38,7 @@ impl Maker {
         (operations, instances, copies)
     }
 
-    fn operation(&mut self, at: i32, topic: usize, end: f64) -> Operation {
+    pub(in crate::case) fn operation(&mut self, at: i32, topic: usize, end: f64) -> Operation {
         use OperationKind as Kind;
         let carries = self.carries[topic];
         let drain = self.one(&[Drain::Finish, Drain::Flush, Drain::Drop]);
@@ -143,7 +143,7 @@ impl Maker {
         kinds.swap_remove(at)
     }
 
-    fn instance(
+    pub(in crate::case) fn instance(
         &mut self,
         id: OperationId,
         operation: &Operation,

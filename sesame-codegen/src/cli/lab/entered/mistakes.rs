@@ -1,9 +1,13 @@
 //! What is wrong with a file, and where.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// How many mistakes of a file are listed; a file may have one in each of a million cells.
 const MOST: usize = 100;
+
+/// How many mistakes are listed that are the same.
+const ALIKE: usize = 3;
 
 /// The mistakes of one file. Places are offsets in bytes.
 pub(super) struct Mistakes<'f> {
@@ -50,15 +54,30 @@ impl<'f> Mistakes<'f> {
         (begin + column.saturating_sub(1)).min(self.text.len())
     }
 
-    /// All mistakes in the order of the file, each with its line and its column in characters.
+    /// All mistakes in the order of the file, each with its line and its column in characters. Where many places
+    /// have the same one, the first ones are listed and the others counted.
     pub(super) fn listed(mut self) -> Vec<String> {
         self.found.sort_by_key(|&(at, _)| at);
-        let said = |(at, what): &(usize, String)| {
+        let mut seen: BTreeMap<String, usize> = BTreeMap::new();
+        self.found.retain(|(_, what)| {
+            let times = seen.entry(what.clone()).or_default();
+            *times += 1;
+            *times <= ALIKE
+        });
+        let mut last: BTreeMap<&str, usize> = BTreeMap::new();
+        for (at, (_, what)) in self.found.iter().enumerate() {
+            last.insert(what, at);
+        }
+        let more = |at: usize, what: &str| match seen[what].checked_sub(ALIKE) {
+            Some(more) if more > 0 && last[what] == at => format!(" (and in {more} more places)"),
+            _ => String::new(),
+        };
+        let said = |(place, (at, what)): (usize, &(usize, String))| {
             let begin = self.lines[self.number(*at) - 1];
             let column = self.text[begin..].char_indices().take_while(|(before, _)| begin + before < *at).count() + 1;
-            format!("{}:{column}: {what}", self.line(*at))
+            format!("{}:{column}: {what}{}", self.line(*at), more(place, what))
         };
-        let mut listed: Vec<String> = self.found.iter().map(said).collect();
+        let mut listed: Vec<String> = self.found.iter().enumerate().map(said).collect();
         if self.more > 0 {
             listed.push(format!("{}: {} more mistakes; correct these first", self.file.display(), self.more));
         }

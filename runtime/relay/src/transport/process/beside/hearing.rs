@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use sesame_base::activation::TICK;
 use sesame_base::time::SimTime;
 use sesame_plan::{CampaignPlan, Side};
 
@@ -125,8 +126,12 @@ impl<'p, 't> Hearing<'p, 't> {
 
     /// Time passes: what is due until this instant, and at it, happens. An earlier instant than before changes nothing.
     pub(super) fn pass_to(&mut self, now: SimTime) {
-        self.now = self.now.max(now);
+        let before = self.now;
+        self.now = before.max(now);
         if let Some(monitors) = &mut self.monitors {
+            if before < self.now {
+                monitors.settle(before);
+            }
             monitors.advance(self.now);
         }
         self.tell();
@@ -134,7 +139,8 @@ impl<'p, 't> Hearing<'p, 't> {
 
     /// When something is due next without a message.
     pub(super) fn next_due(&self) -> Option<SimTime> {
-        self.monitors.as_ref().and_then(Monitors::next_due)
+        let monitors = self.monitors.as_ref()?;
+        if monitors.wait() { Some(self.now + TICK) } else { monitors.next_due() }
     }
 
     /// The next message that is to be published: its topic, and its value as JSON.

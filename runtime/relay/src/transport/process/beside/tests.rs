@@ -30,7 +30,7 @@ fn plans() -> [CampaignPlan; 2] {
     ];
     let high = Evidence {
         held: 0.17,
-        stale: Some(Stale { after: 0.23, is: StaleIs::Unknown }),
+        stale: Some(Stale { after: 0.23, is: StaleIs::Unknown, all: false }),
         ..evidence_above("high", 0, 1.0)
     };
     let gate = Gate::Any(vec![Gate::Evidence(0), Gate::Evidence(1)]);

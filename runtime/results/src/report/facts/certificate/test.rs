@@ -62,9 +62,11 @@ pub struct HazardReport {
     pub text: String,
     /// When, in seconds.
     pub at: f64,
-    /// Whether the monitor was in its safe state.
+    /// Whether the monitor had been in its safe state before.
     pub foreseen: bool,
-    /// For how long it had been, in seconds.
+    /// Whether it went into its safe state in the very instant.
+    pub detected: bool,
+    /// For how long it had been in its safe state, in seconds; `None` if it was not.
     pub lead: Option<f64>,
 }
 
@@ -113,9 +115,16 @@ pub struct ChangeReport {
 }
 
 impl MonitorReport {
-    /// The hazards that it did not foresee.
+    /// The hazards at which it was not in its safe state.
     pub fn missed(&self) -> impl Iterator<Item = &HazardReport> {
-        self.hazards.iter().filter(|hazard| !hazard.foreseen)
+        self.hazards.iter().filter(|hazard| hazard.is_missed())
+    }
+}
+
+impl HazardReport {
+    /// Whether the monitor was not in its safe state.
+    pub fn is_missed(&self) -> bool {
+        self.lead.is_none()
     }
 }
 
@@ -211,7 +220,8 @@ fn hazard_report(plan: &CampaignPlan, hazard: &MonitorHazard) -> HazardReport {
         requirement: requirement.name.clone(),
         text: requirement.text.clone(),
         at: hazard.time,
-        foreseen: hazard.lead.is_some(),
+        foreseen: hazard.lead.is_some_and(|lead| lead > 0.0),
+        detected: hazard.lead == Some(0.0),
         lead: hazard.lead,
     }
 }
