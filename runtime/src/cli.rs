@@ -67,9 +67,11 @@ pub use self::place::RUNNER;
 
 /// What the exit codes of a runner mean.
 pub const EXIT_CODES: &str = "Exit codes: 0 done; 1 failed; 2 wrong usage; 3 done, but not as required (`known`: an \
-                          expectation is not kept; `null`, `mitm`, `prepare`: what they say; `replay`: the test came out different; `replay-recording`: a metric \
-                          did; `monitors`: a monitor decides otherwise; `twin`: a hazard was not mitigated in time; `--fail-on`: what it names was found; a campaign says too little: most of its tests broke \
-                          off, none was disturbed, or no requirement was judged); 130 stopped by the user.";
+                          expectation is not met; `null`, `mitm`, `prepare`: they found a deviation; `replay`, \
+                          `replay-recording`: a test or a metric has another result; `monitors`: monitors decide \
+                          differently; `twin`: a hazard was not mitigated in time; `--fail-on`: such a finding; \
+                          insufficient results: most tests broke off, no operation had an effect, or no requirement \
+                          was judged); 130 stopped by the user.";
 
 #[derive(Debug, Parser)]
 #[command(version, args_conflicts_with_subcommands = true, after_help = EXIT_CODES)]

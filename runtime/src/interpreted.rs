@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use sesame_base::time::SimTime;
-use sesame_plan::CampaignPlan;
+use sesame_plan::{CampaignPlan, SimulatorKind};
 use sesame_relay::relay::Exchange;
 use sesame_relay::simulator::Progress;
 use sesame_relay::transport::{self, Capabilities, Connect, Transport, TransportError};
@@ -27,19 +27,19 @@ pub struct Interpreted {
 
 /// The transport to the simulator of a plan, which is not part of the runner.
 pub(crate) fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
-    let connect = match &plan.simulator.transport {
+    let connect = match plan.simulator.transport.kind() {
         #[cfg(feature = "mqtt")]
-        sesame_plan::Transport::Mqtt(_) => sesame_mqtt::mqtt(folder.to_owned()),
+        SimulatorKind::Mqtt => sesame_mqtt::mqtt(folder.to_owned()),
         #[cfg(feature = "ros1")]
-        sesame_plan::Transport::Ros1(_) => sesame_ros1::ros1(folder.to_owned()),
+        SimulatorKind::Ros1 => sesame_ros1::ros1(folder.to_owned()),
         #[cfg(feature = "ros2")]
-        sesame_plan::Transport::Ros2(_) => sesame_ros2::ros2(folder.to_owned()),
+        SimulatorKind::Ros2 => sesame_ros2::ros2(folder.to_owned()),
         #[cfg(feature = "rosbridge")]
-        sesame_plan::Transport::Rosbridge(_) => sesame_rosbridge::rosbridge(folder.to_owned()),
+        SimulatorKind::Rosbridge => sesame_rosbridge::rosbridge(folder.to_owned()),
         #[cfg(feature = "simlog")]
-        sesame_plan::Transport::Simlog(_) => sesame_simlog::simlog(folder.to_owned()),
-        sesame_plan::Transport::Process { .. } => transport::process(folder.to_owned()),
-        other => return Box::new(Unavailable(other.word())),
+        SimulatorKind::Simlog => sesame_simlog::simlog(folder.to_owned()),
+        SimulatorKind::Process => transport::process(folder.to_owned()),
+        _ => return Box::new(Unavailable(plan.simulator.properties().keyword)),
     };
     connect.transport(plan)
 }

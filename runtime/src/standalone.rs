@@ -15,7 +15,7 @@ use std::process::ExitCode;
 use clap::{CommandFactory as _, FromArgMatches as _, Parser};
 
 use sesame_base::visible::{visible, visible_lines};
-use sesame_plan::{CampaignPlan, Monitor, Transport, is_shared};
+use sesame_plan::{CampaignPlan, Endpoint, Monitor, is_shared};
 use sesame_relay::metric::MetricTable;
 use sesame_relay::monitor::Decided;
 use sesame_relay::trace::feed_telling;
@@ -34,8 +34,8 @@ pub struct Standalone {
     pub connect: Option<Connect>,
 }
 
-const ABOUT: &str = "Exit codes: 0 done: the recording or the input has ended, or the monitor was stopped by Ctrl-C or \
-                     SIGTERM; 1 failed; 2 wrong usage.";
+const ABOUT: &str = "Exit codes: 0 done: the recording or the input has ended, or Ctrl-C or SIGTERM has stopped the \
+                     monitor; 1 failed; 2 wrong usage.";
 
 #[derive(Debug, Parser)]
 #[command(version, after_help = ABOUT)]
@@ -43,10 +43,10 @@ struct Options {
     /// Run on a recording instead of a system: an MCAP file, as campaigns record with `record mcap`
     #[arg(long, value_name = "FILE", conflicts_with_all = ["program", "domain", "url"])]
     recording: Option<PathBuf>,
-    /// How decisions are shown on standard output; as JSON there is one object in each line
+    /// The format of decisions on standard output; JSON has one object per line
     #[arg(long, value_enum, default_value_t)]
     format: Format,
-    /// Write decisions into this file as well, as `--format json` shows them. It is written anew
+    /// Also write decisions into this file, as `--format json` shows them; an existing file is replaced
     #[arg(long, value_name = "FILE")]
     decisions: Option<PathBuf>,
     /// The domain of ROS 2; by default that of the space
@@ -55,8 +55,8 @@ struct Options {
     /// The address of the bridge, broker or master; by default that of the space
     #[arg(long, value_name = "URL")]
     url: Option<String>,
-    /// Another name for a topic on a bus, as `/eddi/state:=/eddi/state/undisturbed`: where operations act on what the
-    /// monitor publishes, a runner asks for it. May be given several times, with `-r` before it or without
+    /// Another name for a topic on a bus, such as `/eddi/state:=/eddi/state/undisturbed`: a runner asks for it if
+    /// operations act on what the monitor publishes. May be repeated, with or without `-r`
     #[arg(short = 'r', long = "remap", value_name = "FROM:=TO", conflicts_with_all = ["recording", "program"])]
     remap: Vec<String>,
     #[arg(value_name = "FROM:=TO", hide = true, conflicts_with_all = ["recording", "program"])]
@@ -64,8 +64,8 @@ struct Options {
     /// What stands before rules of ROS 2
     #[arg(long, hide = true)]
     ros_args: bool,
-    /// The simulator, with its arguments: a runner that starts this program in its place, as `process` does, reaches it
-    /// through the monitor
+    /// The simulator with its arguments. A runner that starts this program instead, as its `process`, reaches the
+    /// simulator through the monitor
     #[arg(last = true, value_name = "PROGRAM")]
     program: Vec<OsString>,
 }
@@ -97,11 +97,9 @@ fn carried_out(standalone: &Standalone) -> Result<ExitCode, Failure> {
         return beside::run(&plan, program, arguments, &mut shown);
     }
     let Some(connect) = &standalone.connect else {
-        let how = match &plan.simulator.transport {
-            Transport::Process { .. } => {
-                "is a program, which the monitor starts: give it behind `--`, with its arguments"
-            }
-            _ => "is a part of its runner, and no other program reaches it",
+        let how = match plan.simulator.program() {
+            Some(_) => "is a program, which the monitor starts: give it behind `--`, with its arguments",
+            None => "is a part of its runner, and no other program reaches it",
         };
         let problem = format!("the simulator `{}` {how}; or give a recording with `--recording`", plan.simulator.name);
         return Err(Failure(problem));
@@ -119,7 +117,7 @@ fn options(plan: &CampaignPlan, monitor: &Monitor) -> Options {
     if !relied_on.is_empty() {
         about = format!("{about}\n\nIt relies on {}, which it evaluates, too.", relied_on.join(", "));
     }
-    let command = Options::command().name(monitor.name.clone()).about(visible_lines(&about));
+    let command = Options::command().name(monitor.name.clone()).about(visible_lines(&about).into_owned());
     let matches = command.try_get_matches().unwrap_or_else(|error| error.exit());
     Options::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
 }
@@ -129,18 +127,16 @@ fn at(mut plan: CampaignPlan, options: &Options) -> Result<CampaignPlan, Failure
     for rule in options.remap.iter().chain(&options.remap_too) {
         remap(&mut plan, rule)?;
     }
-    let url = match &mut plan.simulator.transport {
-        Transport::Ros2(ros2) => {
+    let url = match plan.simulator.endpoint() {
+        Some(Endpoint::Domain(domain)) => {
             if options.url.is_some() {
                 return Err(Failure("a system of ROS 2 has no address: choose its domain with `--domain`".to_owned()));
             }
-            ros2.domain = options.domain.unwrap_or(ros2.domain);
+            *domain = options.domain.unwrap_or(*domain);
             return Ok(plan);
         }
-        Transport::Rosbridge(rosbridge) => &mut rosbridge.remote.url,
-        Transport::Ros1(ros1) => &mut ros1.master,
-        Transport::Mqtt(mqtt) => &mut mqtt.broker.remote.url,
-        Transport::InProcess { .. } | Transport::Process { .. } | Transport::Simlog(_) => return Ok(plan),
+        Some(Endpoint::Address(url)) => url,
+        None => return Ok(plan),
     };
     if options.domain.is_some() {
         return Err(Failure("only a system of ROS 2 has a domain: choose an address with `--url`".to_owned()));
@@ -149,8 +145,7 @@ fn at(mut plan: CampaignPlan, options: &Options) -> Result<CampaignPlan, Failure
         url.clone_from(asked);
     }
     if !is_shared(url) {
-        let problem =
-            format!("the address `{url}` is another one for each worker of a runner: choose one with `--url`");
+        let problem = format!("the address `{url}` differs for each worker of a runner: choose one with `--url`");
         return Err(Failure(visible(&problem)));
     }
     Ok(plan)

@@ -16,8 +16,8 @@ mod runner {
     use sesame_runtime::metric::{Context, Hook, HookEntry};
     use sesame_runtime::plan::testing::{known_test, lab, operation, plan, requirement, test_of, use_of};
     use sesame_runtime::plan::{
-        Bound, CampaignPlan, Count, Expectation, KnownTest, Lab, LabTolerance, Lifecycle, MetricId, MetricSource,
-        OperationKind, RelayBudget, Search, Simulator, Strategy, TopicId, Transport,
+        Bound, CampaignPlan, Count, Expectation, KnownTest, Lab, LabTolerance, MetricId, MetricSource, OperationKind,
+        RelayBudget, Search, Simulator, Strategy, TopicId, Transport,
     };
     use sesame_runtime::record::Repository;
     use sesame_runtime::value::Value;
@@ -117,11 +117,7 @@ for line in sys.stdin:
     /// A lab whose commands begin with this number, and that tolerates a difference of 0.5 in the last command.
     fn hall(first: &str) -> Lab {
         Lab {
-            simulator: Some(Simulator {
-                name: "hall".to_owned(),
-                transport: simulator(first),
-                lifecycle: Lifecycle::default(),
-            }),
+            simulator: Some(Simulator::new("hall", simulator(first))),
             tolerances: vec![LabTolerance { metric: MetricId(1), value: 0.5 }],
             ..lab("hall")
         }

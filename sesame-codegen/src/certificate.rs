@@ -18,20 +18,21 @@ use sesame_plan::TextTest;
 pub struct CertificatePart {
     /// What it is.
     pub kind: PartKind,
-    /// Its name; `None` of `and`, `or` and `at_least`.
+    /// Its name; `None` for `and`, `or` and `at_least`.
     pub name: Option<String>,
-    /// Of a demand: the monitor whose guarantee it is.
+    /// For a demand: the monitor whose guarantee it is.
     pub from: Option<String>,
-    /// Of a guarantee: its integrity.
+    /// For a guarantee: its integrity.
     pub integrity: Option<u32>,
-    /// Of `and`, `or` and `at_least`: how many parts must hold.
+    /// For `and`, `or` and `at_least`: how many parts must hold.
     pub needs: Option<usize>,
-    /// Of evidence: its condition, with how long it must hold and when it is stale. Of the safe state: its mitigation.
+    /// For evidence: its condition, with how long it must hold and when it is stale. For the safe state: its
+    /// mitigation.
     pub says: Option<String>,
-    /// Of a demand: whether its parts are those of an earlier demand of the same guarantee, and not listed again.
+    /// For a demand: whether its parts are those of an earlier demand of the same guarantee, and not listed again.
     pub repeated: bool,
-    /// What it depends on, in the order of the declaration. Of a monitor: its guarantees, the strongest first, and its
-    /// safe state. Of a demand: the guarantees of the other monitor that fulfil it.
+    /// What it depends on, in the order of the declaration. For a monitor: its guarantees, the strongest first, and its
+    /// safe state. For a demand: the guarantees of the other monitor that fulfil it.
     pub parts: Vec<CertificatePart>,
 }
 

@@ -84,7 +84,7 @@ enum Command {
     Generate {
         #[command(flatten)]
         generation: Generation,
-        /// Instead of runners, write a monitor of the space as a program of its own.
+        /// Write a monitor of the space as a program, instead of runners.
         #[arg(long, value_name = "NAME", conflicts_with = "campaign")]
         eddi: Option<String>,
         /// Write nothing; exit with code 1 if anything would be written.
@@ -93,8 +93,8 @@ enum Command {
         /// Write nothing; show what would be written, and how files would change.
         #[arg(long, conflicts_with = "check")]
         dry_run: bool,
-        /// Put the hooks into each runner's own `src/hooks/`, so that its crate can be moved. They are copied from the
-        /// shared hooks in the output folder, or else in `runners` beside the file.
+        /// Put copies of the hooks into each runner's own `src/hooks/`, so that its crate can be moved. They come from
+        /// the shared hooks in the output folder, or else in `runners` beside the file.
         #[arg(long)]
         self_contained: bool,
         /// Copy the runtime, the simulator's crate and all other crates in local folders into each runner, so that it
@@ -108,7 +108,7 @@ enum Command {
     Run {
         #[command(flatten)]
         generation: Generation,
-        /// Generate and build the runner even if the campaign needs no Rust code: simulator a program, no hooks.
+        /// Generate and build the runner even if the campaign needs no Rust code of yours.
         #[arg(long)]
         build: bool,
         /// Arguments for the runner.
@@ -133,7 +133,7 @@ enum Command {
     /// Write the page of a study: the chosen tests in the reduced space, the gap between simulation and lab, traces of
     /// both, what a compensation changed, and briefing sheets.
     Study(study::Asked),
-    /// Brief those who run tests in a lab, record what they saw, and find contacts in recordings.
+    /// Brief people who run tests in a lab, record their runs, and find contacts in recordings.
     #[command(subcommand)]
     Lab(lab::Lab),
     /// Import a testing space of the original SESAME platform (an EMF file, `.model`), with the tests that it
@@ -154,7 +154,7 @@ enum Command {
     /// certificate as a tree. Without a code or a name, all codes are listed. `explain wiring FILE` shows how the nodes
     /// of a ROS 2 system are remapped.
     Explain {
-        /// The code, or the name: for a field or parameter with what it belongs to, as in `SafetyZone.level`.
+        /// The code, or the name; qualify a field or parameter, as in `SafetyZone.level`.
         #[arg(value_name = "CODE or NAME")]
         what: Option<String>,
         /// The `.sesame` file that declares the name.
@@ -265,7 +265,7 @@ mod tests {
             let (_, section) = page.split_once(&heading).unwrap_or_else(|| panic!("no section{heading}"));
             section.split("\n## ").next().unwrap().to_owned()
         };
-        let guide = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/guide.md");
+        let guide = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/guide/running.md");
         let guide = section(&std::fs::read_to_string(guide).unwrap(), "\n## Running again\n".to_owned());
         let (runners, command) = (runners(), command_line());
         let mut missing = Vec::new();

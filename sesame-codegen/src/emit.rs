@@ -19,7 +19,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use quote::{format_ident, quote};
 use serde::Serialize;
-use sesame_plan::{CampaignPlan, Transport};
+use sesame_plan::{CampaignPlan, Simulator};
 use sha2::{Digest as _, Sha256};
 
 use self::messages::Messages;
@@ -102,11 +102,8 @@ pub fn emit(plans: &[RunnerPlan], environment: &Environment) -> Result<Vec<Tree>
 }
 
 /// The simulator's type, part by part; `None` for a simulator that is none of Rust's.
-pub fn simulator_path(transport: &Transport) -> Option<Vec<&str>> {
-    match transport {
-        Transport::InProcess { path, .. } => Some(path.split("::").collect()),
-        _ => None,
-    }
+pub fn simulator_path(simulator: &Simulator) -> Option<Vec<&str>> {
+    simulator.rust_type().map(|path| path.split("::").collect())
 }
 
 #[derive(Serialize)]
@@ -261,7 +258,7 @@ fn runner(runner: &RunnerPlan, environment: &Environment) -> Result<Tree, Proble
     let mut features = FEATURES.to_vec();
     let in_labs = plan.labs.iter().filter_map(|lab| lab.simulator.as_ref());
     let reached = std::iter::once(&plan.simulator).chain(in_labs);
-    let wanted: BTreeSet<&str> = reached.filter_map(|simulator| runtime_feature(&simulator.transport)).collect();
+    let wanted: BTreeSet<&str> = reached.filter_map(runtime_feature).collect();
     features.extend(wanted);
     let dependencies = package::with_features(&environment.dependencies, &features);
     tree.add(
@@ -287,9 +284,9 @@ fn runner(runner: &RunnerPlan, environment: &Environment) -> Result<Tree, Proble
         hooks: readme_hooks(runner, true),
         evaluations: plan.campaign.search.evaluations(),
         seed: plan.campaign.seed,
-        wiring: match plan.simulator.transport {
-            Transport::InProcess { .. } | Transport::Process { .. } | Transport::Simlog(_) => Vec::new(),
-            _ => doc_lines(&crate::wiring::text(plan)),
+        wiring: match plan.simulator.properties().bus {
+            Some(_) => doc_lines(&crate::wiring::text(plan)),
+            None => Vec::new(),
         },
     };
     tree.add("README.md", Owner::Machine, environment.templates.render("runner/runner_readme.md.tera", &readme)?);
@@ -365,7 +362,7 @@ fn campaign(runner: &RunnerPlan, environment: &Environment, header: &str) -> Str
         quote! { super::operation_registry::OPERATIONS }
     };
     let abi = proc_macro2::Literal::u32_unsuffixed(ABI);
-    let (simulator, connect) = if let Some(path) = simulator_path(&plan.simulator.transport) {
+    let (simulator, connect) = if let Some(path) = simulator_path(&plan.simulator) {
         let path = path.into_iter().map(names::ident);
         let simulator = quote! {
             /// The simulator under test.
@@ -378,7 +375,7 @@ fn campaign(runner: &RunnerPlan, environment: &Environment, header: &str) -> Str
             /// The folder that the simulator runs in, as seen from this crate's.
             const SIMULATOR: &str = #folder;
         };
-        let transport = format_ident!("{}", plan.simulator.transport.word());
+        let transport = format_ident!("{}", plan.simulator.properties().keyword);
         let connect = quote! {
             ::sesame_runtime::transport::#transport(::std::path::Path::new(::core::env!("CARGO_MANIFEST_DIR")).join(SIMULATOR))
         };

@@ -12,7 +12,6 @@ use std::io;
 use std::path::{Component, Path, PathBuf};
 
 use serde::Deserialize;
-use sesame_plan::Transport;
 use toml::{Table, Value};
 
 use crate::emit::{Environment, HooksFolder, Problem, Templates, simulator_path};
@@ -446,22 +445,14 @@ fn simulator_dependency(
     dependencies: &BTreeMap<String, Value>,
 ) -> Result<Option<(String, Value)>, Error> {
     let system = home.join(plan.system_folder());
-    let path = match &plan.plan.simulator.transport {
-        Transport::InProcess { .. } => simulator_path(&plan.plan.simulator.transport).unwrap_or_default(),
-        Transport::Process { program, .. } => {
-            let file = system.join(program);
-            if program.contains('/') && !file.is_file() {
-                let (source_file, program) = (plan.plan.source.clone(), program.clone());
-                return Err(Error::NoProgram { source_file, program, file });
-            }
-            return Ok(None);
+    if let Some((program, _)) = plan.plan.simulator.program() {
+        let file = system.join(program);
+        if program.contains('/') && !file.is_file() {
+            let (source_file, program) = (plan.plan.source.clone(), program.to_owned());
+            return Err(Error::NoProgram { source_file, program, file });
         }
-        Transport::Ros2(_)
-        | Transport::Rosbridge(_)
-        | Transport::Ros1(_)
-        | Transport::Mqtt(_)
-        | Transport::Simlog(_) => return Ok(None),
-    };
+    }
+    let Some(path) = simulator_path(&plan.plan.simulator) else { return Ok(None) };
     let name = path.first().copied().unwrap_or_default().to_owned();
     let listed = dependencies.keys().any(|key| key.replace('-', "_") == name);
     let Some(folder) = &plan.simulator_crate else {

@@ -279,6 +279,6 @@ novelty    { neighbours 10  over T1, O2 }
             .take_while(|line| line.starts_with("(* the conditions") || line.ends_with(';'))
             .collect();
         assert_eq!(shown.len(), 8);
-        assert!(include_str!("../../docs/language.md").contains(&shown.join("\n")), "{explained}");
+        assert!(include_str!("../../docs/language/conditions.md").contains(&shown.join("\n")), "{explained}");
     }
 }

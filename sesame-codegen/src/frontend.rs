@@ -5,7 +5,7 @@ use std::path::Path;
 use sesame_dsl::Analysis;
 use sesame_dsl::diagnostic::{Diagnostic, MEANINGS, Severity, page, render};
 use sesame_dsl::index::Kind;
-use sesame_dsl::model::{Space, Transport};
+use sesame_dsl::model::Space;
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::span::Span;
 use sesame_plan::NotAlone;
@@ -13,7 +13,7 @@ use sesame_plan::NotAlone;
 use crate::certificate;
 use crate::input::{self, Unreadable};
 use crate::interfaces::Files;
-use crate::lower::{lower, lower_monitor};
+use crate::lower::{lower, lower_monitor, simulator};
 use crate::plan::{MonitorPlan, RunnerPlan};
 use crate::uses;
 
@@ -151,18 +151,13 @@ fn not_used(space: &Space, sources: &SourceMap) -> Vec<String> {
         format!("{file}:{}", sources.position(span).line)
     };
     let mut notes = Vec::new();
-    let unmeasured = match &space.simulator.transport {
-        Transport::InProcess { .. } => Some("an in-process simulator is stepped without delay"),
-        Transport::Process { step_ns: Some(_), .. }
-        | Transport::Ros2 { step: Some(_), .. }
-        | Transport::Simlog { .. } => Some("in lock-step time stands still while messages pass through the relay"),
-        Transport::Process { step_ns: None, .. }
-        | Transport::Ros2 { step: None, .. }
-        | Transport::Rosbridge { .. }
-        | Transport::Ros1 { .. }
-        | Transport::Mqtt { .. } => None,
-    };
-    if let (Some(budget), Some(why)) = (&space.lifecycle.relay_budget, unmeasured) {
+    let simulator = simulator(space, &space.simulator);
+    if let (Some(budget), Some(_)) = (&space.lifecycle.relay_budget, simulator.step_ns()) {
+        let why = if simulator.properties().in_runner {
+            "an in-process simulator is stepped without delay"
+        } else {
+            "in lock-step time stands still while messages pass through the relay"
+        };
         notes.push(format!("`relay budget` ({}) has no effect: {why}", at(budget.span)));
     }
     notes

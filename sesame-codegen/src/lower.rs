@@ -19,8 +19,8 @@ mod operation;
 mod robustness;
 mod ros2;
 mod selection;
+mod simulator;
 mod system;
-mod transport;
 
 use sesame_dsl::model::{self, CampaignId, EddiId, Space};
 use sesame_plan as plan;
@@ -28,8 +28,8 @@ use sesame_plan as plan;
 use self::id::topic_id;
 use self::operation::custom_operations;
 use self::selection::{Selection, without_operations};
+pub(crate) use self::simulator::simulator;
 use self::system::{lifecycle, message, node, topic, unit};
-use self::transport::transport;
 use crate::plan::{HookPlan, MonitorPlan, RunnerPlan};
 
 /// The plan of a campaign's runner. `source` is the `.sesame` file's name without its folder, `generator` the name and
@@ -37,10 +37,7 @@ use crate::plan::{HookPlan, MonitorPlan, RunnerPlan};
 pub fn lower(space: &Space, campaign: CampaignId, source: &str, generator: &str) -> RunnerPlan {
     let declared = &space.campaigns[campaign];
     let selection = Selection::of(space, declared);
-    let simulator_crate = match &space.simulator.transport {
-        model::Transport::InProcess { crate_folder, .. } => crate_folder.clone(),
-        _ => None,
-    };
+    let simulator_crate = space.simulator.crate_folder.clone();
     let system_file = space.file_of(&space.simulator.declaration).to_owned();
     let plan = plan::CampaignPlan {
         metrics: selection.metrics.iter().map(|&id| metric(&space.metrics[id])).collect(),
@@ -85,11 +82,7 @@ fn of_system(space: &Space, campaign: plan::Campaign, source: &str, generator: &
         source: source.to_owned(),
         space: space.declaration.name.clone(),
         doc: space.declaration.doc.clone(),
-        simulator: plan::Simulator {
-            name: space.simulator.declaration.name.clone(),
-            transport: transport(space, &space.simulator.transport),
-            lifecycle: lifecycle(&space.lifecycle),
-        },
+        simulator: plan::Simulator { lifecycle: lifecycle(&space.lifecycle), ..simulator(space, &space.simulator) },
         messages: space.messages.values().map(message).collect(),
         topics: space.topics.values().map(|declared| topic(space, declared)).collect(),
         nodes: space.nodes.values().map(node).collect(),
@@ -273,7 +266,7 @@ pub(crate) mod tests {
         "#;
         let plan = lowered_from(text, "look").plan;
         plan.validate().unwrap();
-        let cut: Vec<bool> = plan.simulator.transport.wiring().iter().map(|wiring| wiring.cut).collect();
+        let cut: Vec<bool> = plan.simulator.wiring.iter().map(|wiring| wiring.cut).collect();
         assert_eq!(cut, [false, true, true], "a level is only heard");
         let remapped = |node| plan.remappings(plan::NodeId(node)).into_iter().map(|it| it.to).collect::<Vec<_>>();
         assert_eq!((remapped(0), remapped(1)), (Vec::new(), vec!["/stop/undisturbed".to_owned()]));

@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use sesame_plan::{CampaignPlan, Direction, MetricSource, Parameter, TopicId, Transport};
+use sesame_plan::{CampaignPlan, Direction, MetricSource, Parameter, Simulator, TopicId};
 
 /// The plan of one runner crate.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,15 +100,12 @@ impl OperationPlan {
 }
 
 /// The feature of the runtime for a transport that not every runner has: its libraries take long to compile.
-pub(crate) fn runtime_feature(transport: &Transport) -> Option<&'static str> {
-    match transport {
-        Transport::InProcess { .. } | Transport::Process { .. } => None,
-        Transport::Ros2(_) | Transport::Rosbridge(_) | Transport::Ros1(_) | Transport::Mqtt(_) => {
-            Some(transport.word())
-        }
-        Transport::Simlog(simlog) if simlog.url.starts_with("https://") => Some("simlog-tls"),
-        Transport::Simlog(_) => Some("simlog"),
-    }
+pub(crate) fn runtime_feature(simulator: &Simulator) -> Option<&'static str> {
+    let kind = simulator.properties();
+    let encrypted = kind.address.and_then(|schemes| schemes.encrypted);
+    let over_tls = encrypted.zip(simulator.addresses().first().copied());
+    let over_tls = over_tls.is_some_and(|(encrypted, address)| address.starts_with(encrypted));
+    kind.feature_over_tls.filter(|_| over_tls).or(kind.feature)
 }
 
 /// Whether this command was built with a feature of the runtime: its own have the same names.
@@ -133,9 +130,9 @@ impl RunnerPlan {
     /// Whether a runner of this campaign contains Rust that this command does not: the user's simulator or hooks, or
     /// a transport that the command was built without. Without, the plan says everything.
     pub fn needs_rust(&self) -> bool {
-        let transport = &self.plan.simulator.transport;
-        matches!(transport, Transport::InProcess { .. })
-            || runtime_feature(transport).is_some_and(|feature| !is_built_in(feature))
+        let simulator = &self.plan.simulator;
+        simulator.properties().in_runner
+            || runtime_feature(simulator).is_some_and(|feature| !is_built_in(feature))
             || self.hooks.iter().any(|hook| self.uses(hook))
             || self.operations.iter().any(|operation| self.applies(operation))
     }

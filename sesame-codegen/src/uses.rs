@@ -143,7 +143,7 @@ struct Explained<'a> {
     doc: &'a str,
     /// The declaration as written.
     text: &'a str,
-    /// Of a monitor of a space without errors: its certificate as a tree.
+    /// For a monitor of a space without errors: its certificate as a tree.
     #[serde(skip_serializing_if = "Option::is_none")]
     certificate: Option<&'a CertificatePart>,
     /// Every place that mentions it.
@@ -153,9 +153,9 @@ struct Explained<'a> {
 /// A place that mentions a definition.
 #[derive(Serialize)]
 struct Use<'a> {
-    /// Where.
+    /// The place.
     at: Place<'a>,
-    /// In which declaration.
+    /// The declaration that contains it.
     within: Within,
 }
 

@@ -3,17 +3,16 @@
 
 use std::fmt::Write as _;
 
-use sesame_plan::{CampaignPlan, Channel, Dialect, NodeId, Remapping, Rosbridge, Transport};
+use sesame_plan::{CampaignPlan, Channel, Dialect, NodeId, Remapping};
 
 /// A line to paste for each node, and for each program that the plan does not know.
 pub fn text(plan: &CampaignPlan) -> String {
     const STRING: &str = "a string takes all text";
-    match &plan.simulator.transport {
-        Transport::Ros2(_) | Transport::Rosbridge(Rosbridge { dialect: Dialect::Ros2, .. }) => {}
-        Transport::Rosbridge(_) | Transport::Ros1(_) | Transport::Mqtt(_) => return names(plan),
-        Transport::InProcess { .. } | Transport::Process { .. } | Transport::Simlog(_) => {
-            return format!("`{}` brings all messages itself: nothing is remapped\n", plan.simulator.name);
-        }
+    if plan.simulator.properties().bus.is_none() {
+        return format!("`{}` brings all messages itself: nothing is remapped\n", plan.simulator.name);
+    }
+    if plan.simulator.dialect() != Some(Dialect::Ros2) {
+        return names(plan);
     }
     let mut out = proxies(plan);
     for (id, node) in (0..).map(NodeId).zip(&plan.nodes) {

@@ -7,9 +7,8 @@
 mod code;
 pub mod render;
 
-use std::borrow::Cow;
-
 pub use code::{CODES, Code, MEANINGS, Severity, page};
+pub use sesame_base::visible::visible_lines;
 
 use crate::span::Span;
 
@@ -139,21 +138,6 @@ pub fn shortened(text: String) -> String {
     if from < to { format!("{} … {}", &text[..from], &text[to..]) } else { text }
 }
 
-/// A text without characters that a terminal interprets or that change the direction of the text after them: control
-/// characters other than line feeds and tabs, and direction marks. Each is replaced by U+FFFD.
-pub fn visible(text: &str) -> Cow<'_, str> {
-    if !text.contains(hidden) {
-        return Cow::Borrowed(text);
-    }
-    Cow::Owned(text.chars().map(|c| if hidden(c) { '\u{fffd}' } else { c }).collect())
-}
-
-/// Whether a terminal interprets a character, or it changes the direction of the text after it.
-fn hidden(c: char) -> bool {
-    (c.is_control() && !matches!(c, '\n' | '\t'))
-        || matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -166,11 +150,5 @@ mod tests {
         assert!(short.starts_with("`µµ") && short.contains("µ … µ") && short.ends_with("µ` is not a unit"));
         let long = "µ".repeat(600);
         assert_eq!(shortened(long.clone()), long, "the limit counts characters, not bytes");
-    }
-
-    #[test]
-    fn what_commands_a_terminal_is_replaced_and_all_else_stays() {
-        assert_eq!(visible("a\x1b[31mb\r\u{9b}\u{7f}\u{0}\u{202e}c\n\td µ🤖"), "a�[31mb�����c\n\td µ🤖");
-        assert!(matches!(visible("space a\n"), Cow::Borrowed(_)));
     }
 }

@@ -32,9 +32,9 @@ pub use sesame_plan::stl::Interval;
 pub use sesame_plan::{
     Aggregate, Averaging, BinaryFunction, BoostedChildren, Bound, Channel, Choice, Clock, Comparison, Condition,
     Confirmation, Copies, Dimension, Direction, Distance, Distribution, Drain, Exploration, Expression, Interface,
-    Members, Moment, NotFinite, OperationKind, OwnSetting, Point, Recorded, Region, Setting, Shape, SignedDistance,
-    Statistic, Step, StepBy, Stepping, StopRule, Strategy, StrategyKind, StrategyProperties, TextTest, Trend,
-    UnaryFunction, ValueMode,
+    Members, Moment, NotFinite, OperationKind, OwnSetting, Point, Recorded, Region, Ros, Setting, Shape,
+    SignedDistance, Statistic, Step, StepBy, Stepping, StopRule, Strategy, StrategyKind, StrategyProperties, TextTest,
+    Transport, Trend, UnaryFunction, ValueMode,
 };
 
 use crate::span::FileId;

@@ -25,7 +25,7 @@ pub struct Position {
     pub line: u32,
     /// Its column in characters, from 1.
     pub column: u32,
-    /// Its column in units of UTF-16, from 1; of definitions and uses only ([`Place::with_utf16`]).
+    /// Its column in units of UTF-16, from 1; only for definitions and uses ([`Place::with_utf16`]).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub utf16_column: Option<u32>,
 }

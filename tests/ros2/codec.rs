@@ -7,10 +7,11 @@ use std::process::{Command, Output};
 use std::sync::Arc;
 
 use serde_json::{Value as Json, json};
+use sesame_codec::cdr::Codec;
 use sesame_interfaces::Catalogue;
 use sesame_plan::Interface;
 use sesame_relay::value::Value;
-use sesame_ros2::cdr::{Codec, Wanted};
+use sesame_relay::wire::Wanted;
 use sesame_tests::workspace;
 
 use crate::environment::Vendor;

@@ -163,7 +163,7 @@ fn noise_is_fitted_by_how_much_runs_differ_and_varied_from_run_to_run() {
     child.kill().unwrap();
     child.wait().unwrap();
     let again = study.sesamec(&[&asked[..], &["--format", "json"]].concat()).expect(0);
-    assert!(again.err.contains("Going on with a fit of which"), "{}", again.err);
+    assert!(again.err.contains("Continuing a fit of which"), "{}", again.err);
     let again: serde_json::Value = serde_json::from_str(&again.out).unwrap();
     assert_eq!(again["compensation"], compensated["compensation"]);
     assert_eq!(again["held_out"], compensated["held_out"]);

@@ -109,17 +109,35 @@ pub(crate) fn without_purpose(files: &[File]) -> Vec<String> {
     silent.map(|file| format!("{}: begin it with `//!` and a sentence on what it is for", file.path)).collect()
 }
 
-/// Pages of documentation that its index does not list, and entries of the index without a page.
+/// Pages of documentation that no index lists, and entries of the index without a page. The README.md of a folder that
+/// the index lists is the index of that folder.
 pub(crate) fn not_in_the_index(files: &[File]) -> Vec<String> {
     const INDEX: &str = "docs/README.md";
     let pages = files.iter().filter(|file| file.ending() == Some("md") && file.path != INDEX);
     let pages: Vec<&str> = pages.filter_map(|file| file.path.strip_prefix("docs/")).collect();
-    let index = files.iter().find(|file| file.path == INDEX).map_or("", |file| file.text.as_str());
-    let linked: Vec<&str> = index.split("](").skip(1).filter_map(|rest| rest.split(')').next()).collect();
-    let unlisted = pages.iter().filter(|page| !linked.contains(page));
-    let missing = linked.iter().filter(|link| !link.starts_with("..") && !pages.contains(link));
-    let unlisted = unlisted.map(|page| format!("{INDEX}: add a row for docs/{page}"));
-    unlisted.chain(missing.map(|link| format!("{INDEX}: there is no page docs/{link}; remove its row"))).collect()
+    let index = linked(files, INDEX);
+    let mut complaints = Vec::new();
+    for &page in pages.iter().filter(|page| !index.contains(page)) {
+        let Some((folder, name)) = page.rsplit_once('/').filter(|&(_, name)| name != "README.md") else {
+            complaints.push(format!("{INDEX}: add a row for docs/{page}"));
+            continue;
+        };
+        let readme = format!("{folder}/README.md");
+        let listed = index.iter().any(|link| *link == readme);
+        if !listed || !linked(files, &format!("docs/{readme}")).contains(&name) {
+            complaints.push(format!("{INDEX}: add a row for docs/{page}, or link it in docs/{readme}"));
+        }
+    }
+    let missing = index.iter().filter(|link| !link.starts_with("..") && !pages.contains(link));
+    complaints.extend(missing.map(|link| format!("{INDEX}: there is no page docs/{link}; remove its row")));
+    complaints
+}
+
+/// The files that a page links, as seen from its folder.
+fn linked<'f>(files: &'f [File], page: &str) -> Vec<&'f str> {
+    let text = files.iter().find(|file| file.path == page).map_or("", |file| file.text.as_str());
+    let links = text.split("](").skip(1).filter_map(|rest| rest.split([')', '#']).next());
+    links.filter(|link| !link.is_empty()).collect()
 }
 
 /// Pictures of the documentation that no page shows.
@@ -143,9 +161,11 @@ pub(crate) fn digests(files: &[File]) -> Vec<String> {
     complaints
 }
 
-/// Tables of exit codes beside the one of the guide.
+/// The page with the table of exit codes.
+const PAGE: &str = "docs/guide/running.md";
+
+/// Tables of exit codes in addition to the one of the guide.
 pub(crate) fn exit_codes(files: &[File]) -> Vec<String> {
-    const PAGE: &str = "docs/guide.md";
     let mut complaints = Vec::new();
     for file in files.iter().filter(|file| file.ending() == Some("md")) {
         let tables = file.text.lines().filter(|line| line.starts_with("| exit code |")).count();
@@ -257,6 +277,21 @@ mod tests {
     }
 
     #[test]
+    fn a_page_in_a_folder_is_listed_by_the_index_or_by_its_folder() {
+        let files = |index: &str, folder: &str| {
+            [file("docs/README.md", index), file("docs/x/README.md", folder), file("docs/x/y.md", "")]
+        };
+        let folder = "[x](x/README.md)";
+        assert_eq!(not_in_the_index(&files(folder, "[y](y.md#why)")), [""; 0]);
+        assert_eq!(not_in_the_index(&files("[x](x/README.md) [y](x/y.md)", "")), [""; 0]);
+        assert_eq!(
+            not_in_the_index(&files(folder, "[up](../README.md)")),
+            ["docs/README.md: add a row for docs/x/y.md, or link it in docs/x/README.md"]
+        );
+        assert_eq!(not_in_the_index(&files("", "[y](y.md)")).len(), 2, "nobody finds the folder");
+    }
+
+    #[test]
     fn each_picture_is_shown_by_a_page() {
         let page = file("docs/a.md", "![A front](front.png)");
         let files = [page, file("docs/front.png", ""), file("docs/old.png", "")];
@@ -274,8 +309,8 @@ mod tests {
         assert_eq!(digests(&[page("a.md", &format!("{digest}0")), page("a.rs", &digest)]), [""; 0]);
         let table = "| exit code | means |\n";
         let [guide, twice] = [table.to_owned(), table.repeat(2)];
-        assert_eq!(exit_codes(&[page("docs/guide.md", &guide), page("docs/b.md", "")]), [""; 0]);
-        assert_eq!(exit_codes(&[page("docs/guide.md", &twice), page("docs/b.md", table)]).len(), 2);
-        assert_eq!(exit_codes(&[page("docs/guide.md", "")]).len(), 1);
+        assert_eq!(exit_codes(&[page(PAGE, &guide), page("docs/b.md", "")]), [""; 0]);
+        assert_eq!(exit_codes(&[page(PAGE, &twice), page("docs/b.md", table)]).len(), 2);
+        assert_eq!(exit_codes(&[page(PAGE, "")]).len(), 1);
     }
 }

@@ -3,16 +3,15 @@
 use sesame_plan::{CampaignPlan, MetricSource, RequirementId};
 
 use crate::observation::{MetricObservation, MetricValue, Outcome, Reach};
-use crate::robustness::{Quantifier, lost, quantifier};
-use crate::verdict::{Verdict, breaks, ends, verdict};
+use crate::verdict::{Verdict, breaks, verdict};
 
 /// The first moment, in seconds, from which no continuation of a run could satisfy a requirement, from what all metrics
 /// showed in a run that ended at `end`; `None` if the run did not violate it. If an instant has several values, the
 /// last one counts.
 ///
 /// A metric that only gets worse, such as a maximum with an upper bound, is lost when it leaves its bound. For all
-/// others, only the end decides: a mean may recover, and a count may yet be reached. The robustness of a temporal
-/// formula is known when all is over, and its signal says when it was lost.
+/// others, only the end decides: a mean may recover, and a count may yet be reached. Whoever evaluated a temporal
+/// formula says when a bound on its robustness was lost: for `eventually [0s, 60s]` that is at 60 s.
 pub fn hazard(
     plan: &CampaignPlan,
     requirement: RequirementId,
@@ -23,44 +22,18 @@ pub fn hazard(
     let declared = plan.requirement(requirement);
     let observed = metrics.get(declared.metric.index())?;
     let metric = plan.metric(declared.metric);
-    if matches!(metric.source, MetricSource::Robustness { .. }) {
-        return of_formula(plan, requirement, outcome, observed);
-    }
     if verdict(declared.bound, outcome, MetricValue::from(observed)) != Verdict::Violated {
         return None;
+    }
+    if matches!(metric.source, MetricSource::Robustness { .. }) {
+        let lost = observed.lost.iter().find(|lost| lost.requirement == requirement);
+        return Some(lost.map_or(end, |lost| lost.at));
     }
     let next = |at: usize| observed.series.get(at + 1).map(|point| point.0);
     let lasting = observed.series.iter().enumerate().filter(|(at, point)| next(*at) != Some(point.0));
     let mut lasting = lasting.map(|(_, point)| *point);
     let lost = lasting.find(|&(_, value)| breaks(declared.bound, Reach::onwards(metric.trend, Some(value))));
     Some(lost.map_or(end, |(time, _)| time))
-}
-
-/// When a requirement on the robustness of a formula was violated, from what that showed; `None` if it was not.
-pub fn of_formula(
-    plan: &CampaignPlan,
-    requirement: RequirementId,
-    outcome: &Outcome,
-    observed: &MetricObservation,
-) -> Option<f64> {
-    let declared = plan.requirement(requirement);
-    let MetricSource::Robustness { robustness } = &plan.metric(declared.metric).source else { return None };
-    let shown = MetricValue::from(observed);
-    if verdict(declared.bound, outcome, shown) != Verdict::Violated {
-        return None;
-    }
-    let value = shown.value?;
-    let quantifier = quantifier(&robustness.formula);
-    let (low, _, high, _) = ends(declared.bound);
-    let by_single_times = match quantifier {
-        Some(Quantifier::Always) => low.is_some_and(|low| value <= low),
-        Some(Quantifier::Eventually) => high.is_some_and(|high| value >= high),
-        None => false,
-    };
-    let spans = lost(&observed.robustness, quantifier, declared.bound, value);
-    let first = spans.first().filter(|_| by_single_times).map(|span| span.start);
-    // Otherwise it took the whole run.
-    first.or(observed.series.last().map(|point| point.0))
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 
 use serde::{Deserialize, Serialize};
 
-use sesame_plan::{Span, Trend};
+use sesame_plan::{RequirementId, Span, Trend};
 
 pub use monitor::{CHANGES_KEPT, ChangeCause, EvidenceChange, MonitorDecision, MonitorHazard, MonitorObservation};
 pub use traffic::{Traffic, Unreached};
@@ -191,12 +191,12 @@ pub struct Counters {
     pub delayed: u64,
     /// Messages that came while it was not active and waited behind those it still held.
     pub queued: u64,
-    /// Messages it made up.
+    /// Messages it created.
     pub injected: u64,
-    /// Side effects it had beside messages.
+    /// Side effects it had in addition to those on messages.
     pub side_effects: u64,
-    /// Messages it changed, dropped, held back or made up on wires that nobody heard. They are in none of the others,
-    /// and no effect.
+    /// Messages it changed, dropped, held back or created on wires without a receiver. No other counter contains them,
+    /// and they are no effect.
     pub unheard: u64,
 }
 
@@ -212,7 +212,7 @@ impl Counters {
 pub struct MetricObservation {
     /// Its value: the last one at or before the end, or its default; `None` where there is neither.
     pub value: Option<f64>,
-    /// Whether the value is one that was set, not the default.
+    /// Whether the value was set; otherwise it is the default.
     pub set: bool,
     /// The values that it could have had at the end of the run.
     pub reach: Reach,
@@ -225,6 +225,20 @@ pub struct MetricObservation {
     /// else, and explains the value; it is neither part of the digest nor compared when a run is repeated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub robustness: Vec<(f64, f64)>,
+    /// Of the robustness of a formula: when requirements on it were lost before the run ended, in order of declaration.
+    /// Empty for other metrics, whose series shows it. Like the signal, it explains the value, and is neither part of
+    /// the digest nor compared when a run is repeated.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lost: Vec<Lost>,
+}
+
+/// When a run lost a requirement.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Lost {
+    /// The requirement.
+    pub requirement: RequirementId,
+    /// The first moment from which no continuation of the run could satisfy it, in seconds.
+    pub at: f64,
 }
 
 impl MetricObservation {
@@ -237,6 +251,7 @@ impl MetricObservation {
             not_finite: None,
             series,
             robustness: Vec::new(),
+            lost: Vec::new(),
         }
     }
 }
@@ -288,7 +303,7 @@ impl Reach {
 pub struct MetricValue {
     /// The last value set, or the default; `None` where there is neither.
     pub value: Option<f64>,
-    /// Whether the value is one that was set, not the default.
+    /// Whether the value was set; otherwise it is the default.
     pub set: bool,
     /// The values that it could have had at the end of the run.
     pub reach: Reach,
@@ -305,7 +320,7 @@ impl MetricValue {
 
 impl From<&MetricObservation> for MetricValue {
     fn from(shown: &MetricObservation) -> Self {
-        let MetricObservation { value, set, reach, not_finite, series: _, robustness: _ } = *shown;
+        let MetricObservation { value, set, reach, not_finite, series: _, robustness: _, lost: _ } = *shown;
         MetricValue { value, set, reach, not_finite }
     }
 }
@@ -343,6 +358,7 @@ impl Observation {
             not_finite,
             series: Vec::new(),
             robustness: Vec::new(),
+            lost: Vec::new(),
         };
         Observation {
             outcome: self.outcome.clone(),

@@ -145,7 +145,7 @@ impl Scorer {
         }
     }
 
-    /// A requirement was violated for the first time.
+    /// A requirement was lost: from now on, nothing can satisfy it.
     pub fn hazard(&mut self, at: SimTime, requirement: u32) {
         self.pass(at);
         self.pending.push(requirement);

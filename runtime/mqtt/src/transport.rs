@@ -36,11 +36,9 @@ pub fn mqtt(folder: PathBuf) -> Connect {
 }
 
 fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
-    let sesame_plan::Transport::Mqtt(mqtt) = &plan.simulator.transport else {
+    let Some(mqtt) = plan.simulator.brokers() else {
         unreachable!("the generator connects each kind of simulator by its own transport")
     };
-    let addresses = mqtt.all().into_iter().map(|broker| broker.remote.url.clone()).collect();
-    let settings = Settings { has_clock: false, resets: false, addresses };
     let place = Place::of_worker(folder.to_owned()).remapping(plan);
     let bus = Brokers {
         worker: place.worker,
@@ -59,7 +57,7 @@ fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
         latest: BTreeMap::new(),
         misfits: BTreeSet::new(),
     };
-    on_bus(plan, Box::new(bus), settings, place)
+    on_bus(plan, Box::new(bus), Settings::of(plan), place)
 }
 
 struct Brokers {

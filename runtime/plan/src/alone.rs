@@ -4,8 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use crate::{
-    CampaignPlan, FieldRef, Interface, Lifecycle, MessageId, MonitorId, Side, TopicId, Transport, Type, WireType,
-    Wiring,
+    CampaignPlan, FieldRef, Interface, Lifecycle, MessageId, MonitorId, Side, TopicId, Type, WireType, Wiring,
 };
 
 /// Why a monitor cannot be a program of its own, in words with a remedy.
@@ -68,7 +67,7 @@ impl CampaignPlan {
     /// Whether the runner of this plan is a guest in a system that runs without it: it cuts nothing, starts nothing and
     /// waits for nobody, and publishes beside the nodes.
     pub fn is_guest(&self) -> bool {
-        self.simulator.transport.wiring().iter().any(|wiring| wiring.joined)
+        self.simulator.wiring.iter().any(|wiring| wiring.joined)
     }
 
     /// Whether a monitor reads the messages of a topic: as evidence, or because its mitigation sets one field of a
@@ -90,10 +89,10 @@ impl CampaignPlan {
         if self.monitor(id).publishes.is_none() {
             return Err(NotAlone::External { monitor: name() });
         }
-        if matches!(&self.simulator.transport, Transport::Mqtt(mqtt) if mqtt.all().len() > 1) {
+        if self.simulator.brokers().is_some_and(|mqtt| mqtt.all().len() > 1) {
             return Err(NotAlone::Brokers { monitor: name() });
         }
-        if matches!(&self.simulator.transport, Transport::Simlog(_)) {
+        if self.simulator.properties().one_client {
             return Err(NotAlone::Simlog { monitor: name() });
         }
         let relied_on = self.relied_on_by(id);
@@ -174,43 +173,33 @@ impl CampaignPlan {
         let fields = self.messages.iter_mut().flat_map(|message| &mut message.fields).map(|field| &mut field.ty);
         fields.chain(self.topics.iter_mut().map(|topic| &mut topic.ty)).for_each(|ty| moved(ty, &places));
         let mut named: Vec<String> = self.topics.iter().filter_map(|topic| topic.interface.clone()).collect();
-        let interfaces = match &mut self.simulator.transport {
-            Transport::Ros2(ros2) => &mut ros2.interfaces,
-            Transport::Rosbridge(rosbridge) => &mut rosbridge.interfaces,
-            Transport::Ros1(ros1) => &mut ros1.interfaces,
-            Transport::InProcess { .. } | Transport::Process { .. } | Transport::Mqtt(_) | Transport::Simlog(_) => {
-                return;
-            }
-        };
+        let Some(ros) = &mut self.simulator.ros else { return };
         let mut kept: Vec<Interface> = Vec::new();
-        for interface in interfaces.iter().rev() {
+        for interface in ros.interfaces.iter().rev() {
             if named.contains(&interface.name) {
                 named.extend(interface.fields.iter().filter_map(|field| in_interface(&field.ty)).map(str::to_owned));
                 kept.push(interface.clone());
             }
         }
         kept.reverse();
-        *interfaces = kept;
+        ros.interfaces = kept;
     }
 
     /// Makes the way to the system that of a guest.
     fn join(&mut self) {
-        let wiring = (0..).map(TopicId).take(self.topics.len());
-        let wiring = wiring.map(|topic| Wiring { joined: self.is_published_by_monitor(topic), ..Wiring::default() });
-        let wiring: Vec<Wiring> = wiring.collect();
+        if self.simulator.properties().bus.is_some() {
+            let topics = (0..).map(TopicId).take(self.topics.len());
+            let wiring =
+                topics.map(|topic| Wiring { joined: self.is_published_by_monitor(topic), ..Wiring::default() });
+            self.simulator.wiring = wiring.collect();
+        }
         // A guest neither steps nor resets the system.
-        match &mut self.simulator.transport {
-            Transport::InProcess { .. } | Transport::Process { .. } | Transport::Simlog(_) => {}
-            Transport::Ros2(ros2) => (ros2.step, ros2.reset, ros2.wiring) = (None, None, wiring),
-            Transport::Rosbridge(rosbridge) => {
-                (rosbridge.reset, rosbridge.wiring) = (None, wiring);
-                rosbridge.proxies.clear();
-            }
-            Transport::Ros1(ros1) => (ros1.reset, ros1.wiring) = (None, wiring),
-            Transport::Mqtt(mqtt) => {
-                mqtt.wiring = wiring;
-                mqtt.brokers.clear();
-            }
+        if let Some(ros) = &mut self.simulator.ros {
+            (ros.step, ros.reset) = (None, None);
+            ros.proxies.clear();
+        }
+        if let Some(mqtt) = self.simulator.brokers_mut() {
+            mqtt.brokers.clear();
         }
     }
 }
@@ -245,8 +234,8 @@ fn in_interface(ty: &WireType) -> Option<&str> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{demand, evidence_above, field, guarantee, message, minimal, monitor, topic};
-    use crate::{Clock, Evidence, Gate, Mitigation, MitigationValue, Monitor, Ros2, StepBy, Stepping};
+    use crate::testing::{demand, evidence_above, field, guarantee, message, minimal, monitor, ros2, topic};
+    use crate::{Endpoint, Evidence, Gate, Mitigation, MitigationValue, Monitor, Ros, StepBy, Stepping};
 
     /// `fast` relies on `seen`; `other` is on its own. The first topic and the first message are nobody's.
     fn plan() -> CampaignPlan {
@@ -283,15 +272,13 @@ mod tests {
     #[test]
     fn a_monitor_alone_has_what_it_needs_and_nothing_else() {
         let mut whole = plan();
-        whole.simulator.transport = Transport::Ros2(Ros2 {
-            domain: 3,
-            clock: Clock::Wall,
+        whole.simulator = ros2(3, vec![Wiring { cut: true, ..Wiring::default() }; 7]);
+        whole.simulator.ros = Some(Ros {
             step: Some(Stepping { step_ns: 1, by: StepBy::Topic { path: "/step".to_owned() } }),
             reset: Some("/reset".to_owned()),
-            interfaces: Vec::new(),
-            wiring: vec![Wiring { cut: true, ..Wiring::default() }; 7],
+            ..Ros::default()
         });
-        let alone = whole.of_monitor_alone(MonitorId(0)).unwrap();
+        let mut alone = whole.of_monitor_alone(MonitorId(0)).unwrap();
         let names = |plan: &CampaignPlan| plan.topics.iter().map(|it| it.name.clone()).collect::<Vec<_>>();
         assert_eq!(names(&alone), ["light", "gap", "drive", "state"], "nobody publishes what `seen` is");
         assert_eq!(alone.messages.iter().map(|it| it.name.as_str()).collect::<Vec<_>>(), ["Inner", "Drive"]);
@@ -300,11 +287,10 @@ mod tests {
         assert_eq!((fast.publishes, fast.demands[0].monitor), (Some(TopicId(3)), MonitorId(1)));
         assert_eq!(fast.otherwise.mitigation.as_ref().unwrap().field.topic, TopicId(2));
         assert_eq!((seen.publishes, seen.evidence[0].inputs[0].field.topic), (None, TopicId(0)));
-        let joined: Vec<bool> = alone.simulator.transport.wiring().iter().map(|it| it.joined).collect();
+        let joined: Vec<bool> = alone.simulator.wiring.iter().map(|it| it.joined).collect();
         assert_eq!((joined, alone.is_guest(), whole.is_guest()), (vec![false, false, true, true], true, false));
-        let Transport::Ros2(Ros2 { step: None, reset: None, domain: 3, .. }) = &alone.simulator.transport else {
-            panic!("{:?}", alone.simulator)
-        };
+        assert_eq!(alone.simulator.ros, Some(Ros::default()), "a guest neither steps nor resets");
+        assert_eq!(alone.simulator.endpoint(), Some(Endpoint::Domain(&mut 3)));
         let read = [0, 1, 2, 3].map(|topic| alone.is_read_by_monitor(TopicId(topic)));
         assert_eq!(read, [true, true, true, false], "other fields of a mitigation are those of the last message");
     }

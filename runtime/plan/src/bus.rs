@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Clock, Interface, NodeId, Wiring};
+use crate::NodeId;
 
 /// Where a bus is, and what a runner shows to be let in.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -49,27 +49,6 @@ pub struct Rosbridge {
     /// How it is asked to send messages.
     #[serde(default, skip_serializing_if = "Compression::is_default")]
     pub compression: Compression,
-    /// What simulation time is.
-    pub clock: Clock,
-    /// The service that sets the simulator to time zero, of type `std_srvs/srv/Empty` or `std_srvs/srv/Trigger`; `None`
-    /// for one that is launched again for each test.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub reset: Option<String>,
-    /// Where clients connect that do not connect to the server itself.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub proxies: Vec<Proxy>,
-    /// The layouts of all messages, each after those that it contains.
-    pub interfaces: Vec<Interface>,
-    /// How each topic of the plan is cut, in their order.
-    pub wiring: Vec<Wiring>,
-}
-
-impl Rosbridge {
-    /// Its address, and those of its proxies.
-    pub fn addresses(&self) -> Vec<&str> {
-        let proxies = self.proxies.iter().map(|proxy| proxy.url.as_str());
-        std::iter::once(self.remote.url.as_str()).chain(proxies).collect()
-    }
 }
 
 /// An address at which the runner stands for a server of rosbridge: whoever connects there is one node, and finds the
@@ -149,8 +128,6 @@ pub struct Mqtt {
     pub brokers: Vec<(NodeId, Broker)>,
     /// How surely messages arrive.
     pub quality: Quality,
-    /// How each topic of the plan is cut, in their order.
-    pub wiring: Vec<Wiring>,
 }
 
 /// A broker of MQTT.
@@ -177,19 +154,9 @@ pub enum Quality {
 }
 
 /// Nodes of ROS 1.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Ros1 {
     /// The address of the master, for example `http://127.0.0.1:11311`. It may contain placeholders as that of a
     /// [`Remote`].
     pub master: String,
-    /// What simulation time is.
-    pub clock: Clock,
-    /// The service that sets the simulator to time zero, of type `std_srvs/Empty` or `std_srvs/Trigger`; `None` for one
-    /// that is launched again for each test.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub reset: Option<String>,
-    /// The layouts of all messages, each after those that it contains.
-    pub interfaces: Vec<Interface>,
-    /// How each topic of the plan is cut, in their order.
-    pub wiring: Vec<Wiring>,
 }

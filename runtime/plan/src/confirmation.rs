@@ -11,7 +11,7 @@ pub struct Confirmation {
     pub times: u32,
     /// How the values of these runs become one.
     pub by: Statistic,
-    /// Whether each test that violates a requirement is confirmed too, wherever it lies.
+    /// Whether each test that violates a requirement is confirmed too, on the front or not.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub violations: bool,
 }
@@ -22,7 +22,7 @@ pub struct Confirmation {
 pub enum Statistic {
     /// Their mean.
     Mean,
-    /// Their median; the mean of the two in the middle of an even number.
+    /// Their median; with an even number of values, the mean of the two in the middle.
     Median,
     /// The value that this share of the runs reach or go beyond in the objective's direction.
     Quantile {

@@ -1,30 +1,36 @@
-//! A system of ROS 2 nodes: how a runner reaches it, and how its messages are laid out on the wire.
+//! Systems of ROS: what they have in common, and how their messages are laid out on the wire; and nodes of ROS 2.
 
 use serde::{Deserialize, Serialize};
 
-use crate::NodeId;
+use crate::{NodeId, Proxy};
+
+/// What systems of ROS have in common, whichever way the runner reaches their nodes.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Ros {
+    /// What simulation time is.
+    pub clock: Clock,
+    /// How the simulator is stepped; `None` for one that runs freely. Only a runner that
+    /// [reaches nodes](crate::SimulatorProperties::reaches_nodes) steps one.
+    pub step: Option<Stepping>,
+    /// The service that sets the simulator to time zero, of type `std_srvs/srv/Empty` or `std_srvs/srv/Trigger`; `None`
+    /// for one that is launched again for each test.
+    pub reset: Option<String>,
+    /// Where clients connect that do not connect to the server itself; empty where there
+    /// [are none](crate::SimulatorProperties::proxies).
+    pub proxies: Vec<Proxy>,
+    /// The layouts of all messages, each after those that it contains.
+    pub interfaces: Vec<Interface>,
+}
 
 /// The nodes of a ROS 2 system, between which the runner stands as a node of its own.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Ros2 {
     /// The domain (`ROS_DOMAIN_ID`) of the first worker; each further one has the next. The last one is at most 232.
     pub domain: u16,
-    /// What simulation time is.
-    pub clock: Clock,
-    /// How the simulator is stepped; `None` for one that runs freely.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub step: Option<Stepping>,
-    /// The service that sets the simulator to time zero; `None` for one that is launched again for each test.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub reset: Option<String>,
-    /// The layouts of all messages, each after those that it contains.
-    pub interfaces: Vec<Interface>,
-    /// How each topic of the plan is cut, in their order.
-    pub wiring: Vec<Wiring>,
 }
 
 /// What simulation time is.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Clock {
     /// The latest `rosgraph_msgs/msg/Clock` of this topic.
@@ -33,6 +39,7 @@ pub enum Clock {
         path: String,
     },
     /// Wall time.
+    #[default]
     Wall,
 }
 

@@ -7,11 +7,12 @@
 pub mod compact;
 
 use crate::{
-    Activation, ActivationMode, Bound, Campaign, CampaignPlan, Channel, Choice, Comparison, Copies, Count, Demand,
-    Distribution, Domain, Drain, Evidence, Expression, Field, FieldRef, Gate, Guarantee, Input, KnownTest, Lab,
-    LabCost, Lifecycle, Members, MessageId, MessageType, Metric, MetricId, MetricSource, Monitor, MonitorId, Node,
-    Operation, OperationId, OperationKind, Parameter, Requirement, SCHEMA, SafeState, Score, Search, Shape, Side,
-    Simulator, Span, Step, Strategy, Test, TestOperation, Topic, TopicId, Transport, Type, ValueMode, formula,
+    Activation, ActivationMode, Bound, Campaign, CampaignPlan, Channel, Choice, Comparison, Compression, Copies, Count,
+    Demand, Dialect, Distribution, Domain, Drain, Evidence, Expression, Field, FieldRef, Gate, Guarantee, Input,
+    KnownTest, Lab, LabCost, Members, MessageId, MessageType, Metric, MetricId, MetricSource, Monitor, MonitorId, Node,
+    Operation, OperationId, OperationKind, Parameter, Remote, Requirement, Ros, Ros1, Ros2, Rosbridge, SCHEMA,
+    SafeState, Score, Search, Shape, Side, Simlog, SimlogVersion, Simulator, Span, Step, Strategy, Test, TestOperation,
+    Topic, TopicId, Transport, Type, ValueMode, WireNames, Wiring, formula,
 };
 
 /// The smallest valid plan: a simulator, and [a campaign](campaign) that may not use anything.
@@ -63,11 +64,47 @@ pub fn campaign(name: &str, operations: usize) -> Campaign {
 
 /// A simulator that is a Rust type, with steps of so many nanoseconds.
 pub fn in_process(name: &str, path: &str, step_ns: u64) -> Simulator {
-    Simulator {
-        name: name.to_owned(),
-        transport: Transport::InProcess { path: path.to_owned(), step_ns },
-        lifecycle: Lifecycle::default(),
-    }
+    Simulator::new(name, Transport::InProcess { path: path.to_owned(), step_ns })
+}
+
+/// Nodes of ROS 2 in a domain, by wall time, whose messages have no layouts. The topics of the plan are cut so.
+pub fn ros2(domain: u16, wiring: Vec<Wiring>) -> Simulator {
+    let transport = Transport::Ros2(Ros2 { domain });
+    Simulator { ros: Some(Ros::default()), wiring, ..Simulator::new("nodes", transport) }
+}
+
+/// The same behind a bridge of rosbridge at this address.
+pub fn rosbridge(url: &str, wiring: Vec<Wiring>) -> Simulator {
+    let remote = Remote { url: url.to_owned(), token: None, trust: None };
+    let (dialect, compression) = (Dialect::Ros2, Compression::None);
+    let settings = Rosbridge { remote, domain: 0, dialect, compression };
+    Simulator { transport: Transport::Rosbridge(settings), ..ros2(0, wiring) }
+}
+
+/// The same of ROS 1, at a master.
+pub fn ros1(master: &str, wiring: Vec<Wiring>) -> Simulator {
+    Simulator { transport: Transport::Ros1(Ros1 { master: master.to_owned() }), ..ros2(0, wiring) }
+}
+
+/// A simulator that speaks version 2 of SimlogAPI, in steps of 20 ms.
+pub fn simlog(url: &str) -> Simulator {
+    let settings = Simlog {
+        url: url.to_owned(),
+        topics_url: None,
+        step_ns: 20_000_000,
+        protocol: SimlogVersion::V2,
+        names: WireNames::default(),
+        marker: None,
+        cut: Vec::new(),
+        settle_ns: 0,
+        ca: None,
+    };
+    Simulator::new("there", Transport::Simlog(settings))
+}
+
+/// The settings of such a simulator.
+pub fn simlog_mut(simulator: &mut Simulator) -> &mut Simlog {
+    simulator.simlog_mut().expect("it speaks SimlogAPI")
 }
 
 /// A message type.

@@ -1,7 +1,7 @@
 //! Who is remapped, so that the messages of topics that are cut pass through the relay.
 
 use crate::brokers::BrokerAt;
-use crate::{CampaignPlan, Channel, Node, NodeId, Proxy, Topic, TopicId, Transport, Wiring};
+use crate::{CampaignPlan, Channel, Dialect, Node, NodeId, Proxy, Topic, TopicId, Wiring};
 
 /// A name of a topic or service that a node knows under another name.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -56,8 +56,7 @@ impl CampaignPlan {
 
     /// The proxy at which the programs of a node connect, if there is one.
     pub fn proxy_of(&self, id: NodeId) -> Option<&Proxy> {
-        let Transport::Rosbridge(rosbridge) = &self.simulator.transport else { return None };
-        rosbridge.proxies.iter().find(|proxy| proxy.node == id)
+        self.simulator.ros.as_ref()?.proxies.iter().find(|proxy| proxy.node == id)
     }
 
     /// What a proxy changes in the names that clients use who are this node. A node is told apart as a publisher and as
@@ -93,7 +92,7 @@ impl CampaignPlan {
     /// In ROS 2 they are rules behind `--ros-args -r`, in ROS 1 they are the rules alone. There, no rule is of one node
     /// of a program only, so that a program that starts several gets none: its nodes are remapped where it starts them.
     pub fn ros_args(&self, node: Option<NodeId>) -> Vec<String> {
-        if matches!(self.simulator.transport, Transport::Ros1(_)) {
+        if self.simulator.dialect() == Some(Dialect::Ros1) {
             let rules = node.map(|node| self.remappings(node)).unwrap_or_default();
             return rules.iter().map(Remapping::rule).collect();
         }
@@ -146,19 +145,18 @@ impl CampaignPlan {
     /// Whether a topic passes through the relay in any case: in lock-step, nodes of ROS 2 hear what they answer, and
     /// answer, through it, so that a step ends when all answers have come.
     pub fn needed_in_step(&self, id: TopicId) -> bool {
-        let Transport::Ros2(ros2) = &self.simulator.transport else { return false };
         let needs = |node: &Node| {
             let answers = node.answers.iter().any(|answer| answer.with == id);
             answers || !node.answers.is_empty() && node.subscribes.contains(&id)
         };
-        ros2.step.is_some() && self.nodes.iter().any(needs)
+        self.simulator.stepping().is_some() && self.nodes.iter().any(needs)
     }
 
     /// The topics that operations can act on, in declaration order; the two directions of a service are one. Of a
     /// system of ROS 2 nodes they are the topics that are cut, for all operations of the space, without those that are
     /// [needed in each step](CampaignPlan::needed_in_step).
     pub fn relayable(&self) -> Vec<Vec<TopicId>> {
-        let acted_on = |id: TopicId| match self.simulator.transport.wiring() {
+        let acted_on = |id: TopicId| match self.simulator.wiring.as_slice() {
             [] => self.operations.iter().any(|operation| operation.topic == Some(id)),
             wiring => wiring.get(id.index()).is_some_and(|wiring| wiring.cut) && !self.needed_in_step(id),
         };
@@ -185,7 +183,7 @@ impl CampaignPlan {
         let relayed: Vec<TopicId> =
             self.relayable().into_iter().take(usize::try_from(first).unwrap_or(usize::MAX)).flatten().collect();
         let mut plan = self.clone();
-        for (id, wiring) in (0..).map(TopicId).zip(plan.simulator.transport.wiring_mut()) {
+        for (id, wiring) in (0..).map(TopicId).zip(&mut plan.simulator.wiring) {
             if !relayed.contains(&id) && !self.needed_in_step(id) {
                 *wiring = Wiring::default();
             }
@@ -194,21 +192,18 @@ impl CampaignPlan {
     }
 
     fn broker_of(&self, id: NodeId) -> BrokerAt {
-        if let Transport::Mqtt(mqtt) = &self.simulator.transport { mqtt.of(id) } else { 0 }
+        self.simulator.brokers().map_or(0, |mqtt| mqtt.of(id))
     }
 
     /// Whether subscribers of a topic are at this broker, so that its publishers there need another name. Only systems
     /// of MQTT have more places than one.
     fn shares_broker(&self, broker: BrokerAt, topic: TopicId) -> bool {
-        match &self.simulator.transport {
-            Transport::Mqtt(mqtt) => mqtt.subscribers(self, topic).contains(&broker),
-            _ => true,
-        }
+        self.simulator.brokers().is_none_or(|mqtt| mqtt.subscribers(self, topic).contains(&broker))
     }
 
     /// The topics that are cut.
     fn cut(&self) -> impl Iterator<Item = (TopicId, &Topic, &Wiring)> {
-        let topics = (0..).map(TopicId).zip(&self.topics).zip(self.simulator.transport.wiring());
+        let topics = (0..).map(TopicId).zip(&self.topics).zip(&self.simulator.wiring);
         topics.filter(|(_, wiring)| wiring.cut).map(|((id, topic), wiring)| (id, topic, wiring))
     }
 }
@@ -243,7 +238,7 @@ fn is_source(node: &Node, topic: TopicId, channel: Channel) -> bool {
 mod tests {
     use super::*;
     use crate::testing::{self, minimal, topic};
-    use crate::{Clock, Compression, Dialect, Remote, Ros1, Ros2, Rosbridge, Transport, Type};
+    use crate::{Ros, Type};
 
     fn plan() -> CampaignPlan {
         let mut plan = minimal();
@@ -271,14 +266,8 @@ mod tests {
             subscribers: subscribers.iter().copied().map(NodeId).collect(),
             joined: false,
         };
-        plan.simulator.transport = Transport::Ros2(Ros2 {
-            domain: 0,
-            clock: Clock::Wall,
-            step: None,
-            reset: None,
-            interfaces: Vec::new(),
-            wiring: vec![cut(&[], &[0]), cut(&[0], &[]), Wiring::default(), cut(&[], &[]), cut(&[], &[])],
-        });
+        let wiring = vec![cut(&[], &[0]), cut(&[0], &[]), Wiring::default(), cut(&[], &[]), cut(&[], &[])];
+        plan.simulator = testing::ros2(0, wiring);
         plan
     }
 
@@ -310,7 +299,6 @@ mod tests {
     #[test]
     fn a_node_behind_a_proxy_is_renamed_there_and_not_remapped() {
         let mut plan = plan();
-        let Transport::Ros2(ros2) = plan.simulator.transport else { panic!("it is a system of ROS 2") };
         let proxy = |node: u32| Proxy {
             node: NodeId(node),
             url: format!("ws://127.0.0.1:919{node}"),
@@ -318,20 +306,11 @@ mod tests {
             identity: None,
             public: false,
         };
-        plan.simulator.transport = Transport::Rosbridge(Rosbridge {
-            remote: Remote { url: "ws://127.0.0.1:9090".to_owned(), token: None, trust: None },
-            domain: 0,
-            dialect: Dialect::Ros2,
-            compression: Compression::None,
-            clock: ros2.clock,
-            reset: None,
-            proxies: vec![proxy(0), proxy(1)],
-            interfaces: Vec::new(),
-            wiring: ros2.wiring,
-        });
+        plan.simulator = testing::rosbridge("ws://127.0.0.1:9090", plan.simulator.wiring);
+        plan.simulator.ros = Some(Ros { proxies: vec![proxy(0), proxy(1)], ..Ros::default() });
         assert!(rules(&plan, 0).is_empty() && rules(&plan, 1).is_empty());
         assert_eq!(rules(&plan, 2), ["/grip:=/grip/undisturbed"], "it is not behind a proxy");
-        assert_eq!(plan.simulator.transport.shared_address(), Some("ws://127.0.0.1:9090"));
+        assert_eq!(plan.simulator.shared_address(), Some("ws://127.0.0.1:9090"));
         let of = |remappings: &[Remapping]| remappings.iter().map(Remapping::rule).collect::<Vec<_>>();
         let arm = plan.renamed(NodeId(0));
         let joints = ["/a/joints:=/a/joints/undisturbed", "/b/joints:=/b/joints/undisturbed"];
@@ -346,17 +325,18 @@ mod tests {
     #[test]
     fn in_ros_1_the_rules_alone_are_the_arguments_of_a_node() {
         let mut plan = plan();
-        let Transport::Ros2(ros2) = plan.simulator.transport else { panic!("it is a system of ROS 2") };
-        plan.simulator.transport = Transport::Ros1(Ros1 {
-            master: "http://127.0.0.1:{port}".to_owned(),
-            clock: ros2.clock,
-            reset: None,
-            interfaces: Vec::new(),
-            wiring: ros2.wiring,
-        });
+        plan.simulator = testing::ros1("http://127.0.0.1:{port}", plan.simulator.wiring);
         assert_eq!(plan.ros_args(Some(NodeId(2))), ["/grip:=/grip/undisturbed"]);
         assert_eq!(plan.ros_args(Some(NodeId(0))).len(), 3);
         assert!(plan.ros_args(None).is_empty(), "a rule would be of all nodes of the program");
+        let wiring = plan.simulator.wiring;
+        plan.simulator = testing::rosbridge("ws://127.0.0.1:9090", wiring);
+        assert_eq!(plan.ros_args(Some(NodeId(2))).len(), 3);
+        let crate::Transport::Rosbridge(settings) = &mut plan.simulator.transport else {
+            unreachable!("it is a bridge")
+        };
+        settings.dialect = Dialect::Ros1;
+        assert_eq!(plan.ros_args(Some(NodeId(2))), ["/grip:=/grip/undisturbed"], "behind a bridge, too");
     }
 
     #[test]
@@ -371,8 +351,8 @@ mod tests {
         // In lock-step, what is answered and the answers pass through the relay in any case.
         let mut stepped = plan.clone();
         stepped.nodes[1].answers = vec![crate::Answer { to: TopicId(1), with: TopicId(0) }];
-        let Transport::Ros2(ros2) = &mut stepped.simulator.transport else { unreachable!() };
-        ros2.step = Some(crate::Stepping { step_ns: 1, by: crate::StepBy::Topic { path: "/step".to_owned() } });
+        let step = crate::Stepping { step_ns: 1, by: crate::StepBy::Topic { path: "/step".to_owned() } };
+        stepped.simulator.ros = Some(Ros { step: Some(step), ..Ros::default() });
         assert_eq!(stepped.relayable(), [ids(&[3, 4])]);
         let cut: Vec<TopicId> = stepped.relaying(0).cut().map(|(id, ..)| id).collect();
         assert_eq!(cut, ids(&[0, 1]));

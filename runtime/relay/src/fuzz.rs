@@ -4,16 +4,19 @@
 //! happened before: repeating a test repeats its disturbance, and a shorter window disturbs its messages in the same
 //! way. Operations that add up, such as a random walk, add up numbers of this kind.
 
+mod action;
 mod bias;
 mod burst_loss;
 mod change;
 mod custom;
+mod draws;
 mod drift;
 mod freeze;
 mod latency;
 mod noise;
 mod not_finite;
 mod packet_loss;
+mod per_wire;
 mod places;
 mod probe;
 mod random_value;
@@ -27,10 +30,10 @@ mod stuck_at;
 
 use sesame_base::time::SimTime;
 use sesame_plan::{Activation, Choice, Domain, Drain, Operation, OperationKind, Shape, TestOperation, ValueMode};
-use sesame_rng as rng;
 
 use crate::value::{Text, Value};
 
+pub use action::{Action, HELD_LIMIT, MessageContext};
 pub use bias::Bias;
 pub use burst_loss::BurstLoss;
 pub use change::Amount;
@@ -38,12 +41,14 @@ pub(crate) use custom::custom_operations;
 pub use custom::{
     Custom, FromChoice, MessageCall, OperationContext, OperationEntry, OperationHook, RunContext, chosen,
 };
+pub use draws::KeyedRng;
 pub use drift::Drift;
 pub use freeze::Freeze;
 pub use latency::Latency;
 pub use noise::Noise;
 pub use not_finite::MakeNotFinite;
 pub use packet_loss::PacketLoss;
+pub use per_wire::PerWire;
 pub use places::Places;
 pub use probe::unimplemented_operations;
 pub use random_value::{RandomText, RandomValue};
@@ -98,81 +103,6 @@ pub enum Disturbance {
     Resource(Resource),
     /// Calls the user's code.
     Custom(Custom),
-}
-
-/// The state of an operation per wire of its topic, by the wire's position in the topic.
-#[derive(Debug)]
-pub struct PerWire<T>(Vec<T>);
-
-impl<T> Default for PerWire<T> {
-    fn default() -> Self {
-        PerWire(Vec::new())
-    }
-}
-
-impl<T: Default> PerWire<T> {
-    /// The state for a wire; initially the default.
-    pub fn entry(&mut self, member: u64) -> &mut T {
-        let at = usize::try_from(member).expect("a topic has fewer wires than memory has places");
-        if at >= self.0.len() {
-            self.0.resize_with(at + 1, T::default);
-        }
-        &mut self.0[at]
-    }
-}
-
-/// The circumstances of a message: when, and on which wire of its topic, an operation acts on it.
-#[derive(Debug, Clone, Copy)]
-pub struct MessageContext {
-    /// Simulation time.
-    pub now: SimTime,
-    /// How long the operation has been active.
-    pub active: SimTime,
-    /// The wire's position in the topic.
-    pub member: u64,
-    /// The operation's random numbers for the message.
-    pub draws: KeyedRng,
-}
-
-/// What an operation does with a message.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Action {
-    /// Passes it on unchanged.
-    Unchanged,
-    /// Passes it on, changed.
-    Changed,
-    /// Drops it.
-    Dropped,
-    /// Passes it on this much later; with latency, not before messages that are held already.
-    Delayed(SimTime),
-    /// Passes it on, followed by this many copies.
-    Duplicated(u32),
-}
-
-/// The random numbers of one operation for one message: each is a function of the key.
-#[derive(Debug, Clone, Copy)]
-pub struct KeyedRng {
-    seed: u64,
-    message: u64,
-}
-
-impl KeyedRng {
-    /// The random numbers for the `index`th message on the `member`th wire of the operation's topic.
-    pub fn new(operation_seed: u64, member: u64, index: u64) -> Self {
-        let seed = if member == 0 { operation_seed } else { rng::derive_seed(operation_seed, "member", &[member]) };
-        KeyedRng { seed, message: index }
-    }
-
-    /// The `n`th number, uniform in `[0, 1)`.
-    pub fn unit(self, n: u64) -> f64 {
-        rng::keyed_unit(self.seed, self.message, n)
-    }
-
-    /// A standard normal number (Box–Muller) from the `n`th number and the next one.
-    pub fn normal(self, n: u64) -> f64 {
-        let radius = libm::sqrt(-2.0 * libm::log(1.0 - self.unit(n)));
-        radius * libm::cos(std::f64::consts::TAU * self.unit(n + 1))
-    }
 }
 
 impl Disturbance {

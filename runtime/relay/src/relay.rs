@@ -53,9 +53,6 @@ pub use finished::Finished;
 pub use listener::{Listener, MessageRef, OperationEvent};
 pub(crate) use marks::{beyond, reaching};
 
-/// The most messages that operations may hold back at once; beyond it, the oldest is released early, with a warning.
-pub const HELD_LIMIT: usize = 100_000;
-
 /// The most copies that operations may make in one event; beyond it, no more are made, with a warning.
 pub const COPIES_LIMIT: u32 = 10_000;
 

@@ -240,14 +240,14 @@ impl Monitor {
             if known > 0 {
                 ahead.extend(known, false, None);
             }
-            ahead.extend(FOREVER, true, Some(Unknown { known, extreme }));
+            ahead.extend(FOREVER, true, Some(&Unknown { known, extreme }));
             let value = ahead.robustness.front().map_or(extreme, |first| first.value + 0.0);
             if value.abs() == f64::MAX { extreme } else { value }
         };
         (extreme(f64::NEG_INFINITY), extreme(f64::INFINITY))
     }
 
-    fn extend(&mut self, end: i64, last: bool, unknown: Option<Unknown>) {
+    fn extend(&mut self, end: i64, last: bool, unknown: Option<&Unknown>) {
         let stretch = Stretch { end, last, unknown, whole: self.whole };
         self.root.extend(stretch, &self.values, &mut self.robustness);
         if self.decided.is_none() && !self.robustness.is_empty() {

@@ -29,6 +29,7 @@ use mcap::McapError;
 use mcap::records::Metadata;
 
 use sesame_base::observation::{Observation, Outcome};
+use sesame_base::visible::{visible_json, visible_lines};
 use sesame_plan::{CampaignPlan, Test};
 
 pub use crate::monitor::recorded::{Heard, RecordedMonitors};
@@ -71,7 +72,9 @@ pub struct Subject<'a> {
 impl Subject<'_> {
     fn metadata(&self) -> Metadata {
         let Subject { plan, number, test, simulator_seed } = *self;
-        let json = |value: serde_json::Result<String>| value.expect("plans and tests are plain data with text keys");
+        let json = |value: serde_json::Result<String>| {
+            visible_json(&value.expect("plans and tests are plain data with text keys")).into_owned()
+        };
         let entries = [
             ("runtime", env!("CARGO_PKG_VERSION").to_owned()),
             ("space", plan.space.clone()),
@@ -93,7 +96,9 @@ fn ending(plan: &CampaignPlan, observation: &Observation) -> Metadata {
         .zip(&observation.metrics)
         .map(|(metric, observed)| RecordedMetric { name: metric.name.clone(), value: observed.value })
         .collect();
-    let json = |value: serde_json::Result<String>| value.expect("observations are plain data with text keys");
+    let json = |value: serde_json::Result<String>| {
+        visible_json(&value.expect("observations are plain data with text keys")).into_owned()
+    };
     let mut metadata = how_it_ended(&observation.outcome);
     metadata.extend(owned([
         ("end_s", observation.end.to_string()),
@@ -106,7 +111,7 @@ fn ending(plan: &CampaignPlan, observation: &Observation) -> Metadata {
 
 fn how_it_ended(outcome: &Outcome) -> BTreeMap<String, String> {
     let mut entries = owned([("outcome", outcome.word().to_owned())]);
-    entries.extend(outcome.detail().map(|detail| ("outcome_detail".to_owned(), detail)));
+    entries.extend(outcome.detail().map(|detail| ("outcome_detail".to_owned(), visible_lines(&detail).into_owned())));
     entries
 }
 

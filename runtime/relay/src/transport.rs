@@ -12,6 +12,7 @@ pub mod clock;
 mod in_process;
 #[cfg(feature = "process")]
 mod process;
+pub mod round;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;

@@ -55,7 +55,7 @@ impl WireTable {
             .collect();
         let by_path = (0u32..).zip(&paths).map(|(at, (path, _))| (path.clone(), Wire(at))).collect();
         let mut table = WireTable { paths, by_path, links: Vec::new() };
-        let wiring = plan.simulator.transport.wiring();
+        let wiring = &plan.simulator.wiring;
         let mut links = Vec::new();
         for of in table.iter() {
             let distinguished = wiring.get(table.topic(of).index()).into_iter().flat_map(|it| &it.subscribers);

@@ -12,7 +12,6 @@ mod columns;
 mod cursor;
 mod difference;
 mod digest;
-mod earlier_plans;
 mod entered;
 mod error;
 mod files;
@@ -21,8 +20,10 @@ mod fresh;
 mod imported;
 mod lab_runs;
 mod left_out_operations;
+mod lost;
 mod monitors;
 mod original_extents;
+mod plan;
 mod quarantine;
 mod read_monitors;
 mod read_tests;
@@ -243,7 +244,7 @@ pub struct GenerationCoverage {
     pub evaluations: u32,
     /// Cells that enough tests have hit.
     pub covered: usize,
-    /// Cells there are.
+    /// All cells.
     pub cells: usize,
     /// Cells that a test can reach, as far as known, or has hit.
     pub feasible: usize,

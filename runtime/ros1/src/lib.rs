@@ -1,12 +1,10 @@
-//! ROS 1: its messages ([`codec`]), the definitions of its types ([`definition`]), and the runner as a node between
-//! real nodes.
+//! ROS 1: the definitions of its types ([`definition`]), and the runner as a node between real nodes.
 //!
-//! The codec and the definitions are pure. The node is an adapter around them, in Rust alone: nothing of ROS is needed
-//! to build or run it. It speaks XML-RPC and TCPROS itself, because it needs what no crate has: connection headers of
-//! others, under which it publishes and serves; services whose types are known only when it runs; bounds for everything
-//! that others send; and no interface but the loopback one.
+//! The definitions are pure, and so is the codec of messages, [`sesame_codec::ros1`]. The node is an adapter around
+//! them, in Rust alone: nothing of ROS is needed to build or run it. It speaks XML-RPC and TCPROS itself, because it
+//! needs what no crate has: connection headers of others, under which it publishes and serves; services whose types are
+//! known only when it runs; bounds for everything that others send; and no interface but the loopback one.
 
-pub mod codec;
 #[expect(clippy::disallowed_methods, clippy::disallowed_types, reason = "an adapter: it has connections")]
 mod connection;
 #[expect(clippy::disallowed_methods, reason = "an adapter: it waits for others")]

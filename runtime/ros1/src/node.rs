@@ -8,15 +8,19 @@
 mod host;
 mod inbox;
 mod listen;
+mod lock;
+mod publication;
 mod receive;
 mod send;
 mod serve;
+mod service;
+mod shared;
+mod subscription;
 mod watch;
 
 use std::net::{SocketAddr, TcpListener};
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::thread::{self, JoinHandle};
+use std::sync::atomic::AtomicUsize;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use crate::connection::{Connection, Stop};
@@ -24,17 +28,11 @@ use crate::master::{Address, AskError, Master};
 
 use self::inbox::Inbox;
 pub(crate) use self::inbox::Incoming;
-pub(crate) use self::receive::Subscription;
-pub(crate) use self::send::Publication;
-use self::serve::Calls;
-pub(crate) use self::serve::Service;
-use self::watch::Seen;
-
-/// The most connections at a time, in each direction.
-const MOST_CONNECTIONS: usize = 500;
-
-/// The most characters of a note, in which may be what others sent.
-const LONGEST_NOTE: usize = 600;
+use self::lock::lock;
+pub(crate) use self::publication::Publication;
+pub(crate) use self::service::Service;
+use self::shared::Shared;
+pub(crate) use self::subscription::Subscription;
 
 /// How long it takes at most to find out that nobody listens at an address.
 const LOOK: Duration = Duration::from_millis(100);
@@ -44,25 +42,6 @@ pub(crate) struct Node {
     shared: Arc<Shared>,
     /// Where it listens, to be woken.
     listens: [SocketAddr; 2],
-}
-
-/// What all threads of a node know.
-pub(crate) struct Shared {
-    pub(crate) name: String,
-    /// The host that others are told.
-    host: String,
-    /// The port for messages and calls.
-    port: u16,
-    pub(crate) master: Master,
-    pub(crate) stop: Stop,
-    pub(crate) inbox: Inbox,
-    subscriptions: Mutex<Vec<Subscription>>,
-    publications: Mutex<Vec<Publication>>,
-    services: Mutex<Vec<Service>>,
-    calls: Mutex<Calls>,
-    seen: Mutex<Seen>,
-    threads: Mutex<Vec<JoinHandle<()>>>,
-    connections: AtomicUsize,
 }
 
 /// Why a node cannot be started.
@@ -142,80 +121,4 @@ impl Drop for Node {
             let _ = thread.join();
         }
     }
-}
-
-impl Shared {
-    /// Starts a thread that ends when the node does.
-    fn spawn(self: &Arc<Self>, work: impl FnOnce(&Arc<Shared>) + Send + 'static) {
-        let shared = Arc::clone(self);
-        let started = thread::Builder::new().name("ros1".to_owned()).spawn(move || work(&shared));
-        let mut threads = lock(&self.threads);
-        threads.retain(|thread| !thread.is_finished());
-        match started {
-            Ok(thread) => threads.push(thread),
-            Err(error) => self.note(format!("a thread for a connection of ROS 1 cannot be started: {error}")),
-        }
-    }
-
-    /// Starts a thread for a connection, if there are not too many.
-    fn spawn_connection(self: &Arc<Self>, work: impl FnOnce(&Arc<Shared>) + Send + 'static) {
-        if self.connections.fetch_add(1, Ordering::Relaxed) >= MOST_CONNECTIONS {
-            self.connections.fetch_sub(1, Ordering::Relaxed);
-            self.note(format!(
-                "more than {MOST_CONNECTIONS} connections of ROS 1 were wanted; the others were refused"
-            ));
-            return;
-        }
-        self.spawn(move |shared| {
-            work(shared);
-            shared.connections.fetch_sub(1, Ordering::Relaxed);
-        });
-    }
-
-    /// Something for the user to know.
-    fn note(&self, mut note: String) {
-        if let Some((end, _)) = note.char_indices().nth(LONGEST_NOTE) {
-            note.truncate(end);
-            note.push('…');
-        }
-        self.inbox.note(note);
-    }
-
-    /// Waits, but not beyond the end of the node.
-    fn pause(&self, time: Duration) {
-        let end = std::time::Instant::now() + time;
-        while !self.stop.is_set() {
-            let left = end.saturating_duration_since(std::time::Instant::now());
-            if left.is_zero() {
-                return;
-            }
-            thread::sleep(left.min(crate::connection::LOOK));
-        }
-    }
-
-    /// Where calls of services reach it.
-    fn served_at(&self) -> String {
-        format!("rosrpc://{}:{}", self.host, self.port)
-    }
-
-    /// Takes the node out of the graph. A master that is gone has forgotten it anyway.
-    fn unregister(&self) {
-        let ask = |method: &str, parameters: &[&str]| self.master.ask(method, parameters).is_ok();
-        let topics: Vec<String> = lock(&self.subscriptions).iter().map(|it| it.topic.clone()).collect();
-        let offered: Vec<String> =
-            lock(&self.publications).iter().filter(|it| it.offer.is_some()).map(|it| it.topic.clone()).collect();
-        let served: Vec<String> =
-            lock(&self.services).iter().filter(|it| it.offer.is_some()).map(|it| it.path.clone()).collect();
-        let uri = self.master.uri.as_str();
-        let at = self.served_at();
-        // The first question without an answer is the last one.
-        let _ = topics.iter().all(|topic| ask("unregisterSubscriber", &[topic, uri]))
-            && offered.iter().all(|topic| ask("unregisterPublisher", &[topic, uri]))
-            && served.iter().all(|service| ask("unregisterService", &[service, &at]));
-    }
-}
-
-/// What a thread that panicked left is used all the same: each change is complete in itself.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

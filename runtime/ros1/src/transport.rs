@@ -4,6 +4,7 @@
 //! and the relay publishes on the name that subscribers know, with the type, the definition and the latching of the
 //! original publishers. A service that is cut is served under the name that clients know, in the same way.
 
+mod lost;
 mod presence;
 #[cfg(test)]
 mod tests;
@@ -13,13 +14,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use sesame_plan::{CampaignPlan, Channel, Clock, Ros1};
+use sesame_plan::{CampaignPlan, Channel, Clock, Ros};
 use sesame_relay::lifecycle::launch::Place;
 use sesame_relay::transport::bus::{Bus, Event, FOUND_AGAIN_WITHIN, Settings, on_bus};
 use sesame_relay::transport::{Connect, Transport, TransportError};
 use sesame_relay::value::Value;
 use sesame_relay::wire::Line;
 
+use self::lost::lost;
 use self::wired::{Clocked, Role, Wired, wire};
 use crate::master::Address;
 use crate::node::{Incoming, Node, Subscription};
@@ -46,23 +48,19 @@ pub fn ros1(folder: PathBuf) -> Connect {
 }
 
 fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
-    let sesame_plan::Transport::Ros1(ros1) = &plan.simulator.transport else {
-        unreachable!("the generator connects each kind of simulator by its own transport")
-    };
-    at_place(plan, ros1, Place::of_worker(folder.to_owned()))
+    at_place(plan, Place::of_worker(folder.to_owned()))
 }
 
 /// The transport of a worker whose programs run at this place.
-fn at_place(plan: &CampaignPlan, ros1: &Ros1, place: Place) -> Box<dyn Transport> {
-    let place = in_ros(plan, ros1, place);
-    let settings = Settings {
-        has_clock: matches!(ros1.clock, Clock::Topic { .. }),
-        resets: ros1.reset.is_some(),
-        addresses: vec![ros1.master.clone()],
+fn at_place(plan: &CampaignPlan, place: Place) -> Box<dyn Transport> {
+    let (sesame_plan::Transport::Ros1(ros1), Some(ros)) = (&plan.simulator.transport, &plan.simulator.ros) else {
+        unreachable!("the generator connects each kind of simulator by its own transport")
     };
+    let place = in_ros(plan, &ros1.master, place);
     let bus = Ros1Bus {
         plan: plan.clone(),
-        ros1: ros1.clone(),
+        master: ros1.master.clone(),
+        ros: ros.clone(),
         name: node_name(plan, place.worker),
         node: None,
         lines: Vec::new(),
@@ -70,7 +68,7 @@ fn at_place(plan: &CampaignPlan, ros1: &Ros1, place: Place) -> Box<dyn Transport
         services: Vec::new(),
         clock: None,
     };
-    on_bus(plan, Box::new(bus), settings, place)
+    on_bus(plan, Box::new(bus), Settings::of(plan), place)
 }
 
 /// What this process is called as a node: of two nodes of one name, the master ends the first.
@@ -82,10 +80,10 @@ fn node_name(plan: &CampaignPlan, worker: u32) -> String {
 }
 
 /// What launched programs are given.
-fn in_ros(plan: &CampaignPlan, ros1: &Ros1, place: Place) -> Place {
+fn in_ros(plan: &CampaignPlan, master: &str, place: Place) -> Place {
     let own = |name: &str| place.folder.join(name).display().to_string();
     let mut environment = vec![
-        ("ROS_MASTER_URI".to_owned(), ros1.master.clone()),
+        ("ROS_MASTER_URI".to_owned(), master.to_owned()),
         ("ROS_HOME".to_owned(), own("ros")),
         ("ROS_LOG_DIR".to_owned(), own("ros/log")),
     ];
@@ -97,7 +95,9 @@ fn in_ros(plan: &CampaignPlan, ros1: &Ros1, place: Place) -> Place {
 
 struct Ros1Bus {
     plan: CampaignPlan,
-    ros1: Ros1,
+    /// The address of the master, as the plan has it.
+    master: String,
+    ros: Ros,
     name: String,
     node: Option<Node>,
     lines: Vec<Wired>,
@@ -175,7 +175,7 @@ impl Ros1Bus {
 
 impl Bus for Ros1Bus {
     fn connect(&mut self, lines: &[Line], address: &dyn Fn(&str) -> String) -> Result<bool, TransportError> {
-        let master = address(&self.ros1.master);
+        let master = address(&self.master);
         let at = Address::read(&master).ok_or_else(|| {
             TransportError::Wiring(format!(
                 "`{master}` is not the address of a master, such as `http://127.0.0.1:11311`"
@@ -186,16 +186,17 @@ impl Bus for Ros1Bus {
         let lost = |error: crate::master::AskError| lost(&at, &error.to_string());
         (self.lines, self.roles, self.services) = (Vec::new(), Vec::new(), Vec::new());
         for line in lines {
-            let mut wired = wire(&self.plan, &self.ros1, line)?;
+            let mut wired = wire(&self.plan, &self.ros.interfaces, line)?;
             if line.channel == Channel::Topic {
                 let (roles, position) = (&mut self.roles, self.lines.len());
-                wired.subscribe(&node, &self.ros1, |source| roles.push(Role::Source { line: position, source }))?;
+                let each = |source| roles.push(Role::Source { line: position, source });
+                wired.subscribe(&node, &self.ros.interfaces, each)?;
             } else {
                 wired.serve(&node, &self.lines, &mut self.services, self.lines.len());
             }
             self.lines.push(wired);
         }
-        if let Clock::Topic { path } = &self.ros1.clock {
+        if let Clock::Topic { path } = &self.ros.clock {
             let path = wired::absolute(path);
             self.roles.push(Role::Clock);
             let subscription = node.subscribe(Subscription::new(&path, CLOCK, None, Vec::new())).map_err(lost)?;
@@ -246,7 +247,7 @@ impl Bus for Ros1Bus {
     }
 
     fn reset(&mut self, within: Duration) -> Result<(), TransportError> {
-        let (Some(service), Some(node)) = (&self.ros1.reset, &self.node) else { return Ok(()) };
+        let (Some(service), Some(node)) = (&self.ros.reset, &self.node) else { return Ok(()) };
         let service = wired::absolute(service);
         let failed = |problem: String| TransportError::Simulator(format!("the reset by `{service}` failed: {problem}"));
         let (header, reply) =
@@ -268,8 +269,4 @@ impl Bus for Ros1Bus {
         self.node = None;
         self.clock = None;
     }
-}
-
-fn lost(at: &Address, how: &str) -> TransportError {
-    TransportError::ConnectionLost { to: format!("the master at `{at}`"), how: how.to_owned() }
 }

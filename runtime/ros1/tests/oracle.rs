@@ -13,10 +13,10 @@ use std::sync::Arc;
 
 use serde::Deserialize;
 use serde_json::Value as Json;
+use sesame_codec::ros1::Codec;
 use sesame_plan::{Interface, WireType};
 use sesame_relay::value::{Fields, Record, Value};
 use sesame_relay::wire::Wanted;
-use sesame_ros1::codec::Codec;
 use sesame_ros1::definition::Texts;
 
 /// A line of `oracle.py`.

@@ -7,10 +7,10 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use rustdds::GUID;
+use sesame_codec::cdr::Codec;
 use sesame_plan::{Interface, InterfaceField, Primitive, WireType};
 use sesame_relay::value::{Fields, Record, Text, Value};
-
-use crate::cdr::{Codec, Wanted};
+use sesame_relay::wire::Wanted;
 
 /// The topic on which participants say what nodes they have.
 pub(crate) const DISCOVERY_TOPIC: &str = "ros_discovery_info";

@@ -4,10 +4,11 @@ use std::sync::Arc;
 
 use rustdds::rpc::SampleIdentity;
 use rustdds::{GUID, SequenceNumber};
+use sesame_codec::cdr::Codec;
 use sesame_plan::{Interface, InterfaceField, Primitive, WireType};
 use sesame_relay::value::{Fields, Record, Text, Value};
+use sesame_relay::wire::Wanted;
 
-use crate::cdr::{Codec, Wanted};
 use crate::dds::{DdsError, Endpoint, Participant, ReaderId, Sample, WriterId, mirrored};
 use crate::names;
 

@@ -4,6 +4,7 @@
 //! and the relay publishes on the name that subscribers know. A run begins when every wire has somebody at both ends.
 
 mod assembly;
+mod change;
 mod domain;
 mod free_running;
 mod lock_stepped;
@@ -13,6 +14,7 @@ mod served;
 mod service;
 mod session;
 mod traffic;
+mod wall_clock;
 mod watch;
 mod wires;
 
@@ -21,18 +23,20 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use sesame_base::time::SimTime;
-use sesame_plan::{CampaignPlan, NodeId, Ros2, TopicId};
+use sesame_plan::{CampaignPlan, NodeId, Ros};
 use sesame_relay::lifecycle::launch::{Launched, Place};
 use sesame_relay::relay::{Delivery, Exchange};
 use sesame_relay::simulator::Progress;
 use sesame_relay::transport::added::{AddedOnWire, join, objections};
 use sesame_relay::transport::clock::Ticks;
+use sesame_relay::transport::round::Promises;
 use sesame_relay::transport::{Capabilities, Connect, Incidents, Transport, TransportError, wall_time_since};
-use sesame_relay::wire::WireTable;
+use sesame_relay::wire::{Wire, WireTable};
 
+use self::change::Change;
 use self::domain::Domain;
-use self::orders::Change;
 use self::session::{Session, in_ros};
+use self::wall_clock::now;
 
 /// How long a system may take until it is complete, where nothing else is declared.
 const COMPLETE_WITHIN: Duration = Duration::from_secs(30);
@@ -49,16 +53,16 @@ pub fn ros2(folder: PathBuf) -> Connect {
 }
 
 fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
-    let sesame_plan::Transport::Ros2(ros2) = &plan.simulator.transport else {
+    let (sesame_plan::Transport::Ros2(ros2), Some(ros)) = (&plan.simulator.transport, &plan.simulator.ros) else {
         unreachable!("the generator connects each kind of simulator by its own transport")
     };
-    Box::new(System::new(plan.clone(), ros2.clone(), folder.to_owned()))
+    Box::new(System::new(plan.clone(), ros2.domain, ros.clone(), folder.to_owned()))
 }
 
 /// A system of ROS 2 nodes.
 struct System {
     plan: CampaignPlan,
-    ros2: Ros2,
+    ros: Ros,
     domain: u16,
     // Ended before the session: what it launched may want to say goodbye.
     launched: Launched,
@@ -77,8 +81,10 @@ struct System {
     wires: WireTable,
     /// What operations have changed and not yet restored.
     changes: Vec<Change>,
-    /// Answers that nodes owe which are stopped: they come when the nodes go on.
-    postponed: BTreeMap<NodeId, BTreeMap<TopicId, i64>>,
+    /// What its nodes promise to publish in a step.
+    promises: Promises,
+    /// The wires on which nodes owe answers that are stopped: these come when the nodes go on.
+    postponed: BTreeMap<NodeId, Vec<Wire>>,
     /// Nodes that were killed and started again, and have forgotten what they owe.
     restarted: BTreeSet<NodeId>,
     /// Whether something could not be restored, so that the next run must start afresh.
@@ -107,12 +113,14 @@ impl Zero {
 }
 
 impl System {
-    fn new(plan: CampaignPlan, ros2: Ros2, folder: PathBuf) -> Self {
-        let place = Place::of_worker(folder).remapping(&plan).in_domain(ros2.domain);
+    fn new(plan: CampaignPlan, domain: u16, ros: Ros, folder: PathBuf) -> Self {
+        let place = Place::of_worker(folder).remapping(&plan).in_domain(domain);
         let domain = u16::try_from(place.domain).unwrap_or(u16::MAX);
+        let wires = WireTable::new(&plan);
         System {
             added: Vec::new(),
-            wires: WireTable::new(&plan),
+            promises: Promises::new(&plan, &wires),
+            wires,
             changes: Vec::new(),
             postponed: BTreeMap::new(),
             spoilt: false,
@@ -120,7 +128,7 @@ impl System {
             launched: Launched::new(&plan, place),
             domain,
             plan,
-            ros2,
+            ros,
             session: None,
             reserved: None,
             now: SimTime::ZERO,
@@ -137,7 +145,7 @@ impl System {
         self.undo(None)?;
         self.postponed.clear();
         self.restarted.clear();
-        if self.session.is_none() || self.ros2.reset.is_none() || std::mem::take(&mut self.spoilt) {
+        if self.session.is_none() || self.ros.reset.is_none() || std::mem::take(&mut self.spoilt) {
             self.launched.end();
             self.session = None;
             if self.domain > LAST_DOMAIN {
@@ -149,7 +157,7 @@ impl System {
             if self.reserved.is_none() && !self.plan.is_guest() {
                 self.reserved = Some(Domain::take(self.domain)?);
             }
-            let session = Session::join(&self.plan, &self.ros2, relay.wires(), self.domain)?;
+            let session = Session::join(&self.plan, &self.ros, relay.wires(), self.domain)?;
             let session = self.session.insert(session);
             self.launched.start(seed)?;
             session.assemble(&self.plan, &mut self.launched, COMPLETE_WITHIN)?;
@@ -158,7 +166,7 @@ impl System {
         session.call_reset(&mut self.launched, now() + SILENCE)?;
         session.begin(&self.plan);
         session.tell_subscribers(relay);
-        self.zero = match (&self.ros2.clock, &self.ros2.step) {
+        self.zero = match (&self.ros.clock, &self.ros.step) {
             (_, Some(_)) => Zero::Steps,
             (sesame_plan::Clock::Wall, None) => Zero::Wall(now()),
             (sesame_plan::Clock::Topic { .. }, None) => Zero::Clock(session.tick(&mut self.launched, now() + SILENCE)?),
@@ -180,7 +188,7 @@ impl System {
 
 impl Transport for System {
     fn capabilities(&self) -> Capabilities {
-        Capabilities { lock_stepped: self.ros2.step.is_some(), resets: self.ros2.reset.is_some() }
+        Capabilities { lock_stepped: self.ros.step.is_some(), resets: self.ros.reset.is_some() }
     }
 
     fn reset(&mut self, seed: u64, relay: &mut dyn Exchange) -> Result<(), TransportError> {
@@ -192,7 +200,7 @@ impl Transport for System {
     }
 
     fn advance(&mut self, until: SimTime, relay: &mut dyn Exchange) -> Result<Progress, TransportError> {
-        let advanced = match self.ros2.step.as_ref().map(|step| step.step_ns) {
+        let advanced = match self.ros.step.as_ref().map(|step| step.step_ns) {
             Some(step) => self.take_step(SimTime::from_nanos(i64::try_from(step).unwrap_or(i64::MAX)), until, relay),
             None => self.run_freely(until, relay),
         };
@@ -273,9 +281,4 @@ impl System {
 /// That nothing was heard for too long.
 fn silent(awaited: String) -> TransportError {
     TransportError::Silent { awaited, limit: SILENCE.as_secs_f64() }
-}
-
-#[expect(clippy::disallowed_methods, reason = "an adapter: it waits for other processes")]
-fn now() -> Instant {
-    Instant::now()
 }

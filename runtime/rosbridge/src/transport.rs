@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use sesame_plan::{CampaignPlan, Channel, Clock, Dialect, Rosbridge};
+use sesame_plan::{CampaignPlan, Channel, Clock, Dialect, Ros, Rosbridge};
 use sesame_relay::lifecycle::launch::Place;
 use sesame_relay::transport::bus::echo::Echoes;
 use sesame_relay::transport::bus::secret::{Token, identity, trusted};
@@ -34,15 +34,12 @@ pub fn rosbridge(folder: PathBuf) -> Connect {
 }
 
 fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
-    let sesame_plan::Transport::Rosbridge(rosbridge) = &plan.simulator.transport else {
+    let (sesame_plan::Transport::Rosbridge(rosbridge), Some(ros)) = (&plan.simulator.transport, &plan.simulator.ros)
+    else {
         unreachable!("the generator connects each kind of simulator by its own transport")
     };
-    let settings = Settings {
-        has_clock: matches!(rosbridge.clock, Clock::Topic { .. }),
-        resets: rosbridge.reset.is_some(),
-        addresses: rosbridge.addresses().into_iter().map(str::to_owned).collect(),
-    };
-    on_bus(plan, Box::new(Bridge::new(plan, rosbridge, folder)), settings, place(plan, rosbridge, folder))
+    let bridge = Bridge::new(plan, rosbridge, ros, folder);
+    on_bus(plan, Box::new(bridge), Settings::of(plan), place(plan, rosbridge, folder))
 }
 
 /// Where launched programs run: as they would for a runner that is a node of ROS itself.
@@ -60,6 +57,7 @@ fn place(plan: &CampaignPlan, rosbridge: &Rosbridge, folder: &Path) -> Place {
 struct Bridge {
     plan: CampaignPlan,
     settings: Rosbridge,
+    ros: Ros,
     folder: PathBuf,
     payloads: Payloads,
     lines: Vec<Line>,
@@ -106,11 +104,12 @@ enum Heard {
 }
 
 impl Bridge {
-    fn new(plan: &CampaignPlan, settings: &Rosbridge, folder: &Path) -> Self {
+    fn new(plan: &CampaignPlan, settings: &Rosbridge, ros: &Ros, folder: &Path) -> Self {
         Bridge {
-            payloads: Payloads::new(plan, settings.dialect, &settings.interfaces),
+            payloads: Payloads::new(plan, settings.dialect, &ros.interfaces),
             plan: plan.clone(),
             settings: settings.clone(),
+            ros: ros.clone(),
             folder: folder.to_owned(),
             lines: Vec::new(),
             client: None,
@@ -218,7 +217,7 @@ impl Bridge {
                 Channel::Reply => {}
             }
         }
-        if let Clock::Topic { path } = &self.settings.clock {
+        if let Clock::Topic { path } = &self.ros.clock {
             self.topics.insert(path.clone(), Heard::Clock);
             client.stand(&subscribe(path, type_name("rosgraph_msgs/msg/Clock", self.settings.dialect)));
         }
@@ -384,10 +383,10 @@ const RESET: &str = "sesame reset";
 
 impl Bus for Bridge {
     fn listen(&mut self, address: &dyn Fn(&str) -> String) -> Result<(), TransportError> {
-        if self.proxies.is_some() || self.settings.proxies.is_empty() {
+        if self.proxies.is_some() || self.ros.proxies.is_empty() {
             return Ok(());
         }
-        let proxies = self.settings.proxies.iter().map(|proxy| self.proxy(proxy, address));
+        let proxies = self.ros.proxies.iter().map(|proxy| self.proxy(proxy, address));
         self.proxies = Some(Proxies::listen(proxies.collect::<Result<_, _>>()?)?);
         Ok(())
     }
@@ -462,7 +461,7 @@ impl Bus for Bridge {
     }
 
     fn reset(&mut self, within: Duration) -> Result<(), TransportError> {
-        let Some(service) = self.settings.reset.clone() else { return Ok(()) };
+        let Some(service) = self.ros.reset.clone() else { return Ok(()) };
         let call = Operation::CallService {
             id: Some(RESET.to_owned()),
             service: service.clone(),

@@ -259,25 +259,6 @@ fn seconds(time: f64) -> String {
     format!("{} s", number(time))
 }
 
-/// Whether a character must not be shown as it is: it has an effect on a terminal, on the direction of the text around
-/// it, or is nothing that a document may hold.
-fn hidden(c: char) -> bool {
-    c.is_control()
-        || matches!(c, '\u{200E}' | '\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}' | '\u{061C}')
-        || matches!(c, '\u{2028}' | '\u{2029}' | '\u{FFFE}' | '\u{FFFF}')
-}
-
-/// Text on one line, without characters that must not be shown.
-fn visible(text: &str) -> String {
-    text.chars()
-        .map(|c| match c {
-            '\n' | '\t' => ' ',
-            c if hidden(c) => '\u{FFFD}',
-            c => c,
-        })
-        .collect()
-}
-
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;

@@ -1,18 +1,18 @@
 //! What was found, as data.
 
 use serde::Serialize;
-use sesame_plan::Dialect;
+use sesame_plan::{Dialect, SimulatorKind};
 
 /// What was found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Facts {
-    /// What was looked at.
+    /// The system that was scanned.
     pub system: System,
     /// How long it was listened to, in seconds of wall time.
     pub seconds: f64,
     /// Whether there was more than a scan keeps.
     pub cut: bool,
-    /// The nodes, by name, without those of tools; none where a middleware does not know nodes.
+    /// The nodes, by name, without those of tools; none if the middleware does not reveal nodes.
     pub nodes: Vec<FoundNode>,
     /// The topics, by path, without those that every node has.
     pub topics: Vec<FoundTopic>,
@@ -54,16 +54,16 @@ pub enum System {
         /// The address of their master.
         master: String,
     },
-    /// Nodes of ROS behind a server of rosbridge.
+    /// ROS nodes behind a rosbridge server.
     Rosbridge {
         /// The address of the server.
         url: String,
         /// Which ROS is behind it.
         dialect: Dialect,
-        /// Whether it has the services of rosapi, which say what is there.
+        /// Whether it has the services of rosapi, which list the system.
         rosapi: bool,
     },
-    /// Clients of a broker of MQTT.
+    /// Clients of an MQTT broker.
     Mqtt {
         /// The address of the broker.
         url: String,
@@ -82,21 +82,28 @@ pub enum System {
 }
 
 impl System {
+    /// The kind of simulator that it is in a space.
+    pub const fn kind(&self) -> SimulatorKind {
+        match self {
+            System::Ros2 { .. } => SimulatorKind::Ros2,
+            System::Ros1 { .. } => SimulatorKind::Ros1,
+            System::Rosbridge { .. } => SimulatorKind::Rosbridge,
+            System::Mqtt { .. } => SimulatorKind::Mqtt,
+            System::Simlog { .. } => SimulatorKind::Simlog,
+        }
+    }
+
     /// Of which ROS it is; ROS 2 where it is of none.
     pub fn dialect(&self) -> Dialect {
         match self {
-            System::Ros1 { .. } => Dialect::Ros1,
             System::Rosbridge { dialect, .. } => *dialect,
-            System::Ros2 { .. } | System::Mqtt { .. } | System::Simlog { .. } => Dialect::Ros2,
+            _ => self.kind().properties().ros.unwrap_or_default(),
         }
     }
 
     /// Whether its messages have types of ROS.
     pub fn is_ros(&self) -> bool {
-        match self {
-            System::Ros2 { .. } | System::Ros1 { .. } | System::Rosbridge { .. } => true,
-            System::Mqtt { .. } | System::Simlog { .. } => false,
-        }
+        self.kind().properties().ros.is_some()
     }
 }
 
@@ -107,7 +114,7 @@ pub struct FoundNode {
     pub name: String,
     /// How many nodes have this name: more than 1 is a mistake of the system.
     pub count: usize,
-    /// Whether it answers, in ROS 1: the master also knows nodes that have ended without a word.
+    /// Whether it answers, in ROS 1: the master also lists nodes that ended without unregistering.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub answers: Option<bool>,
     /// The topics that it publishes.
@@ -116,7 +123,7 @@ pub struct FoundNode {
     pub subscribes: Vec<String>,
     /// The services that it serves.
     pub serves: Vec<String>,
-    /// The services of which it is a client, as far as the middleware tells.
+    /// The services of which it is a client, as far as the middleware reveals them.
     pub calls: Vec<String>,
 }
 
@@ -125,15 +132,15 @@ pub struct FoundNode {
 pub struct FoundTopic {
     /// Its path.
     pub path: String,
-    /// Its type: in ROS a name such as `sensor_msgs/msg/JointState`, or the name in DDS of one that is not ROS's;
-    /// elsewhere the name of a message that is among the types here, or `float64`, `int64`, `bool`, `string` or a list
-    /// of these, such as `float64[]`. Left out if nobody said it.
+    /// Its type, if it is known: in ROS a name such as `sensor_msgs/msg/JointState`, or the DDS name of a type from
+    /// elsewhere; otherwise the name of a message in `types`, or `float64`, `int64`, `bool`, `string` or a list of
+    /// these, such as `float64[]`.
     #[serde(rename = "type", skip_serializing_if = "Option::is_none")]
     pub ty: Option<String>,
     /// The hash of the type, as a publisher or subscriber announces it; in ROS 1 the MD5 of its definition.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hash: Option<String>,
-    /// The node of each publisher; one of no known node is `?`.
+    /// The node of each publisher; `?` for an unknown node.
     pub publishers: Vec<String>,
     /// The node of each subscriber, in the same way.
     pub subscribers: Vec<String>,
@@ -159,7 +166,7 @@ pub struct FoundTopic {
     pub messages: u64,
     /// The messages per second of wall time between the first and the last, if there were two.
     pub rate: Option<f64>,
-    /// Why nothing is known of its messages, if the reason is special.
+    /// Why nothing is known about its messages, if there is a particular reason.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub problem: Option<String>,
 }
@@ -169,12 +176,12 @@ pub struct FoundTopic {
 pub struct FoundService {
     /// Its path.
     pub path: String,
-    /// Its type, for example `std_srvs/srv/Trigger`. Left out if nobody said it.
+    /// Its type, for example `std_srvs/srv/Trigger`, if it is known.
     #[serde(rename = "type", skip_serializing_if = "Option::is_none")]
     pub ty: Option<String>,
-    /// The node of each server; one of no known node is `?`.
+    /// The node of each server; `?` for an unknown node.
     pub servers: Vec<String>,
-    /// The node of each client, in the same way, as far as the middleware tells.
+    /// The node of each client, in the same way, as far as the middleware reveals it.
     pub clients: Vec<String>,
 }
 
@@ -200,7 +207,7 @@ pub struct FoundType {
     /// Fields of payloads in JSON that a space cannot declare.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub left_out: Vec<LeftOut>,
-    /// Why its layout is unknown or of no use.
+    /// Why its layout is unknown or cannot be used.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub problem: Option<String>,
 }
@@ -236,6 +243,6 @@ pub struct FoundField {
 pub struct LeftOut {
     /// Its name.
     pub name: String,
-    /// Why, in a clause.
+    /// The reason, in a clause.
     pub why: String,
 }

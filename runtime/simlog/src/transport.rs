@@ -5,10 +5,10 @@
 //! subscribers in the next one, disturbed or not. All other topics are only listened to.
 //!
 //! When the messages of a step are complete: in version 3, when the message of the marker has come. Else, when the
-//! simulator has answered the step, each topic that a node publishes `every step` has sent one message on each of its
-//! names, and each message that was delivered has been answered where a node says that it `answers`. If a topic is
-//! heard of which no node says how many messages it has, nothing may have come for a settling time as well; a message
-//! that is later than that goes through the relay in the step after, which is noted where its time stamp shows it.
+//! simulator has answered the step, and everything has come that is owed by what nodes publish `every step` and by what
+//! they answer ([`round`](sesame_relay::transport::round)). If a topic is heard of which no node says how many messages
+//! it has, nothing may have come for a settling time as well; a message that is later than that goes through the relay
+//! in the step after, which is noted where its time stamp shows it.
 //!
 //! A run begins with a new connection and the length of a step. The plan launches the simulator afresh, or else the
 //! simulator must begin anew then, as ours do; one whose time goes on from the run before is refused.
@@ -26,7 +26,9 @@ use sesame_relay::lifecycle::launch::{Launched, Place};
 use sesame_relay::relay::{Delivery, Exchange};
 use sesame_relay::simulator::Progress;
 use sesame_relay::transport::bus::secret::trusted;
+use sesame_relay::transport::round::Promises;
 use sesame_relay::transport::{Capabilities, Connect, Incidents, Transport, TransportError};
+use sesame_relay::wire::WireTable;
 
 use self::lines::Lines;
 use self::round::Round;
@@ -74,6 +76,7 @@ fn transport(plan: &CampaignPlan, folder: &Path, in_runner: bool) -> System {
     let place = Place { in_runner, ..Place::of_worker(folder.to_owned()) };
     System {
         launched: Launched::new(plan, place),
+        promises: Promises::new(plan, &WireTable::new(plan)),
         plan: plan.clone(),
         settings: settings.clone(),
         folder: folder.to_owned(),
@@ -88,6 +91,8 @@ fn transport(plan: &CampaignPlan, folder: &Path, in_runner: bool) -> System {
 /// A simulator with what is around it.
 struct System {
     plan: CampaignPlan,
+    /// What its nodes promise to publish in a step.
+    promises: Promises,
     settings: Simlog,
     folder: PathBuf,
     // Ended before the launched programs: what is launched may want to say goodbye.
@@ -106,8 +111,7 @@ impl System {
     }
 
     fn options(&self) -> Result<Options, TransportError> {
-        let port = self.launched.port();
-        let url = |url: &String| port.map_or_else(|| url.clone(), |port| url.replace("{port}", &port.to_string()));
+        let url = |url: &String| self.launched.fill(url);
         let ca = self.settings.ca.as_ref().map(|file| trusted(file, &self.folder)).transpose()?;
         Ok(Options {
             topics_url: self.settings.topics_url.as_ref().map(url),
@@ -181,8 +185,8 @@ impl System {
         // What was held back reaches its subscribers before the step begins.
         relay.advance(self.now, &mut self.deliveries);
         let before = session.start.or(self.start).map(|start| start.middle_of(self.now, step));
-        let mut round = Round::new(&self.plan, relay.wires(), session.marker, before);
-        session.deliver(&self.plan, &mut self.deliveries, relay, self.now, &mut round)?;
+        let mut round = Round::new(&self.promises, session.marker, before);
+        session.deliver(&self.promises, &mut self.deliveries, relay, self.now, &mut round)?;
         let answer = session.client.begin_step();
         let settle = Duration::from_nanos(self.settings.settle_ns);
         let mut began = now();
@@ -192,7 +196,7 @@ impl System {
                 round.stepped = answer.wait(Duration::from_millis(1)).map_err(fault)?;
             }
             let complete = round.stepped.is_some() && round.is_complete();
-            if complete && round.is_certain(&session.lines) {
+            if complete && round.is_certain(&self.promises, &session.lines) {
                 break;
             }
             let ended = round.stepped.is_some_and(|stepped| stepped.ended);
@@ -214,7 +218,7 @@ impl System {
             }
             round.take(&session.lines, &mut heard);
             if began.elapsed() > SILENCE {
-                let awaited = round.awaited(&self.plan, &session.lines);
+                let awaited = round.awaited(relay.wires());
                 return Err(TransportError::Silent { awaited, limit: SILENCE.as_secs_f64() });
             }
         }

@@ -26,13 +26,13 @@ pub enum Running {
     Resume(run::ResumeOptions),
     /// Run the regression tests and check their expectations
     Known(known::Options),
-    /// Run one test again and again, to see what of its result is chance
+    /// Run one test several times, to see how much of its result is chance
     Repeat(repeat::Options),
-    /// Run recorded tests again with fresh seeds of the simulator and say whether what was found comes again
+    /// Run recorded tests again with fresh simulator seeds, and report whether their findings recur
     Confirm(confirm::Options),
     /// Run variations of a recorded test along one dimension, to see where something begins and ends
     Explore(explore::Options),
-    /// Run recorded tests in a lab, and record what they show there as results of their own
+    /// Run recorded tests in a lab, and record the lab's results
     #[cfg(feature = "process")]
     Physical(physical::Options),
     /// Run the scenario without disturbance, in simulation and in a lab, and compare
@@ -44,18 +44,18 @@ pub enum Running {
     /// Prepare a campaign: `null`, `mitm`, `known` and `monitors` in this order, up to the first that fails
     #[cfg(feature = "process")]
     Prepare(prepare::Options),
-    /// Fit the simulation to what a lab recorded, and say how much smaller the reality gap is then
+    /// Fit the simulation to the recordings of a lab, and report how much smaller the reality gap becomes
     #[cfg(all(feature = "process", feature = "mcap"))]
     Compensate(compensate::Options),
-    /// Run a recorded test again just as it was and say whether it is the same, bit for bit
+    /// Run a recorded test again unchanged, and report whether its result is the same, bit for bit
     Replay(replay::Options),
-    /// Make a failing test smaller for as long as it fails as it did: fewer operations, shorter, milder
+    /// Reduce a failing test while it still fails in the same way: fewer operations, shorter, milder
     Shrink(shrink::Options),
     /// Feed a recording to the campaign's metrics, without a simulator
     ReplayRecording(replay_recording::Options),
-    /// Compare what the monitors decide on two recordings, and say how late messages may be
+    /// Compare what the monitors decide on two recordings, and report how late messages may be
     Monitors(monitors::Options),
-    /// Run a recorded test again without the mitigation of its monitors, and say what that was worth
+    /// Run a recorded test again without the mitigation of its monitors, and report what the mitigation was worth
     Twin(twin::Options),
 }
 
@@ -64,11 +64,11 @@ pub enum Running {
 pub enum Showing {
     /// Print a recorded test as a `test` block for the `.sesame` file
     Export(export::Options),
-    /// Write the page with pictures anew and print what was found, also of an unfinished run
+    /// Write the page again and print the findings, also of an unfinished run
     Report(report::Options),
     /// List all tests of a run
     List(view::Which),
-    /// Show one test whole: operations, effects, metrics, requirements
+    /// Show one test in full: operations, effects, metrics, requirements
     Show {
         /// The test, for example `T158`
         test: String,

@@ -47,13 +47,14 @@ pub struct Options {
     /// Folder with the results of the lab, for example `results/42-hall`
     #[arg(value_name = "LAB")]
     lab: PathBuf,
-    /// Folder of the run that recorded the tests; by default the one beside it after which it is named, `results/42`
+    /// Folder of the run that recorded the tests; by default the one after which the lab's folder is named,
+    /// `results/42`
     #[arg(long, value_name = "DIR")]
     results: Option<PathBuf>,
-    /// Tests to which nothing is fitted, and by which the fit is judged; by default every third
+    /// Tests that are kept out of the fit and by which it is judged; by default every third
     #[arg(long, value_name = "TEST", value_delimiter = ',')]
     hold_out: Vec<String>,
-    /// How many sets of values are tried
+    /// The number of sets of values to try
     #[arg(long, default_value_t = 60, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     evaluations: u32,
     /// End after the fit, without running the campaign again with the compensated simulation
@@ -118,7 +119,7 @@ pub(super) fn compensate(session: &Session, options: &Options) -> Result<ExitCod
     }
     let (fitted_to, held_out) = split(&campaign, &traces, &options.hold_out)?;
     if held_out.is_empty() {
-        say(format_args!("note: with so few tests none is kept aside, so nothing says how the fit does elsewhere"));
+        say(format_args!("note: with so few tests none is held out, so nothing shows how the fit does on others"));
     }
 
     let files = claim_files(&session.runner, &session.plan)?;
@@ -131,13 +132,13 @@ pub(super) fn compensate(session: &Session, options: &Options) -> Result<ExitCod
     let cannot = |error| Failure(format!("cannot keep what is tried in {}: {error}", shown(&tried)));
     let mut journal = Journal::open(&tried, &of).map_err(cannot)?;
     if journal.known() > 0 {
-        say(format_args!("   Going on with a fit of which {} sets of values were tried", journal.known()));
+        say(format_args!("Continuing a fit of which {} sets of values were tried", journal.known()));
     }
     let of = (&found, &task, seed);
     let fit = fitted(session, options, &campaign, of, (&fitted_to, &held_out), &mut journal, &interrupted);
     files.finish()?;
     let Some(outcome) = fit? else {
-        say(format_args!("stopped; the same command goes on with what was tried, which is in {}", shown(&tried)));
+        say(format_args!("stopped; the same command continues from the tried values in {}", shown(&tried)));
         return Ok(ExitCode::from(STOPPED));
     };
     let for_people = options.output.format() == Format::Text;

@@ -28,16 +28,16 @@ pub struct Options {
     /// The tests, for example `T158 T17`; by default those of the front (with `--violations` those that violate)
     #[arg(value_name = "TEST")]
     tests: Vec<String>,
-    /// Run each test again that violates a requirement and was run once only, on the front or not
+    /// Run again each test that violates a requirement and was run only once, on the front or not
     #[arg(long, conflicts_with = "tests")]
     violations: bool,
-    /// How often each is run again, beside the times it was before
+    /// The number of further runs of each test
     #[arg(short = 'n', long, default_value_t = 5, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     times: u32,
     /// Folder of the run, for example `results/42`; by default the latest
     #[arg(long, value_name = "DIR")]
     results: Option<PathBuf>,
-    /// How to show what came of it
+    /// The format of the results
     #[arg(long, value_enum, default_value_t)]
     format: Format,
     #[command(flatten)]

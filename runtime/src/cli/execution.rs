@@ -36,8 +36,8 @@ const MOST_WORKERS: usize = 512;
 /// How tests are run.
 #[derive(Debug, Default, Args)]
 pub(super) struct ExecutionArgs {
-    /// How many worker processes, at most 512; by default one per processor, and never more than tests. It is always
-    /// one where all would use the same system: an address without `{port}` or `{worker}`
+    /// The number of worker processes, at most 512 and never more than tests; by default one per processor. Always one
+    /// if all would use the same system, at an address without `{port}` or `{worker}`
     #[arg(long, value_name = "N", value_parser = workers)]
     workers: Option<NonZeroUsize>,
     /// Seconds of wall time after which a test is stopped; by default 20 times the reference run, at least 60
@@ -46,8 +46,8 @@ pub(super) struct ExecutionArgs {
     /// Seconds of wall time after which the first reference run is stopped; by default those of `--timeout`, or 600
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     reference_timeout: Option<Duration>,
-    /// Go on although nothing receives what an operation disturbs: the simulator does not subscribe to its topic, and
-    /// no outbound metric and no monitor reads it
+    /// Continue although nothing receives what an operation disturbs: the simulator does not subscribe to its topic,
+    /// and no outbound metric or monitor reads it
     #[arg(long)]
     allow_unheard: bool,
 }
@@ -55,7 +55,7 @@ pub(super) struct ExecutionArgs {
 /// How a command says what was found.
 #[derive(Debug, Default, Args)]
 pub(super) struct OutputArgs {
-    /// How to show what was found; as JSON there is nothing else on standard output
+    /// The format of the results; with JSON, standard output contains nothing else
     #[arg(long, value_enum, default_value_t)]
     format: Format,
     /// Write requirements, expectations, crashes and timeouts as JUnit test cases into this file
@@ -109,7 +109,7 @@ impl ExecutionArgs {
         // A file that is changed is changed for every simulator.
         let workers = if files.may_change { 1 } else { self.processes(&session.plan) };
         if self.workers.is_some_and(|asked| asked.get() > workers) {
-            let since = match session.plan.simulator.transport.shared_address() {
+            let since = match session.plan.simulator.shared_address() {
                 Some(address) => format!(
                     "all workers would use the one system at `{address}`; `{{port}}` or `{{worker}}` in an address gives \
                      each its own"
@@ -142,7 +142,7 @@ impl ExecutionArgs {
 
     /// One where all would use the same system, whatever is asked for.
     fn processes(&self, plan: &CampaignPlan) -> usize {
-        if plan.simulator.transport.shared_address().is_some() {
+        if plan.simulator.shared_address().is_some() {
             return 1;
         }
         let processors = || std::thread::available_parallelism().map_or(1, NonZeroUsize::get).min(MOST_WORKERS);

@@ -31,13 +31,13 @@ pub struct Options {
     /// The dimension: P1 for how strong the operations are, T1 for when they are active, T2 for how long
     #[arg(long, value_name = "DIMENSION", value_parser = dimension)]
     vary: Dimension,
-    /// How many variations
+    /// The number of variations
     #[arg(short = 'n', long, default_value_t = 7, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     times: u32,
-    /// Where they begin; by default as low as the test can go
+    /// The first coordinate; by default as low as the test can go
     #[arg(long, value_name = "COORDINATE")]
     from: Option<f64>,
-    /// Where they end; by default as high as the test can go
+    /// The last coordinate; by default as high as the test can go
     #[arg(long, value_name = "COORDINATE")]
     to: Option<f64>,
     /// Folder of the run that recorded the test, for example `results/42`; by default the latest

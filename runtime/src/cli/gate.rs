@@ -19,7 +19,7 @@ use crate::cli::terminal::say;
 /// Which findings make a command end with exit code 3.
 #[derive(Debug, Default, Args)]
 pub(super) struct Gate {
-    /// Exit with code 3 when this was found; several are separated by commas, or the option is given again
+    /// Exit with code 3 if this was found; separate several by commas, or repeat the option
     #[arg(long, value_enum, value_name = "FINDING", value_delimiter = ',')]
     fail_on: Vec<Finding>,
 }

@@ -28,15 +28,15 @@ pub struct Options {
     /// Names of regression tests; by default all that this campaign can run
     #[arg(value_name = "NAME")]
     names: Vec<String>,
-    /// The seed of the simulator's randomness, for all of them; by default each has the `simulator seed` that it names,
-    /// and that of the campaign's seed if it names none
+    /// The seed that determines the simulator's seed of each test; by default a test has its own `simulator seed`, or
+    /// one determined by the campaign's seed
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     /// Run them in simulation and in this lab, and compare
     #[cfg(feature = "process")]
     #[arg(long, value_name = "NAME", conflicts_with_all = ["junit", "fail_on"])]
     lab: Option<String>,
-    /// With `--lab`, go on in this folder, for example `results/known-hall`: what is complete is not run again
+    /// With `--lab`, continue in this folder, for example `results/known-hall`; complete runs are not repeated
     #[cfg(feature = "process")]
     #[arg(long, value_name = "DIR", requires = "lab", conflicts_with = "results")]
     resume: Option<PathBuf>,

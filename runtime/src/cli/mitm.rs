@@ -16,13 +16,13 @@ use crate::lab::find;
 /// How often each stage is run, and where.
 #[derive(Debug, Args)]
 pub struct Options {
-    /// How often each stage is run
+    /// The number of runs of each stage
     #[arg(long, default_value_t = 3, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     runs: u32,
     /// The lab in which the stages are run; by default in simulation
     #[arg(long, value_name = "NAME")]
     lab: Option<String>,
-    /// The seed of the simulator's seed, which is one for all runs; by default the campaign's
+    /// The seed that determines the simulator's seed, the same for all runs; by default the campaign's
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     #[command(flatten)]

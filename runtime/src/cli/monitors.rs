@@ -20,18 +20,18 @@ pub(super) use compared::compared;
 pub struct Options {
     /// The first recording: a file, a test of the run such as `T17`, or a test of another run such as `42-hall/T3`
     first: PathBuf,
-    /// The second recording, likewise
+    /// The second recording, in the same notation
     second: PathBuf,
     /// Compare this monitor only; may be repeated
     #[arg(long = "monitor", value_name = "NAME")]
     monitors: Vec<String>,
-    /// Seconds by which the times of a decision may differ; by default they may differ by any time
+    /// Seconds by which the times of a decision may differ; by default any number
     #[arg(long, value_name = "SECONDS", value_parser = not_negative)]
     within: Option<f64>,
     /// Folder of the run with the tests, for example `results/42`; by default the latest
     #[arg(long, value_name = "DIR")]
     results: Option<PathBuf>,
-    /// How to show what was found
+    /// The format of the results
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 }
@@ -174,8 +174,8 @@ fn recording(session: &Session, options: &Options, named: &std::path::Path) -> R
         let folder = shown(repository.folder());
         let again = session.caller.command("replay", &[&original, "--record", "--results", &folder]);
         Failure(format!(
-            "{} has no recording: `record mcap all` in the campaign makes one of each test, and this makes one of this \
-             test, if it comes out the same:\n    {again}",
+            "{} has no recording: `record mcap all` in the campaign records one for each test, and this records one \
+             for this test, if its result is the same:\n    {again}",
             TestNumber(number)
         ))
     })

@@ -17,13 +17,13 @@ use crate::cli::session::Session;
 /// How often the scenario is run, and where.
 #[derive(Debug, Args)]
 pub struct Options {
-    /// How often it is run on each side
+    /// The number of runs on each side
     #[arg(long, default_value_t = 3, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     runs: u32,
     /// The lab; by default the only one of the space that runners reach, if there is exactly one
     #[arg(long, value_name = "NAME")]
     lab: Option<String>,
-    /// The seed of the simulator's seeds; by default the campaign's
+    /// The seed that determines the simulator's seeds; by default the campaign's
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     #[command(flatten)]

@@ -22,7 +22,7 @@ pub(super) fn refuse_over_budget(session: &Session, results: &Path) -> Result<()
         let stages = match stages(session, &folder) {
             Ok(stages) => stages,
             Err(Failure(words)) => {
-                say(format_args!("note: {} cannot be read and is passed over: {words}", shown(&folder)));
+                say(format_args!("note: {} cannot be read and is skipped: {words}", shown(&folder)));
                 continue;
             }
         };

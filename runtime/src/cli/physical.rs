@@ -32,7 +32,7 @@ pub struct Options {
     /// The lab; by default the only one of the space
     #[arg(long, value_name = "NAME")]
     lab: Option<String>,
-    /// How often each test is run; by default as often as the lab says
+    /// The number of runs of each test; by default the lab's `repeats`
     #[arg(short = 'n', long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     times: Option<u32>,
     /// Folder of the run that recorded the tests, for example `results/42`; by default the latest
@@ -41,7 +41,7 @@ pub struct Options {
     /// Folder in which the results of the lab get a folder of their own; by default beside the run
     #[arg(long, value_name = "DIR")]
     into: Option<PathBuf>,
-    /// Run tests that the lab excludes as too dangerous, too
+    /// Also run tests that the lab excludes as too dangerous
     #[arg(long)]
     although_excluded: bool,
     #[command(flatten)]

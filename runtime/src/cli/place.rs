@@ -28,9 +28,9 @@ fn same(compiled_for: &Path, wanted: &Path) -> Result<(), String> {
         return Ok(());
     }
     Err(format!(
-        "this program was built for the runner in {}, and is asked to run for the one in {}: cargo takes them for one, \
-         since their spaces and campaigns have the same names and they share a target folder, or since one is a copy of \
-         the other; `touch {}` and run it again",
+        "this program was built for the runner in {}, and is asked to run for the one in {}: cargo confuses them, \
+         because their spaces and campaigns have the same names and they share a target folder, or because one is a \
+         copy of the other; `touch {}` and run it again",
         compiled_for.display(),
         wanted.display(),
         wanted.join("src/main.rs").display()

@@ -25,13 +25,13 @@ use crate::lab::find;
 /// Where the results of preparatory testing go, and how they are shown.
 #[derive(Debug, Default, Args)]
 pub(super) struct PreparationArgs {
-    /// Go on in this folder, for example `results/mitm`, with the same options: what is complete is not run again
+    /// Continue in this folder, for example `results/mitm`, with the same options; complete runs are not repeated
     #[arg(long, value_name = "DIR", conflicts_with = "results")]
     resume: Option<PathBuf>,
     /// Folder in which the results get a folder of their own; by default `results` in the runner's folder
     #[arg(long, value_name = "DIR")]
     results: Option<PathBuf>,
-    /// How to show what was found; as JSON there is nothing else on standard output
+    /// The format of the results; with JSON, standard output contains nothing else
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 }
@@ -107,7 +107,7 @@ impl<'a> Work<'a> {
         } else {
             let (recorder, made) = begin(session, &self.folder, name, plan, task, seed, execution)?;
             if made != folder {
-                return Err(Failure(format!("{} is taken by something else than results", shown(&folder))));
+                return Err(Failure(format!("{} exists and does not contain results", shown(&folder))));
             }
             recorder
         };

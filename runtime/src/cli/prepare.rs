@@ -14,7 +14,7 @@ use crate::cli::{known, mitm, monitors, null};
 /// How often things are run, and where.
 #[derive(Debug, Args)]
 pub struct Options {
-    /// How often the scenario is run without disturbance, on each side and in each stage
+    /// The number of runs without disturbance on each side, and in each stage
     #[arg(long, default_value_t = 3, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     runs: u32,
     /// The lab; by default the only one of the space that runners reach, if there is exactly one
@@ -23,7 +23,7 @@ pub struct Options {
     /// The seed of all runs; by default the campaign's
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Go on with the next step although one fails
+    /// Continue with the next step after one that fails
     #[arg(long)]
     keep_going: bool,
     #[command(flatten)]

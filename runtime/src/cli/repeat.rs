@@ -19,7 +19,7 @@ use crate::cli::session::{Session, World};
 pub struct Options {
     /// A regression test's name, or a recorded test, for example `T158`
     test: String,
-    /// How often
+    /// The number of runs
     #[arg(value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     times: u32,
     /// Folder of the run that recorded the test, for example `results/42`; by default the latest
@@ -28,8 +28,8 @@ pub struct Options {
     /// Folder in which the results get a folder of their own; by default beside the run that recorded the test
     #[arg(long, value_name = "DIR")]
     into: Option<PathBuf>,
-    /// The seed of the simulator's seeds; by default one of this test's own, so that the run that found it is not part
-    /// of it
+    /// The seed that determines the simulator's seeds; by default one of this test's own, so that the run that found it
+    /// is not repeated
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     #[command(flatten)]

@@ -25,12 +25,11 @@ pub struct Options {
     test: String,
     #[command(flatten)]
     which: Which,
-    /// Write the trace of the run as that of the recorded test, if it comes out the same: `traces/T158.mcap` in the
-    /// folder of the run
+    /// If the result is the same, record the trace of the test: `traces/T158.mcap` in the folder of the run
     #[arg(long)]
     record: bool,
-    /// Seconds of wall time after which it is stopped; by default 20 times what it took, at least 60, or what stopped
-    /// it
+    /// Seconds of wall time after which it is stopped; by default 20 times its recorded time, at least 60, or the limit
+    /// that stopped it
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     timeout: Option<Duration>,
 }

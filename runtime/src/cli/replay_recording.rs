@@ -18,7 +18,7 @@ pub struct Options {
     /// The recording, for example `results/42/traces/T17.mcap`
     #[arg(value_name = "FILE")]
     recording: PathBuf,
-    /// How to show what came of it
+    /// The format of the results
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 }

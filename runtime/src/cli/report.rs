@@ -18,8 +18,8 @@ pub struct Options {
     /// File of the page; by default `report.html` beside the results
     #[arg(long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Folder of a run from before certificates of monitors were mended: the page shows in the same tests which hazards
-    /// were missed before and after
+    /// Folder of a run from before certificates of monitors were mended: the page compares which hazards were missed in
+    /// the same tests before and after
     #[arg(long, value_name = "DIR")]
     before: Option<PathBuf>,
     #[command(flatten)]

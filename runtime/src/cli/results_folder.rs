@@ -32,7 +32,7 @@ pub(super) fn refuse_changed(session: &Session, repository: &Repository, test: u
     let Some(difference) = repository.plan().model_difference(&session.plan) else { return Ok(()) };
     Err(Failure(format!(
         "the model has changed since {} was recorded ({difference}), so T{test} cannot be run as it was. This writes it as a \
-         `test` for the `.sesame` file, which runs in the model of today:\n    {}",
+         `test` for the `.sesame` file, which runs in the current model:\n    {}",
         shown(repository.path()),
         session.caller.command("export", &[&format!("T{test}"), "--results", &shown(repository.folder())])
     )))

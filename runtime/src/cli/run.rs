@@ -17,7 +17,7 @@ use crate::cli::session::{Session, World};
 /// How a campaign is run. Nothing here but the seed and the number of evaluations changes results.
 #[derive(Debug, Args)]
 pub(super) struct Options {
-    /// The seed that decides everything; by default the campaign's
+    /// The seed that determines everything; by default the campaign's
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     /// Evaluate this many tests instead of the campaign's number
@@ -27,7 +27,7 @@ pub(super) struct Options {
     /// `results/42-hall-compensated`
     #[arg(long, value_name = "DIR")]
     compensation: Option<PathBuf>,
-    /// Run although a hook of an objective is not filled in: tests then count as unmeasured
+    /// Run although a hook of an objective is still a stub: tests then count as unmeasured
     #[arg(long)]
     allow_unimplemented: bool,
     /// Run although the latest `mitm` of the same plan exceeded the relay budget

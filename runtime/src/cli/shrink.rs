@@ -28,15 +28,15 @@ pub struct Options {
     /// Folder in which the results get a folder of their own; by default beside the run that recorded the test
     #[arg(long, value_name = "DIR")]
     into: Option<PathBuf>,
-    /// Insist on this requirement only (may be given again); by default on each that the test violates, or that its run
-    /// crashes or times out if it did
+    /// The requirement that a smaller test must violate; may be repeated. By default it must violate every requirement
+    /// that the test violates, or crash or time out as the test did
     #[arg(long, value_name = "NAME")]
     requirement: Vec<String>,
-    /// In how many runs a smaller test has to fail: the first with the simulator's seed of the test, the others with
-    /// seeds of their own. More than one for a simulator that is noisy
+    /// In how many runs a smaller test must fail, for noisy simulators: the first has the test's simulator seed, the
+    /// others have seeds of their own
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     runs: u32,
-    /// Runs of the simulator at most
+    /// The maximum number of simulator runs
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
     evaluations: u32,
     #[command(flatten)]
@@ -121,8 +121,8 @@ pub(super) fn failing(repository: &Repository, record: &TestRecord, wanted: &[St
     }
     if violated.is_empty() {
         return Err(Failure(format!(
-            "{test} violates no requirement and its run came to its end, so there is nothing that a smaller test could \
-             keep; the command `list` shows which tests violate what"
+            "{test} violates no requirement and its run completed, so there is no failure for a smaller test to keep; \
+             the command `list` shows which tests violate what"
         )));
     }
     let chosen: Vec<RequirementId> = violated

@@ -2,6 +2,7 @@
 
 use std::process::ExitCode;
 
+use sesame_base::visible::visible_json;
 use sesame_results::report::TextOptions;
 
 use crate::cli::failure::Failure;
@@ -11,7 +12,7 @@ pub(super) use crate::said::{Format, print, say};
 /// Prints a value as JSON, indented.
 pub(super) fn print_json(value: &impl serde::Serialize) -> Result<ExitCode, Failure> {
     let text = serde_json::to_string_pretty(value)?;
-    print(&format!("{text}\n"))
+    print(&format!("{}\n", visible_json(&text)))
 }
 
 /// On a terminal as wide as it is, with colour unless `NO_COLOR` says no; elsewhere plain and as wide as it comes.

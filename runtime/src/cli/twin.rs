@@ -22,7 +22,7 @@ use crate::cli::view::Which;
 pub struct Options {
     /// The test, for example `T158`
     test: String,
-    /// Withhold the mitigation of this monitor only; may be repeated. By default that of all monitors is withheld
+    /// Withhold the mitigation of this monitor only; may be repeated. By default no monitor's mitigation is sent
     #[arg(long, value_name = "MONITOR")]
     without: Vec<String>,
     #[command(flatten)]
@@ -30,8 +30,8 @@ pub struct Options {
     /// Write the trace of the twin into this file, which must not exist
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
-    /// Seconds of wall time after which the twin is stopped; by default 20 times what the test took, at least 60, or
-    /// what stopped it
+    /// Seconds of wall time after which the twin is stopped; by default 20 times the test's time, at least 60, or the
+    /// limit that stopped the test
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     timeout: Option<Duration>,
 }

@@ -18,7 +18,7 @@ pub struct Which {
     /// Folder of the run, for example `results/42`; by default the latest
     #[arg(long, value_name = "DIR")]
     pub(super) results: Option<PathBuf>,
-    /// How to show it
+    /// The format of the output
     #[arg(long, value_enum, default_value_t)]
     pub(super) format: Format,
 }

@@ -8,7 +8,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use sesame_base::observation::ChangeCause;
-use sesame_base::visible::visible;
+use sesame_base::visible::{visible, visible_json};
 use sesame_plan::CampaignPlan;
 use sesame_relay::monitor::{Cause, Decided};
 
@@ -89,7 +89,7 @@ impl<'p> Shown<'p> {
             state: monitor.state_name(decided.state),
             causes: causes.collect(),
         };
-        Ok(serde_json::to_string(&line)? + "\n")
+        Ok(visible_json(&serde_json::to_string(&line)?).into_owned() + "\n")
     }
 
     fn text(&self, decided: &Decided) -> String {

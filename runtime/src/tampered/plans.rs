@@ -1,12 +1,12 @@
 //! Plans in which one thing is wrong that later code relies on: each is refused with the place of it.
 
 use sesame_plan::condition::{ConditionEnd, ConditionSpace};
-use sesame_plan::testing::{field, lab, message, minimal, node, topic};
+use sesame_plan::testing::{self, field, lab, message, minimal, node, ros2, simlog_mut, topic};
 use sesame_plan::{
     Activation, ActivationMode, Adjustment, Answer, Bound, CampaignPlan, Channel, Clock, Command, Dimension, Domain,
-    Fitted, Interface, InterfaceField, KnownTestId, LabBudget, Launch, Lifecycle, MessageId, MessageType, MetricId,
-    MetricSource, Node, NodeId, OperationId, RankOrder, Ready, ReadyWhen, RelayBudget, Ros2, Search, ShapeForm,
-    ShapePlace, Simlog, SimlogVersion, Simulator, StepBy, Stepping, Strategy, Topic, TopicId, Transport, Type,
+    Endpoint, Fitted, Interface, InterfaceField, KnownTestId, LabBudget, Launch, Lifecycle, MessageId, MessageType,
+    MetricId, MetricSource, Node, NodeId, OperationId, Proxy, RankOrder, Ready, ReadyWhen, RelayBudget, Ros, Search,
+    ShapeForm, ShapePlace, Simlog, SimlogVersion, Simulator, StepBy, Stepping, Strategy, Topic, TopicId, Type,
     WireNames, WireType, Wiring,
 };
 use sesame_results::record::sample;
@@ -153,7 +153,9 @@ fn each_thing_that_later_code_relies_on_is_asked_for() {
         (|plan| plan.operations[4].topic = Some(TopicId(0)), "operations[4].topic: it acts on none"),
     ];
     let of_ros: &[Altered] = &[
-        (|plan| ros(plan).domain = 233, "simulator.transport.domain: is 233, more than 232"),
+        (|plan| in_domain(plan, 233), "simulator.transport.domain: is 233, more than 232"),
+        (|plan| plan.simulator.ros = None, "simulator.transport: has no `clock`, or no `interfaces`"),
+        (|plan| ros(plan).proxies.push(proxy()), "simulator.transport: a simulator of kind `ros2` has no `proxies`"),
         (|plan| ros(plan).step.as_mut().unwrap().step_ns = 0, "simulator.transport.step_ns: must be positive"),
         (|plan| ros(plan).interfaces.reverse(), "interfaces[0].fields[0].type: `test_msgs/msg/Inner` is not before it"),
         (
@@ -167,10 +169,10 @@ fn each_thing_that_later_code_relies_on_is_asked_for() {
             },
             "interfaces[2].name: `test_msgs/msg/Inner` is there twice",
         ),
-        (|plan| ros(plan).wiring.clear(), "simulator.transport.wiring: there are 0 for 1 topics"),
-        (|plan| ros(plan).wiring[0].publishers[0] = NodeId(1), "wiring[0].publishers[0]: there is no node 1"),
-        (|plan| ros(plan).wiring[0].subscribers.push(NodeId(7)), "wiring[0].subscribers[0]: there is no node 7"),
-        (|plan| ros(plan).wiring[0].cut = false, "wiring[0]: distinguishes nodes of a topic that is not cut"),
+        (|plan| plan.simulator.wiring.clear(), "simulator.transport.wiring: there are 0 for 1 topics"),
+        (|plan| plan.simulator.wiring[0].publishers[0] = NodeId(1), "wiring[0].publishers[0]: there is no node 1"),
+        (|plan| plan.simulator.wiring[0].subscribers.push(NodeId(7)), "wiring[0].subscribers[0]: there is no node 7"),
+        (|plan| plan.simulator.wiring[0].cut = false, "wiring[0]: distinguishes nodes of a topic that is not cut"),
         (|plan| plan.topics[0].interface = None, "topics[0].interface: there is none"),
         (
             |plan| plan.topics[0].interface = Some("test_msgs/msg/Other".to_owned()),
@@ -188,6 +190,11 @@ fn each_thing_that_later_code_relies_on_is_asked_for() {
         ),
     ];
     let of_simlog: &[Altered] = &[
+        (
+            |plan| plan.simulator.ros = Some(Ros::default()),
+            "simulator.transport: a simulator of kind `simlog` has no `clock` and no `interfaces`",
+        ),
+        (|plan| plan.simulator.wiring.push(Wiring::default()), "simulator.transport.wiring: there are 1 for 0 topics"),
         (|plan| simlog(plan).step_ns = 0, "simulator.transport.step_ns: must be positive"),
         (|plan| simlog(plan).step_ns = 1_500_000, "step_ns: is 1500000, which is not a whole number of milliseconds"),
         (|plan| simlog(plan).url = "localhost:8089".to_owned(), "simulator.transport.url: is `localhost:8089`, not"),
@@ -237,17 +244,16 @@ fn arm() -> CampaignPlan {
     };
     let answers = vec![Answer { to: TopicId(0), with: TopicId(0) }];
     let path = "/clock".to_owned();
-    let transport = Transport::Ros2(Ros2 {
-        domain: 232,
+    let ros = Ros {
         clock: Clock::Topic { path: path.clone() },
         step: Some(Stepping { step_ns: 1, by: StepBy::Topic { path } }),
-        reset: None,
         interfaces: vec![
             interface("Inner", WireType::String),
             interface("Outer", WireType::Sequence { of: Box::new(inner), bound: None }),
         ],
-        wiring: vec![Wiring { cut: true, publishers: vec![NodeId(0)], ..Wiring::default() }],
-    });
+        ..Ros::default()
+    };
+    let wiring = vec![Wiring { cut: true, publishers: vec![NodeId(0)], ..Wiring::default() }];
     let lifecycle = Lifecycle {
         launch: Some(launch(ReadyWhen::Clock)),
         terminate: None,
@@ -257,7 +263,7 @@ fn arm() -> CampaignPlan {
         Topic { interface: Some("test_msgs/msg/Outer".to_owned()), ..topic("joints", &["/joints"], Type::Bool) };
     let ready_at = ReadyWhen::Topic { topic: TopicId(0) };
     CampaignPlan {
-        simulator: Simulator { name: "cell".to_owned(), transport, lifecycle },
+        simulator: Simulator { ros: Some(ros), lifecycle, ..ros2(232, wiring) },
         topics: vec![topic],
         nodes: vec![Node { launch: Some(launch(ready_at)), answers, ..node("arm") }],
         ..minimal()
@@ -266,36 +272,32 @@ fn arm() -> CampaignPlan {
 
 /// A plan of a simulator that speaks SimlogAPI.
 fn over_simlog() -> CampaignPlan {
-    let transport = Transport::Simlog(Simlog {
-        url: "http://localhost:8089".to_owned(),
-        topics_url: None,
-        step_ns: 20_000_000,
-        protocol: SimlogVersion::V3,
-        names: WireNames::of_version_3(),
-        marker: Some("SIMLOG://step".to_owned()),
-        cut: vec![TopicId(0)],
-        settle_ns: 0,
-        ca: None,
-    });
+    let mut simulator = testing::simlog("http://localhost:8089");
+    let settings = simlog_mut(&mut simulator);
+    (settings.protocol, settings.names) = (SimlogVersion::V3, WireNames::of_version_3());
+    (settings.marker, settings.cut) = (Some("SIMLOG://step".to_owned()), vec![TopicId(0)]);
     CampaignPlan {
-        simulator: Simulator { name: "cell".to_owned(), transport, lifecycle: Lifecycle::default() },
+        simulator,
         topics: vec![Topic { interface: Some("STRING".to_owned()), ..topic("joints", &["joints"], Type::Bool) }],
         ..minimal()
     }
 }
 
 fn simlog(plan: &mut CampaignPlan) -> &mut Simlog {
-    match &mut plan.simulator.transport {
-        Transport::Simlog(simlog) => simlog,
-        other => panic!("it speaks SimlogAPI, and not {}", other.word()),
-    }
+    simlog_mut(&mut plan.simulator)
 }
 
-fn ros(plan: &mut CampaignPlan) -> &mut Ros2 {
-    match &mut plan.simulator.transport {
-        Transport::Ros2(ros2) => ros2,
-        other => panic!("it is a system of ROS 2, not {}", other.word()),
-    }
+fn ros(plan: &mut CampaignPlan) -> &mut Ros {
+    plan.simulator.ros.as_mut().expect("it is a system of ROS 2")
+}
+
+fn in_domain(plan: &mut CampaignPlan, wanted: u16) {
+    let Some(Endpoint::Domain(domain)) = plan.simulator.endpoint() else { panic!("it is a system of ROS 2") };
+    *domain = wanted;
+}
+
+fn proxy() -> Proxy {
+    Proxy { node: NodeId(0), url: "ws://127.0.0.1:9190".to_owned(), token: None, identity: None, public: false }
 }
 
 fn ready(plan: &mut CampaignPlan) -> &mut Ready {

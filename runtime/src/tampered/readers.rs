@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use sesame_base::observation::Observation;
+use sesame_base::visible::is_hidden;
 use sesame_plan::Dimension;
 use sesame_results::analysis::{
     self, Run, Selection, compare, coverage, front, indicators, regions, sspr, tests as tests_of,
@@ -28,7 +29,7 @@ pub(super) fn read_all(folder: &Path) -> Read {
         Ok(()) => read.answered += 1,
         Err(words) => {
             read.refused += 1;
-            assert!(!words.chars().any(|c| c.is_control() && c != '\n'), "control characters in {words:?}");
+            assert!(!words.contains(|c| is_hidden(c) && c != '\n'), "hidden characters in {words:?}");
             assert!(!words.is_empty());
         }
     };

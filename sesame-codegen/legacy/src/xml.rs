@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use quick_xml::XmlVersion;
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::reader::Reader;
+use sesame_base::visible::{is_hidden, visible};
 
 /// Levels of elements at most: conditions nest, but nobody nests them this deep.
 const DEEPEST: usize = 200;
@@ -306,13 +307,13 @@ fn is_name(name: &str) -> bool {
 
 /// What can be shown on a terminal of a text that anybody may have written.
 pub(crate) fn printable(text: &str) -> String {
-    let shown: String = text.chars().filter(|c| !c.is_control()).take(80).collect();
+    let shown: String = visible(text).chars().take(80).collect();
     shown.trim().to_owned()
 }
 
 /// A text without what no line holds, and of a length that a file can.
 pub(crate) fn cleaned(text: &str) -> String {
-    let cleaned: String = text.chars().filter(|c| !c.is_control()).take(1000).collect();
+    let cleaned: String = text.chars().filter(|&c| !is_hidden(c)).take(1000).collect();
     cleaned.trim().to_owned()
 }
 

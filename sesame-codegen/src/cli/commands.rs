@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context as _, anyhow, bail};
-use sesame_dsl::diagnostic::visible;
-use sesame_plan::Transport;
+use sesame_dsl::diagnostic::visible_lines;
 
 use super::arguments::{Deny, ExplainFormat, Generation, Purpose};
 use super::owner;
@@ -147,7 +146,7 @@ pub(super) fn conclude(
     file: &Path,
 ) -> anyhow::Result<ExitCode> {
     if purpose == Purpose::DryRun {
-        shell::asked_for(&visible(&preview(out, report)))?;
+        shell::asked_for(&visible_lines(&preview(out, report)))?;
     }
     if purpose == Purpose::Check && report.out_of_date() {
         let files = report.files.iter().filter(|file| file.owner != Owner::Seed);
@@ -157,7 +156,7 @@ pub(super) fn conclude(
                 Change::Removed => "is no longer generated",
                 _ => "is out of date",
             };
-            shell.text(&visible(&format!("{} {what}", out.join(&file.path).display())));
+            shell.text(&visible_lines(&format!("{} {what}", out.join(&file.path).display())));
         }
         bail!("out of date: run `{}`", shell::command_for("generate", file));
     }
@@ -237,7 +236,7 @@ pub(super) fn explain_name(
             text.push('\n');
             text.extend(found.uses.lines().map(|line| format!("// {line}\n")));
         }
-        shell::asked_for(&visible(&text))?;
+        shell::asked_for(&visible_lines(&text))?;
         return Ok(ExitCode::SUCCESS);
     }
     if found.errors > 0 {
@@ -249,7 +248,7 @@ pub(super) fn explain_name(
         ));
     }
     match format {
-        ExplainFormat::Human => shell::asked_for(&visible(&found.text))?,
+        ExplainFormat::Human => shell::asked_for(&visible_lines(&found.text))?,
         ExplainFormat::Json => shell::asked_for(&found.json)?,
     }
     Ok(ExitCode::SUCCESS)
@@ -260,7 +259,7 @@ fn explain_wiring(shell: Shell, language: &Language, file: &Path, text: &str) ->
     let checked = check_text(shell, language, file, text, Format::Human)?;
     // All campaigns of a space need the same remappings.
     let Some(runner) = checked.plans.first() else { bail!("{} has no campaign", file.display()) };
-    shell::asked_for(&visible(&crate::wiring::text(&runner.plan)))?;
+    shell::asked_for(&visible_lines(&crate::wiring::text(&runner.plan)))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -311,7 +310,7 @@ pub(super) fn write(
     let report = output::apply(&out, &trees, mode)?;
     let space = &checked.plans[chosen[0]];
     tell(shell, &out, &trees, &report, mode, space);
-    if let Transport::Process { program, .. } = &space.plan.simulator.transport
+    if let Some((program, _)) = space.plan.simulator.program()
         && alone
     {
         let folder = &environment.simulator_folder;

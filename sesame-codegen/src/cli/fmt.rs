@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context as _, anyhow, bail};
-use sesame_dsl::diagnostic::visible;
+use sesame_dsl::diagnostic::visible_lines;
 
 use super::commands;
 use super::shell::{self, Format, Shell};
@@ -41,7 +41,7 @@ pub(super) fn fmt(
             Ok((text, formatted)) if check => {
                 if text != formatted {
                     unformatted += 1;
-                    shell::asked_for(&visible(&shown(file, &text, &formatted, format)))?;
+                    shell::asked_for(&visible_lines(&shown(file, &text, &formatted, format)))?;
                 }
             }
             Ok((_, formatted)) if file.as_os_str() == STANDARD_INPUT => shell::asked_for(&formatted)?,

@@ -25,7 +25,7 @@ pub(super) struct Compared {
     /// The results of the lab, in which tests of this campaign were run; several are taken together.
     #[arg(required = true, value_name = "LAB")]
     labs: Vec<PathBuf>,
-    /// Compare with the tests as `compensate` simulated them again: the folder of these results.
+    /// Compare with the tests that `compensate` simulated again: the folder of its results.
     #[arg(long, value_name = "DIR")]
     simulation: Option<PathBuf>,
     /// Show the traces instead: each signal of each test, how far both sides are apart, and how much later the lab is.
@@ -35,7 +35,8 @@ pub(super) struct Compared {
     /// lag and level of signals.
     #[arg(long, conflicts_with = "events")]
     extents: bool,
-    /// Show requirements and interlocked metrics instead: how many tests violate them where.
+    /// Show requirements and interlocked metrics instead: how many tests violate them on both sides, on one, or on
+    /// neither.
     #[arg(long)]
     events: bool,
     #[command(flatten)]

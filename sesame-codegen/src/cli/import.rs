@@ -31,7 +31,7 @@ pub(super) fn import(shell: Shell, language: &Language, file: &Path, out: &Path)
     let name = format!("{}.sesame", if stem.is_empty() { "space" } else { &stem });
     let space = out.join(&name);
     // Whatever is wrong is found before anything is written.
-    let nothing = || format!("{} cannot be said in the language as it is, so nothing was written", file.display());
+    let nothing = || format!("{} cannot be expressed in the language as it is, so nothing was written", file.display());
     let shown_as = space.display().to_string();
     let text = (language.format)(&shown_as, imported.text(), shell.look(Format::Human)).map_err(|found| {
         let written = shell.diagnostics(&found.diagnostics, Format::Human).err();

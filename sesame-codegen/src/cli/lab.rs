@@ -22,15 +22,15 @@ pub(super) use brief::{Conditions, sheet};
 /// What is done for a lab.
 #[derive(Debug, Subcommand)]
 pub(super) enum Lab {
-    /// Print a briefing for those who run tests in a lab: what is disturbed, what the simulation showed, and when to
+    /// Print a briefing for people who run tests in a lab: what is disturbed, what the simulation showed, and when to
     /// stop.
     Brief(brief::Brief),
     /// Print a form for runs in a lab, to be filled in: a row for each run of each test.
     Form(entered::Form),
     /// Check filled-in forms, and record their runs as results of the lab.
     Add(entered::Add),
-    /// Find contacts between the shapes of a lab in recordings: of a robot with objects that were not there, and of
-    /// robots that were recorded one at a time.
+    /// Find contacts between the shapes of a lab in recordings: between a robot and objects that were not there, and
+    /// between robots that were recorded one at a time.
     Contacts(contacts::Asked),
     /// Judge by recordings whether an interlock on expanded shapes acts early enough, and in exactly the tests in which
     /// shapes would touch.

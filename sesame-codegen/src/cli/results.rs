@@ -66,7 +66,7 @@ pub(super) enum Results {
     Regions {
         #[command(flatten)]
         input: Input,
-        /// Only this requirement, or `crash` or `timeout`; everything that tests fail by if omitted.
+        /// Only this requirement, or `crash` or `timeout`; if omitted, everything by which tests fail.
         #[arg(long, value_name = "NAME")]
         requirement: Option<String>,
         /// The maximum number of conditions in a rule.
@@ -153,7 +153,7 @@ pub(super) enum Results {
 pub(super) struct Input {
     /// A results file, or the folder of a run.
     file: PathBuf,
-    /// Only the tests of this result set; `campaigns` names them.
+    /// Only the tests of this result set; `campaigns` lists them.
     #[arg(long, value_name = "NAME")]
     set: Option<String>,
 }

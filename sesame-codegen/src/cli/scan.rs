@@ -33,10 +33,10 @@ pub(super) enum Scan {
     /// Ask a master of ROS 1 and its nodes, and print a space with their topics, services and messages.
     #[command(after_help = arguments::ROS_1)]
     Ros1(Ros1),
-    /// Ask a server of rosbridge what is behind it, listen, and print a space with topics, services and messages.
+    /// Ask a rosbridge server for its system, listen, and print a space with topics, services and messages.
     #[command(after_help = arguments::ROSBRIDGE)]
     Rosbridge(Rosbridge),
-    /// Listen at a broker of MQTT, and print a space with its topics and the messages that their payloads are.
+    /// Listen to an MQTT broker, and print a space with its topics and the messages of their payloads.
     #[command(after_help = arguments::MQTT)]
     Mqtt(Mqtt),
     /// Listen to topics of a simulator that speaks SimlogAPI, and print a space with them and their messages.

@@ -21,16 +21,16 @@ use super::shell::{self, Shell};
 pub(super) struct Selected {
     /// A results file, or the folder of a run.
     file: PathBuf,
-    /// The lab whose `physical` block says what the options below do not; the only one of the space if omitted.
+    /// The lab whose `physical` block provides defaults for the options below; the only one of the space if omitted.
     #[arg(long, value_name = "NAME")]
     lab: Option<String>,
-    /// Choose from this result set; from the latest front if omitted. `sesamec results campaigns` names them.
+    /// Choose from this result set; from the latest front if omitted. `sesamec results campaigns` lists them.
     #[arg(long, value_name = "NAME", conflicts_with = "all")]
     set: Option<String>,
     /// Choose from all tests instead of the front.
     #[arg(long)]
     all: bool,
-    /// What the tests together may cost.
+    /// The most that the tests together may cost.
     #[arg(long, value_name = "COST")]
     budget: Option<f64>,
     /// The weight of difference against interest, from 0 (the most interesting tests) to 1 (the most different ones).
@@ -43,23 +43,23 @@ pub(super) struct Selected {
     /// number, tests close to it come first: `clearance:0.5`.
     #[arg(long, value_delimiter = ',', value_name = "METRIC:ORDER")]
     rank: Vec<String>,
-    /// What a test costs, for example `1`, or `1+0.5` with what each of its operations costs besides; `T5=3` for one
-    /// test. May be given several times.
+    /// The cost of a test, for example `1`, or `1+0.5` to add 0.5 for each of its operations; `T5=3` for one test. May
+    /// be repeated.
     #[arg(long, value_delimiter = ',', value_name = "COST", value_parser = cost)]
     cost: Vec<Cost>,
-    /// Tests that must not be run, for example `T5,T9`.
+    /// Tests that must not be run, for example `T5,T9`, in addition to those that the lab excludes.
     #[arg(long, value_delimiter = ',', value_name = "TESTS")]
     exclude: Vec<String>,
-    /// Tests that were run already: they are in the choice, and the budget is for others.
+    /// Tests that were already run: the choice contains them, and the budget is for others.
     #[arg(long, value_delimiter = ',', value_name = "TESTS")]
     run: Vec<String>,
-    /// Only tests of which fresh runs have confirmed a finding.
+    /// Only tests with a finding that fresh runs confirmed.
     #[arg(long)]
     confirmed: bool,
     /// Show all weights at which the choice changes instead, and which tests enter and leave.
     #[arg(long)]
     sweep: bool,
-    /// Wall time after which the best choice so far is taken, with what is known of a better one.
+    /// Wall time after which the best choice so far is taken, with a bound for any better one.
     #[arg(long, value_name = "SECONDS", default_value_t = 60.0)]
     limit: f64,
     /// The formulas to use: `original` for those of the original platform, `paper` for those of the paper.

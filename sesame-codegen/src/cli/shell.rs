@@ -4,7 +4,7 @@ use std::fmt::Display;
 use std::io::{self, IsTerminal as _, Write as _};
 use std::path::Path;
 
-use sesame_dsl::diagnostic::{shortened, visible};
+use sesame_dsl::diagnostic::{shortened, visible_lines};
 use sesame_runtime::cli::Caller;
 
 use crate::frontend::Look;
@@ -69,7 +69,7 @@ impl Shell {
             return self.say("1;36", &format!("{verb:>10}"), what);
         }
         let what = what.to_string();
-        let text = format!("\r\x1b[K{} {}", self.painted("1;36", &format!("{verb:>10}")), visible(&what));
+        let text = format!("\r\x1b[K{} {}", self.painted("1;36", &format!("{verb:>10}")), visible_lines(&what));
         // A closed terminal must not end the program.
         let _ = io::stderr().write_all(text.as_bytes());
     }
@@ -115,7 +115,7 @@ impl Shell {
     /// a command, and no line of it fills the screen.
     fn say(self, style: &str, word: &str, what: impl Display) {
         let text: Vec<String> = what.to_string().split('\n').map(|line| shortened(line.to_owned())).collect();
-        self.line(&format!("{} {}", self.painted(style, word), visible(&text.join("\n"))));
+        self.line(&format!("{} {}", self.painted(style, word), visible_lines(&text.join("\n"))));
     }
 
     /// Text as it is: of this program, or of one that cleans what it quotes.

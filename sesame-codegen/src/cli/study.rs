@@ -34,16 +34,16 @@ pub(super) struct Asked {
     /// together.
     #[arg(value_name = "LAB")]
     labs: Vec<PathBuf>,
-    /// The tests as `compensate` simulated them again: the folder of these results.
+    /// The tests that `compensate` simulated again: the folder of its results.
     #[arg(long, value_name = "DIR")]
     simulation: Option<PathBuf>,
-    /// The lab, where it has not run yet; the only one of the space if omitted.
+    /// The lab, if it has not run yet; the only one of the space if omitted.
     #[arg(long, value_name = "NAME")]
     lab: Option<String>,
-    /// The file of the page; a page that is there is replaced, another file is not.
+    /// The file of the page; replaces an earlier page of a study, but no other file.
     #[arg(short, long, value_name = "FILE", default_value = "study.html")]
     out: PathBuf,
-    /// Write each figure as an SVG file into this folder, too.
+    /// Also write each figure as an SVG file into this folder.
     #[arg(long, value_name = "DIR")]
     svg: Option<PathBuf>,
     #[command(flatten)]

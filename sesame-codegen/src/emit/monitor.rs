@@ -5,7 +5,6 @@ use std::path::Path;
 
 use quote::{format_ident, quote};
 use serde::Serialize;
-use sesame_plan::Transport;
 
 use super::package::Kind;
 use super::{ABI, Environment, Problem, add_options, by, doc_lines, package, problem, rust, sha256};
@@ -59,7 +58,7 @@ pub fn monitor(monitor: &MonitorPlan, environment: &Environment) -> Result<Tree,
         runners: Vec::new(),
     };
     let program = names::package(&plan.space, &names::monitor_folder(name));
-    let features: Vec<&str> = FEATURES.into_iter().chain(runtime_feature(&plan.simulator.transport)).collect();
+    let features: Vec<&str> = FEATURES.into_iter().chain(runtime_feature(&plan.simulator)).collect();
     let runtime = environment.dependencies.iter().filter(|(name, _)| *name == "sesame-runtime");
     let runtime: BTreeMap<String, toml::Value> = runtime.map(|(name, value)| (name.clone(), value.clone())).collect();
     let dependencies = package::with_features(&runtime, &features);
@@ -77,7 +76,7 @@ pub fn monitor(monitor: &MonitorPlan, environment: &Environment) -> Result<Tree,
         monitor: name.clone(),
         doc: doc_lines(plan.monitors.iter().find(|it| it.name == *name).map_or("", |it| it.doc.as_str())),
         program,
-        bus: bus(&plan.simulator.transport).to_owned(),
+        bus: plan.simulator.properties().bus.unwrap_or_default().to_owned(),
     };
     let readme = environment.templates.render("runner/monitor_readme.md.tera", &readme).map_err(|it| vec![it])?;
     tree.add("README.md", Owner::Machine, readme);
@@ -90,23 +89,13 @@ pub fn monitor(monitor: &MonitorPlan, environment: &Environment) -> Result<Tree,
     Ok(tree)
 }
 
-/// The bus of a system, in words; empty for a simulator that is none.
-fn bus(transport: &Transport) -> &'static str {
-    match transport {
-        Transport::InProcess { .. } | Transport::Process { .. } | Transport::Simlog(_) => "",
-        Transport::Ros2(_) => "as a node of ROS 2",
-        Transport::Rosbridge(_) => "as a client of the rosbridge server",
-        Transport::Ros1(_) => "as a node of ROS 1",
-        Transport::Mqtt(_) => "as a client of the MQTT broker",
-    }
-}
-
 fn main(monitor: &MonitorPlan, header: &str, system: &str) -> String {
     let MonitorPlan { name, plan, .. } = monitor;
     let docs = rust::module_docs([format!("The monitor `{name}` of the space `{}` as a program.", plan.space)]);
     let abi = proc_macro2::Literal::u32_unsuffixed(ABI);
-    let transport = format_ident!("{}", plan.simulator.transport.word());
-    let (folder, connect) = if bus(&plan.simulator.transport).is_empty() {
+    let kind = plan.simulator.properties();
+    let transport = format_ident!("{}", kind.keyword);
+    let (folder, connect) = if kind.bus.is_none() {
         (quote! {}, quote! { ::core::option::Option::None })
     } else {
         let folder = quote! {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use sesame_plan::{MetricSource, Transport};
+use sesame_plan::MetricSource;
 
 use super::package;
 use crate::names;
@@ -122,23 +122,16 @@ pub(super) fn problems(plans: &[RunnerPlan], dependencies: &BTreeMap<String, tom
         }
     }
     for RunnerPlan { plan, .. } in plans {
-        let problem = match &plan.simulator.transport {
-            Transport::InProcess { path, .. } => {
-                let here = ["self", "Self", "super", "crate"];
-                let parts: Vec<&str> = path.split("::").collect();
-                let good = parts.len() >= 2 && parts.iter().all(|part| names::check(part) && !here.contains(part));
-                (!good).then(|| Problem::SimulatorPath { path: path.clone() })
-            }
-            Transport::Process { program, arguments, .. } => {
-                let nul = std::iter::once(program).chain(arguments).any(|text| text.contains('\0'));
-                (program.is_empty() || nul).then_some(Problem::SimulatorProgram)
-            }
-            Transport::Ros2(_)
-            | Transport::Rosbridge(_)
-            | Transport::Ros1(_)
-            | Transport::Mqtt(_)
-            | Transport::Simlog(_) => None,
-        };
+        let of_type = plan.simulator.rust_type().and_then(|path| {
+            let here = ["self", "Self", "super", "crate"];
+            let parts: Vec<&str> = path.split("::").collect();
+            let good = parts.len() >= 2 && parts.iter().all(|part| names::check(part) && !here.contains(part));
+            (!good).then(|| Problem::SimulatorPath { path: path.to_owned() })
+        });
+        let of_program = plan.simulator.program().and_then(|(program, arguments)| {
+            let nul = program.contains('\0') || arguments.iter().any(|text| text.contains('\0'));
+            (program.is_empty() || nul).then_some(Problem::SimulatorProgram)
+        });
         let lifecycle = &plan.simulator.lifecycle;
         let launches = plan.nodes.iter().filter_map(|node| node.launch.as_ref()).chain(&lifecycle.launch);
         let mut commands = launches.map(|launch| &launch.command).chain(&lifecycle.terminate);
@@ -146,7 +139,7 @@ pub(super) fn problems(plans: &[RunnerPlan], dependencies: &BTreeMap<String, tom
             let nul = std::iter::once(&command.program).chain(&command.arguments).any(|text| text.contains('\0'));
             command.program.is_empty() || nul
         });
-        let problem = problem.or(bad.then_some(Problem::LaunchedProgram));
+        let problem = of_type.or(of_program).or(bad.then_some(Problem::LaunchedProgram));
         problems.extend(problem.filter(|problem| !problems.contains(problem)));
     }
     for name in dependencies.keys().filter(|name| !package::is_dependency(name)) {

@@ -6,21 +6,14 @@ use sesame_plan as plan;
 
 use super::id::topic_id;
 use super::selection::Selection;
-use super::transport::transport;
-
-/// How a lab is reached; `None` if people run its tests.
-fn lab_simulator(space: &Space, lab: &Physical) -> Option<plan::Simulator> {
-    let model::Simulator { declaration, transport: way } = lab.simulator.as_ref()?;
-    let (name, lifecycle) = (declaration.name.clone(), plan::Lifecycle::default());
-    Some(plan::Simulator { name, transport: transport(space, way), lifecycle })
-}
+use super::simulator::simulator;
 
 impl Selection {
     pub(super) fn lab(&self, space: &Space, lab: &Physical) -> plan::Lab {
         plan::Lab {
             name: lab.declaration.name.clone(),
             doc: lab.declaration.doc.clone(),
-            simulator: lab_simulator(space, lab),
+            simulator: lab.simulator.as_ref().map(|of_lab| simulator(space, of_lab)),
             repeats: lab.repeats,
             cost: lab.cost,
             exclude: lab

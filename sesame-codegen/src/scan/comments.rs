@@ -1,6 +1,6 @@
 //! Comments of the space: what it cannot say, numbers in words, and text that anybody may have written.
 
-use sesame_dsl::diagnostic::visible;
+use sesame_dsl::diagnostic::visible_lines;
 
 /// What cannot be said in the language, one comment each.
 #[derive(Default)]
@@ -39,6 +39,6 @@ pub(super) fn counted(n: u64, what: &str) -> String {
 
 /// Text for a comment: on one line, without signs that a terminal would interpret.
 pub(super) fn on_one_line(text: &str) -> String {
-    let longest: String = visible(text).chars().take(400).collect();
+    let longest: String = visible_lines(text).chars().take(400).collect();
     longest.replace(['\n', '\r', '\u{2028}', '\u{2029}', '\u{85}'], " ")
 }

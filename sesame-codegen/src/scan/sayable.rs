@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use sesame_dsl::diagnostic::visible;
+use sesame_dsl::diagnostic::visible_lines;
 use sesame_notation::quoted;
 use sesame_scan::{CLOCK, Facts, FoundService, FoundTopic, System, TypeSource};
 
@@ -89,7 +89,7 @@ fn is_path(system: &System, path: &str) -> bool {
     }
     // A brace begins a group, and what is not visible is not text of a space.
     let unsayable = |c: char| c.is_whitespace() || c.is_control() || matches!(c, '{' | '}');
-    !path.is_empty() && path.len() <= LONGEST && !path.contains(unsayable) && visible(path) == path
+    !path.is_empty() && path.len() <= LONGEST && !path.contains(unsayable) && visible_lines(path) == path
 }
 
 /// Whether this can be the name of a topic, a service or a node of ROS, with its `/` at the beginning.

@@ -12,15 +12,14 @@ use super::sayable::is_ros_name;
 
 /// The first line of the space, which says what was looked at.
 pub(super) fn heading(facts: &Facts) -> String {
-    let (command, whereabouts) = match &facts.system {
-        System::Ros2 { domain } => ("ros2", format!("in domain {domain}")),
-        System::Ros1 { master } => ("ros1", format!("at the master {}", quoted(master))),
-        System::Rosbridge { url, .. } => ("rosbridge", format!("behind the bridge {}", quoted(url))),
-        System::Mqtt { url } => ("mqtt", format!("at the broker {}", quoted(url))),
-        System::Simlog { url, steps: 0, .. } => ("simlog", format!("at the simulator {}, without a step", quoted(url))),
-        System::Simlog { url, steps, .. } => {
-            ("simlog", format!("at the simulator {}, which took {steps} steps", quoted(url)))
-        }
+    let command = facts.system.kind().properties().keyword;
+    let whereabouts = match &facts.system {
+        System::Ros2 { domain } => format!("in domain {domain}"),
+        System::Ros1 { master } => format!("at the master {}", quoted(master)),
+        System::Rosbridge { url, .. } => format!("behind the bridge {}", quoted(url)),
+        System::Mqtt { url } => format!("at the broker {}", quoted(url)),
+        System::Simlog { url, steps: 0, .. } => format!("at the simulator {}, without a step", quoted(url)),
+        System::Simlog { url, steps, .. } => format!("at the simulator {}, which took {steps} steps", quoted(url)),
     };
     let said = on_one_line(&format!("What `sesamec scan {command}` found {whereabouts} in {} s", facts.seconds));
     format!("// {said}. Each `decide:` is a question to a person.\n")
@@ -30,19 +29,16 @@ pub(super) fn heading(facts: &Facts) -> String {
 pub(super) fn space_name(system: &System) -> String {
     match system {
         System::Ros2 { domain } => format!("domain_{domain}"),
-        System::Ros1 { .. } => "ros1_system".to_owned(),
         System::Rosbridge { .. } => "bridged_system".to_owned(),
-        System::Mqtt { .. } => "mqtt_system".to_owned(),
-        System::Simlog { .. } => "simlog_system".to_owned(),
+        other => format!("{}_system", other.kind().properties().keyword),
     }
 }
 
 /// Whether a scan of this middleware learns who publishes and who subscribes.
 pub(super) fn knows_nodes(system: &System) -> bool {
     match system {
-        System::Ros2 { .. } | System::Ros1 { .. } => true,
         System::Rosbridge { rosapi, .. } => *rosapi,
-        System::Mqtt { .. } | System::Simlog { .. } => false,
+        other => other.is_ros(),
     }
 }
 
@@ -109,7 +105,7 @@ pub(super) fn block(name: &str, facts: &Facts, origin: Origin<'_>, clock: Option
 /// How the system is started: a scan sees what runs, not how that began.
 fn launching(system: &System) -> String {
     let example = match system {
-        System::Ros2 { .. } => r#"launch "ros2" "launch" "PACKAGE" "FILE" "{ros-args}""#,
+        System::Ros2 { .. } => r#"launch "ros2" "run" "PACKAGE" "PROGRAM" "{ros-args}""#,
         System::Ros1 { .. } => r#"launch "rosrun" "PACKAGE" "PROGRAM" "{ros-args}""#,
         System::Rosbridge { .. } => r#"launch "PROGRAM" "{ros-args}""#,
         System::Mqtt { .. } => r#"launch "PROGRAM" { ready when line "ready" within 30s }"#,
@@ -137,8 +133,8 @@ fn of_ros(facts: &Facts, origin: Origin<'_>, clock: Option<&str>, text: &mut Str
         Some(clock) => _ = writeln!(text, "clock  {}", quoted(clock)),
         None => text.push_str("// decide: nobody publishes a clock, so simulation time is wall time\n"),
     }
-    // Only a runner that is a node of ROS 2 steps its simulator.
-    let words = if matches!(facts.system, System::Ros2 { .. }) { &["step", "reset"][..] } else { &["reset"][..] };
+    let can_step = facts.system.kind().properties().reaches_nodes;
+    let words = if can_step { &["step", "reset"][..] } else { &["reset"][..] };
     for word in words {
         for service in facts.services.iter().filter(|service| is_control(service, word)) {
             let path = quoted(&service.path);

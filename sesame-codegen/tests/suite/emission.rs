@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use sesame_codegen::emit::{Problem, emit};
 use sesame_codegen::files::Tree;
 use sesame_codegen::plan::RunnerPlan;
-use sesame_plan::testing::node;
+use sesame_plan::testing::{node, ros2};
 
 use crate::placed::environment;
 use crate::plans::{awkward, small, with_program};
@@ -61,14 +61,8 @@ fn a_runner_of_a_ros_system_has_its_transport_and_says_how_nodes_are_remapped() 
     let path = format!("/{}", runner.plan.topics[0].paths[0]);
     runner.plan.topics[0].paths = vec![path.clone()];
     let cut = |cut| sesame_plan::Wiring { cut, ..sesame_plan::Wiring::default() };
-    runner.plan.simulator.transport = sesame_plan::Transport::Ros2(sesame_plan::Ros2 {
-        domain: 0,
-        clock: sesame_plan::Clock::Wall,
-        step: None,
-        reset: None,
-        interfaces: Vec::new(),
-        wiring: (0..runner.plan.topics.len()).map(|topic| cut(topic == 0)).collect(),
-    });
+    let wiring = (0..runner.plan.topics.len()).map(|topic| cut(topic == 0)).collect();
+    runner.plan.simulator = ros2(0, wiring);
     let without_hooks = RunnerPlan { hooks: Vec::new(), operations: Vec::new(), ..runner.clone() };
     assert_eq!(without_hooks.needs_rust(), !cfg!(feature = "ros2"));
     let trees = emit(&[runner], &environment()).unwrap();

@@ -1,108 +1,28 @@
 //! The system under test: simulator, messages, topics, nodes.
 
 use super::declaration::Declaration;
-use super::ids::{MessageId, NodeId, TopicId};
+use super::ids::{MessageId, TopicId};
 use crate::span::Span;
 use crate::units::Unit;
-use sesame_plan::{
-    Broker, Channel, Clock, Compression, Dialect, Identity, Quality, Remote, Secret, SimlogVersion, Stepping, WireNames,
-};
+use sesame_plan::{Channel, Ros, Transport};
 
-/// The simulator under test.
+/// The simulator under test, or that of a lab.
+///
+/// It is as in a plan, with these guarantees: the path of a Rust type consists of two or more identifiers, no argument
+/// is empty, domains are at most 232, names of ROS are absolute, and each node has at most one proxy; one that can be
+/// reached from other machines is public, at an address of TLS, and wants a token. Empty are the parts that follow from
+/// the rest of the space: the layouts of messages, which topics are cut, and which nodes are at other brokers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Simulator {
     /// Its name and doc comment.
     pub declaration: Declaration,
     /// How a runner reaches it.
     pub transport: Transport,
-}
-
-/// How a runner exchanges messages with a simulator.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Transport {
-    /// A Rust type linked into the runner, stepped in lock-step with the relay.
-    InProcess {
-        /// Path of the type: two or more identifiers joined by `::`, the first being the crate's name.
-        path: String,
-        /// The crate's folder as written, relative to the `.sesame` file; `None` when the crate comes from the space's
-        /// `sesame.toml`.
-        crate_folder: Option<String>,
-        /// Simulation time of one step, in nanoseconds; positive.
-        step_ns: u64,
-    },
-    /// A program that the runner starts in the folder of the `.sesame` file.
-    Process {
-        /// A name to be found on `PATH`, or a path with `/` in it, relative to that folder.
-        program: String,
-        /// Its arguments, none empty.
-        arguments: Vec<String>,
-        /// Simulation time of one step, in nanoseconds; positive. `None` for a simulator that runs freely.
-        step_ns: Option<u64>,
-    },
-    /// Nodes of ROS 2.
-    Ros2 {
-        /// The domain of worker 0, at most 232. Default 0.
-        domain: u16,
-        /// What simulation time is; its topic is absolute. Default wall time.
-        clock: Clock,
-        /// How it is stepped, by absolute names; `None` for one that runs freely.
-        step: Option<Stepping>,
-        /// The service that resets it, absolute; `None` for one that is launched again.
-        reset: Option<String>,
-    },
-    /// Nodes of ROS behind a server that speaks the rosbridge protocol.
-    Rosbridge {
-        /// Where it is.
-        remote: Remote,
-        /// The domain of worker 1, at most 232. Default 0.
-        domain: u16,
-        /// Which ROS is behind it. Default ROS 2.
-        dialect: Dialect,
-        /// How it is asked to send messages. Default JSON.
-        compression: Compression,
-        /// What simulation time is; its topic is absolute. Default wall time.
-        clock: Clock,
-        /// The service that resets it, absolute; `None` for one that is launched again.
-        reset: Option<String>,
-        /// Where clients connect that are one node each. Each node has at most one.
-        proxies: Vec<Proxy>,
-    },
-    /// Nodes of ROS 1.
-    Ros1 {
-        /// The address of the master.
-        master: String,
-        /// What simulation time is; its topic is absolute. Default wall time.
-        clock: Clock,
-        /// The service that resets it, absolute; `None` for one that is launched again.
-        reset: Option<String>,
-    },
-    /// A system whose messages go over brokers of MQTT.
-    Mqtt {
-        /// The broker of all nodes that have none of their own.
-        broker: Broker,
-        /// How surely messages arrive. Default at least once.
-        quality: Quality,
-    },
-    /// A simulator that speaks `SimlogAPI`, stepped in lock-step.
-    Simlog {
-        /// Where it is.
-        url: String,
-        /// Where its topics are, in version 3; `None` for the port after that of `url`.
-        topics_url: Option<String>,
-        /// Simulation time of one step, in nanoseconds; whole milliseconds.
-        step_ns: u64,
-        /// The version of the protocol. Default 2.
-        protocol: SimlogVersion,
-        /// How names on the wire follow from those of topics. Default as the original platform.
-        names: WireNames,
-        /// The topic that marks the end of a step, in version 3.
-        marker: Option<String>,
-        /// For how long nothing may come in until a step is complete that nobody declares, in nanoseconds. Default 5
-        /// ms.
-        settle_ns: u64,
-        /// A file with the certificates of authorities that are trusted.
-        trust: Option<String>,
-    },
+    /// The folder of the crate of one that is a part of the runner as written, relative to the `.sesame` file; `None`
+    /// when the crate comes from the space's `sesame.toml`.
+    pub crate_folder: Option<String>,
+    /// What systems of ROS have; `None` for others.
+    pub ros: Option<Ros>,
 }
 
 /// What a system says beside its simulator.
@@ -243,21 +163,6 @@ pub struct Node {
     pub every_step: Vec<TopicId>,
     /// The address of its broker, where it is not that of the simulator.
     pub broker: Option<String>,
-}
-
-/// An address at which clients of a bridge are one node.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Proxy {
-    /// The node.
-    pub node: NodeId,
-    /// Its address, with a port. Beyond this machine it is one of TLS, with a token, and public.
-    pub url: String,
-    /// What clients have to show; `None` if everybody is let in.
-    pub token: Option<Secret>,
-    /// What it shows to clients; there if the address is one of TLS.
-    pub identity: Option<Identity>,
-    /// Whether it may be reached from other machines.
-    pub public: bool,
 }
 
 /// A value inside the messages of a topic.

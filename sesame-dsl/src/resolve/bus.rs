@@ -1,107 +1,68 @@
 //! Systems whose messages go over a bus: addresses, and what is shown to whoever is there.
 
-use sesame_plan::{Broker, Dialect, Remote, Secret, SimlogVersion, WireNames};
+use sesame_plan::{
+    Broker, Dialect, Mqtt, Remote, Ros1, Rosbridge, Schemes, Secret, Simlog, SimlogVersion, SimulatorKind, WireNames,
+};
 
 use super::Resolver;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::Transport;
 use crate::span::Span;
-use crate::syntax::ast::{self, BusKind, Name, Text};
-
-/// How addresses of a kind begin.
-struct Schemes {
-    plain: &'static str,
-    /// Over TLS, if there is such a way.
-    encrypted: Option<&'static str>,
-    example: &'static str,
-}
-
-impl Schemes {
-    fn of(kind: BusKind) -> Schemes {
-        match kind {
-            BusKind::Rosbridge => Schemes { plain: "ws://", encrypted: Some("wss://"), example: "ws://127.0.0.1:9090" },
-            BusKind::Ros1 => Schemes { plain: "http://", encrypted: None, example: "http://127.0.0.1:11311" },
-            BusKind::Simlog => {
-                Schemes { plain: "http://", encrypted: Some("https://"), example: "http://127.0.0.1:8089" }
-            }
-            BusKind::Mqtt => {
-                Schemes { plain: "mqtt://", encrypted: Some("mqtts://"), example: "mqtt://127.0.0.1:1883" }
-            }
-        }
-    }
-}
+use crate::syntax::ast::{self, Name, Text};
 
 impl<'a> Resolver<'a> {
-    pub(super) fn bus(&mut self, name: &Name, bus: &'a ast::Bus) -> Option<Transport> {
-        match bus.kind {
-            BusKind::Rosbridge => self.rosbridge(bus),
-            BusKind::Ros1 => self.ros1(bus),
-            BusKind::Mqtt => self.mqtt(bus),
-            BusKind::Simlog => self.simlog(name, bus),
-        }
-    }
-
     /// Nodes of ROS behind a bridge.
-    fn rosbridge(&mut self, bus: &'a ast::Bus) -> Option<Transport> {
-        let url = self.address(&bus.address, bus);
-        let clock = self.simulator_clock(&bus.clocks);
-        let reset = self.reset_service(&bus.resets);
-        let domain = match self.single(&bus.domains, "domain") {
-            Some(domain) => self.domain_id(*domain),
-            None => Some(0),
-        };
-        self.single(&bus.types, "types");
-        let dialect = self.single(&bus.dialects, "dialect").copied().unwrap_or_default();
-        let compression = self.single(&bus.compressions, "compression").copied().unwrap_or_default();
-        let trust = self.single(&bus.trusts, "trust").map(|file| file.text.clone());
-        let token = self.secret(&bus.secrets, "token");
-        let proxies = self.proxies(&bus.proxies);
-        if let (Dialect::Ros1, Some((span, _))) = (dialect, bus.domains.first()) {
+    pub(super) fn rosbridge(&mut self, written: &'a ast::Transport) -> Option<Transport> {
+        let settings = &written.settings;
+        let remote = self.remote(written, "token");
+        let domain = self.first_domain(written);
+        let dialect = self.single(&settings.dialects, "dialect").copied().unwrap_or_default();
+        let compression = self.single(&settings.compressions, "compression").copied().unwrap_or_default();
+        if let (Dialect::Ros1, Some((span, _))) = (dialect, settings.domains.first()) {
             let title = "ROS 1 has no domains".to_owned();
             let diagnostic = Diagnostic::new(Code::NOT_ROS, *span, title).label("remove it, or `dialect ros1`");
             self.report(diagnostic);
             return None;
         }
-        let remote = Remote { url: url?, token, trust };
-        let (domain, clock, reset) = (domain?, clock?, reset.ok()?);
-        Some(Transport::Rosbridge { remote, domain, dialect, compression, clock, reset, proxies: proxies? })
+        Some(Transport::Rosbridge(Rosbridge { remote: remote?, domain: domain?, dialect, compression }))
     }
 
     /// Nodes of ROS 1.
-    fn ros1(&mut self, bus: &'a ast::Bus) -> Option<Transport> {
-        let master = self.address(&bus.address, bus);
-        let clock = self.simulator_clock(&bus.clocks);
-        let reset = self.reset_service(&bus.resets);
-        self.single(&bus.types, "types");
-        Some(Transport::Ros1 { master: master?, clock: clock?, reset: reset.ok()? })
+    pub(super) fn ros1(&mut self, written: &'a ast::Transport) -> Option<Transport> {
+        let master = self.address(written.first_text(), written)?;
+        Some(Transport::Ros1(Ros1 { master }))
     }
 
     /// A system whose messages go over brokers of MQTT.
-    fn mqtt(&mut self, bus: &'a ast::Bus) -> Option<Transport> {
-        let url = self.address(&bus.address, bus);
-        let quality = self.single(&bus.qualities, "quality").copied().unwrap_or_default();
-        let user = self.single(&bus.users, "user").map(|user| user.text.clone());
-        let trust = self.single(&bus.trusts, "trust").map(|file| file.text.clone());
-        let token = self.secret(&bus.secrets, "password");
-        let broker = Broker { remote: Remote { url: url?, token, trust }, user };
-        Some(Transport::Mqtt { broker, quality })
+    pub(super) fn mqtt(&mut self, written: &'a ast::Transport) -> Option<Transport> {
+        let remote = self.remote(written, "password");
+        let quality = self.single(&written.settings.qualities, "quality").copied().unwrap_or_default();
+        let user = self.single(&written.settings.users, "user").map(|user| user.text.clone());
+        let broker = Broker { remote: remote?, user };
+        Some(Transport::Mqtt(Mqtt { broker, brokers: Vec::new(), quality }))
+    }
+
+    /// Where a bus is, and what it wants to be shown, which the language calls so.
+    fn remote(&mut self, written: &'a ast::Transport, secret: &str) -> Option<Remote> {
+        let url = self.address(written.first_text(), written);
+        let trust = self.single(&written.settings.trusts, "trust").map(|file| file.text.clone());
+        let token = self.secret(&written.settings.secrets, secret);
+        Some(Remote { url: url?, token, trust })
     }
 
     /// The address of a node's own broker, if it has one. An error was reported.
     pub(super) fn broker_of(&mut self, node: &'a ast::Node) -> Result<Option<String>, ()> {
         let Some(written) = self.single(&node.brokers, "broker") else { return Ok(None) };
-        match (self.kind(), self.ast_bus()) {
-            (_, Some(bus)) if bus.kind == BusKind::Mqtt => self.address(written, bus).map(Some).ok_or(()),
-            (Some((kind, simulator)), _) => {
-                let title = format!("simulator kind `{kind}` has no brokers");
-                let diagnostic = Diagnostic::new(Code::BAD_ADDRESS, written.span, title)
-                    .label("only nodes of an `mqtt` simulator have a broker; remove it")
-                    .secondary(simulator, "the simulator is declared here");
-                self.report(diagnostic);
-                Err(())
-            }
-            (None, _) => Err(()),
+        if let Some((kind, simulator)) = self.without(|kind| kind.brokers) {
+            let title = format!("simulator kind `{kind}` has no brokers");
+            let diagnostic = Diagnostic::new(Code::BAD_ADDRESS, written.span, title)
+                .label("only nodes of an `mqtt` simulator have a broker; remove it")
+                .secondary(simulator, "the simulator is declared here");
+            self.report(diagnostic);
+            return Err(());
         }
+        let transport = self.transport().ok_or(())?;
+        self.address(written, transport).map(Some).ok_or(())
     }
 
     /// What is to be shown, if anything.
@@ -113,34 +74,36 @@ impl<'a> Resolver<'a> {
     }
 
     /// A simulator that speaks `SimlogAPI`.
-    fn simlog(&mut self, name: &Name, bus: &'a ast::Bus) -> Option<Transport> {
+    pub(super) fn simlog(&mut self, name: &Name, written: &'a ast::Transport) -> Option<Transport> {
         const MILLISECOND: u64 = 1_000_000;
-        let url = self.address(&bus.address, bus);
-        let topics_url = match self.single(&bus.topics, "topics at") {
-            Some(written) => self.address(written, bus).map(Some).ok_or(()),
+        let settings = &written.settings;
+        let url = self.address(written.first_text(), written);
+        let topics_url = match self.single(&settings.topics, "topics at") {
+            Some(address) => self.address(address, written).map(Some).ok_or(()),
             None => Ok(None),
         };
-        let step_ns = self.step_of(name, &bus.steps, bus.has_errors);
+        let step_ns = self.step_of(name, settings);
         let whole = step_ns.is_none_or(|step| step % MILLISECOND == 0);
-        if let (false, Some((_, step))) = (whole, bus.steps.first()) {
+        if let (false, Some((_, step))) = (whole, settings.steps.first()) {
             let title = format!("`{}` is not a step of SimlogAPI", self.text(step.span));
             let label = "expected whole milliseconds, which the protocol counts in";
             self.report(Diagnostic::new(Code::OUT_OF_RANGE, step.span, title).label(label));
         }
-        let protocol = match self.single(&bus.protocols, "protocol").map(|protocol| (protocol.value, protocol.span)) {
-            None | Some((Some(2), _)) => Some(SimlogVersion::V2),
-            Some((Some(3), _)) => Some(SimlogVersion::V3),
-            Some((_, span)) => {
-                let title = format!("SimlogAPI has no version `{}`", self.text(span));
-                self.report(Diagnostic::new(Code::OUT_OF_RANGE, span, title).label("expected 2 or 3"));
-                None
-            }
-        };
-        let settle_ns = match self.single(&bus.settles, "settle") {
+        let protocol =
+            match self.single(&settings.protocols, "protocol").map(|protocol| (protocol.value, protocol.span)) {
+                None | Some((Some(2), _)) => Some(SimlogVersion::V2),
+                Some((Some(3), _)) => Some(SimlogVersion::V3),
+                Some((_, span)) => {
+                    let title = format!("SimlogAPI has no version `{}`", self.text(span));
+                    self.report(Diagnostic::new(Code::OUT_OF_RANGE, span, title).label("expected 2 or 3"));
+                    None
+                }
+            };
+        let settle_ns = match self.single(&settings.settles, "settle") {
             Some(settle) => self.step(settle),
             None => Some(5 * MILLISECOND),
         };
-        let marker = self.single(&bus.markers, "marker").map(|marker| marker.text.clone());
+        let marker = self.single(&settings.markers, "marker").map(|marker| marker.text.clone());
         let mut names = match protocol? {
             SimlogVersion::V2 => WireNames::default(),
             SimlogVersion::V3 => WireNames::of_version_3(),
@@ -150,29 +113,31 @@ impl<'a> Resolver<'a> {
                 name.clone_from(&text.text);
             }
         };
-        replace(&bus.prefixes, "prefix", &mut names.prefix);
-        replace(&bus.cuts, "cut", &mut names.cut);
-        replace(&bus.heards, "heard", &mut names.heard);
-        replace(&bus.injecteds, "injected", &mut names.injected);
-        if let Some(bare) = self.single(&bus.bares, "bare") {
+        replace(&settings.prefixes, "prefix", &mut names.prefix);
+        replace(&settings.cuts, "cut", &mut names.cut);
+        replace(&settings.heards, "heard", &mut names.heard);
+        replace(&settings.injecteds, "injected", &mut names.injected);
+        if let Some(bare) = self.single(&settings.bares, "bare") {
             names.bare = bare.iter().map(|text| text.text.clone()).collect();
         }
-        if let (SimlogVersion::V2, Some((span, _))) = (protocol?, bus.topics.first().or(bus.markers.first())) {
+        if let (SimlogVersion::V2, Some((span, _))) = (protocol?, settings.topics.first().or(settings.markers.first()))
+        {
             let title = "version 2 of SimlogAPI has one server, and no marker".to_owned();
             self.report(Diagnostic::new(Code::BAD_ADDRESS, *span, title).label("remove it, or add `protocol 3`"));
             return None;
         }
-        let trust = self.single(&bus.trusts, "trust").map(|file| file.text.clone());
+        let ca = self.single(&settings.trusts, "trust").map(|file| file.text.clone());
         let (protocol, settle_ns, step_ns) = (protocol?, settle_ns?, step_ns.filter(|_| whole)?);
         let (url, topics_url) = (url?, topics_url.ok()?);
-        Some(Transport::Simlog { url, topics_url, step_ns, protocol, names, marker, settle_ns, trust })
+        let cut = Vec::new();
+        Some(Transport::Simlog(Simlog { url, topics_url, step_ns, protocol, names, marker, cut, settle_ns, ca }))
     }
 
     /// An address: its scheme, a host, and a port. A secret goes over plain text on this machine only.
-    fn address(&mut self, written: &Text, bus: &ast::Bus) -> Option<String> {
-        let Schemes { plain, encrypted, .. } = Schemes::of(bus.kind);
-        let (scheme, host) = self.well_formed(written, bus.kind)?;
-        if let (Some(encrypted), Some((span, _))) = (encrypted, bus.secrets.first())
+    fn address(&mut self, written: &Text, transport: &ast::Transport) -> Option<String> {
+        let Schemes { plain, encrypted, .. } = transport.kind.properties().address?;
+        let (scheme, host) = self.well_formed(written, transport.kind)?;
+        if let (Some(encrypted), Some((span, _))) = (encrypted, transport.settings.secrets.first())
             && scheme == plain
             && !is_here(host)
         {
@@ -186,13 +151,17 @@ impl<'a> Resolver<'a> {
         Some(written.text.clone())
     }
 
-    /// The scheme and the host of an address of a kind.
-    pub(super) fn well_formed<'t>(&mut self, written: &'t Text, kind: BusKind) -> Option<(&'static str, &'t str)> {
+    /// The scheme and the host of an address of a kind, which is one that has addresses.
+    pub(super) fn well_formed<'t>(
+        &mut self,
+        written: &'t Text,
+        kind: SimulatorKind,
+    ) -> Option<(&'static str, &'t str)> {
         // An empty text was reported where it was read.
         if written.text.trim().is_empty() {
             return None;
         }
-        let Schemes { plain, encrypted, example } = Schemes::of(kind);
+        let Schemes { plain, encrypted, example } = kind.properties().address?;
         let scheme = [Some(plain), encrypted].into_iter().flatten().find(|scheme| written.text.starts_with(scheme));
         let problem = match scheme {
             None => {

@@ -59,8 +59,8 @@ impl<'a> Resolver<'a> {
 
     /// Reports a command for a simulator that is part of the runner.
     fn has_programs(&mut self, span: Span, what: &str) {
-        let Some(("in_process", simulator)) = self.other_than_ros2() else { return };
-        let title = format!("`{what}` has nothing to do: simulator kind `in_process` is part of the runner");
+        let Some((word, simulator)) = self.without(|kind| !kind.in_runner) else { return };
+        let title = format!("`{what}` has nothing to do: simulator kind `{word}` is part of the runner");
         let diagnostic = Diagnostic::new(Code::NOTHING_TO_LAUNCH, span, title)
             .label(format!("remove this `{what}`"))
             .secondary(simulator, "the simulator is declared here")

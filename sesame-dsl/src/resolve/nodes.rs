@@ -6,6 +6,11 @@ use crate::model::{Channel, Id as _, NodeId};
 use crate::span::Span;
 use crate::syntax::ast::{Name, OperationBody, Target};
 
+/// The node at a position, as plans know it: their nodes are those of the space, in the same order.
+pub(super) fn node_of_plans(position: usize) -> sesame_plan::NodeId {
+    sesame_plan::NodeId(u32::try_from(position).expect("a file has fewer than 2^32 declarations"))
+}
+
 impl<'a> Resolver<'a> {
     /// Nodes must publish or subscribe to the topic, and the transport must tell them apart.
     pub(super) fn between_nodes(&mut self, body: &'a OperationBody) -> Option<[Vec<NodeId>; 2]> {
@@ -62,7 +67,7 @@ impl<'a> Resolver<'a> {
     }
 
     fn tells_nodes_apart(&mut self, span: Span, from: bool) -> bool {
-        let Some((word, simulator)) = self.one_for_all() else { return true };
+        let Some((word, simulator)) = self.without(|kind| kind.bus.is_some()) else { return true };
         let who = if from { "which node publishes a message" } else { "which node receives a message" };
         let title = format!("simulator kind `{word}` does not report {who}");
         let diagnostic = Diagnostic::new(Code::WHICH_NODES, span, title)

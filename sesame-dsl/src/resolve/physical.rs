@@ -86,19 +86,17 @@ impl<'a> Resolver<'a> {
     /// The simulator in a lab's place: as that of a system, but no part of the runner.
     fn lab_simulator(&mut self, simulator: &'a ast::Simulator) -> Option<Simulator> {
         let resolved = self.simulator(simulator);
-        let problem = match simulator.transport.as_ref()? {
-            ast::Transport::InProcess(_) => {
-                let label =
-                    "a Rust type is part of the runner; write a program around it, and reach that with `process`";
-                Some(("a lab is reached from outside", label))
-            }
-            transport if is_of_ros(transport) && !self.has_ros_types() => {
-                let label = "name the ROS type of each topic's message, for example `message Twist = \"geometry_msgs/msg/Twist\"`";
-                Some(("a lab of ROS needs topics of ROS", label))
-            }
-            _ => None,
+        let transport = simulator.transport.as_ref()?;
+        let (title, label) = if transport.kind.properties().in_runner {
+            let label = "a Rust type is part of the runner; write a program around it, and reach that with `process`";
+            ("a lab is reached from outside", label)
+        } else if is_of_ros(transport) && !self.has_ros_types() {
+            let label =
+                "name the ROS type of each topic's message, for example `message Twist = \"geometry_msgs/msg/Twist\"`";
+            ("a lab of ROS needs topics of ROS", label)
+        } else {
+            return resolved;
         };
-        let Some((title, label)) = problem else { return resolved };
         self.report(Diagnostic::new(Code::BAD_LAB, simulator.head.name.span, title).label(label));
         None
     }

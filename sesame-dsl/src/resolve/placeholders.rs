@@ -47,19 +47,25 @@ impl Resolver<'_> {
                     .note("write it as a text of its own: `\"{ros-args}\"`");
                 self.report(diagnostic);
                 sound = false;
-            } else if matches!(word, "ros-args" | "domain")
-                && let Some((kind, simulator)) = self.other_than_ros()
-            {
-                let what = if word == "domain" { "domains" } else { "remappings" };
+            } else if let Some((what, whose, (kind, simulator))) = self.lacking(word) {
                 let title = format!("simulator kind `{kind}` has no {what}");
                 let diagnostic = Diagnostic::new(Code::PLACEHOLDER, span, title)
-                    .label("only a simulator of ROS has this placeholder")
+                    .label(format!("only a simulator of {whose} has this placeholder"))
                     .secondary(simulator, "the simulator is declared here");
                 self.report(diagnostic);
                 sound = false;
             }
         }
         sound
+    }
+
+    /// What a placeholder stands for, of which systems, and the simulator that has none of it.
+    fn lacking(&self, word: &str) -> Option<(&'static str, &'static str, (&'static str, Span))> {
+        match word {
+            "ros-args" => Some(("remappings", "ROS", self.other_than_ros()?)),
+            "domain" => Some(("domains", "ROS 2", self.other_than_ros_2()?)),
+            _ => None,
+        }
     }
 
     /// Where a part of a text stands, with its braces; the whole text if escapes move it.

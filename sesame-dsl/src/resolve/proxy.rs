@@ -2,22 +2,22 @@
 
 use std::collections::BTreeMap;
 
-use sesame_plan::Identity;
+use sesame_plan::{Identity, Proxy, SimulatorKind};
 
 use super::bus::is_here;
+use super::nodes::node_of_plans;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{self, Id as _, NodeId};
 use crate::span::Span;
-use crate::syntax::ast::{self, BusKind};
+use crate::syntax::ast;
 
 impl<'a> Resolver<'a> {
-    pub(super) fn proxies(&mut self, written: &'a [ast::Proxy]) -> Option<Vec<model::Proxy>> {
+    pub(super) fn proxies(&mut self, written: &'a [ast::Proxy], kind: SimulatorKind) -> Option<Vec<Proxy>> {
         let mut nodes: BTreeMap<&str, Span> = BTreeMap::new();
         let mut addresses: BTreeMap<&str, Span> = BTreeMap::new();
         let mut proxies = Some(Vec::new());
         for proxy in written {
-            let mut resolved = self.proxy(proxy);
+            let mut resolved = self.proxy(proxy, kind);
             if let Some(first) = nodes.insert(&proxy.node.text, proxy.node.span) {
                 self.listed_twice(proxy.node.span, first);
                 resolved = None;
@@ -38,9 +38,9 @@ impl<'a> Resolver<'a> {
         proxies
     }
 
-    fn proxy(&mut self, proxy: &'a ast::Proxy) -> Option<model::Proxy> {
-        let node = self.find(&proxy.node, Kind::Node).map(NodeId::from_index);
-        let address = self.well_formed(&proxy.address, BusKind::Rosbridge);
+    fn proxy(&mut self, proxy: &'a ast::Proxy, kind: SimulatorKind) -> Option<Proxy> {
+        let node = self.find(&proxy.node, Kind::Node).map(node_of_plans);
+        let address = self.well_formed(&proxy.address, kind);
         let token = self.secret(&proxy.secrets, "token");
         let certificate = self.single(&proxy.certificates, "certificate").map(|file| file.text.clone());
         let key = self.single(&proxy.keys, "key").map(|file| file.text.clone());
@@ -66,7 +66,7 @@ impl<'a> Resolver<'a> {
             return None;
         }
         let identity = certificate.zip(key).map(|(certificate, key)| Identity { certificate, key });
-        Some(model::Proxy { node: node?, url: proxy.address.text.clone(), token, identity, public })
+        Some(Proxy { node: node?, url: proxy.address.text.clone(), token, identity, public })
     }
 }
 

@@ -3,6 +3,7 @@
 use sesame_grammar::Rule;
 
 use super::disturbance::number;
+use super::nodes::node_of_plans;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{OperationKind, Parameter, Range};
@@ -43,7 +44,7 @@ impl<'a> Resolver<'a> {
         if !can {
             return None;
         }
-        let node = sesame_plan::NodeId(u32::try_from(node).expect("a file has fewer than 2^32 declarations"));
+        let node = node_of_plans(node);
         let kind = match (rule, &resource.parameter) {
             (Rule::set_parameter, Some(parameter)) => OperationKind::Set { node, parameter: parameter.text.clone() },
             (Rule::pause, None) => OperationKind::Pause { node },
@@ -56,7 +57,7 @@ impl<'a> Resolver<'a> {
 
     /// Reports a simulator whose nodes a runner does not reach.
     fn has_nodes(&mut self, resource: &ast::Resource) -> bool {
-        let Some((word, simulator)) = self.other_than_ros2() else { return true };
+        let Some((word, simulator)) = self.without(|kind| kind.reaches_nodes) else { return true };
         let title = format!("simulator kind `{word}` has no nodes that an operation could act on");
         let diagnostic = Diagnostic::new(Code::NODE_OUT_OF_REACH, resource.span, title)
             .label("only nodes of a `ros2` simulator have parameters, and can be paused, slowed and killed")
@@ -163,7 +164,9 @@ impl<'a> Resolver<'a> {
 
     /// Reports a slowed node of a simulator that waits for its nodes in every step.
     fn runs_freely(&mut self, body: &ast::OperationBody) -> bool {
-        let Some(step) = self.ast_ros2().and_then(|ros2| ros2.steps.first()) else { return true };
+        let Some(step) = self.transport().and_then(|transport| transport.settings.steppings.first()) else {
+            return true;
+        };
         let title = "`slow` has no effect on a node of a stepped simulator";
         let diagnostic = Diagnostic::new(Code::NODE_OUT_OF_REACH, body.kind_word, title)
             .label("a step takes as long as its nodes need, so a share of the time changes nothing")

@@ -1,45 +1,32 @@
-//! A system of ROS 2: the settings of its simulator, and the names that ROS permits.
+//! Systems of ROS: the settings of their simulator, and the names that ROS permits.
 
-use sesame_plan::Dialect;
+use sesame_plan::{Dialect, Ros2, SimulatorKind, SimulatorProperties};
 
 use super::Resolver;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{Clock, StepBy, Stepping, Transport};
+use crate::model::{Clock, Ros, StepBy, Stepping, Transport};
 use crate::span::Span;
-use crate::syntax::ast::{self, BusKind, Name, StepChannel, Text};
+use crate::syntax::ast::{self, Name, StepChannel, Text};
 
 /// The highest domain whose ports exist on every system.
 const MOST_DOMAIN: u64 = 232;
 
 impl<'a> Resolver<'a> {
-    /// The settings of a ROS 2 simulator, if the simulator is one.
-    pub(super) fn ast_ros2(&self) -> Option<&'a ast::Ros2> {
-        match &self.simulators().next()?.transport {
-            Some(ast::Transport::Ros2(ros2)) => Some(ros2),
-            _ => None,
-        }
-    }
-
-    /// The settings of a simulator on a bus, if the simulator is one.
-    pub(super) fn ast_bus(&self) -> Option<&'a ast::Bus> {
-        match &self.simulators().next()?.transport {
-            Some(ast::Transport::Bus(bus)) => Some(bus),
-            _ => None,
-        }
+    /// How the simulator is reached, if that is known.
+    pub(super) fn transport(&self) -> Option<&'a ast::Transport> {
+        self.simulators().next()?.transport.as_ref()
     }
 
     /// Of which ROS the simulator is; ROS 2 where it is of none.
     pub(super) fn dialect(&self) -> Dialect {
-        match self.ast_bus() {
-            Some(bus) if bus.kind == BusKind::Ros1 => Dialect::Ros1,
-            Some(bus) => bus.dialects.first().map(|(_, dialect)| *dialect).unwrap_or_default(),
-            None => Dialect::Ros2,
-        }
+        let Some(transport) = self.transport() else { return Dialect::default() };
+        let written = transport.settings.dialects.first().map(|(_, dialect)| *dialect);
+        written.or(transport.kind.properties().ros).unwrap_or_default()
     }
 
     /// Whether the simulator's messages are those of ROS, whichever way they come.
     pub(super) fn is_of_ros(&self) -> bool {
-        self.simulators().next().and_then(|simulator| simulator.transport.as_ref()).is_some_and(is_of_ros)
+        self.transport().is_some_and(is_of_ros)
     }
 
     /// Whether the messages of some lab are those of ROS.
@@ -50,71 +37,74 @@ impl<'a> Resolver<'a> {
 
     /// The folders with definitions of messages that the simulator names.
     pub(super) fn ast_types(&self) -> &'a [(Span, Vec<Text>)] {
-        match (self.ast_ros2(), self.ast_bus()) {
-            (Some(ros2), _) => &ros2.types,
-            (None, Some(bus)) => &bus.types,
-            (None, None) => &[],
+        match self.transport() {
+            Some(transport) => &transport.settings.types,
+            None => &[],
         }
     }
 
     /// Whether the simulator has a clock of its own.
     pub(super) fn has_a_clock(&self) -> bool {
-        let clocks = match (self.ast_ros2(), self.ast_bus()) {
-            (Some(ros2), _) => &ros2.clocks[..],
-            (None, Some(bus)) => &bus.clocks,
-            (None, None) => &[],
-        };
-        clocks.iter().any(|(_, clock)| matches!(clock, ast::Clock::Topic(_)))
+        let is_topic = |(_, clock): &(Span, ast::Clock)| matches!(clock, ast::Clock::Topic(_));
+        self.transport().is_some_and(|transport| transport.settings.clocks.iter().any(is_topic))
     }
 
-    /// The word of the simulator's kind, and where it is declared, if the kind is known and not ROS 2.
-    pub(super) fn other_than_ros2(&self) -> Option<(&'static str, Span)> {
-        self.kind().filter(|(word, _)| *word != "ros2")
+    /// The simulator's kind, if that is known, and where it is declared.
+    pub(super) fn kind(&self) -> Option<(SimulatorKind, Span)> {
+        let simulator = self.simulators().next()?;
+        Some((simulator.transport.as_ref()?.kind, simulator.head.name.span))
+    }
+
+    /// The word of the simulator's kind, and where it is declared, if the kind is known and does not have what is asked
+    /// for.
+    pub(super) fn without(&self, has: impl Fn(SimulatorProperties) -> bool) -> Option<(&'static str, Span)> {
+        let (kind, simulator) = self.kind()?;
+        let properties = kind.properties();
+        (!has(properties)).then_some((properties.keyword, simulator))
     }
 
     /// The same if its messages are not those of ROS, and those of no lab are.
     pub(super) fn other_than_ros(&self) -> Option<(&'static str, Span)> {
-        self.kind().filter(|_| !self.is_of_ros() && !self.has_a_lab_of_ros())
+        self.without(|kind| kind.ros.is_some()).filter(|_| !self.has_a_lab_of_ros())
     }
 
-    /// The same if the simulator itself brings all messages, so that nobody is told apart.
-    pub(super) fn one_for_all(&self) -> Option<(&'static str, Span)> {
-        self.kind().filter(|(word, _)| matches!(*word, "in_process" | "process" | "simlog"))
+    /// The kind of the simulator and where it is declared, if neither it nor some lab is of ROS 2.
+    pub(super) fn other_than_ros_2(&self) -> Option<(&'static str, Span)> {
+        if self.dialect() == Dialect::Ros1 && !self.has_a_lab_of_ros() {
+            return self.without(|_| false);
+        }
+        self.other_than_ros()
     }
 
-    /// The word of the simulator's kind, if that is known, and where it is declared.
-    pub(super) fn kind(&self) -> Option<(&'static str, Span)> {
-        let simulator = self.simulators().next()?;
-        let word = match simulator.transport.as_ref()? {
-            ast::Transport::InProcess(_) => "in_process",
-            ast::Transport::Process(_) => "process",
-            ast::Transport::Ros2(_) => "ros2",
-            ast::Transport::Bus(bus) => match bus.kind {
-                BusKind::Rosbridge => "rosbridge",
-                BusKind::Ros1 => "ros1",
-                BusKind::Mqtt => "mqtt",
-                BusKind::Simlog => "simlog",
-            },
-        };
-        Some((word, simulator.head.name.span))
+    /// Nodes of ROS 2.
+    pub(super) fn ros2(&mut self, written: &'a ast::Transport) -> Option<Transport> {
+        let domain = self.first_domain(written)?;
+        Some(Transport::Ros2(Ros2 { domain }))
     }
 
-    pub(super) fn ros2(&mut self, name: &Name, ros2: &'a ast::Ros2) -> Option<Transport> {
-        let domain = match self.single(&ros2.domains, "domain") {
+    /// The domain of the first worker.
+    pub(super) fn first_domain(&mut self, written: &'a ast::Transport) -> Option<u16> {
+        match self.single(&written.settings.domains, "domain") {
             Some(domain) => self.domain_id(*domain),
             None => Some(0),
-        };
-        self.single(&ros2.types, "types");
-        let clock = self.simulator_clock(&ros2.clocks);
-        let step = match self.single(&ros2.steps, "step") {
-            Some(step) => self.stepping(name, step, ros2).map(Some),
-            None => Some(None),
-        };
-        let reset = self.reset_service(&ros2.resets);
-        Some(Transport::Ros2 { domain: domain?, clock: clock?, step: step?, reset: reset.ok()? })
+        }
     }
 
-    pub(super) fn simulator_clock(&mut self, clocks: &'a [(Span, ast::Clock)]) -> Option<Clock> {
+    /// What systems of ROS have in common.
+    pub(super) fn ros(&mut self, name: &Name, written: &'a ast::Transport) -> Option<Ros> {
+        let settings = &written.settings;
+        self.single(&settings.types, "types");
+        let clock = self.simulator_clock(&settings.clocks);
+        let step = match self.single(&settings.steppings, "step") {
+            Some(step) => self.stepping(name, step, settings).map(Some),
+            None => Some(None),
+        };
+        let reset = self.reset_service(&settings.resets);
+        let proxies = self.proxies(&settings.proxies, written.kind);
+        Some(Ros { clock: clock?, step: step?, reset: reset.ok()?, proxies: proxies?, interfaces: Vec::new() })
+    }
+
+    fn simulator_clock(&mut self, clocks: &'a [(Span, ast::Clock)]) -> Option<Clock> {
         match self.single(clocks, "clock") {
             Some(ast::Clock::Topic(path)) => self.ros_name(path, "topic").map(|path| Clock::Topic { path }),
             Some(ast::Clock::Wall) | None => Some(Clock::Wall),
@@ -122,14 +112,14 @@ impl<'a> Resolver<'a> {
     }
 
     /// The service that resets the simulator, if there is one. An error was reported.
-    pub(super) fn reset_service(&mut self, resets: &'a [(Span, Text)]) -> Result<Option<String>, ()> {
+    fn reset_service(&mut self, resets: &'a [(Span, Text)]) -> Result<Option<String>, ()> {
         match self.single(resets, "reset") {
             Some(path) => self.ros_name(path, "service").map(Some).ok_or(()),
             None => Ok(None),
         }
     }
 
-    pub(super) fn domain_id(&mut self, domain: ast::Count) -> Option<u16> {
+    fn domain_id(&mut self, domain: ast::Count) -> Option<u16> {
         let value = domain.value?;
         if value > MOST_DOMAIN {
             let title = format!("`{}` is not a domain", self.text(domain.span));
@@ -141,10 +131,10 @@ impl<'a> Resolver<'a> {
         u16::try_from(value).ok()
     }
 
-    fn stepping(&mut self, name: &Name, step: &'a ast::Stepping, ros2: &ast::Ros2) -> Option<Stepping> {
+    fn stepping(&mut self, name: &Name, step: &'a ast::Stepping, settings: &ast::Settings) -> Option<Stepping> {
         let step_ns = self.step(&step.time);
         let Some(by) = &step.by else {
-            if ros2.has_errors {
+            if settings.has_errors {
                 return None;
             }
             let title = format!("the step of `{}` does not say what takes it", name.text);
@@ -163,7 +153,7 @@ impl<'a> Resolver<'a> {
         let by = match by.channel {
             StepChannel::Service => StepBy::Service { path: path? },
             StepChannel::Topic => {
-                if !ros2.clocks.iter().any(|(_, clock)| matches!(clock, ast::Clock::Topic(_))) {
+                if !settings.clocks.iter().any(|(_, clock)| matches!(clock, ast::Clock::Topic(_))) {
                     let title = format!("a step by topic needs a clock, but `{}` has none", name.text);
                     let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, by.span.to(by.path.span), title)
                         .label("a topic does not answer: only the clock shows that the step was taken")
@@ -201,11 +191,7 @@ impl<'a> Resolver<'a> {
 
 /// Whether messages that come this way are those of ROS.
 pub(super) fn is_of_ros(transport: &ast::Transport) -> bool {
-    match transport {
-        ast::Transport::InProcess(_) | ast::Transport::Process(_) => false,
-        ast::Transport::Ros2(_) => true,
-        ast::Transport::Bus(bus) => matches!(bus.kind, BusKind::Rosbridge | BusKind::Ros1),
-    }
+    transport.kind.properties().ros.is_some()
 }
 
 /// A name with a `/` before it, or why ROS does not permit it.

@@ -1,69 +1,69 @@
 //! The simulator: how a runner reaches it, and how it moves on in time.
 
+use sesame_plan::SimulatorKind;
+
 use super::Resolver;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{Simulator, Transport};
-use crate::span::Span;
 use crate::syntax::ast::{self, Name};
 use crate::units::Unit;
 
-/// How a simulator's program moves on in time.
-enum Pace {
-    /// When it is told to, by this much.
-    LockStepped { step_ns: u64 },
-    /// By its own clock.
-    FreeRunning,
-}
-
 impl<'a> Resolver<'a> {
     pub(super) fn simulator(&mut self, simulator: &'a ast::Simulator) -> Option<Simulator> {
+        let written = simulator.transport.as_ref()?;
         let name = &simulator.head.name;
-        let transport = match simulator.transport.as_ref()? {
-            ast::Transport::InProcess(in_process) => {
-                let path = self.rust_path(&in_process.path);
-                let folder = self.single(&in_process.crates, "crate");
-                let step_ns = self.step_of(name, &in_process.steps, in_process.has_errors);
-                let crate_folder = folder.map(|folder| folder.text.clone());
-                Transport::InProcess { path: path?, crate_folder, step_ns: step_ns? }
-            }
-            ast::Transport::Process(process) => {
-                let program = self.program(&process.program);
-                let pace = self.pace_of(name, process);
-                // Empty texts were reported where they were read.
-                let arguments = process.arguments.iter().map(|argument| argument.text.clone()).collect();
-                let step_ns = match pace? {
-                    Pace::LockStepped { step_ns } => Some(step_ns),
-                    Pace::FreeRunning => None,
-                };
-                Transport::Process { program: program?, arguments, step_ns }
-            }
-            ast::Transport::Ros2(ros2) => self.ros2(name, ros2)?,
-            ast::Transport::Bus(bus) => self.bus(name, bus)?,
+        let crate_folder = self.single(&written.settings.crates, "crate").map(|folder| folder.text.clone());
+        let ros = match written.kind.properties().ros {
+            Some(_) => self.ros(name, written).map(Some),
+            None => Some(None),
         };
-        Some(Simulator { declaration: self.declaration(&simulator.head), transport })
+        let transport = match written.kind {
+            SimulatorKind::InProcess => self.in_process(name, written),
+            SimulatorKind::Process => self.process(name, written),
+            SimulatorKind::Ros2 => self.ros2(written),
+            SimulatorKind::Rosbridge => self.rosbridge(written),
+            SimulatorKind::Ros1 => self.ros1(written),
+            SimulatorKind::Mqtt => self.mqtt(written),
+            SimulatorKind::Simlog => self.simlog(name, written),
+        };
+        let declaration = self.declaration(&simulator.head);
+        Some(Simulator { declaration, transport: transport?, crate_folder, ros: ros? })
     }
 
-    /// How a program moves on in time; nothing if that is not clear.
-    fn pace_of(&mut self, name: &Name, process: &'a ast::Process) -> Option<Pace> {
-        let Some((free, ())) = process.free_running.first() else {
-            let step_ns = self.step_of(name, &process.steps, process.has_errors)?;
-            return Some(Pace::LockStepped { step_ns });
+    fn in_process(&mut self, name: &Name, written: &'a ast::Transport) -> Option<Transport> {
+        let path = self.rust_path(written.first_text());
+        let step_ns = self.step_of(name, &written.settings);
+        Some(Transport::InProcess { path: path?, step_ns: step_ns? })
+    }
+
+    fn process(&mut self, name: &Name, written: &'a ast::Transport) -> Option<Transport> {
+        let program = self.program(written.first_text());
+        // Empty texts were reported where they were read.
+        let arguments = written.texts[1..].iter().map(|argument| argument.text.clone()).collect();
+        let step_ns = self.pace_of(name, &written.settings);
+        Some(Transport::Process { program: program?, arguments, step_ns: step_ns.ok()? })
+    }
+
+    /// How a program moves on in time: in steps of so many nanoseconds, or freely. An error was reported.
+    fn pace_of(&mut self, name: &Name, settings: &'a ast::Settings) -> Result<Option<u64>, ()> {
+        let Some((free, ())) = settings.free_running.first() else {
+            return self.step_of(name, settings).map(Some).ok_or(());
         };
-        self.single(&process.free_running, "free running");
-        if let Some((step, _)) = process.steps.first() {
+        self.single(&settings.free_running, "free running");
+        if let Some((step, _)) = settings.steps.first() {
             let title = "a simulator that runs freely has no step".to_owned();
             let diagnostic = Diagnostic::new(Code::CLAUSE_TWICE, *step, title)
                 .label("remove `step`, or `free running`")
                 .secondary(*free, "it runs freely");
             self.report(diagnostic);
-            return None;
+            return Err(());
         }
-        Some(Pace::FreeRunning)
+        Ok(None)
     }
 
-    pub(super) fn step_of(&mut self, name: &Name, steps: &'a [(Span, ast::Quantity)], has_errors: bool) -> Option<u64> {
-        let step = self.single(steps, "step");
-        if step.is_none() && !has_errors {
+    pub(super) fn step_of(&mut self, name: &Name, settings: &'a ast::Settings) -> Option<u64> {
+        let step = self.single(&settings.steps, "step");
+        if step.is_none() && !settings.has_errors {
             self.missing(name.span, &name.text, "its step size", "step 20ms");
         }
         self.step(step?)

@@ -20,6 +20,9 @@ use sesame_dsl::diagnostic::{CODES, Severity, render};
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::{analyse, load_imports, units};
 
+/// The page that has the standard space.
+const STANDARD: &str = "docs/language/README.md";
+
 const GRAMMAR: &str = include_str!("../../../grammars/sesame.pest");
 
 fn project() -> PathBuf {
@@ -34,13 +37,19 @@ fn read(path: &str) -> String {
 
 #[expect(clippy::disallowed_methods, reason = "the crate is pure; this test reads the project's documentation")]
 fn pages() -> Vec<(String, String)> {
-    let folder = project().join("docs");
-    let mut paths: Vec<String> = std::fs::read_dir(&folder)
-        .expect("the project has documentation")
-        .map(|entry| entry.expect("the folder can be listed").path())
-        .filter(|file| file.extension().is_some_and(|extension| extension == "md"))
-        .map(|file| format!("docs/{}", file.file_name().and_then(|name| name.to_str()).expect("names are plain")))
-        .collect();
+    let mut paths: Vec<String> = Vec::new();
+    let mut folders = vec!["docs".to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(project().join(&folder)).expect("the project has documentation") {
+            let entry = entry.expect("the folder can be listed");
+            let path = format!("{folder}/{}", entry.file_name().to_str().expect("names are plain"));
+            if entry.path().is_dir() {
+                folders.push(path);
+            } else if entry.path().extension() == Some("md".as_ref()) {
+                paths.push(path);
+            }
+        }
+    }
     assert!(paths.len() >= 2, "guide and reference are there");
     let examples = ["a50_cell", "kuka_cell", "transport", "two_robots"];
     paths.extend(examples.map(|example| format!("examples/{example}/README.md")));
@@ -92,7 +101,7 @@ fn check(text: &str) -> (Vec<(String, bool)>, String) {
     let mut sources = SourceMap::new();
     let file = sources.add("example.sesame", text);
     load_imports(&mut sources, file, |name| {
-        let known = (name == "cell.sesame").then(|| standard(&blocks("docs/language.md", &read("docs/language.md"))));
+        let known = (name == "cell.sesame").then(|| standard(&blocks(STANDARD, &read(STANDARD))));
         known.ok_or_else(|| "examples import `cell.sesame` only".to_owned())
     });
     let analysis = analyse(&sources, file);
@@ -180,7 +189,8 @@ fn what_hooks_are_said_to_call_exists() {
 
 #[test]
 fn the_reference_lists_every_code_and_every_unit() {
-    let reference = read("docs/language.md");
+    let chapters = pages().into_iter().filter(|(page, _)| page.starts_with("docs/language/"));
+    let reference: String = chapters.map(|(_, text)| text).collect();
     for (code, _) in CODES {
         assert!(reference.contains(&format!("| {} |", code.text())), "{code} is not in the table");
     }

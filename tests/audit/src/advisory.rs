@@ -4,6 +4,8 @@
 //! RustSec's own library reads the same files, but needs 36 more packages than this; what the audit compares are two
 //! lists of versions.
 
+mod problems;
+
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
@@ -11,9 +13,10 @@ use std::path::Path;
 use semver::{Version, VersionReq};
 use serde::Deserialize;
 
-use crate::agreed::Exception;
+use crate::error::AuditError;
 use crate::locked::Package;
-use crate::{AuditError, Problem};
+
+pub use problems::problems;
 
 /// What is known of some versions of a package.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -151,33 +154,4 @@ pub fn read(folder: &Path, packages: &[Package]) -> Result<Database, AuditError>
         }
     }
     Ok(Database { advisories, covers })
-}
-
-/// The packages that an advisory affects and no exception names, then the exceptions that name nothing of the kind,
-/// then the packages from elsewhere that the database does not cover.
-///
-/// Every kind counts: vulnerable, unsound, unmaintained, or a mere notice.
-pub fn problems(packages: &[Package], database: &Database, exceptions: &[Exception]) -> Vec<Problem> {
-    let names = |exception: &Exception, advisory: &Advisory| {
-        exception.id == advisory.id && exception.package == advisory.package
-    };
-    let affected: Vec<(&Package, &Advisory)> = packages
-        .iter()
-        .flat_map(|package| database.advisories.iter().map(move |advisory| (package, advisory)))
-        .filter(|(package, advisory)| advisory.package == package.name && advisory.affects(&package.version))
-        .collect();
-    let unnamed = affected
-        .iter()
-        .filter(|(_, advisory)| !exceptions.iter().any(|exception| names(exception, advisory)))
-        .map(|&(package, advisory)| Problem::Affected { package: package.clone(), advisory: advisory.clone() });
-    let needless = exceptions
-        .iter()
-        .filter(|exception| !affected.iter().any(|(_, advisory)| names(exception, advisory)))
-        .map(|Exception { id, package, .. }| Problem::NeedlessException { id: id.clone(), package: package.clone() });
-    let uncovered = packages
-        .iter()
-        .filter(|package| package.source.is_some())
-        .filter(|package| database.covers.as_ref().is_some_and(|covers| !covers.contains(&package.name)))
-        .map(|package| Problem::NotCovered { package: package.clone() });
-    unnamed.chain(needless).chain(uncovered).collect()
 }

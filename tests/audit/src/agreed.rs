@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use crate::AuditError;
+use crate::error::AuditError;
 
 /// What is accepted.
 #[derive(Debug, Clone, Default, Deserialize)]

@@ -6,8 +6,9 @@ use semver::Version;
 use serde::Deserialize;
 use spdx::{Expression, Licensee, ParseMode};
 
+use crate::error::AuditError;
 use crate::locked::Package;
-use crate::{AuditError, Problem};
+use crate::problem::Problem;
 
 /// What each package, by name and version, offers; `None` if its manifest names no licence.
 pub type Licences = BTreeMap<(String, Version), Option<String>>;

@@ -1,9 +1,13 @@
 //! Packages as `Cargo.lock` names them, and where they come from.
 
+mod problems;
+
 use semver::Version;
 use serde::Deserialize;
 
-use crate::{AuditError, Problem};
+use crate::error::AuditError;
+
+pub use problems::problems;
 
 /// One locked package.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
@@ -28,13 +32,4 @@ pub fn packages(lock: &str) -> Result<Vec<Package>, AuditError> {
     }
     let lock: Lock = toml::from_str(lock).map_err(|error| AuditError::malformed("Cargo.lock", error))?;
     Ok(lock.package)
-}
-
-/// The packages that come from elsewhere than `sources`.
-pub fn problems(packages: &[Package], sources: &[String]) -> Vec<Problem> {
-    packages
-        .iter()
-        .filter(|package| package.source.as_ref().is_some_and(|source| !sources.contains(source)))
-        .map(|package| Problem::Source { package: package.clone() })
-        .collect()
 }

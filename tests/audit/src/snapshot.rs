@@ -7,8 +7,8 @@ use std::path::Path;
 
 use semver::VersionReq;
 
-use crate::AuditError;
 use crate::advisory::{self, Advisory, Database};
+use crate::error::AuditError;
 use crate::locked::Package;
 
 /// Replaces the snapshot in `folder` by the facts that `database` has on `packages` at `date`, and says how many

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::Draw;
+use super::draw::Draw;
 use super::words::{Names, docs, file, own_names, path, quoted, text};
 
 /// Units that are not time; the empty one is none.

@@ -3,7 +3,10 @@
 use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
-use super::{Draw, MARK};
+use super::draw::Draw;
+
+/// What stands in hostile texts and nowhere else: where it turns up as anything but text, a text became something.
+pub const MARK: &str = "injected";
 
 /// Names that mean something to Rust, to generated code, to SQLite, to cargo, or to the language at other places.
 static NAMES: LazyLock<Vec<&str>> = LazyLock::new(|| {

@@ -38,7 +38,7 @@ pub struct MonitorDecision {
     pub state: MonitorState,
 }
 
-/// A requirement was violated for the first time in the run.
+/// A run lost a requirement: from a moment on, nothing could satisfy it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MonitorHazard {
     /// Which.

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::check::{Checked, at, each, id, name, positive, require};
 use crate::{
-    CampaignPlan, Channel, Clock, Interface, Launch, Lifecycle, Node, NodeId, ReadyWhen, Ros2, Simlog, SimlogVersion,
+    CampaignPlan, Channel, Interface, Launch, Lifecycle, Node, NodeId, ReadyWhen, Ros, Ros2, Simlog, SimlogVersion,
     Simulator, Transport, WireType, Wiring,
 };
 
@@ -17,39 +17,10 @@ const MILLISECOND: u64 = 1_000_000;
 impl CampaignPlan {
     pub(super) fn sound_simulator(&self, simulator: &Simulator) -> Checked {
         at("name", name(&simulator.name))?;
-        at("transport.step_ns", require(simulator.transport.step_ns() != Some(0), || "must be positive".to_owned()))?;
-        match &simulator.transport {
-            Transport::InProcess { .. } | Transport::Process { .. } => {}
-            Transport::Ros2(Ros2 { domain, interfaces, .. }) => {
-                let beyond = || format!("is {domain}, more than {MOST_DOMAIN}");
-                at("transport.domain", require(*domain <= MOST_DOMAIN, beyond))?;
-                at("transport", sound_interfaces(interfaces))?;
-                at("transport", self.sound_wiring(&simulator.transport))?;
-            }
-            Transport::Rosbridge(rosbridge) => {
-                at("transport.remote.url", name(&rosbridge.remote.url))?;
-                each("transport.proxies", &rosbridge.proxies, |proxy| {
-                    at("node", self.has_node(proxy.node))?;
-                    at("url", name(&proxy.url))
-                })?;
-                at("transport", sound_interfaces(&rosbridge.interfaces))?;
-                at("transport", self.sound_wiring(&simulator.transport))?;
-            }
-            Transport::Ros1(ros1) => {
-                at("transport.master", name(&ros1.master))?;
-                at("transport", sound_interfaces(&ros1.interfaces))?;
-                at("transport", self.sound_wiring(&simulator.transport))?;
-            }
-            Transport::Mqtt(mqtt) => {
-                at("transport.broker.remote.url", name(&mqtt.broker.remote.url))?;
-                each("transport.brokers", &mqtt.brokers, |(node, broker)| {
-                    self.has_node(*node)?;
-                    name(&broker.remote.url)
-                })?;
-                at("transport", self.sound_wiring(&simulator.transport))?;
-            }
-            Transport::Simlog(simlog) => at("transport", self.sound_simlog(simlog))?,
-        }
+        at("transport.step_ns", require(simulator.step_ns() != Some(0), || "must be positive".to_owned()))?;
+        at("transport", self.sound_transport(&simulator.transport))?;
+        at("transport", self.sound_ros(simulator))?;
+        at("transport", self.sound_wiring(simulator))?;
         let Lifecycle { launch, terminate: _, relay_budget } = &simulator.lifecycle;
         at("lifecycle.launch", launch.as_ref().map_or(Ok(()), |launch| self.sound_launch(launch)))?;
         let Some(budget) = relay_budget else { return Ok(()) };
@@ -57,10 +28,51 @@ impl CampaignPlan {
         at("lifecycle.relay_budget.jitter", budget.jitter.map_or(Ok(()), positive))
     }
 
-    fn sound_wiring(&self, transport: &Transport) -> Checked {
-        let (topics, wiring) = (self.topics.len(), transport.wiring().len());
+    /// The settings that are those of one kind.
+    fn sound_transport(&self, transport: &Transport) -> Checked {
+        match transport {
+            Transport::Ros2(Ros2 { domain }) => {
+                let beyond = || format!("is {domain}, more than {MOST_DOMAIN}");
+                at("domain", require(*domain <= MOST_DOMAIN, beyond))
+            }
+            Transport::Rosbridge(rosbridge) => at("remote.url", name(&rosbridge.remote.url)),
+            Transport::Ros1(ros1) => at("master", name(&ros1.master)),
+            Transport::Mqtt(mqtt) => {
+                at("broker.remote.url", name(&mqtt.broker.remote.url))?;
+                each("brokers", &mqtt.brokers, |(node, broker)| {
+                    self.has_node(*node)?;
+                    name(&broker.remote.url)
+                })
+            }
+            Transport::Simlog(simlog) => self.sound_simlog(simlog),
+            // The generator checks these, since a type becomes code.
+            Transport::InProcess { .. } | Transport::Process { .. } => Ok(()),
+        }
+    }
+
+    /// What systems of ROS have, and no others.
+    fn sound_ros(&self, simulator: &Simulator) -> Checked {
+        let properties = simulator.properties();
+        let Some(Ros { clock: _, step, reset: _, proxies, interfaces }) = &simulator.ros else {
+            return require(properties.ros.is_none(), || "has no `clock`, or no `interfaces`".to_owned());
+        };
+        let other = |part: &str| format!("a simulator of kind `{}` has no {part}", properties.keyword);
+        require(properties.ros.is_some(), || other("`clock` and no `interfaces`"))?;
+        require(step.is_none() || properties.reaches_nodes, || other("`step`"))?;
+        require(proxies.is_empty() || properties.proxies, || other("`proxies`"))?;
+        each("proxies", proxies, |proxy| {
+            at("node", self.has_node(proxy.node))?;
+            at("url", name(&proxy.url))
+        })?;
+        sound_interfaces(interfaces)
+    }
+
+    /// How topics are cut, of a system on a bus: each of them is.
+    fn sound_wiring(&self, simulator: &Simulator) -> Checked {
+        let on_a_bus = simulator.properties().bus.is_some();
+        let (topics, wiring) = (if on_a_bus { self.topics.len() } else { 0 }, simulator.wiring.len());
         at("wiring", require(topics == wiring, || format!("there are {wiring} for {topics} topics")))?;
-        each("wiring", transport.wiring(), |Wiring { cut, publishers, subscribers, joined }| {
+        each("wiring", &simulator.wiring, |Wiring { cut, publishers, subscribers, joined }| {
             each("publishers", publishers, |&id| self.has_node(id))?;
             each("subscribers", subscribers, |&id| self.has_node(id))?;
             let distinguishes = !publishers.is_empty() || !subscribers.is_empty();
@@ -115,23 +127,11 @@ impl CampaignPlan {
         let Some(ready) = &launch.ready else { return Ok(()) };
         let when = match &ready.when {
             ReadyWhen::Topic { topic } => self.has_topic(*topic),
-            ReadyWhen::Clock => require(self.has_a_clock(), || "the simulator has no clock".to_owned()),
+            ReadyWhen::Clock => require(self.simulator.has_a_clock(), || "the simulator has no clock".to_owned()),
             ReadyWhen::Port { .. } | ReadyWhen::Line { .. } => Ok(()),
         };
         at("ready.when", when)?;
         at("ready.within", positive(ready.within))
-    }
-
-    fn has_a_clock(&self) -> bool {
-        let clock = match &self.simulator.transport {
-            Transport::InProcess { .. } | Transport::Process { .. } | Transport::Mqtt(_) | Transport::Simlog(_) => {
-                return false;
-            }
-            Transport::Ros2(ros2) => &ros2.clock,
-            Transport::Rosbridge(rosbridge) => &rosbridge.clock,
-            Transport::Ros1(ros1) => &ros1.clock,
-        };
-        matches!(clock, Clock::Topic { .. })
     }
 
     pub(super) fn has_node(&self, node: NodeId) -> Checked {
@@ -140,17 +140,10 @@ impl CampaignPlan {
 
     /// A topic of ROS has a layout.
     pub(super) fn has_interface(&self, interface: Option<&str>) -> Checked {
-        let interfaces = match &self.simulator.transport {
-            Transport::Ros2(ros2) => &ros2.interfaces,
-            Transport::Rosbridge(rosbridge) => &rosbridge.interfaces,
-            Transport::Ros1(ros1) => &ros1.interfaces,
-            // It may be for a lab.
-            Transport::InProcess { .. } | Transport::Process { .. } | Transport::Mqtt(_) | Transport::Simlog(_) => {
-                return interface.map_or(Ok(()), name);
-            }
-        };
+        // In other systems it may be for a lab.
+        let Some(ros) = &self.simulator.ros else { return interface.map_or(Ok(()), name) };
         let Some(wanted) = interface else { return require(false, || "there is none".to_owned()) };
-        let known = interfaces.iter().any(|Interface { name, .. }| name == wanted);
+        let known = ros.interfaces.iter().any(|Interface { name, .. }| name == wanted);
         require(known, || format!("there is no interface `{wanted}`"))
     }
 }

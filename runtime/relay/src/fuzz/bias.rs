@@ -1,7 +1,8 @@
 //! Bias: adds a constant. On time stamps this is the skew of a clock.
 
+use crate::fuzz::action::Action;
 use crate::fuzz::change::{Amount, add};
-use crate::fuzz::{Action, Places};
+use crate::fuzz::places::Places;
 use crate::value::Value;
 
 /// A bias or clock skew operation.

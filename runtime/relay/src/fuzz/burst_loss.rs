@@ -5,7 +5,9 @@
 //! message before the message is handled. In the long run `loss * enter / (enter + leave)` of all messages are dropped,
 //! and a burst has a mean length of `1 / leave` messages.
 
-use crate::fuzz::{Action, KeyedRng, PerWire};
+use crate::fuzz::action::Action;
+use crate::fuzz::draws::KeyedRng;
+use crate::fuzz::per_wire::PerWire;
 
 /// A burst loss operation.
 #[derive(Debug)]

@@ -10,7 +10,7 @@ use sesame_base::time::SimTime;
 use sesame_plan::{CampaignPlan, Choice, Moment, Operation, OperationId, OperationKind};
 
 use crate::files::SpaceFiles;
-use crate::fuzz::KeyedRng;
+use crate::fuzz::draws::KeyedRng;
 use crate::message::{FromValue, Mismatch, ToValue};
 use crate::value::{Text, Value};
 

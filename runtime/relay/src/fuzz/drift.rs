@@ -2,8 +2,9 @@
 
 use sesame_base::time::SimTime;
 
+use crate::fuzz::action::Action;
 use crate::fuzz::change::{Amount, add};
-use crate::fuzz::{Action, Places};
+use crate::fuzz::places::Places;
 use crate::value::Value;
 
 /// A drift operation.

@@ -1,7 +1,8 @@
 //! Freeze: repeats the last values from before the operation became active.
 
-use crate::fuzz::places::Memory;
-use crate::fuzz::{Action, PerWire, Places};
+use crate::fuzz::action::Action;
+use crate::fuzz::per_wire::PerWire;
+use crate::fuzz::places::{Memory, Places};
 use crate::value::Value;
 
 /// A freeze operation.

@@ -4,7 +4,8 @@
 use sesame_base::time::SimTime;
 use sesame_plan::{Distribution, Drain};
 
-use crate::fuzz::{Action, KeyedRng};
+use crate::fuzz::action::Action;
+use crate::fuzz::draws::KeyedRng;
 
 /// How many times a normal delay is drawn before the middle is used; the probability that all are out of range is
 /// 1e-21.

@@ -1,7 +1,9 @@
 //! Noise: adds a new normally distributed number with mean zero per message and number.
 
+use crate::fuzz::action::Action;
 use crate::fuzz::change::add;
-use crate::fuzz::{Action, KeyedRng, Places};
+use crate::fuzz::draws::KeyedRng;
+use crate::fuzz::places::Places;
 use crate::value::Value;
 
 /// A noise operation.

@@ -2,8 +2,9 @@
 
 use sesame_plan::NotFinite;
 
+use crate::fuzz::action::Action;
 use crate::fuzz::change::map;
-use crate::fuzz::{Action, Places};
+use crate::fuzz::places::Places;
 use crate::value::Value;
 
 /// An operation that replaces reals by NaN or infinity.

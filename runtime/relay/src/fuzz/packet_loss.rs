@@ -1,6 +1,7 @@
 //! Packet loss: drops each message independently ([SESAME 2023, §3.8], `PacketLossNetworkOperation`).
 
-use crate::fuzz::{Action, KeyedRng};
+use crate::fuzz::action::Action;
+use crate::fuzz::draws::KeyedRng;
 
 /// A packet loss operation.
 #[derive(Debug, Clone, Copy)]

@@ -2,7 +2,7 @@
 
 use sesame_plan::{Place, Step};
 
-use crate::fuzz::Action;
+use crate::fuzz::action::Action;
 use crate::value::Value;
 
 /// How many random numbers each value of a message may use.

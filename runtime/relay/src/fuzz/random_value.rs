@@ -3,8 +3,10 @@
 
 use sesame_plan::ValueMode;
 
+use crate::fuzz::action::Action;
 use crate::fuzz::change::{add, map, put};
-use crate::fuzz::{Action, KeyedRng, Places};
+use crate::fuzz::draws::KeyedRng;
+use crate::fuzz::places::Places;
 use crate::value::{Text, Value};
 
 /// A random value operation on numbers or points, with its sub-ranges.

@@ -11,8 +11,10 @@ use std::collections::BTreeMap;
 
 use sesame_base::time::SimTime;
 
+use crate::fuzz::action::{Action, MessageContext};
 use crate::fuzz::change::add;
-use crate::fuzz::{Action, MessageContext, PerWire, Places};
+use crate::fuzz::per_wire::PerWire;
+use crate::fuzz::places::Places;
 use crate::value::Value;
 
 /// A random walk operation.

@@ -2,7 +2,8 @@
 
 use sesame_base::time::SimTime;
 
-use crate::fuzz::{Action, PerWire};
+use crate::fuzz::action::Action;
+use crate::fuzz::per_wire::PerWire;
 
 /// A rate limit operation.
 #[derive(Debug)]

@@ -3,7 +3,8 @@
 use sesame_base::time::SimTime;
 use sesame_plan::Drain;
 
-use crate::fuzz::{Action, KeyedRng};
+use crate::fuzz::action::Action;
+use crate::fuzz::draws::KeyedRng;
 
 /// A reorder operation.
 #[derive(Debug, Clone, Copy)]

@@ -1,7 +1,8 @@
 //! Scale: multiplies by a constant.
 
+use crate::fuzz::action::Action;
 use crate::fuzz::change::map;
-use crate::fuzz::{Action, Places};
+use crate::fuzz::places::Places;
 use crate::value::Value;
 
 /// A scale operation.

@@ -4,9 +4,9 @@ use std::collections::VecDeque;
 
 use sesame_base::time::SimTime;
 
-use crate::fuzz::places::Memory;
-use crate::fuzz::{Action, PerWire, Places};
-use crate::relay::HELD_LIMIT;
+use crate::fuzz::action::{Action, HELD_LIMIT};
+use crate::fuzz::per_wire::PerWire;
+use crate::fuzz::places::{Memory, Places};
 use crate::value::Value;
 
 /// A stale operation.

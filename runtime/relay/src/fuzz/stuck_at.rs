@@ -1,7 +1,8 @@
 //! Stuck-at: replaces a value by a constant.
 
+use crate::fuzz::action::Action;
 use crate::fuzz::change::{Amount, map, put};
-use crate::fuzz::{Action, Places};
+use crate::fuzz::places::Places;
 use crate::value::{Text, Value};
 
 /// A stuck-at operation.

@@ -2,13 +2,15 @@
 
 use std::sync::Arc;
 
-use sesame_base::observation::{MetricObservation, Reach};
+use sesame_base::observation::{Lost, MetricObservation, Reach};
 use sesame_base::time::SimTime;
-use sesame_base::verdict::ends;
+use sesame_base::verdict::{breaks, ends};
 use sesame_monitor::{Invalid, Network};
 use sesame_plan::condition::Operand;
 use sesame_plan::stl::Robustness;
-use sesame_plan::{CampaignPlan, Formula, Members, MetricId, MetricSource, Side, Span, TopicId, Trend};
+use sesame_plan::{
+    Bound, CampaignPlan, Formula, Members, MetricId, MetricSource, RequirementId, Side, Span, TopicId, Trend,
+};
 
 use crate::metric::aggregate::FormulaState;
 use crate::metric::robustness::RobustnessState;
@@ -90,7 +92,7 @@ impl<'p> MetricTable<'p> {
             }
             if let MetricSource::Robustness { robustness } = &metric.source {
                 let refused = |error| MetricError::Formula { metric: metric.name.clone(), error };
-                RobustnessState::new(robustness, plan).map_err(refused)?;
+                RobustnessState::new(robustness, plan, false).map_err(refused)?;
             }
             for wire in wires.iter() {
                 let input = topics.iter().position(|&topic| topic == wires.topic(wire));
@@ -134,8 +136,12 @@ impl<'p> MetricTable<'p> {
                 },
                 robustness: match &metric.source {
                     MetricSource::Robustness { robustness } => Some(
-                        RobustnessState::new(robustness, self.plan)
-                            .expect("the table was made of formulas that are sound"),
+                        RobustnessState::new(
+                            robustness,
+                            self.plan,
+                            required_of(self.plan, MetricId(at)).next().is_some(),
+                        )
+                        .expect("the table was made of formulas that are sound"),
                     ),
                     _ => None,
                 },
@@ -586,6 +592,11 @@ impl Metrics<'_> {
                 (_, Some(formula)) => context.onwards(formula.certain(context)),
                 _ => context.onwards(context.not_finite.map_or(context.value, |(_, before)| before)),
             };
+            let lost = state.robustness.as_ref().map_or_else(Vec::new, |robustness| {
+                let violated = required_of(self.table.plan, MetricId(at)).filter(|(_, bound)| breaks(*bound, reach));
+                let lost = violated.filter_map(|(requirement, bound)| Some((requirement, robustness.lost(bound)?)));
+                lost.map(|(requirement, at)| Lost { requirement, at: at.seconds() }).collect()
+            });
             observations.push(MetricObservation {
                 value,
                 set,
@@ -593,6 +604,7 @@ impl Metrics<'_> {
                 not_finite: context.not_finite.map(|(time, _)| time.seconds()),
                 series: std::mem::take(&mut context.series),
                 robustness: state.robustness.as_mut().map_or_else(Vec::new, |robustness| robustness.signal(&bounds)),
+                lost,
             });
         }
         (observations, warnings)
@@ -610,15 +622,21 @@ impl Metrics<'_> {
 
 /// Simulation time of one step of a system that is stepped.
 fn step_of(plan: &CampaignPlan) -> Option<SimTime> {
-    let step = plan.simulator.transport.step_ns()?;
+    let step = plan.simulator.step_ns()?;
     i64::try_from(step).ok().filter(|&step| step > 0).map(SimTime::from_nanos)
+}
+
+/// The requirements on a metric, with their bounds, in order of declaration.
+fn required_of(plan: &CampaignPlan, metric: MetricId) -> impl Iterator<Item = (RequirementId, Bound)> {
+    let requirements = (0..).map(RequirementId).zip(&plan.requirements);
+    let requirements = requirements.filter(move |(_, requirement)| requirement.metric == metric);
+    requirements.map(|(id, requirement)| (id, requirement.bound))
 }
 
 /// The ends of the bounds of requirements on a metric.
 fn bounds_on(plan: &CampaignPlan, metric: MetricId) -> impl Iterator<Item = f64> {
-    let requirements = plan.requirements.iter().filter(move |requirement| requirement.metric == metric);
-    requirements.flat_map(|requirement| {
-        let (low, _, high, _) = ends(requirement.bound);
+    required_of(plan, metric).flat_map(|(_, bound)| {
+        let (low, _, high, _) = ends(bound);
         [low, high].into_iter().flatten()
     })
 }

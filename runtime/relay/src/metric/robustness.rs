@@ -5,8 +5,9 @@ use sesame_base::activation::TICK;
 use sesame_base::observation::Reach;
 use sesame_base::robustness::quantifier;
 use sesame_base::time::SimTime;
+use sesame_base::verdict::breaks;
 use sesame_plan::stl::Robustness;
-use sesame_plan::{CampaignPlan, Expression, Members, TopicId};
+use sesame_plan::{Bound, CampaignPlan, Expression, Members, TopicId};
 
 use crate::metric::Context;
 use crate::metric::aggregate::pairs_of;
@@ -25,8 +26,12 @@ pub(super) struct RobustnessState<'p> {
     /// When the last message came, and when the last one of an earlier instant did.
     last: SimTime,
     previous: SimTime,
+    /// Once the run is over: its last instant.
+    end: SimTime,
     attendance: Attendance,
     heard: Vec<(usize, Held)>,
+    /// A monitor without samples, to find out when a requirement was lost; `None` where nothing is required of it.
+    fresh: Option<Monitor>,
 }
 
 struct Instance {
@@ -41,6 +46,39 @@ struct Instance {
     said: Option<Said>,
     /// The robustness with its signal, where the trace had begun.
     signal: Option<(f64, Signal)>,
+    /// What the monitor got, without repetitions of a value, where something is required of it.
+    samples: Samples,
+    /// Nothing is known of its signals from then on; `None` as long as there is a monitor.
+    unknown_from: Option<SimTime>,
+}
+
+/// The samples of a monitor, in the order of their times.
+#[derive(Default)]
+struct Samples {
+    /// Time, signal, value.
+    all: Vec<(SimTime, usize, f64)>,
+    /// The last value of each signal.
+    last: Vec<Option<f64>>,
+}
+
+impl Samples {
+    fn push(&mut self, time: SimTime, signal: usize, value: f64) {
+        if self.last.len() <= signal {
+            self.last.resize(signal + 1, None);
+        }
+        if self.last[signal].replace(value) != Some(value) {
+            self.all.push((time, signal, value));
+        }
+    }
+
+    /// Gives a monitor those from the `from`th on, up to a time and that time included. Returns how many it then has.
+    fn give(&self, monitor: &mut Monitor, from: usize, until: SimTime) -> usize {
+        let new = self.all[from..].iter().take_while(|sample| sample.0 <= until);
+        new.fold(from, |given, &(time, signal, value)| {
+            monitor.push(time, signal, value);
+            given + 1
+        })
+    }
 }
 
 /// The outcome of one monitor.
@@ -54,7 +92,7 @@ struct Said {
 
 impl Instance {
     /// Gives the monitor the values of the signals at the context's time, once there are values.
-    fn push(&mut self, signals: &[Expression], context: &mut Context) {
+    fn push(&mut self, signals: &[Expression], kept: bool, context: &mut Context) {
         let (Some(values), Some(monitor)) = (self.held.values(), &mut self.monitor) else { return };
         self.pushed = context.now;
         for (at, signal) in signals.iter().enumerate() {
@@ -63,6 +101,9 @@ impl Instance {
             // As with other formulas: if arithmetic gives no number, the last value stays.
             if value.is_finite() {
                 monitor.push(context.now, at, value);
+                if kept {
+                    self.samples.push(context.now, at, value);
+                }
             }
             if let Some(undefined) = moment.undefined() {
                 context.note(format!("{undefined} at {}", context.now));
@@ -77,6 +118,7 @@ impl Instance {
     fn break_off(&mut self, now: SimTime, last: SimTime) {
         if let Some(monitor) = self.monitor.take() {
             let reach = monitor.reach(now);
+            self.unknown_from = Some(now);
             self.signal = monitor.finish_with_signal(last.max(self.pushed));
             self.said = Some(Said { robustness: self.signal.as_ref().map(|signal| signal.0), reach });
         }
@@ -84,10 +126,12 @@ impl Instance {
 }
 
 impl<'p> RobustnessState<'p> {
-    /// Before the first message. Fails for a formula that the generator never writes.
-    pub(super) fn new(robustness: &'p Robustness, plan: &CampaignPlan) -> Result<Self, FormulaError> {
-        let monitor = Monitor::new(&robustness.formula, robustness.signals.len())?.keeping_its_signal();
-        let monitor = if robustness.whole_windows { monitor.over_whole_windows() } else { monitor };
+    /// Before the first message. Fails for a formula that the generator never writes. If something is `required` of it,
+    /// it can tell [when that was lost](RobustnessState::lost).
+    pub(super) fn new(robustness: &'p Robustness, plan: &CampaignPlan, required: bool) -> Result<Self, FormulaError> {
+        let fresh = Monitor::new(&robustness.formula, robustness.signals.len())?;
+        let fresh = if robustness.whole_windows { fresh.over_whole_windows() } else { fresh };
+        let monitor = fresh.clone().keeping_its_signal();
         let each = robustness.inputs.iter().find(|input| input.members == Members::Each).map(|input| input.field.topic);
         let instance = |of: (usize, usize)| Instance {
             of,
@@ -96,6 +140,8 @@ impl<'p> RobustnessState<'p> {
             monitor: Some(monitor.clone()),
             said: None,
             signal: None,
+            samples: Samples::default(),
+            unknown_from: None,
         };
         let mut instances: Vec<Instance> = pairs_of(&robustness.inputs, plan).map(instance).collect();
         if instances.is_empty() {
@@ -108,8 +154,10 @@ impl<'p> RobustnessState<'p> {
             instances,
             last: SimTime::ZERO,
             previous: SimTime::ZERO,
+            end: SimTime::ZERO,
             attendance,
             heard: Vec::new(),
+            fresh: required.then_some(fresh),
         })
     }
 
@@ -155,7 +203,7 @@ impl<'p> RobustnessState<'p> {
                 instance.break_off(context.now, self.previous);
                 continue;
             }
-            instance.push(signals, context);
+            instance.push(signals, self.fresh.is_some(), context);
         }
     }
 
@@ -179,13 +227,14 @@ impl<'p> RobustnessState<'p> {
     pub(super) fn tick(&mut self, context: &mut Context) {
         self.last = self.last.max(context.now);
         for instance in &mut self.instances {
-            instance.push(&self.robustness.signals, context);
+            instance.push(&self.robustness.signals, self.fresh.is_some(), context);
         }
     }
 
     /// The run is over, at the context's time: sets the robustness.
     pub(super) fn end(&mut self, context: &mut Context) {
         let end = context.now.max(self.last);
+        self.end = end;
         for instance in &mut self.instances {
             if let Some(monitor) = instance.monitor.take() {
                 // A formula without a trace says nothing about the run.
@@ -216,9 +265,10 @@ impl<'p> RobustnessState<'p> {
                 context.now = self.last;
                 self.tick(context);
             }
-            let known = if complete { self.last + TICK } else { self.last };
+            let known = now.max(if complete { self.last + TICK } else { self.last });
+            self.end = known;
             for instance in &mut self.instances {
-                instance.break_off(now.max(known), self.last);
+                instance.break_off(known, self.last);
             }
             context.now = self.last;
             self.set(context);
@@ -231,14 +281,56 @@ impl<'p> RobustnessState<'p> {
         Signal::of_least(signals, quantifier(&self.robustness.formula)).thinned(bounds)
     }
 
-    /// The values that it may have at the end of the run, once the run is over: the least of all instances counts.
+    /// The values that it may have at the end of the run, once the run is over.
     pub(super) fn reach(&self) -> Reach {
-        let ends = |end: fn((f64, f64)) -> f64| {
-            let ends = self.instances.iter().filter_map(|instance| instance.said).map(|said| end(said.reach));
-            ends.reduce(least).filter(|end| end.is_finite())
-        };
-        Reach { low: ends(|reach| reach.0), high: ends(|reach| reach.1) }
+        let said = self.instances.iter().filter_map(|instance| instance.said);
+        reach_of_least(&said.map(|said| said.reach).collect::<Vec<_>>())
     }
+
+    /// Once the run is over: the first moment from which no continuation of the run could keep a bound that the run did
+    /// not keep. `None` if there was none before the run ended, or nothing is required of it.
+    pub(super) fn lost(&self, bound: Bound) -> Option<SimTime> {
+        let fresh = self.fresh.as_ref()?;
+        let all: Vec<&Instance> = self.instances.iter().filter(|instance| instance.said.is_some()).collect();
+        // What was lost stays lost, so the moment is found by halving. The monitors have the samples up to the time
+        // before the earliest moment that is possible.
+        let mut behind: Vec<(Monitor, usize)> = all.iter().map(|_| (fresh.clone(), 0)).collect();
+        let ahead = |behind: &[(Monitor, usize)], time: SimTime| -> Vec<(Monitor, usize)> {
+            let mut ahead = behind.to_vec();
+            for (instance, (monitor, given)) in all.iter().zip(&mut ahead) {
+                *given = instance.samples.give(monitor, *given, time);
+            }
+            ahead
+        };
+        let is_lost = |monitors: &[(Monitor, usize)], time: SimTime| {
+            let known = |instance: &Instance| instance.unknown_from.unwrap_or(SimTime::MAX).min(time + TICK);
+            let reaches = all.iter().zip(monitors).map(|(instance, (monitor, _))| monitor.reach(known(instance)));
+            breaks(bound, reach_of_least(&reaches.collect::<Vec<_>>()))
+        };
+        let first = all.iter().filter_map(|instance| instance.samples.all.first()).map(|sample| sample.0).min()?;
+        let (mut low, mut high) = (first, self.end);
+        if !is_lost(&ahead(&behind, high), high) {
+            return None;
+        }
+        while low < high {
+            let middle = SimTime::from_nanos(low.nanos() + (high.nanos() - low.nanos()) / 2);
+            let monitors = ahead(&behind, middle);
+            if is_lost(&monitors, middle) {
+                high = middle;
+            } else {
+                behind = monitors;
+                low = middle + TICK;
+            }
+        }
+        Some(low)
+    }
+}
+
+/// The values that the least of several robustnesses may have, from those that each may have.
+fn reach_of_least(reaches: &[(f64, f64)]) -> Reach {
+    let ends =
+        |end: fn((f64, f64)) -> f64| reaches.iter().copied().map(end).reduce(least).filter(|end| end.is_finite());
+    Reach { low: ends(|reach| reach.0), high: ends(|reach| reach.1) }
 }
 
 #[cfg(test)]
@@ -247,7 +339,7 @@ mod tests {
 
     use sesame_base::observation::MetricObservation;
     use sesame_plan::stl::{Formula, Interval};
-    use sesame_plan::testing::plan;
+    use sesame_plan::testing::{plan, requirement};
     use sesame_plan::{Comparison, FieldRef, Input, MetricSource, Side};
 
     use super::*;
@@ -320,6 +412,10 @@ mod tests {
 
     fn value(robustness: Robustness, sent: &[Sent]) -> Option<f64> {
         measured(robustness, sent, Some(10_000)).0
+    }
+
+    fn value_at(robustness: Robustness, sent: &[Sent], end: i64) -> Option<f64> {
+        measured(robustness, sent, Some(end)).0
     }
 
     #[test]
@@ -447,6 +543,52 @@ mod tests {
         assert_eq!(reach(eventually(2.0, 5.0, above(0)), None), Reach::ANY);
     }
 
+    /// When a run that ends at this time in milliseconds lost a bound on a robustness, in seconds.
+    fn lost(robustness: Robustness, bound: Bound, sent: &[Sent], end: Option<i64>) -> Option<f64> {
+        let mut plan = plan(Vec::new());
+        plan.metrics.truncate(1);
+        plan.metrics[0].source = MetricSource::Robustness { robustness };
+        plan.requirements = vec![requirement("R1", 0, bound)];
+        let wires = WireTable::new(&plan);
+        let table = MetricTable::new(&plan, &wires, &[]).unwrap();
+        let mut metrics = table.start();
+        metrics.begin();
+        for &(time, path, number) in sent {
+            let wire = wires.find(PATHS[path]).unwrap();
+            metrics.message(SimTime::from_nanos(time * 1_000_000), wire, &payload(path, number));
+        }
+        if let Some(end) = end {
+            metrics.end(SimTime::from_nanos(end * 1_000_000));
+        }
+        metrics.finish(&[]).0[0].lost.first().map(|lost| lost.at)
+    }
+
+    #[test]
+    fn a_requirement_is_lost_at_the_first_moment_from_which_nothing_could_satisfy_it() {
+        let kept = Bound::AtLeast { value: 0.0 };
+        let one = || vec![level(Members::Min)];
+        let late = [(0, 1, -4.0), (70_000, 1, 3.0)];
+        let within_a_minute = || of(one(), eventually(0.0, 60.0, above(0)));
+        assert_eq!(lost(within_a_minute(), kept, &late, Some(90_000)), Some(60.0), "the deadline, not the end");
+        assert_eq!(lost(within_a_minute(), kept, &late[..1], Some(90_000)), Some(60.0), "without any message there");
+        assert_eq!(lost(within_a_minute(), kept, &late[..1], Some(30_000)), None, "it could come until the end");
+        assert_eq!(lost(within_a_minute(), kept, &[(0, 1, -4.0), (50_000, 1, 3.0)], Some(90_000)), None);
+        // A request that nobody grants is lost when its time is over, not when it is made.
+        let granted = Formula::Implies { left: Box::new(above(0)), right: Box::new(eventually(0.0, 5.0, above(1))) };
+        let granted = of(vec![command(), level(Members::Min)], always(granted));
+        let sent = [(0, 0, -1.0), (0, 1, -1.0), (10_000, 0, 1.0), (11_000, 0, -1.0), (20_000, 1, 1.0)];
+        assert_eq!(lost(granted.clone(), kept, &sent, Some(30_000)), Some(15.0));
+        assert_eq!(lost(granted.clone(), kept, &sent[..4], None), None, "of a run that broke off nobody knows");
+        assert_eq!(lost(granted, kept, &[&sent[..4], &[(17_000, 0, -1.0)]].concat(), None), Some(15.0));
+        // The least of the members counts: one that is lost is enough, and for an upper bound all have to be.
+        let each = of(vec![level(Members::Each)], always(above(0)));
+        let sent = [(0, 1, 4.0), (0, 2, 5.0), (2_000, 2, -3.0), (3_000, 1, -1.0)];
+        assert_eq!(lost(each, kept, &sent, Some(9_000)), Some(2.0));
+        let each = of(vec![level(Members::Each)], eventually(0.0, 60.0, above(0)));
+        let sent = [(0, 1, -4.0), (0, 2, -5.0), (2_000, 2, 3.0), (3_000, 1, 1.0)];
+        assert_eq!(lost(each, Bound::AtMost { value: 0.0 }, &sent, Some(9_000)), Some(3.0));
+    }
+
     #[test]
     fn a_formula_that_no_generator_writes_is_refused_before_any_run() {
         let mut plan = plan(Vec::new());
@@ -456,7 +598,81 @@ mod tests {
         assert!(refused.starts_with("metric `fuzzing_time`: the formula names signal 7 of 1"), "{refused}");
     }
 
+    /// By trying every moment at which anything can be decided, each with a monitor of its own.
+    fn lost_by_trying(robustness: &Robustness, bound: Bound, sent: &[Sent], end: i64) -> Option<f64> {
+        let nanos = |millis: i64| SimTime::from_nanos(millis * 1_000_000);
+        let first = |path: usize| sent.iter().find(|sent| sent.1 == path).map(|sent| sent.0);
+        let start = first(0)?.max(first(1)?);
+        let is_lost = |now: i64| {
+            let mut monitor = Monitor::new(&robustness.formula, 2).unwrap();
+            let mut last = [None, None];
+            for &(time, path, number) in sent.iter().filter(|sent| sent.0 <= now) {
+                last[path] = Some(number);
+                if let [Some(command), Some(level)] = last {
+                    monitor.push(nanos(time), 0, command);
+                    monitor.push(nanos(time), 1, level);
+                }
+            }
+            breaks(bound, reach_of_least(&[monitor.reach(nanos(now) + TICK)]))
+        };
+        (start..=end).find(|&now| is_lost(now)).map(|now| nanos(now).seconds())
+    }
+
+    /// Formulas over two signals; all ends of intervals are whole milliseconds.
+    fn formulas() -> impl Strategy<Value = Formula> {
+        let boxed = |formula: Formula| Box::new(formula);
+        let predicate = (0..2u32).prop_map(above);
+        predicate.prop_recursive(3, 8, 2, move |inner| {
+            let interval = (0..20u8, prop::option::of(0..20u8)).prop_map(|(from, length)| {
+                let millis = |millis: u8| f64::from(millis) / 1_000.0;
+                Interval { from: millis(from), to: length.map(|length| millis(from + length)) }
+            });
+            prop_oneof![
+                inner.clone().prop_map(move |of| Formula::Not { of: boxed(of) }),
+                (inner.clone(), inner.clone())
+                    .prop_map(move |(left, right)| Formula::And { left: boxed(left), right: boxed(right) }),
+                (inner.clone(), inner.clone())
+                    .prop_map(move |(left, right)| Formula::Implies { left: boxed(left), right: boxed(right) }),
+                (interval.clone(), inner.clone())
+                    .prop_map(move |(interval, of)| Formula::Always { interval, of: boxed(of) }),
+                (interval.clone(), inner.clone())
+                    .prop_map(move |(interval, of)| Formula::Eventually { interval, of: boxed(of) }),
+                (interval, inner.clone(), inner).prop_map(move |(interval, left, right)| Formula::Until {
+                    interval,
+                    left: boxed(left),
+                    right: boxed(right)
+                }),
+            ]
+        })
+    }
+
     proptest! {
+        #[test]
+        fn what_is_lost_is_lost_when_trying_every_moment_says_so(
+            formula in formulas(),
+            steps in proptest::collection::vec((0..12i64, 0..2usize, -3..4i32), 1..10),
+            bound in prop_oneof![
+                Just(Bound::AtLeast { value: 0.0 }), Just(Bound::Below { value: 1.0 }), Just(Bound::Equal { value: 1.0 })
+            ],
+        ) {
+            let mut now = 0;
+            let sent: Vec<Sent> = steps
+                .into_iter()
+                .map(|(step, path, number)| {
+                    now += step;
+                    (now, path, f64::from(number))
+                })
+                .collect();
+            let robustness = of(vec![command(), level(Members::Min)], formula);
+            let end = now + 30;
+            let expected = lost_by_trying(&robustness, bound, &sent, end);
+            let value = value_at(robustness.clone(), &sent, end);
+            // A run that kept the bound lost nothing, and one of which nothing is known neither.
+            prop_assert!(value.is_none_or(|value| !(bound.holds(value) && expected.is_some())));
+            let expected = expected.filter(|_| value.is_some_and(|value| !bound.holds(value)));
+            prop_assert_eq!(lost(robustness, bound, &sent, Some(end)), expected);
+        }
+
         // With each message at a time of its own, the least over time is the least over messages.
         #[test]
         fn always_is_the_least_of_all_messages(

@@ -5,7 +5,7 @@
 //! recover, only the end decides. The robustness of a temporal formula is known when the run is over, and its
 //! signal says when the formula was lost: scores of such requirements are computed then.
 
-use sesame_base::hazard;
+use sesame_base::hazard::hazard;
 use sesame_base::observation::{MetricObservation, MetricValue, MonitorHazard, Outcome, Reach};
 use sesame_base::time::SimTime;
 use sesame_base::verdict::{Verdict, breaks, verdict};
@@ -249,14 +249,15 @@ impl<'p> Scores<'p> {
         metrics: &mut [MetricObservation],
         whole: bool,
     ) -> Vec<Vec<MonitorHazard>> {
-        let hazards = self.hazards(end, metrics);
-        let undecided = self.undecided(metrics, whole);
+        let outcome = if whole { Outcome::Completed } else { Outcome::crash(String::new()) };
+        let hazards = self.hazards(end, metrics, &outcome);
+        let undecided = self.undecided(metrics, &outcome);
         let plan = self.plan;
         for MetricScore { metric, monitor, score: of, late, .. } in self.metrics {
             let (Some(steps), Some(requirement)) = (late, of.requirement()) else { continue };
-            let hazard = hazard_of_formula(plan, requirement, metrics);
+            let hazard = hazard_at(plan, requirement, &outcome, metrics, end);
             let RequirementId(number) = requirement;
-            let hazards: Vec<(u32, SimTime)> = hazard.map(|at| (number, at.min(end))).into_iter().collect();
+            let hazards: Vec<(u32, SimTime)> = hazard.map(|at| (number, at)).into_iter().collect();
             let horizon = match of {
                 Score::FalseAlarms { within, .. } => within.map(SimTime::from_seconds),
                 _ => None,
@@ -286,27 +287,26 @@ impl<'p> Scores<'p> {
     }
 
     /// The scores of hazards of which nobody can tell whether there were any.
-    fn undecided(&self, metrics: &[MetricObservation], whole: bool) -> Vec<MetricId> {
-        let outcome = if whole { Outcome::Completed } else { Outcome::crash(String::new()) };
+    fn undecided(&self, metrics: &[MetricObservation], outcome: &Outcome) -> Vec<MetricId> {
         let scores = self.metrics.iter().filter(|it| {
             it.score.requirement().is_some_and(|requirement| {
                 let declared = self.plan.requirement(requirement);
                 let observed = &metrics[declared.metric.index()];
-                verdict(declared.bound, &outcome, MetricValue::from(observed)) == Verdict::Inconclusive
+                verdict(declared.bound, outcome, MetricValue::from(observed)) == Verdict::Inconclusive
             })
         });
         scores.map(|it| it.metric).collect()
     }
 
     /// Per monitor the hazards that it was to foresee, in the order of time.
-    fn hazards(&self, end: SimTime, metrics: &[MetricObservation]) -> Vec<Vec<MonitorHazard>> {
+    fn hazards(&self, end: SimTime, metrics: &[MetricObservation], outcome: &Outcome) -> Vec<Vec<MonitorHazard>> {
         let mut found = vec![Vec::new(); self.plan.monitors.len()];
         for it in &self.judged {
             let scored = match &it.late {
                 None => it.scorer.end(end),
                 Some(steps) => {
-                    let hazard = hazard_of_formula(self.plan, it.requirement, metrics);
-                    let hazards: Vec<_> = hazard.map(|at| (it.requirement.0, at.min(end))).into_iter().collect();
+                    let hazard = hazard_at(self.plan, it.requirement, outcome, metrics, end);
+                    let hazards: Vec<_> = hazard.map(|at| (it.requirement.0, at)).into_iter().collect();
                     score(guarantees(self.plan, it.monitor), None, steps, &hazards, end)
                 }
             };
@@ -334,14 +334,15 @@ impl MetricScore {
     }
 }
 
-/// When a requirement on the robustness of a formula was violated; `None` if it was not.
-fn hazard_of_formula(
+/// When a requirement was lost in a run that is over; `None` if it was not.
+fn hazard_at(
     plan: &CampaignPlan,
     requirement: RequirementId,
+    outcome: &Outcome,
     metrics: &[MetricObservation],
+    end: SimTime,
 ) -> Option<SimTime> {
-    let observed = &metrics[plan.requirement(requirement).metric.index()];
-    hazard::of_formula(plan, requirement, &Outcome::Completed, observed).map(SimTime::from_seconds)
+    hazard(plan, requirement, outcome, metrics, end.seconds()).map(|at| SimTime::from_seconds(at).min(end))
 }
 
 /// What a score is, of all that a monitor was worth.

@@ -4,8 +4,8 @@ use sesame_base::observation::{MetricObservation, MonitorObservation, OperationE
 use sesame_base::time::SimTime;
 use sesame_plan::Span;
 
-use crate::fuzz::Disturbance;
-use crate::relay::{COPIES_LIMIT, HELD_LIMIT, PUBLISHED_LIMIT, Phase, Relay};
+use crate::fuzz::{Disturbance, HELD_LIMIT};
+use crate::relay::{COPIES_LIMIT, PUBLISHED_LIMIT, Phase, Relay};
 
 /// The result of a run.
 pub struct Finished {

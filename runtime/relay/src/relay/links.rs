@@ -2,10 +2,8 @@
 
 use sesame_base::observation::Counters;
 use sesame_base::time::SimTime;
-use sesame_plan::testing::{latency, node, operation, plan, test_of, use_of};
-use sesame_plan::{
-    CampaignPlan, Choice, Clock, Distribution, Drain, NodeId, Operation, OperationKind, Ros2, Test, Transport, Wiring,
-};
+use sesame_plan::testing::{latency, node, operation, plan, ros2, test_of, use_of};
+use sesame_plan::{CampaignPlan, Choice, Distribution, Drain, NodeId, Operation, OperationKind, Test, Wiring};
 
 use crate::metric::MetricTable;
 use crate::relay::{Exchange, Finished, Relay};
@@ -22,14 +20,7 @@ fn plan_of(operations: Vec<Operation>) -> CampaignPlan {
     plan.nodes = vec![node("left"), node("right")];
     let mut wiring = vec![Wiring::default(); plan.topics.len()];
     wiring[0] = Wiring { cut: true, publishers: vec![LEFT], subscribers: vec![LEFT, RIGHT], joined: false };
-    plan.simulator.transport = Transport::Ros2(Ros2 {
-        domain: 0,
-        clock: Clock::Wall,
-        step: None,
-        reset: None,
-        interfaces: Vec::new(),
-        wiring,
-    });
+    plan.simulator = ros2(0, wiring);
     plan
 }
 

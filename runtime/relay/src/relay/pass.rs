@@ -3,9 +3,9 @@
 use sesame_base::time::SimTime;
 use sesame_plan::Side;
 
-use crate::fuzz::{Action, Disturbance, KeyedRng, MessageContext};
+use crate::fuzz::{Action, Disturbance, HELD_LIMIT, KeyedRng, MessageContext};
 use crate::relay::release::{Held, Why};
-use crate::relay::{COPIES_LIMIT, Delivery, HELD_LIMIT, Listener as _, OperationEvent, Phase, Relay};
+use crate::relay::{COPIES_LIMIT, Delivery, Listener as _, OperationEvent, Phase, Relay};
 
 impl Relay<'_> {
     /// Takes a message through the rest of its pipeline.

@@ -15,13 +15,13 @@ use crate::stl::until::SlidingUntil;
 
 /// The next part of the trace, in which no signal changes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Stretch {
+pub(super) struct Stretch<'u> {
     /// Where it ends, excluded.
     pub(super) end: i64,
     /// Whether the trace ends there too.
     pub(super) last: bool,
     /// What stands for everything of which nothing is known.
-    pub(super) unknown: Option<Unknown>,
+    pub(super) unknown: Option<&'u Unknown>,
     /// Whether only windows count that are completely within the trace.
     pub(super) whole: bool,
 }
@@ -38,18 +38,12 @@ pub(super) struct Unknown {
 impl Unknown {
     /// For what has a robustness only if the trace goes on. It differs from the infinity of what has one that is
     /// unknown.
-    fn undecided(self) -> f64 {
+    fn undecided(&self) -> f64 {
         f64::MAX.copysign(self.extreme)
     }
 }
 
-impl Stretch {
-    /// The same for what is negated.
-    fn negated(self) -> Self {
-        let unknown = self.unknown.map(|unknown| Unknown { extreme: -unknown.extreme, ..unknown });
-        Stretch { unknown, ..self }
-    }
-
+impl Stretch<'_> {
     /// Whether windows are cut here. Where nothing is known the trace goes on for ever, and has no end to cut them.
     fn cuts(self) -> bool {
         self.last && !self.whole && self.unknown.is_none()
@@ -176,7 +170,7 @@ impl Node {
     }
 
     /// Follows the trace, on which the signals have these values, and tells what becomes known of the robustness.
-    pub(super) fn extend(&mut self, stretch: Stretch, values: &[f64], out: &mut VecDeque<Piece>) {
+    pub(super) fn extend(&mut self, stretch: Stretch<'_>, values: &[f64], out: &mut VecDeque<Piece>) {
         if self.told >= self.asked.end {
             return;
         }
@@ -188,7 +182,8 @@ impl Node {
                 }
             }
             Operator::Not { of, input } => {
-                of.extend(stretch.negated(), values, input);
+                let unknown = stretch.unknown.map(|unknown| Unknown { extreme: -unknown.extreme, ..*unknown });
+                of.extend(Stretch { unknown: unknown.as_ref(), ..stretch }, values, input);
                 for piece in input.drain(..) {
                     put(out, piece.end, -piece.value);
                 }
@@ -203,21 +198,23 @@ impl Node {
             }
             Operator::Always { of, input, minimum, kept } => {
                 of.extend(stretch, values, input);
-                let defined = stretch.unknown.map(|unknown| {
-                    let ahead = minimum.reaches_ahead(stretch.whole);
-                    (unknown, of.defined(unknown.known, stretch.whole).saturating_sub(ahead))
-                });
-                let mut minima = VecDeque::new();
+                // Where all is known, which is for every sample, it says directly what it says.
+                let mut undecided = stretch.unknown.map(|unknown| (unknown, VecDeque::new()));
+                let minima = undecided.as_mut().map_or(&mut *out, |(_, minima)| minima);
                 for piece in input.drain(..) {
                     if let Some(kept) = kept {
                         put(kept, piece.end, piece.value);
                     }
-                    minimum.push(piece, &mut minima);
+                    minimum.push(piece, minima);
                 }
                 if stretch.cuts() || stretch.last && !minimum.is_bounded() {
-                    minimum.finish(of.told, &mut minima);
+                    minimum.finish(of.told, minima);
                 }
-                put_decided(defined, self.told, minima, out);
+                if let Some((unknown, minima)) = undecided {
+                    let ahead = minimum.reaches_ahead(stretch.whole);
+                    let defined = of.defined(unknown.known, stretch.whole).saturating_sub(ahead);
+                    put_decided(unknown, defined, self.told, minima, out);
+                }
             }
             Operator::Until(until) => until.extend(stretch, values, self.told, out),
         }
@@ -287,7 +284,7 @@ impl Node {
 
 impl Until {
     /// `told` is the time up to which its robustness is known.
-    fn extend(&mut self, stretch: Stretch, values: &[f64], told: i64, out: &mut VecDeque<Piece>) {
+    fn extend(&mut self, stretch: Stretch<'_>, values: &[f64], told: i64, out: &mut VecDeque<Piece>) {
         self.left.extend(stretch, values, &mut self.lead);
         for piece in self.lead.drain(..) {
             self.before.push(piece, &mut self.parts.left);
@@ -296,21 +293,28 @@ impl Until {
             }
         }
         self.right.extend(stretch, values, &mut self.input.right);
+        // What is said of a window that begins at once needs no shift.
+        let ahead = if self.delay == 0 { &mut self.parts.right } else { &mut self.ahead };
         while let Some((end, left, right)) = self.input.pop() {
-            self.within.push(end, left, right, &mut self.ahead);
+            self.within.push(end, left, right, ahead);
         }
         if stretch.cuts() || stretch.last && !self.within.is_bounded() {
-            self.within.finish(self.left.told.min(self.right.told), &mut self.ahead);
+            self.within.finish(self.left.told.min(self.right.told), ahead);
         }
         for piece in self.ahead.drain(..) {
             put(&mut self.parts.right, piece.end - self.delay, piece.value);
         }
-        let mut both = VecDeque::new();
-        while let Some((end, before, within)) = self.parts.pop() {
-            put(&mut both, end, before.min(within));
+        match stretch.unknown {
+            None => self.parts.least(out),
+            Some(unknown) => self.put_decided(unknown, stretch.whole, told, out),
         }
-        let defined = stretch.unknown.map(|unknown| (unknown, self.defined(unknown.known, stretch.whole)));
-        put_decided(defined, told, both, out);
+    }
+
+    #[cold]
+    fn put_decided(&mut self, unknown: &Unknown, whole: bool, told: i64, out: &mut VecDeque<Piece>) {
+        let mut both = VecDeque::new();
+        self.parts.least(&mut both);
+        put_decided(unknown, self.defined(unknown.known, whole), told, both, out);
     }
 
     /// As [`Node::defined`].
@@ -322,17 +326,17 @@ impl Until {
 
 /// Passes on what an operator says. From `defined` on it has a robustness only if the trace goes on, so what it says
 /// there is undecided. It has spoken of times before `told`.
-fn put_decided(defined: Option<(Unknown, i64)>, told: i64, pieces: VecDeque<Piece>, out: &mut VecDeque<Piece>) {
+#[cold]
+fn put_decided(unknown: &Unknown, defined: i64, told: i64, pieces: VecDeque<Piece>, out: &mut VecDeque<Piece>) {
     let mut told = told;
     for piece in pieces {
-        match defined {
-            Some((unknown, defined)) if piece.end > defined => {
-                if told < defined {
-                    put(out, defined, piece.value);
-                }
-                put(out, piece.end, unknown.undecided());
+        if piece.end > defined {
+            if told < defined {
+                put(out, defined, piece.value);
             }
-            _ => put(out, piece.end, piece.value),
+            put(out, piece.end, unknown.undecided());
+        } else {
+            put(out, piece.end, piece.value);
         }
         told = piece.end;
     }

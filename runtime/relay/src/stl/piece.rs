@@ -70,4 +70,11 @@ impl Pair {
         }
         Some((left.end.min(right.end), left.value, right.value))
     }
+
+    /// Takes all that is known of both, and passes on the least of the two.
+    pub(super) fn least(&mut self, out: &mut VecDeque<Piece>) {
+        while let Some((end, left, right)) = self.pop() {
+            put(out, end, left.min(right));
+        }
+    }
 }

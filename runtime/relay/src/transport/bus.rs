@@ -132,6 +132,18 @@ pub struct Settings {
     pub addresses: Vec<String>,
 }
 
+impl Settings {
+    /// What a plan says of its system.
+    pub fn of(plan: &CampaignPlan) -> Settings {
+        let simulator = &plan.simulator;
+        Settings {
+            has_clock: simulator.has_a_clock(),
+            resets: simulator.ros.as_ref().is_some_and(|ros| ros.reset.is_some()),
+            addresses: simulator.addresses().into_iter().map(str::to_owned).collect(),
+        }
+    }
+}
+
 /// The transport to a system on a bus. Launched programs run at this place.
 pub fn on_bus(plan: &CampaignPlan, bus: Box<dyn Bus>, settings: Settings, place: Place) -> Box<dyn Transport> {
     Box::new(System::new(plan, bus, settings, place))

@@ -19,7 +19,7 @@ pub fn in_process<S: Simulator + 'static>() -> Connect {
 }
 
 fn connect<S: Simulator + 'static>(plan: &CampaignPlan, _: &Path) -> Box<dyn Transport> {
-    let sesame_plan::Transport::InProcess { step_ns, .. } = plan.simulator.transport else {
+    let Some(step_ns) = plan.simulator.step_ns() else {
         unreachable!("the generator connects each kind of simulator by its own transport")
     };
     Box::new(InProcess::<S> {

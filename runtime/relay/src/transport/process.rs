@@ -105,18 +105,18 @@ fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
 
 /// The transport to the program of a plan, in this folder.
 fn transport(plan: &CampaignPlan, folder: PathBuf, in_runner: bool) -> Box<dyn Transport> {
-    let sesame_plan::Transport::Process { program, arguments, step_ns } = &plan.simulator.transport else {
+    let Some((program, arguments)) = plan.simulator.program() else {
         unreachable!("the generator connects each kind of simulator by its own transport")
     };
     let launched = Launched::new(plan, Place { in_runner, ..Place::of_worker(folder.clone()) });
     let program =
-        Program { name: program.clone(), arguments: arguments.clone(), folder, environment: Vec::new(), in_runner };
-    match step_ns {
+        Program { name: program.to_owned(), arguments: arguments.to_vec(), folder, environment: Vec::new(), in_runner };
+    match plan.simulator.step_ns() {
         Some(step) => Box::new(LockStepped::new(
             plan,
             program,
             launched,
-            SimTime::from_nanos(i64::try_from(*step).unwrap_or(i64::MAX)),
+            SimTime::from_nanos(i64::try_from(step).unwrap_or(i64::MAX)),
         )),
         None => Box::new(FreeRunning::new(plan, program, launched)),
     }

@@ -85,7 +85,7 @@ pub fn service_lines(plan: &CampaignPlan, wires: &WireTable) -> Vec<Line> {
 }
 
 fn wiring(plan: &CampaignPlan, topic: TopicId) -> Wiring {
-    plan.simulator.transport.wiring().get(topic.index()).cloned().unwrap_or_default()
+    plan.simulator.wiring.get(topic.index()).cloned().unwrap_or_default()
 }
 
 fn line(plan: &CampaignPlan, wires: &WireTable, wire: Wire) -> Line {
@@ -121,8 +121,8 @@ fn line(plan: &CampaignPlan, wires: &WireTable, wire: Wire) -> Line {
 #[cfg(test)]
 mod tests {
     use sesame_base::time::SimTime;
-    use sesame_plan::testing::{evidence_above, guarantee, minimal, monitor, node, topic};
-    use sesame_plan::{Clock, FieldRef, Gate, Mitigation, MitigationValue, MonitorId, Node, Ros2, Transport, Type};
+    use sesame_plan::testing::{evidence_above, guarantee, minimal, monitor, node, ros2, topic};
+    use sesame_plan::{FieldRef, Gate, Mitigation, MitigationValue, MonitorId, Node, Type};
 
     use super::*;
     use crate::value::Value;
@@ -134,10 +134,7 @@ mod tests {
         plan.monitors =
             vec![monitor("cell", 1, vec![evidence_above("low", 0, 1.0)], vec![guarantee("ok", 1, Gate::Evidence(0))])];
         plan.nodes = vec![node("arm")];
-        let wiring = [false, true].map(|cut| Wiring { cut, ..Wiring::default() }).to_vec();
-        let (interfaces, clock) = (Vec::new(), Clock::Wall);
-        plan.simulator.transport =
-            Transport::Ros2(Ros2 { domain: 0, clock, step: None, reset: None, interfaces, wiring });
+        plan.simulator = ros2(0, [false, true].map(|cut| Wiring { cut, ..Wiring::default() }).to_vec());
         let ends = |plan: &CampaignPlan| {
             let path = |source: &Source| source.path.clone();
             let of = |line: Line| (line.sources.iter().map(path).collect(), line.sinks.len());
@@ -163,10 +160,7 @@ mod tests {
         plan.topics = vec![topic("level", &["level"], Type::Real { unit: None }), topic("safe", &["safe"], Type::Bool)];
         plan.monitors =
             vec![monitor("cell", 1, vec![evidence_above("low", 0, 1.0)], vec![guarantee("ok", 1, Gate::Evidence(0))])];
-        let (interfaces, clock) = (Vec::new(), Clock::Wall);
-        let wiring = vec![Wiring { cut: true, ..Wiring::default() }; 2];
-        plan.simulator.transport =
-            Transport::Ros2(Ros2 { domain: 0, clock, step: None, reset: None, interfaces, wiring });
+        plan.simulator = ros2(0, vec![Wiring { cut: true, ..Wiring::default() }; 2]);
         let plan = plan.of_monitor_alone(MonitorId(0)).unwrap();
         let [level, safe] = &lines(&plan, &WireTable::new(&plan))[..] else { panic!("there are two topics") };
         assert_eq!((level.sources[0].path.as_str(), level.sinks.len(), level.cut), ("level", 0, false));

@@ -23,10 +23,10 @@ pub struct ConfirmedTest {
     pub front: bool,
     /// How often it was run again.
     pub repetitions: usize,
-    /// Of these, crashes and timeouts.
+    /// How many of these crashed or timed out.
     pub failures: usize,
-    /// A value per objective by which the front takes the test, where the campaign confirms; `None` where too few
-    /// repetitions have one.
+    /// The value of each objective that the front uses, if the campaign confirms; `None` if too few repetitions have
+    /// one.
     pub values: Option<Vec<f64>>,
     /// Everything that its first run or a fresh one shows: violated requirements in the space's order, then a crash and
     /// a timeout.

@@ -25,9 +25,9 @@ pub struct Indicator {
     pub unique: Option<u32>,
     /// Of these, without effect.
     pub no_effect: Option<u32>,
-    /// Of these, crashes.
+    /// How many of these crashed.
     pub crashes: Option<u32>,
-    /// Of these, timeouts.
+    /// How many of these timed out.
     pub timeouts: Option<u32>,
     /// Tests on the front.
     pub front: u32,

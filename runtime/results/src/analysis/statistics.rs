@@ -13,7 +13,7 @@ pub(crate) struct Sample {
     pub(crate) deviation: Option<f64>,
     /// The smallest.
     pub(crate) min: f64,
-    /// The median; the mean of the two in the middle of an even number.
+    /// The median; with an even number of values, the mean of the two in the middle.
     pub(crate) median: f64,
     /// The largest.
     pub(crate) max: f64,

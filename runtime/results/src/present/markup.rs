@@ -5,6 +5,9 @@
 
 use std::fmt::Write as _;
 
+use serde_json::Value;
+use sesame_base::visible::{is_hidden, visible_lines};
+
 /// Markup in the making.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Markup {
@@ -68,11 +71,11 @@ impl Markup {
 
     /// Data for the page's script. A document in HTML and one in XML read it alike, since it has none of the characters
     /// that end a script or that only one of them decodes.
-    pub(crate) fn json(&mut self, id: &str, data: &serde_json::Value) {
+    pub(crate) fn json(&mut self, id: &str, data: &Value) {
         self.open("script", &[("type", "application/json"), ("id", id)]);
-        for c in data.to_string().chars() {
+        for c in shown(data).to_string().chars() {
             match c {
-                '<' | '>' | '&' | '\u{7F}'..='\u{9F}' | '\u{2028}' | '\u{2029}' | '\u{FFFE}' | '\u{FFFF}' => {
+                '<' | '>' | '&' => {
                     let _ = write!(self.text, "\\u{:04x}", u32::from(c));
                 }
                 c => self.text.push(c),
@@ -110,8 +113,20 @@ impl Markup {
     }
 }
 
-/// Appends text so that it is nothing but text, inside and outside of attributes. Characters that no document may hold
-/// are replaced.
+/// Data whose texts have no characters that must not be shown: the script shows them as they are.
+fn shown(data: &Value) -> Value {
+    match data {
+        Value::String(text) => Value::from(visible_lines(text)),
+        Value::Array(items) => items.iter().map(shown).collect(),
+        Value::Object(fields) => {
+            fields.iter().map(|(name, value)| (visible_lines(name).into_owned(), shown(value))).collect()
+        }
+        other => other.clone(),
+    }
+}
+
+/// Appends text so that it is nothing but text, inside and outside of attributes. Characters that must not be shown are
+/// replaced.
 fn escape(text: &str, into: &mut String) {
     for c in text.chars() {
         match c {
@@ -121,7 +136,7 @@ fn escape(text: &str, into: &mut String) {
             '"' => into.push_str("&quot;"),
             '\'' => into.push_str("&#39;"),
             '\n' | '\t' => into.push(c),
-            c if c.is_control() || matches!(c, '\u{FFFE}' | '\u{FFFF}') => into.push('\u{FFFD}'),
+            c if is_hidden(c) => into.push('\u{FFFD}'),
             c => into.push(c),
         }
     }
@@ -173,12 +188,8 @@ mod tests {
             let document = roxmltree::Document::parse(&html).unwrap();
             let p = document.root_element();
             prop_assert_eq!(p.attribute("title"), Some(title.as_str()));
-            let expected: String = text
-                .chars()
-                .map(|c| if (c.is_control() && c != '\n' && c != '\t') || matches!(c, '\u{FFFE}' | '\u{FFFF}') { '\u{FFFD}' } else { c })
-                .collect();
             let b = p.first_element_child().unwrap();
-            prop_assert_eq!(b.text().unwrap_or_default(), expected);
+            prop_assert_eq!(b.text().unwrap_or_default(), visible_lines(&text));
             prop_assert_eq!(p.children().count(), 1);
         }
     }
@@ -194,10 +205,10 @@ mod tests {
             let (_, raw) = html.split_once('>').unwrap();
             let raw = raw.split_once("</").unwrap().0;
             prop_assert!(!raw.contains(['<', '>', '&']), "{}", raw);
-            prop_assert_eq!(&serde_json::from_str::<serde_json::Value>(raw).unwrap(), &data);
+            prop_assert_eq!(serde_json::from_str::<Value>(raw).unwrap(), shown(&data));
             let document = roxmltree::Document::parse(&html).unwrap();
             let read = document.root_element().text().unwrap();
-            prop_assert_eq!(&serde_json::from_str::<serde_json::Value>(read).unwrap(), &data);
+            prop_assert_eq!(serde_json::from_str::<Value>(read).unwrap(), shown(&data));
         }
 
         #[test]

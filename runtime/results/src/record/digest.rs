@@ -7,7 +7,6 @@ use rusqlite::types::ValueRef;
 use sesame_plan::{CampaignPlan, Test};
 use sha2::{Digest as _, Sha256};
 
-use crate::record::schema::{self, MEANING_SINCE, PIECES_SINCE, STANDARD_WORDS_SINCE};
 use crate::record::{lab_runs, left_out_operations, original_extents, split_operations};
 
 /// What is hashed, in this order: a name, and a query whose order of rows depends on nothing but the content. The
@@ -75,34 +74,6 @@ const CONTENT: &[(&str, &str)] = &[
     ("events", "SELECT test, text FROM events WHERE kind = 'warning' ORDER BY test, text"),
 ];
 
-/// What is hashed of results of an earlier schema: the schema since which it is another, and what was hashed before.
-const EARLIER: [(i64, &str, (&str, &str)); 3] = [
-    (
-        MEANING_SINCE,
-        "campaign",
-        (
-            "campaign",
-            "SELECT space, name, source, generator, runtime, seed, evaluations, end_after_s, plan, stop FROM campaign",
-        ),
-    ),
-    (
-        MEANING_SINCE,
-        "requirements",
-        (
-            "requirements",
-            "SELECT id, name, text, metric, low, low_excluded, high, high_excluded FROM requirements ORDER BY id",
-        ),
-    ),
-    (
-        PIECES_SINCE,
-        "series_pieces",
-        (
-            "change_points",
-            "SELECT test, metric, position, time_s, value FROM change_points ORDER BY test, metric, position",
-        ),
-    ),
-];
-
 /// Bytes that are collected before they are hashed: hashing each number by itself would be slow.
 const PORTION: usize = 1 << 16;
 
@@ -122,27 +93,24 @@ const PORTION: usize = 1 << 16;
 /// not be imported, and windows and ranges of the file that are others in the plan. So are runs of a lab that were
 /// entered by hand: which run of its test each is, but not who made it.
 ///
-/// Results of an earlier schema have the digest that their release computed, over all of the plan's JSON, the sentences
-/// of requirements, and the name of the `.sesame` file. Names of columns and verdicts are not hashed.
-pub(super) fn of_connection(connection: &Connection, version: i64, plan: &CampaignPlan) -> rusqlite::Result<String> {
+/// Names of columns and verdicts are not hashed.
+pub(super) fn of_connection(connection: &Connection, plan: &CampaignPlan) -> rusqlite::Result<String> {
     let meaning = serde_json::to_string(&plan.meaning()).expect("a plan is plain data with text keys");
     // One read transaction, so that a run writing meanwhile is seen at one point.
     let transaction = connection.unchecked_transaction()?;
     let mut hash = Sha256::new();
     let mut portion = Vec::with_capacity(2 * PORTION);
-    let split = version >= STANDARD_WORDS_SINCE && split_operations::are_in(&transaction)?;
+    let split = split_operations::are_in(&transaction)?;
     let split = split.then_some((split_operations::TABLE, split_operations::QUERY));
-    let left_out = version >= STANDARD_WORDS_SINCE && left_out_operations::are_in(&transaction)?;
+    let left_out = left_out_operations::are_in(&transaction)?;
     let left_out = left_out.then_some((left_out_operations::TABLE, left_out_operations::QUERY));
-    let extents = version >= STANDARD_WORDS_SINCE && original_extents::are_in(&transaction)?;
+    let extents = original_extents::are_in(&transaction)?;
     let extents = extents.then_some((original_extents::TABLE, original_extents::QUERY));
-    let entered = version >= STANDARD_WORDS_SINCE && lab_runs::are_in(&transaction)?;
+    let entered = lab_runs::are_in(&transaction)?;
     let entered = entered.then_some((lab_runs::TABLE, lab_runs::QUERY));
-    for content in CONTENT.iter().copied().chain(split).chain(left_out).chain(extents).chain(entered) {
-        let earlier = EARLIER.iter().find(|(since, name, _)| version < *since && *name == content.0);
-        let (name, sql) = earlier.map_or(content, |&(.., earlier)| earlier);
+    for (name, sql) in CONTENT.iter().copied().chain(split).chain(left_out).chain(extents).chain(entered) {
         feed(&mut portion, ValueRef::Text(name.as_bytes()));
-        let mut statement = transaction.prepare(&schema::query(sql, version))?;
+        let mut statement = transaction.prepare(sql)?;
         let columns = statement.column_count();
         let parameters = std::iter::repeat_n(&meaning, statement.parameter_count());
         let mut rows = statement.query(rusqlite::params_from_iter(parameters))?;

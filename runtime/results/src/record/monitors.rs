@@ -47,7 +47,8 @@ pub(super) fn have_hazards_of_repetitions(connection: &Connection) -> rusqlite::
     is_in(connection, "repetition_hazards")
 }
 
-fn is_in(connection: &Connection, table: &str) -> rusqlite::Result<bool> {
+/// Whether a database has a table.
+pub(super) fn is_in(connection: &Connection, table: &str) -> rusqlite::Result<bool> {
     let there = "SELECT EXISTS (SELECT 1 FROM sqlite_schema WHERE type = 'table' AND name = ?1)";
     connection.query_row(there, [table], |row| row.get(0))
 }

@@ -4,7 +4,7 @@
 //! quarantine equal tests. A simulator inside the runner costs nothing to start, so none of its tests is left out.
 
 use sesame_base::observation::Outcome;
-use sesame_plan::{CampaignPlan, Transport};
+use sesame_plan::CampaignPlan;
 
 use crate::record::Repetition;
 
@@ -21,5 +21,5 @@ pub fn is_quarantined(plan: &CampaignPlan, first: &Outcome, repetitions: &[Repet
 
 /// Whether a test that ended so is quarantined if the next runs end so, too.
 pub fn may_be_quarantined(plan: &CampaignPlan, first: &Outcome) -> bool {
-    !matches!(plan.simulator.transport, Transport::InProcess { .. }) && matches!(first, Outcome::Crash { .. })
+    !plan.simulator.properties().in_runner && matches!(first, Outcome::Crash { .. })
 }

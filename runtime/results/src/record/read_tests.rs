@@ -6,14 +6,15 @@ use std::time::Duration;
 
 use rusqlite::{Row, params};
 
-use sesame_base::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, WallTime};
+use sesame_base::observation::{Counters, Lost, MetricObservation, Observation, OperationEffect, Outcome, WallTime};
 use sesame_base::test_number::TestNumber;
 use sesame_notation as notation;
-use sesame_plan::{Activation, Choice, KnownTestId, OperationId, Span, Test, TestOperation};
+use sesame_plan::{Activation, Choice, KnownTestId, OperationId, RequirementId, Span, Test, TestOperation};
 
 use crate::record::columns::{choice, finite, metric_value, perhaps_finite, position, span, unsigned};
 use crate::record::cursor::Cursor;
-use crate::record::schema::{self, STANDARD_WORDS_SINCE};
+use crate::record::lost;
+use crate::record::monitors::is_in;
 use crate::record::{MetricValue, Origin, RecordError, Repository, TestRecord, TestRow};
 
 /// A recorded operation: position, name, seed of its draws, window and conditions.
@@ -154,6 +155,7 @@ impl Repository {
                     not_finite,
                     series: Vec::new(),
                     robustness: Vec::new(),
+                    lost: Vec::new(),
                 })
                 .collect();
             let mut monitors = Vec::new();
@@ -165,6 +167,10 @@ impl Repository {
                 }
                 for (metric, points) in self.robustness(ran)? {
                     metrics.get_mut(metric).ok_or_else(lacking)?.robustness = points;
+                }
+                for lost in self.lost(ran)? {
+                    let metric = self.plan().requirement(lost.requirement).metric;
+                    metrics.get_mut(metric.index()).ok_or_else(lacking)?.lost.push(lost);
                 }
                 monitors = self.monitors(ran)?;
             }
@@ -203,7 +209,7 @@ impl Repository {
         let alone = self.connection.is_autocommit();
         let _transaction = alone.then(|| self.connection.unchecked_transaction()).transpose().map_err(failed)?;
         let damaged = |problem: String| RecordError::damaged(&self.path, problem);
-        let prepare = |sql: &str| self.connection.prepare_cached(&schema::query(sql, self.schema)).map_err(failed);
+        let prepare = |sql: &str| self.connection.prepare_cached(sql).map_err(failed);
         let within = params![numbers.start(), numbers.end()];
         let mut operations = prepare(
             "SELECT test, position, operation, operation_seed, start_s, end_s, start_condition, end_condition, length_s, times, \
@@ -484,8 +490,7 @@ impl Repository {
     ) -> Result<Outcome, RecordError> {
         match (word, detail, limit) {
             ("completed", None, None) => Ok(Outcome::Completed),
-            ("no_effect", None, None) if self.schema >= STANDARD_WORDS_SINCE => Ok(Outcome::NoEffect),
-            ("void", None, None) if self.schema < STANDARD_WORDS_SINCE => Ok(Outcome::NoEffect),
+            ("no_effect", None, None) => Ok(Outcome::NoEffect),
             ("unknown", None, None) => Ok(Outcome::Unknown),
             ("crash", Some(message), None) => Ok(Outcome::Crash { message }),
             ("launch_failed", Some(message), None) => Ok(Outcome::LaunchFailed { message }),
@@ -497,6 +502,22 @@ impl Repository {
             }
             _ => Err(RecordError::damaged(&self.path, format!("a test cannot have ended as `{word}`"))),
         }
+    }
+
+    /// The requirements that a test lost before its end, in order of declaration.
+    fn lost(&self, test: u32) -> Result<Vec<Lost>, RecordError> {
+        if !is_in(&self.connection, lost::TABLE)
+            .map_err(|e| RecordError::database("read the results", &self.path, e))?
+        {
+            return Ok(Vec::new());
+        }
+        let sql = "SELECT requirement, time_s FROM lost_requirements WHERE test = ?1 ORDER BY requirement";
+        let lost =
+            self.read(sql, [test], |row| Ok(Lost { requirement: RequirementId(row.get(0)?), at: finite(row, 1)? }))?;
+        if lost.iter().any(|lost| lost.requirement.index() >= self.plan().requirements.len()) {
+            return Err(self.odd(test, "a lost requirement that is not there"));
+        }
+        Ok(lost)
     }
 
     /// Rows of the tests in this range, by test, which is their first column.

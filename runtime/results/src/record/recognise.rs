@@ -13,11 +13,9 @@ use rusqlite::Connection;
 
 use sesame_plan::CampaignPlan;
 
-use crate::record::schema::{
-    DDL, PIECES_SINCE, ROBUSTNESS, STANDARD_WORDS_SINCE, TRAFFIC, TRAFFIC_SINCE, has_robustness, wide_views,
-};
+use crate::record::schema::{DDL, ROBUSTNESS, TRAFFIC, TRAFFIC_SINCE, has_robustness, wide_views};
 use crate::record::{
-    RecordError, lab_runs, left_out_operations, monitors, original_extents, relay_latencies, series_views,
+    RecordError, lab_runs, left_out_operations, lost, monitors, original_extents, relay_latencies, series_views,
     split_operations,
 };
 
@@ -35,29 +33,8 @@ const SATISFIED: [&str; 2] = [
                ELSE 'satisfied'",
 ];
 
-/// The tables and views of schema 6, which differ from those of this release in their words.
-const DDL_6: &str = include_str!("schema_6.sql");
-
 /// The outcomes that the tables of the first releases of schema 7 do not permit.
 const OF_ENVIRONMENT: &str = ", 'launch_failed', 'disconnect', 'wrong_clock'";
-
-/// Turns the tables of schema 6 into those of schema 5, whose series had a row per point.
-const TO_SCHEMA_5: &str = "
-DROP TABLE series_pieces;
-DROP INDEX events_by_test;
-CREATE TABLE change_points (
-    test            INTEGER NOT NULL REFERENCES tests,
-    metric          INTEGER NOT NULL REFERENCES metrics,
-    position        INTEGER NOT NULL,
-    time_s          REAL NOT NULL,
-    value           REAL NOT NULL,
-    PRIMARY KEY (test, metric, position)
-) STRICT, WITHOUT ROWID;
-CREATE VIEW series AS
-    SELECT t.number AS test, t.name AS test_name, m.name AS metric, m.unit AS unit, c.position AS position,
-           c.time_s AS time_s, c.value AS value
-      FROM tests t JOIN change_points c ON c.test = coalesce(t.duplicate_of, t.number) JOIN metrics m ON m.id = c.metric;
-";
 
 /// The tables and views of schema 7.
 fn ddl_7() -> String {
@@ -71,8 +48,6 @@ pub(super) fn tables(connection: &Connection, path: &Path, schema: i64) -> Resul
     static CURRENT: OnceLock<Objects> = OnceLock::new();
     static SCHEMA_7: OnceLock<Objects> = OnceLock::new();
     static BEFORE_ROBUSTNESS: OnceLock<Objects> = OnceLock::new();
-    static SCHEMA_6: OnceLock<Objects> = OnceLock::new();
-    static SCHEMA_5: OnceLock<Objects> = OnceLock::new();
     let sound = |made: rusqlite::Result<Objects>| {
         made.unwrap_or_else(|error| unreachable!("the schema of this program is sound: {error}"))
     };
@@ -82,14 +57,10 @@ pub(super) fn tables(connection: &Connection, path: &Path, schema: i64) -> Resul
     let ours = if schema >= TRAFFIC_SINCE {
         let statements = [DDL, TRAFFIC, &series, ROBUSTNESS, &robustness];
         CURRENT.get_or_init(|| sound(made_by(&statements)))
-    } else if schema >= STANDARD_WORDS_SINCE && has_robustness {
+    } else if has_robustness {
         SCHEMA_7.get_or_init(|| sound(made_by(&[&ddl_7(), &series, ROBUSTNESS, &robustness])))
-    } else if schema >= STANDARD_WORDS_SINCE {
-        BEFORE_ROBUSTNESS.get_or_init(|| sound(made_by(&[&ddl_7(), &series])))
-    } else if schema >= PIECES_SINCE {
-        SCHEMA_6.get_or_init(|| sound(made_by(&[DDL_6, &series])))
     } else {
-        SCHEMA_5.get_or_init(|| sound(made_by(&[DDL_6, TO_SCHEMA_5])))
+        BEFORE_ROBUSTNESS.get_or_init(|| sound(made_by(&[&ddl_7(), &series])))
     };
     let found = objects(connection).map_err(|error| RecordError::database("read the results", path, error))?;
     if let Some((name, _)) = found.iter().find(|(_, (kind, _))| kind == "trigger") {
@@ -103,12 +74,13 @@ pub(super) fn tables(connection: &Connection, path: &Path, schema: i64) -> Resul
         (original_extents::TABLE, original_extents::DDL),
         (lab_runs::TABLE, lab_runs::DDL),
         (relay_latencies::TABLE, relay_latencies::DDL),
+        (lost::TABLE, lost::DDL),
     ];
     let of_monitors = monitors::OBJECTS.map(|name| (name, monitors::DDL));
     let hazards = if schema >= TRAFFIC_SINCE { monitors::HAZARDS } else { monitors::HAZARDS_7 };
     let of_hazards = monitors::HAZARD_OBJECTS.map(|name| (name, hazards));
     for (name, ddl) in at_will.into_iter().chain(of_monitors).chain(of_hazards) {
-        if schema >= STANDARD_WORDS_SINCE && found.contains_key(name) {
+        if found.contains_key(name) {
             let mut ours = sound(made_by(&["CREATE TABLE tests (number INTEGER PRIMARY KEY)", ddl]));
             ours.retain(|ours, _| ours == name);
             same(&ours, &found, path)?;

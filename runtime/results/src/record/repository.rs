@@ -11,7 +11,7 @@ use sesame_search::indicators::GenerationIndicators;
 use crate::record::columns::{finite, perhaps_finite, position};
 use crate::record::files::{DATABASE, TRACES, trace_file};
 use crate::record::{
-    Event, EventKind, GenerationCoverage, RecordError, ResultSet, Session, Status, earlier_plans, recognise, schema,
+    Event, EventKind, GenerationCoverage, RecordError, ResultSet, Session, Status, plan, recognise, schema,
 };
 
 /// The results of one campaign run, to be read.
@@ -36,7 +36,7 @@ pub struct CampaignFacts {
     pub plan: CampaignPlan,
     /// What the run does with the plan.
     pub task: Task,
-    /// The one seed that decided everything.
+    /// The one seed that determined everything.
     pub seed: u64,
     /// Version of the runtime that ran it.
     pub runtime: String,
@@ -61,17 +61,14 @@ impl Repository {
             .map_err(|e| RecordError::database("read the campaign", &path, e))?;
         // Before the first query: an object with the name of a table may be a view that never ends.
         recognise::tables(&connection, &path, schema)?;
-        let sql = schema::query("SELECT plan, seed, runtime, stop, task FROM campaign", schema);
-        let row: rusqlite::Result<CampaignColumns> = connection.query_row(&sql, [], |row| {
-            let task = if schema >= schema::TASK_SINCE { row.get(4)? } else { None };
-            Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?, task))
-        });
+        let sql = "SELECT plan, seed, runtime, stop, task FROM campaign";
+        let row: rusqlite::Result<CampaignColumns> =
+            connection.query_row(sql, [], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?, row.get(4)?)));
         let (plan, seed, runtime, stop, task) = row.map_err(|source| match source {
             rusqlite::Error::QueryReturnedNoRows => RecordError::damaged(&path, "there is no campaign in it"),
             _ => RecordError::database("read the campaign", &path, source),
         })?;
-        let (plan, task) =
-            earlier_plans::read(&plan, task.as_deref()).map_err(|reason| RecordError::damaged(&path, reason))?;
+        let (plan, task) = plan::read(&plan, task.as_deref()).map_err(|reason| RecordError::damaged(&path, reason))?;
         recognise::views(&connection, &path, &plan)?;
         let seed = seed.parse().map_err(|_| RecordError::damaged(&path, format!("`{seed}` is not a seed")))?;
         connection.set_prepared_statement_cache_capacity(STATEMENTS);
@@ -135,7 +132,7 @@ impl Repository {
     ///
     /// Results of an earlier schema have the digest that their release computed.
     pub fn digest(&self) -> Result<String, RecordError> {
-        super::digest::of_connection(&self.connection, self.schema, self.plan())
+        super::digest::of_connection(&self.connection, self.plan())
             .map_err(|e| RecordError::database("read the results", &self.path, e))
     }
 
@@ -323,7 +320,7 @@ impl Repository {
     ) -> Result<Vec<T>, RecordError> {
         let rows = self
             .connection
-            .prepare_cached(&schema::query(sql, self.schema))
+            .prepare_cached(sql)
             .and_then(|mut statement| statement.query_map(parameters, row)?.collect::<rusqlite::Result<Vec<T>>>());
         rows.map_err(|e| RecordError::database("read the results", &self.path, e))
     }

@@ -1,6 +1,5 @@
 //! The database's schema: made new, and recognised.
 
-use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::io::Read as _;
 use std::path::Path;
@@ -17,7 +16,7 @@ use crate::record::{RecordError, monitors, series_views};
 pub const SCHEMA: i64 = 8;
 
 /// The earliest schema that is still read. Nothing is written into results of an earlier schema than [`SCHEMA`].
-pub(crate) const EARLIEST: i64 = 5;
+pub(crate) const EARLIEST: i64 = 7;
 
 /// Marks an SQLite file as ours, in its `application_id`: "SESM".
 pub(crate) const APPLICATION_ID: i64 = 0x5345_534D;
@@ -30,33 +29,9 @@ pub(super) const TRAFFIC: &str = include_str!("traffic.sql");
 /// The table of robustness signals. Results that the first releases of schema 7 wrote have none.
 pub(super) const ROBUSTNESS: &str = include_str!("robustness.sql");
 
-/// The first schema with the standard words for outcomes, verdicts and columns: `no_effect`, `satisfied`,
-/// `inconclusive`, `conclusive`, `operation_seed`. Before, these were `void`, `kept`, `unsaid`, `said` and `draw_seed`.
-/// Verdicts are only in views, which nothing here reads.
-pub(super) const STANDARD_WORDS_SINCE: i64 = 7;
-
-/// The first schema with series in pieces; before, each point was a row.
-pub(super) const PIECES_SINCE: i64 = 6;
-/// The first schema with the column `task`.
-pub(super) const TASK_SINCE: i64 = 7;
 /// The first schema with the traffic of tests, and with verdicts that follow what a metric could have been also where a
 /// run came to its end.
 pub(super) const TRAFFIC_SINCE: i64 = 8;
-/// The first schema whose digest is over the meaning of the plan; before, it was over all of its JSON.
-pub(super) const MEANING_SINCE: i64 = 7;
-
-/// Columns that this release reads from tables, and their names before [`STANDARD_WORDS_SINCE`].
-const RENAMED: [(&str, &str); 2] = [("operation_seed", "draw_seed"), ("no_effect", "void")];
-
-/// A query of tables of the current schema, with the names of columns that a file of another schema has.
-pub(super) fn query(sql: &str, schema: i64) -> Cow<'_, str> {
-    if schema >= STANDARD_WORDS_SINCE {
-        return Cow::Borrowed(sql);
-    }
-    let sql = if schema < TASK_SINCE { sql.replace(", task FROM", " FROM") } else { sql.to_owned() };
-    Cow::Owned(RENAMED.iter().fold(sql, |sql, (now, before)| sql.replace(now, before)))
-}
-
 /// Makes all tables and views, and fills in what is fixed for a campaign; all or nothing.
 pub(crate) fn install(
     connection: &mut Connection,

@@ -9,7 +9,6 @@ use rusqlite::{Transaction, params};
 use sesame_base::test_number::TestNumber;
 
 use crate::record::columns::{index, position};
-use crate::record::schema::PIECES_SINCE;
 use crate::record::{RecordError, Repository};
 
 /// A series: times in seconds, and the value from then on.
@@ -153,15 +152,6 @@ pub(super) fn write(
 impl Repository {
     /// The series of a test, each with the position of its metric; none of a metric that never changed.
     pub(super) fn series(&self, test: u32) -> Result<Vec<(usize, Series)>, RecordError> {
-        if self.schema < PIECES_SINCE {
-            let mut found = Vec::new();
-            let sql = "SELECT metric, time_s, value FROM change_points WHERE test = ?1 ORDER BY metric, position";
-            let points = self.read(sql, [test], |row| Ok((position(row, 0)?, (row.get(1)?, row.get(2)?))))?;
-            for (metric, point) in points {
-                add(&mut found, metric, vec![point]);
-            }
-            return Ok(found);
-        }
         self.pieces(Pieces::Series, test)
     }
 

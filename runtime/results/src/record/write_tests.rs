@@ -10,7 +10,7 @@ use sesame_plan::{Activation, CampaignPlan, Choice};
 
 use crate::record::columns::index;
 use crate::record::series::{self, Pieces};
-use crate::record::{Event, Origin, TestRecord, monitors, traffic};
+use crate::record::{Event, Origin, TestRecord, lost, monitors, traffic};
 
 /// What SQLite could not return as it was written: numbers that are not finite, counts beyond 63 bits.
 pub(super) fn unrecordable(record: &TestRecord) -> Option<String> {
@@ -71,6 +71,7 @@ pub(super) fn unrecordable(record: &TestRecord) -> Option<String> {
                 .chain(&metric.robustness)
                 .flat_map(|point| [("the time of a change", point.0), ("a value in a series", point.1)]),
         );
+        numbers.extend(metric.lost.iter().map(|lost| ("the time at which a requirement was lost", lost.at)));
     }
     for monitor in monitors {
         let decisions = monitor.decisions.iter().map(|decision| ("the time of a decision", decision.time));
@@ -196,6 +197,7 @@ pub(super) fn write_test(
         series::write(transaction, Pieces::Robustness, *number, metric, &shown.robustness)?;
     }
     if duplicate_of.is_none() {
+        lost::write(transaction, *number, &observation.metrics)?;
         monitors::write(transaction, plan, *number, &observation.monitors)?;
         traffic::write(transaction, plan, *number, observation)?;
     }

@@ -41,7 +41,7 @@ pub struct Preparation {
     /// What monitors decide on both sides (2D).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub monitors: Option<MonitorTesting>,
-    /// Steps that were left out, each in a sentence that says why.
+    /// Steps that were left out, each with the reason, in a sentence.
     pub left_out: Vec<String>,
 }
 

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex};
 use std::time::{Duration, Instant};
 
-use super::lock;
+use super::lock::lock;
 
 /// The most messages that wait.
 const MOST: usize = 10_000;

@@ -4,7 +4,8 @@ use std::net::{TcpListener, TcpStream};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::{Shared, lock};
+use super::lock::lock;
+use super::shared::Shared;
 use crate::connection::Connection;
 use crate::protocol::header::{self, Header};
 use crate::protocol::http;

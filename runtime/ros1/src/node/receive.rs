@@ -1,12 +1,16 @@
 //! Topics to which the node subscribes.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::send::Offer;
-use super::{Incoming, Shared, lock};
-use crate::codec::Codec;
+use sesame_codec::error::LARGEST;
+use sesame_codec::ros1::Codec;
+
+use super::inbox::Incoming;
+use super::lock::lock;
+use super::publication::Offer;
+use super::shared::Shared;
+use super::subscription::{Publisher, Subscription};
 use crate::connection::Connection;
 use crate::contact::{self, ContactError};
 use crate::definition::Texts;
@@ -20,43 +24,7 @@ const PAUSES: [Duration; 2] = [Duration::from_millis(50), Duration::from_secs(1)
 const MOST_PUBLISHERS: usize = 200;
 
 /// The most bytes of a message.
-const MOST_BYTES: usize = crate::codec::LARGEST;
-
-/// A topic to which the node subscribes.
-#[derive(Debug)]
-pub(crate) struct Subscription {
-    pub(crate) topic: String,
-    /// Its declared type as ROS 1 names it.
-    pub(crate) ty: String,
-    /// Its declared layout, with which that of its publishers is compared.
-    pub(crate) codec: Option<Arc<Codec>>,
-    /// The publications that get their type from its publishers, by position.
-    pub(crate) feeds: Vec<usize>,
-    /// Its publishers by their addresses.
-    publishers: BTreeMap<String, Publisher>,
-    /// Whether a connection of it was lost.
-    lost: bool,
-}
-
-#[derive(Debug, Default)]
-struct Publisher {
-    /// Whether the master names it. One that it no longer names is listened to until it closes the connection.
-    listed: bool,
-    /// Its node, while it is connected.
-    node: Option<String>,
-}
-
-impl Subscription {
-    pub(crate) fn new(topic: &str, ty: &str, codec: Option<Arc<Codec>>, feeds: Vec<usize>) -> Self {
-        let (topic, ty) = (topic.to_owned(), ty.to_owned());
-        Subscription { topic, ty, codec, feeds, publishers: BTreeMap::new(), lost: false }
-    }
-
-    /// The nodes to whose messages it listens.
-    pub(crate) fn connected(&self) -> impl Iterator<Item = &str> {
-        self.publishers.values().filter_map(|publisher| publisher.node.as_deref())
-    }
-}
+const MOST_BYTES: usize = LARGEST;
 
 impl Shared {
     /// Subscribes. What arrives comes with the position that is returned.

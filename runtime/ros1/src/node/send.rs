@@ -2,105 +2,15 @@
 //!
 //! Before such a publisher is there, nobody knows the topic: its type is not known. So it is without the runner, too.
 
-use std::collections::{BTreeSet, VecDeque};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex};
 
-use sesame_plan::Interface;
-
-use super::{Shared, lock};
+use super::lock::lock;
+use super::publication::{Link, Offer, Publication};
+use super::shared::Shared;
 use crate::connection::{Connection, LOOK};
-use crate::definition::{Texts, TypeError};
 use crate::master::AskError;
 use crate::protocol::header::Header;
-
-/// The most messages that wait for a subscriber; beyond them the oldest are dropped.
-const MOST: usize = 10_000;
-
-/// The most bytes of messages that wait for a subscriber.
-const MOST_BYTES: usize = 256 << 20;
-
-/// What the publishers of a topic say of it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Offer {
-    pub(super) ty: String,
-    pub(super) md5: String,
-    pub(super) definition: String,
-    pub(super) latching: bool,
-}
-
-impl Offer {
-    pub(super) fn of(header: &Header) -> Self {
-        let get = |name: &str| header.get(name).to_owned();
-        let latching = header.is("latching");
-        Offer { ty: get("type"), md5: get("md5sum"), definition: get("message_definition"), latching }
-    }
-}
-
-/// A topic on which the node publishes.
-#[derive(Debug)]
-pub(crate) struct Publication {
-    pub(crate) topic: String,
-    /// Its type, as soon as it is known.
-    pub(super) offer: Option<Offer>,
-    /// Whether its type is what the space says, because nobody else publishes on it. The space knows no constants, so
-    /// the MD5 of a subscriber that has a type of the same name is as good.
-    by_space: bool,
-    /// Those of its publishers that are latching: as many messages are kept for subscribers that come later.
-    latching: BTreeSet<String>,
-    latest: VecDeque<Arc<[u8]>>,
-    links: Vec<Arc<Link>>,
-}
-
-/// A subscriber.
-#[derive(Debug)]
-struct Link {
-    node: String,
-    waiting: Mutex<Waiting>,
-    filled: Condvar,
-    gone: AtomicBool,
-}
-
-/// Messages for a subscriber.
-#[derive(Debug, Default)]
-struct Waiting {
-    queue: VecDeque<Arc<[u8]>>,
-    bytes: usize,
-}
-
-impl Waiting {
-    /// Adds a message; false if older ones had to go.
-    fn push(&mut self, message: &Arc<[u8]>) -> bool {
-        self.bytes += message.len();
-        self.queue.push_back(Arc::clone(message));
-        let mut fits = true;
-        while self.queue.len() > MOST || (self.bytes > MOST_BYTES && self.queue.len() > 1) {
-            self.bytes -= self.queue.pop_front().map_or(0, |oldest| oldest.len());
-            fits = false;
-        }
-        fits
-    }
-}
-
-impl Publication {
-    pub(crate) fn new(topic: &str) -> Self {
-        let (latest, links) = (VecDeque::new(), Vec::new());
-        Publication { topic: topic.to_owned(), offer: None, by_space: false, latching: BTreeSet::new(), latest, links }
-    }
-
-    /// A topic on which nobody else publishes, with the layouts of the space.
-    pub(crate) fn of_space(topic: &str, interfaces: &[Interface], ty: &str) -> Result<Self, TypeError> {
-        let texts = Texts::of_layout(interfaces);
-        let (md5, definition) = (texts.md5(ty)?, texts.definition(ty)?);
-        let offer = Offer { ty: ty.to_owned(), md5, definition, latching: false };
-        Ok(Publication { offer: Some(offer), by_space: true, ..Publication::new(topic) })
-    }
-
-    /// The nodes that listen.
-    pub(crate) fn connected(&self) -> impl Iterator<Item = &str> {
-        self.links.iter().filter(|link| !link.gone.load(Ordering::Relaxed)).map(|link| link.node.as_str())
-    }
-}
 
 impl Shared {
     /// Adds a publication; it is offered when its type is known.
@@ -239,23 +149,5 @@ impl Shared {
                 return;
             }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_slow_subscriber_loses_the_oldest_messages_only() {
-        let mut waiting = Waiting::default();
-        let message = |at: usize| -> Arc<[u8]> { at.to_le_bytes().into() };
-        assert!((0..MOST).all(|at| waiting.push(&message(at))));
-        assert!(!waiting.push(&message(MOST)));
-        assert_eq!((waiting.queue.len(), waiting.bytes), (MOST, 8 * MOST));
-        assert_eq!(waiting.queue.front(), Some(&message(1)));
-        let large: Arc<[u8]> = vec![0; MOST_BYTES].into();
-        assert!(!waiting.push(&large));
-        assert_eq!((waiting.queue.len(), waiting.bytes), (1, MOST_BYTES), "the last one is never dropped");
     }
 }

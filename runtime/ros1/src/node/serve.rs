@@ -1,12 +1,14 @@
 //! Services that the node offers in the place of their servers, and calls of servers.
 
-use std::collections::BTreeMap;
 use std::io;
 use std::sync::Arc;
-use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::time::{Duration, Instant};
 
-use super::{Incoming, Shared, lock};
+use super::inbox::Incoming;
+use super::lock::lock;
+use super::service::{Outcome, Service};
+use super::shared::Shared;
 use crate::connection::{Connection, LOOK};
 use crate::contact::{self, ContactError};
 use crate::master::AskError;
@@ -17,33 +19,6 @@ const MOST_BYTES: usize = 64 << 20;
 
 /// How long a client may take to hear what it calls.
 const HANDSHAKE: Duration = Duration::from_secs(5);
-
-/// A service that the node offers.
-#[derive(Debug)]
-pub(crate) struct Service {
-    /// The name under which clients call it.
-    pub(crate) path: String,
-    /// The name under which its server is called.
-    pub(crate) server: String,
-    /// What the server says of itself, as soon as it is there.
-    pub(crate) offer: Option<Header>,
-}
-
-impl Service {
-    pub(crate) fn new(path: &str, server: &str) -> Self {
-        Service { path: path.to_owned(), server: server.to_owned(), offer: None }
-    }
-}
-
-/// What a client gets: the reply, or why there is none.
-type Outcome = Result<Arc<[u8]>, String>;
-
-/// The calls that wait for their reply, by their numbers.
-#[derive(Debug, Default)]
-pub(super) struct Calls {
-    last: u64,
-    waiting: BTreeMap<u64, SyncSender<Outcome>>,
-}
 
 /// Why a call has no reply.
 #[derive(Debug, thiserror::Error)]

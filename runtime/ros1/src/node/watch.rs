@@ -3,19 +3,15 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::{Publication, Service, Shared, Subscription, lock};
+use super::lock::lock;
+use super::publication::Publication;
+use super::service::Service;
+use super::shared::Shared;
+use super::subscription::Subscription;
 use crate::master::{AskError, State, nodes};
 
 /// How often the master is asked.
 const EVERY: Duration = Duration::from_millis(250);
-
-/// What was seen last.
-#[derive(Debug, Default)]
-pub(super) struct Seen {
-    state: Option<State>,
-    /// Since when the master does not answer.
-    silent_since: Option<Instant>,
-}
 
 /// Asks the master until the node ends.
 pub(super) fn watch(shared: &Arc<Shared>) {

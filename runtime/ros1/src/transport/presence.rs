@@ -31,7 +31,7 @@ pub(super) fn missing(bus: &Ros1Bus) -> Vec<String> {
     {
         missing.push(format!("nobody publishes the clock `{}`", clock.path));
     }
-    if let Some(reset) = bus.ros1.reset.as_deref().map(wired::absolute)
+    if let Some(reset) = bus.ros.reset.as_deref().map(wired::absolute)
         && nodes(&state.servers, &reset).is_empty()
     {
         missing.push(format!("nobody serves `{reset}`"));

@@ -3,7 +3,7 @@
 use sesame_base::time::SimTime;
 use sesame_plan::testing::{minimal, node, test_of, topic};
 use sesame_plan::{
-    Command, Interface, InterfaceField, Launch, Node, NodeId, Ready, ReadyWhen, TopicId, Type, WireType, Wiring,
+    Command, Interface, InterfaceField, Launch, Node, NodeId, Ready, ReadyWhen, Ros1, TopicId, Type, WireType, Wiring,
 };
 use sesame_relay::lifecycle::launch::Part;
 use sesame_relay::metric::MetricTable;
@@ -12,7 +12,10 @@ use sesame_relay::wire::WireTable;
 
 use super::*;
 
-/// A topic that is cut, `/peer`, from a node to another, at a master with a port of its own.
+/// The address of the master, which has a port of its own.
+const MASTER: &str = "http://127.0.0.1:{port}";
+
+/// A topic that is cut, `/peer`, from a node to another, at such a master.
 fn plan() -> CampaignPlan {
     let mut plan = minimal();
     let string = "std_msgs/msg/String";
@@ -23,13 +26,10 @@ fn plan() -> CampaignPlan {
         Node { subscribes: vec![TopicId(0)], ..node("subscriber") },
     ];
     let data = InterfaceField { name: "data".to_owned(), ty: WireType::String };
-    plan.simulator.transport = sesame_plan::Transport::Ros1(Ros1 {
-        master: "http://127.0.0.1:{port}".to_owned(),
-        clock: Clock::Wall,
-        reset: None,
-        interfaces: vec![Interface { name: string.to_owned(), fields: vec![data] }],
-        wiring: vec![Wiring { cut: true, ..Wiring::default() }],
-    });
+    let interfaces = vec![Interface { name: string.to_owned(), fields: vec![data] }];
+    plan.simulator.transport = sesame_plan::Transport::Ros1(Ros1 { master: MASTER.to_owned() });
+    plan.simulator.ros = Some(Ros { interfaces, ..Ros::default() });
+    plan.simulator.wiring = vec![Wiring { cut: true, ..Wiring::default() }];
     plan
 }
 
@@ -39,15 +39,10 @@ fn place_in(folder: &Path) -> Place {
     Place { worker: 2, folder: folder.clone(), in_runner: false, ..Place::of_worker(folder) }
 }
 
-fn ros1_of(plan: &CampaignPlan) -> &Ros1 {
-    let sesame_plan::Transport::Ros1(ros1) = &plan.simulator.transport else { panic!("it is a system of ROS 1") };
-    ros1
-}
-
 #[test]
 fn launched_programs_find_the_master_of_their_worker_and_write_into_its_folder() {
     let plan = plan();
-    let place = in_ros(&plan, ros1_of(&plan), place_in(Path::new("folder")));
+    let place = in_ros(&plan, MASTER, place_in(Path::new("folder")));
     let value = |name: &str| place.environment.iter().find(|(other, _)| other == name).map(|(_, value)| value.as_str());
     assert_eq!(value("ROS_MASTER_URI"), Some("http://127.0.0.1:{port}"), "which is filled in at the launch");
     assert_eq!(value("ROS_HOME"), Some("folder/ros"));
@@ -88,7 +83,7 @@ mod real {
         plan.nodes[1].launch = Some(peer("subscriber.py", &["600"]));
         plan.validate().unwrap();
         let folder = tempfile::tempdir().unwrap();
-        let mut transport = at_place(&plan, ros1_of(&plan), place_in(folder.path()));
+        let mut transport = at_place(&plan, place_in(folder.path()));
         // The second run has a master of its own again.
         let both = [(), ()].map(|()| {
             let wires = WireTable::new(&plan);

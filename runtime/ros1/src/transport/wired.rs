@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
+use sesame_codec::ros1::Codec;
 use sesame_interfaces::ros1::type_name;
-use sesame_plan::{CampaignPlan, Channel, Ros1};
+use sesame_plan::{CampaignPlan, Channel, Interface};
 use sesame_relay::transport::TransportError;
 use sesame_relay::wire::{Line, Sink, wanted};
 
-use super::lost;
-use crate::codec::Codec;
+use super::lost::lost;
 use crate::master::AskError;
 use crate::node::{Node, Publication, Service, Subscription};
 
@@ -41,13 +41,13 @@ pub(super) struct Wired {
 }
 
 /// A line by absolute names, with a codec for its messages.
-pub(super) fn wire(plan: &CampaignPlan, ros1: &Ros1, line: &Line) -> Result<Wired, TransportError> {
+pub(super) fn wire(plan: &CampaignPlan, interfaces: &[Interface], line: &Line) -> Result<Wired, TransportError> {
     let topic = plan.topic(line.topic);
     let problem = |problem: &str| {
         TransportError::Wiring(format!("the messages of topic `{}` have no layout: {problem}", topic.name))
     };
     let interface = topic.interface.as_deref().ok_or_else(|| problem("it names no interface"))?;
-    let codec = Codec::new(&ros1.interfaces, interface, &wanted(plan, line.topic));
+    let codec = Codec::new(interfaces, interface, &wanted(plan, line.topic));
     let codec = Arc::new(codec.map_err(|error| problem(&error.to_string()))?);
     let mut line = line.clone();
     let sources = line.sources.iter_mut().map(|source| &mut source.path);
@@ -61,11 +61,11 @@ pub(super) fn wire(plan: &CampaignPlan, ros1: &Ros1, line: &Line) -> Result<Wire
 
 impl Wired {
     /// What is published at a sink of a topic. Where nobody else publishes, its type is that of the space.
-    fn publication(&self, sink: &Sink, ros1: &Ros1) -> Result<Publication, TransportError> {
+    fn publication(&self, sink: &Sink, interfaces: &[Interface]) -> Result<Publication, TransportError> {
         if !self.line.sources.is_empty() {
             return Ok(Publication::new(&sink.path));
         }
-        let publication = Publication::of_space(&sink.path, &ros1.interfaces, &self.interface);
+        let publication = Publication::of_space(&sink.path, interfaces, &self.interface);
         publication
             .map_err(|error| TransportError::Wiring(format!("nothing can be published on `{}`: {error}", sink.path)))
     }
@@ -74,12 +74,12 @@ impl Wired {
     pub(super) fn subscribe(
         &mut self,
         node: &Node,
-        ros1: &Ros1,
+        interfaces: &[Interface],
         mut each: impl FnMut(usize),
     ) -> Result<(), TransportError> {
         let lost = |error: AskError| lost(&node.master.at, &error.to_string());
         for sink in &self.line.sinks {
-            let publication = self.publication(sink, ros1)?;
+            let publication = self.publication(sink, interfaces)?;
             self.sinks.push(node.add_publication(publication).map_err(lost)?);
         }
         for (at, source) in self.line.sources.iter().enumerate() {

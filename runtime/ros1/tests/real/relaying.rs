@@ -9,7 +9,7 @@ use sesame_plan::{
 };
 
 use crate::core::{Core, Program};
-use crate::system::{Seen, System, peers, plan, remapped, ros1};
+use crate::system::{Seen, System, peers, plan, remapped, ros};
 
 const STRING: &str = "std_msgs/msg/String";
 const JOINTS: &str = "sensor_msgs/msg/JointState";
@@ -304,7 +304,7 @@ fn latched_messages_are_there_for_those_who_come_later() {
 fn by_a_clock() -> Option<[f64; 2]> {
     let core = Core::start()?;
     let mut plan = peers(&core.uri(), STRING);
-    ros1(&mut plan).clock = Clock::Topic { path: "/clock".to_owned() };
+    ros(&mut plan).clock = Clock::Topic { path: "/clock".to_owned() };
     let remapped = remapped(&plan, 0);
     let _clock = core.ready_peer("clock.py", &["/peer", &remapped[0]]);
     let mut subscriber = core.ready_peer("subscriber.py", &["/peer", "std_msgs/String", "20", "120"]);
@@ -343,8 +343,8 @@ fn a_system_that_is_reset_starts_again_at_zero() {
     let Some(core) = Core::start() else { return };
     let mut plan = peers(&core.uri(), STRING);
     plan.nodes.truncate(1);
-    ros1(&mut plan).clock = Clock::Topic { path: "/clock".to_owned() };
-    ros1(&mut plan).reset = Some("/reset".to_owned());
+    ros(&mut plan).clock = Clock::Topic { path: "/clock".to_owned() };
+    ros(&mut plan).reset = Some("/reset".to_owned());
     let remapped = remapped(&plan, 0);
     let _clock = core.ready_peer("clock.py", &["/peer", &remapped[0]]);
     let mut system = System::new(plan);
@@ -379,7 +379,7 @@ fn nodes_that_operations_tell_apart_have_ways_of_their_own() {
         named(&subscriber, "near"),
         named(&subscriber, "far"),
     ];
-    let wiring = &mut ros1(&mut plan).wiring[0];
+    let wiring = &mut plan.simulator.wiring[0];
     (wiring.publishers, wiring.subscribers) = (vec![NodeId(0), NodeId(1)], vec![NodeId(2)]);
     // What is from the left one never reaches the near one.
     let hole = Operation { from: vec![NodeId(0)], to: vec![NodeId(2)], ..operation(0, OperationKind::Blackhole) };
@@ -422,7 +422,7 @@ fn a_state_reaches_its_subscribers_although_no_publisher_says_of_which_type_it_i
     let Some(core) = Core::start() else { return };
     let topics = [("count", "/count", STRING, Channel::Topic), ("state", "/state", STRING, Channel::Topic)];
     let mut plan = plan(&core.uri(), &topics);
-    ros1(&mut plan).wiring[0].cut = false;
+    plan.simulator.wiring[0].cut = false;
     plan.messages = vec![message("Text", vec![field("data", Type::Text)])];
     for topic in &mut plan.topics {
         topic.ty = Type::Message { id: MessageId(0) };

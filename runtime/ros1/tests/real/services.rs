@@ -5,7 +5,7 @@ use sesame_plan::testing::test_of;
 use sesame_plan::{Node, TopicId, testing};
 
 use crate::core::Core;
-use crate::system::{System, plan, remapped, ros1};
+use crate::system::{System, plan, remapped, ros};
 
 #[test]
 fn clients_call_servers_through_the_runner() {
@@ -21,7 +21,7 @@ fn clients_call_servers_through_the_runner() {
     );
     plan.nodes =
         vec![Node { publishes: vec![TopicId(1)], subscribes: vec![TopicId(0), TopicId(2)], ..testing::node("server") }];
-    ros1(&mut plan).reset = Some("/reset".to_owned());
+    ros(&mut plan).reset = Some("/reset".to_owned());
     let remapped = remapped(&plan, 0);
     assert_eq!(remapped, ["/switch:=/switch/undisturbed", "/ask:=/ask/undisturbed"]);
     let mut server = core.ready_peer("server.py", &[&remapped[0], &remapped[1]]);

@@ -5,7 +5,7 @@ use std::time::Instant;
 use sesame_base::time::SimTime;
 use sesame_plan::testing::{minimal, node, topic};
 use sesame_plan::{
-    CampaignPlan, Channel, Clock, Interface, InterfaceField, Node, NodeId, Primitive, Ros1, Test, TopicId, Transport,
+    CampaignPlan, Channel, Interface, InterfaceField, Node, NodeId, Primitive, Ros, Ros1, Test, TopicId, Transport,
     Type, WireType, Wiring,
 };
 use sesame_relay::metric::MetricTable;
@@ -69,10 +69,9 @@ pub(crate) fn plan(master: &str, topics: &[(&str, &str, &str, Channel)]) -> Camp
             ..topic(name, &[path], Type::Bool)
         })
         .collect();
-    let wiring = topics.iter().map(|_| Wiring { cut: true, ..Wiring::default() }).collect();
-    let clock = Clock::Wall;
-    plan.simulator.transport =
-        Transport::Ros1(Ros1 { master: master.to_owned(), clock, reset: None, interfaces: interfaces(), wiring });
+    plan.simulator.transport = Transport::Ros1(Ros1 { master: master.to_owned() });
+    plan.simulator.ros = Some(Ros { interfaces: interfaces(), ..Ros::default() });
+    plan.simulator.wiring = topics.iter().map(|_| Wiring { cut: true, ..Wiring::default() }).collect();
     plan
 }
 
@@ -86,10 +85,9 @@ pub(crate) fn peers(master: &str, interface: &str) -> CampaignPlan {
     plan
 }
 
-/// What the plan says of ROS 1.
-pub(crate) fn ros1(plan: &mut CampaignPlan) -> &mut Ros1 {
-    let Transport::Ros1(ros1) = &mut plan.simulator.transport else { panic!("it is a system of ROS 1") };
-    ros1
+/// What the plan says of ROS.
+pub(crate) fn ros(plan: &mut CampaignPlan) -> &mut Ros {
+    plan.simulator.ros.as_mut().expect("it is a system of ROS 1")
 }
 
 /// The arguments that remap a node.

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
+use sesame_codec::cdr::Codec;
 use sesame_plan::{Interface, InterfaceField, Primitive, WireType};
 use sesame_relay::value::{Fields, Record, Text, Value};
-
-use crate::cdr::{Codec, Wanted};
+use sesame_relay::wire::Wanted;
 
 /// The service.
 pub(super) const SERVICE: &str = "type_description_interfaces/srv/GetTypeDescription";

@@ -6,26 +6,12 @@ use sesame_plan::CampaignPlan;
 use sesame_relay::lifecycle::launch::{Launched, Probe};
 use sesame_relay::transport::TransportError;
 
-use super::now;
 use super::service::Client;
 use super::session::{ClockReader, Connected, Session, Stepper};
+use super::wall_clock::now;
 use crate::dds::{DdsError, Endpoint, Sample, mirrored};
 use crate::graph::NodeEntities;
 use crate::names;
-
-/// The name of the runner's node.
-const NODE: &str = "/sesame_relay";
-
-/// The name of a guest's node, before that of its monitor.
-const GUEST: &str = "/sesame_monitor_";
-
-/// What this process is called as a node.
-pub(super) fn node_name(plan: &CampaignPlan) -> String {
-    match plan.monitors.iter().find(|monitor| monitor.publishes.is_some()) {
-        Some(monitor) if plan.is_guest() => format!("{GUEST}{}", monitor.name),
-        _ => NODE.to_owned(),
-    }
-}
 
 /// How often it is looked who is there while nothing else happens.
 const LOOK: Duration = Duration::from_millis(20);

@@ -9,8 +9,9 @@ use sesame_relay::simulator::Progress;
 use sesame_relay::transport::TransportError;
 
 use super::session::{ClockReader, Incoming, Session};
+use super::wall_clock::now;
 use super::watch::LOOK;
-use super::{SILENCE, System, Zero, now, silent};
+use super::{SILENCE, System, Zero, silent};
 
 impl System {
     /// Waits for what comes next: a message, a tick of the clock, or the moment at which the relay has something to do.

@@ -4,39 +4,34 @@
 //! The messages of a round are put into the order of their wires before they pass through the relay, so the run does
 //! not depend on which of several nodes was faster.
 
-use std::collections::BTreeMap;
 use std::time::Instant;
 
 use sesame_base::time::SimTime;
-use sesame_plan::{NodeId, TopicId};
+use sesame_plan::NodeId;
 use sesame_relay::lifecycle::launch::Launched;
 use sesame_relay::relay::Exchange;
 use sesame_relay::simulator::Progress;
 use sesame_relay::transport::TransportError;
-use sesame_relay::wire::{Wire, WireTable};
+use sesame_relay::transport::round::Owed;
+use sesame_relay::wire::Wire;
 
 use super::service::Answer;
 use super::session::{Incoming, Message, Session, Stepper};
-use super::{SILENCE, System, now, silent};
+use super::wall_clock::now;
+use super::{SILENCE, System, silent};
 use crate::dds::Sample;
 
-/// What has come in since the relay was last fed, and what is owed: answers to what was delivered in this step.
+/// What has come in since the relay was last fed, and what is still to come in this step.
 #[derive(Default)]
 struct Round {
     messages: Vec<Message>,
-    /// Per topic: how many more answers are expected than have come. A node that hears a message directly may answer it
-    /// before the relay has seen it, so that less than none is expected for a while.
-    owed: BTreeMap<TopicId, i64>,
+    owed: Owed,
 }
 
 impl Round {
     fn take(&mut self, message: Message) {
-        *self.owed.entry(message.topic).or_default() -= 1;
+        self.owed.pay(message.wire);
         self.messages.push(message);
-    }
-
-    fn is_owed(&self) -> bool {
-        self.owed.values().any(|&count| count > 0)
     }
 }
 
@@ -62,10 +57,13 @@ impl System {
         self.call_back(&mut round);
         self.settle(&mut round, relay)?;
         let Some(session) = &mut self.session else { return Ok(Progress::Ended) };
-        for &topic in self.plan.nodes.iter().flat_map(|node| &node.every_step) {
-            let paths = self.plan.topic(topic).paths.len();
-            *round.owed.entry(topic).or_default() += i64::try_from(paths).unwrap_or(i64::MAX);
+        // What has come before the step is taken is none of its messages.
+        for incoming in session.take() {
+            if let Incoming::Message(message) = incoming {
+                round.take(message);
+            }
         }
+        round.owed.extend(self.promises.every_step().iter().copied());
         session.step(&mut round, &mut self.launched, now() + SILENCE)?;
         self.await_owed(&mut round)?;
         self.settle(&mut round, relay)?;
@@ -75,12 +73,10 @@ impl System {
     /// Takes the messages of a round through the relay, delivers what comes out, and waits for the answers, until
     /// nobody has anything to answer.
     fn settle(&mut self, round: &mut Round, relay: &mut dyn Exchange) -> Result<(), TransportError> {
-        let wires = relay.wires().clone();
         loop {
             let Some(session) = &mut self.session else { return Ok(()) };
             // Whoever answers a message has heard everything else of the instant before.
-            let answered = |topic| self.plan.nodes.iter().flat_map(|node| &node.answers).any(|it| it.to == topic);
-            round.messages.sort_by_key(|message| (answered(message.topic), message.wire));
+            round.messages.sort_by_key(|message| (self.promises.is_answered(message.wire), message.wire));
             for message in round.messages.drain(..) {
                 session.relay(self.now, message, relay, &mut self.deliveries)?;
             }
@@ -93,7 +89,7 @@ impl System {
             let Some(session) = &mut self.session else { return Ok(()) };
             session.deliver(&mut self.deliveries, &mut |wire| delivered.push(wire))?;
             for wire in delivered {
-                self.owe(&wires, wire, round);
+                self.owe(wire, round);
             }
             self.await_owed(round)?;
         }
@@ -103,13 +99,10 @@ impl System {
     fn await_owed(&mut self, round: &mut Round) -> Result<(), TransportError> {
         let Some(session) = &mut self.session else { return Ok(()) };
         let limit = now() + SILENCE;
-        while round.is_owed() {
+        while !round.owed.is_empty() {
             session.collect(round, &mut self.launched, limit)?;
-            if now() >= limit && round.is_owed() {
-                let owed = round.owed.iter().filter(|(_, count)| **count > 0);
-                let owed: Vec<String> =
-                    owed.map(|(&topic, count)| format!("{count} on `{}`", self.plan.topic(topic).name)).collect();
-                return Err(silent(format!("a message of the step ({})", owed.join(", "))));
+            if now() >= limit && !round.owed.is_empty() {
+                return Err(silent(round.owed.awaited(&self.wires)));
             }
         }
         Ok(())
@@ -117,21 +110,14 @@ impl System {
 }
 
 impl System {
-    /// Counts the answers to a message that is delivered on this wire.
-    fn owe(&mut self, wires: &WireTable, wire: Wire, round: &mut Round) {
-        let receiver = wires.link(wire).map(|link| link.to);
-        for (node, declared) in (0u32..).map(NodeId).zip(&self.plan.nodes) {
-            let reached = match receiver {
-                Some(receiver) => receiver == node,
-                None => !wires.links().iter().any(|link| link.of == wire && link.to == node),
-            };
-            for answer in declared.answers.iter().filter(|answer| reached && answer.to == wires.topic(wire)) {
-                let [to, with] = [answer.to, answer.with].map(|topic| self.plan.topic(topic).paths.len());
-                // Of groups of one size, one member answers another; else all members answer.
-                let count = if to == with { 1 } else { i64::try_from(with).unwrap_or(i64::MAX) };
-                let absent = self.is_absent(node);
-                let owed = if absent { self.postponed.entry(node).or_default() } else { &mut round.owed };
-                *owed.entry(answer.with).or_default() += count;
+    /// Counts the answers to a message that is delivered on this wire. Those of a node that is stopped or dead are owed
+    /// when it goes on.
+    fn owe(&mut self, delivered: Wire, round: &mut Round) {
+        for &(node, with) in self.promises.answers(delivered) {
+            if self.is_absent(node) {
+                self.postponed.entry(node).or_default().push(with);
+            } else {
+                round.owed.add(with);
             }
         }
     }
@@ -142,9 +128,7 @@ impl System {
         for node in back {
             let owed = self.postponed.remove(&node).unwrap_or_default();
             if !self.restarted.remove(&node) {
-                for (topic, count) in owed {
-                    *round.owed.entry(topic).or_default() += count;
-                }
+                round.owed.extend(owed);
             }
         }
     }
@@ -233,5 +217,40 @@ impl Session {
                 None => {}
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use sesame_plan::testing::{minimal, node, topic};
+    use sesame_plan::{Node, TopicId, Type};
+    use sesame_relay::transport::round::Promises;
+    use sesame_relay::wire::WireTable;
+
+    use super::super::session::Origin;
+    use super::*;
+
+    #[test]
+    fn a_node_that_publishes_twice_never_ends_a_step_early() {
+        let mut plan = minimal();
+        plan.topics = vec![topic("states", &["left/states", "right/states"], Type::Bool)];
+        plan.nodes = vec![Node { every_step: vec![TopicId(0)], ..node("arms") }];
+        let wires = WireTable::new(&plan);
+        let mut round = Round::default();
+        round.owed.extend(Promises::new(&plan, &wires).every_step().iter().copied());
+        let sample = Sample(Arc::from([0, 1, 0, 0, 1]));
+        let mut come = |path: &str| {
+            let wire = wires.find(path).expect("it is a wire of the plan");
+            round.take(Message { wire, origin: Origin::Line(0, None), sample: sample.clone(), arrived: None });
+            silent(round.owed.awaited(&wires)).to_string()
+        };
+        come("left/states");
+        let awaited = come("left/states");
+        assert_eq!(awaited, "a message of the step (1 on `right/states`) was awaited for 10 s of wall time");
+        come("right/states");
+        assert!(round.owed.is_empty());
+        assert_eq!(round.messages.len(), 3, "the surplus message goes through the relay as well");
     }
 }

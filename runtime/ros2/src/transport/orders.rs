@@ -1,14 +1,16 @@
 //! What operations want done to nodes and their parameters, and everything as it was before.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use sesame_plan::NodeId;
 use sesame_relay::fuzz::{Order, Resource};
 use sesame_relay::relay::Exchange;
 use sesame_relay::transport::TransportError;
 
+use super::change::{Change, Changed, Slowed};
 use super::session::Session;
-use super::{COMPLETE_WITHIN, System, now};
+use super::wall_clock::now;
+use super::{COMPLETE_WITHIN, System};
 use crate::parameters::ParameterValue;
 
 /// How long a node may take to tell or set a parameter.
@@ -19,30 +21,6 @@ const PERIOD: Duration = Duration::from_millis(50);
 
 /// In place of the position of an operation: what compensates for a reality gap is undone with everything else.
 const COMPENSATION: usize = usize::MAX;
-
-/// What is not as it was before the run.
-#[derive(Debug)]
-pub(super) struct Change {
-    operation: usize,
-    what: Changed,
-}
-
-#[derive(Debug)]
-enum Changed {
-    Parameter { node: NodeId, name: String, before: ParameterValue },
-    Paused(NodeId),
-    Slowed(Slowed),
-    Killed(NodeId),
-}
-
-/// A node that has only a share of the time.
-#[derive(Debug)]
-struct Slowed {
-    node: NodeId,
-    share: f64,
-    since: Instant,
-    paused: bool,
-}
 
 impl System {
     /// Does what operations want since the last call.
@@ -156,7 +134,7 @@ impl System {
                 Changed::Killed(node) => {
                     self.launched.restart(node)?;
                     self.restarted.insert(node);
-                    if self.ros2.step.is_some() || operation.is_none() {
+                    if self.ros.step.is_some() || operation.is_none() {
                         self.complete()?;
                     }
                 }

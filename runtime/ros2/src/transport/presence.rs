@@ -8,9 +8,9 @@ use rustdds::GUID;
 use sesame_plan::{CampaignPlan, NodeId, TopicId};
 use sesame_relay::transport::TransportError;
 
-use super::now;
 use super::served::Served;
 use super::session::{ClockReader, Connected, Session, Stepper};
+use super::wall_clock::now;
 use super::watch::{Place, Present, Role};
 use crate::dds::{DdsError, Endpoint};
 use crate::graph::DISCOVERY_TOPIC;

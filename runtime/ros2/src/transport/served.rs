@@ -8,10 +8,10 @@ use std::collections::BTreeMap;
 
 use rustdds::rpc::SampleIdentity;
 use rustdds::{GUID, SequenceNumber};
-use sesame_plan::{CampaignPlan, Channel, Ros2, TopicId};
+use sesame_codec::cdr::Codec;
+use sesame_plan::{CampaignPlan, Channel, Interface};
 use sesame_relay::wire::{Wire, WireTable, wanted};
 
-use crate::cdr::Codec;
 use crate::dds::{DdsError, Endpoint, Participant, ReaderId, Received, Sample, WriterId, mirrored};
 use crate::names;
 use crate::transport::wires::absolute;
@@ -43,7 +43,6 @@ pub(super) struct Served {
 /// What is needed for one direction.
 struct Half {
     wire: Wire,
-    topic: TopicId,
     codec: Codec,
     reader: ReaderId,
     /// `None` where it is only listened to.
@@ -56,7 +55,7 @@ struct Half {
 impl Half {
     fn join(
         plan: &CampaignPlan,
-        ros2: &Ros2,
+        interfaces: &[Interface],
         wires: &WireTable,
         wire: Wire,
         [read, write]: [&str; 2],
@@ -65,19 +64,19 @@ impl Half {
     ) -> Result<Self, DdsError> {
         let topic = wires.topic(wire);
         let interface = plan.topic(topic).interface.clone().unwrap_or_default();
-        let codec = Codec::new(&ros2.interfaces, &interface, &wanted(plan, topic));
+        let codec = Codec::new(interfaces, &interface, &wanted(plan, topic));
         let codec = codec.map_err(|error| DdsError(error.to_string()))?;
         let (type_name, qos) = (names::type_name(&interface), mirrored([]));
         let reader = dds.read(read, &type_name, &qos)?;
         let writer = if cut { Some(dds.publish(write, &type_name, &qos)?) } else { None };
-        Ok(Half { wire, topic, codec, reader, writer, clients: BTreeMap::new(), count: 0 })
+        Ok(Half { wire, codec, reader, writer, clients: BTreeMap::new(), count: 0 })
     }
 }
 
 /// The services of a plan, joined at once: what they are is known before anybody appears.
 pub(super) fn services(
     plan: &CampaignPlan,
-    ros2: &Ros2,
+    interfaces: &[Interface],
     wires: &WireTable,
     dds: &mut Participant,
 ) -> Result<Vec<Served>, DdsError> {
@@ -85,13 +84,14 @@ pub(super) fn services(
     let mut services = Vec::new();
     for wire in of(Channel::Request) {
         let Some(reply) = of(Channel::Reply).find(|&reply| wires.path(reply) == wires.path(wire)) else { continue };
-        let cut = [wire, reply].iter().any(|&wire| ros2.wiring.get(wires.topic(wire).index()).is_some_and(|it| it.cut));
+        let wiring = &plan.simulator.wiring;
+        let cut = [wire, reply].iter().any(|&wire| wiring.get(wires.topic(wire).index()).is_some_and(|it| it.cut));
         let path = absolute(wires.path(wire));
         let server = if cut { format!("{path}/undisturbed") } else { path.clone() };
         let (asked, forwarded) = (names::request(&path), names::request(&server));
         let (answered, answer) = (names::reply(&server), names::reply(&path));
-        let request = Half::join(plan, ros2, wires, wire, [&asked, &forwarded], cut, dds)?;
-        let reply = Half::join(plan, ros2, wires, reply, [&answered, &answer], cut, dds)?;
+        let request = Half::join(plan, interfaces, wires, wire, [&asked, &forwarded], cut, dds)?;
+        let reply = Half::join(plan, interfaces, wires, reply, [&answered, &answer], cut, dds)?;
         let address = dds.reader_guid(reply.reader).unwrap_or(GUID::GUID_UNKNOWN);
         services.push(Served { path, cut, request, reply, asked: BTreeMap::new(), address });
     }
@@ -111,10 +111,6 @@ impl Served {
             Direction::Request => &mut self.request,
             Direction::Reply => &mut self.reply,
         }
-    }
-
-    pub(super) fn topic(&self, direction: Direction) -> TopicId {
-        self.half(direction).topic
     }
 
     pub(super) fn wire(&self, direction: Direction) -> Wire {

@@ -7,20 +7,25 @@ use std::time::Instant;
 use rustdds::QosPolicies;
 use rustdds::policy::{Durability, History, Reliability};
 use rustdds::rpc::SampleIdentity;
-use sesame_plan::{CampaignPlan, Clock, Fitted, NodeId, OperationKind, Ros2, StepBy, TopicId};
+use sesame_codec::cdr::Codec;
+use sesame_plan::{CampaignPlan, Clock, Fitted, NodeId, OperationKind, Ros, StepBy, TopicId};
 use sesame_relay::transport::added::Added;
 use sesame_relay::wire::{Line, Wire, WireTable, wanted};
 
-use crate::cdr::Codec;
 use crate::dds::{DdsError, Endpoint, Participant, ReaderId, Received, Sample, WriterId, mirrored};
 use crate::graph::{DISCOVERY_TOPIC, DISCOVERY_TYPE, Gid, NodeInfo, Nodes};
 use crate::names;
 use crate::parameters::Parameters;
-use crate::transport::assembly::node_name;
 use crate::transport::served::{Direction, Served, services};
 use crate::transport::service::{self, Client};
 use crate::transport::watch::Watch;
 use crate::transport::wires::{absolute, lines_in_ros};
+
+/// The name of the runner's node.
+const NODE: &str = "/sesame_relay";
+
+/// The name of a guest's node, before that of its monitor.
+const GUEST: &str = "/sesame_monitor_";
 
 /// A node of our own in the domain, with what it reads and writes.
 pub(super) struct Session {
@@ -110,7 +115,6 @@ pub(super) enum Incoming {
 #[derive(Debug)]
 pub(super) struct Message {
     pub(super) wire: Wire,
-    pub(super) topic: TopicId,
     pub(super) origin: Origin,
     pub(super) sample: Sample,
     /// When it came, if that is measured.
@@ -128,7 +132,7 @@ pub(super) enum Origin {
 
 impl Session {
     /// Joins the domain.
-    pub(super) fn join(plan: &CampaignPlan, ros2: &Ros2, wires: &WireTable, domain: u16) -> Result<Self, DdsError> {
+    pub(super) fn join(plan: &CampaignPlan, ros: &Ros, wires: &WireTable, domain: u16) -> Result<Self, DdsError> {
         let mut dds = Participant::join(domain, false)?;
         let latched = |depth| {
             rustdds::QosPolicyBuilder::new()
@@ -143,7 +147,7 @@ impl Session {
         for (line, interface) in lines_in_ros(plan, wires) {
             let wanted = wanted(plan, line.topic);
             let codec =
-                Codec::new(&ros2.interfaces, &interface, &wanted).map_err(|error| DdsError(error.to_string()))?;
+                Codec::new(&ros.interfaces, &interface, &wanted).map_err(|error| DdsError(error.to_string()))?;
             connected.push(Connected {
                 codec,
                 readers: vec![None; line.sources.len()],
@@ -162,22 +166,22 @@ impl Session {
             info: NodeInfo::new(),
             info_reader,
             info_writer,
-            services: services(plan, ros2, wires, &mut dds)?,
+            services: services(plan, &ros.interfaces, wires, &mut dds)?,
             parameters: parameters(plan, &mut dds)?,
             backlog: Vec::new(),
             dead: Vec::new(),
             dds,
             lines: connected,
-            clock: match &ros2.clock {
+            clock: match &ros.clock {
                 Clock::Wall => ClockReader::Wall,
                 Clock::Topic { path } => ClockReader::Topic { path: absolute(path), reader: None },
             },
-            step: match ros2.step.as_ref().map(|step| &step.by) {
+            step: match ros.step.as_ref().map(|step| &step.by) {
                 None => Stepper::None,
                 Some(StepBy::Service { path }) => Stepper::Service(caller(path)),
                 Some(StepBy::Topic { path }) => Stepper::Topic { path: absolute(path), writer: None },
             },
-            reset: ros2.reset.as_ref().map(caller),
+            reset: ros.reset.as_ref().map(caller),
             heard: BTreeSet::new(),
             ticks: None,
             received: Vec::new(),
@@ -185,7 +189,7 @@ impl Session {
             notes: Vec::new(),
             said: BTreeSet::new(),
             undecodable: BTreeSet::new(),
-            added: ros2.step.is_none().then(Added::default),
+            added: ros.step.is_none().then(Added::default),
             watch: Watch::default(),
         })
     }
@@ -218,6 +222,14 @@ impl Session {
         if self.said.insert(note.clone()) {
             self.notes.push(note);
         }
+    }
+}
+
+/// What this process is called as a node.
+fn node_name(plan: &CampaignPlan) -> String {
+    match plan.monitors.iter().find(|monitor| monitor.publishes.is_some()) {
+        Some(monitor) if plan.is_guest() => format!("{GUEST}{}", monitor.name),
+        _ => NODE.to_owned(),
     }
 }
 

@@ -7,10 +7,10 @@ use sesame_base::time::SimTime;
 use sesame_relay::relay::{Delivery, Exchange};
 use sesame_relay::wire::Wire;
 
-use super::now;
 use super::served::Direction;
 use super::service;
 use super::session::{Caller, ClockReader, Connected, Incoming, Message, Origin, Session, Stepper};
+use super::wall_clock::now;
 use crate::dds::{DdsError, Received, Sample};
 use crate::names;
 use crate::parameters::Ticket;
@@ -95,7 +95,6 @@ impl Session {
                 self.heard.insert(connected.line.topic);
                 return Some(Incoming::Message(Message {
                     wire: connected.line.wire,
-                    topic: connected.line.topic,
                     origin: Origin::Line(at, publisher),
                     sample: received.sample,
                     arrived,
@@ -106,7 +105,6 @@ impl Session {
             if let Some((direction, client)) = service.recognise(&received) {
                 return Some(Incoming::Message(Message {
                     wire: service.wire(direction),
-                    topic: service.topic(direction),
                     origin: Origin::Service(at, direction, client),
                     sample: received.sample,
                     arrived,
@@ -218,58 +216,61 @@ impl Session {
         Ok(())
     }
 
-    /// Publishes what is delivered; what was only listened to stays where it is.
+    /// Publishes what is delivered; what was only listened to stays where it is. Calls `each` with the wire of each
+    /// message that was published.
     pub(super) fn deliver(
         &mut self,
         deliveries: &mut Vec<Delivery>,
         each: &mut dyn FnMut(Wire),
     ) -> Result<(), DdsError> {
         for delivery in deliveries.drain(..) {
-            each(delivery.wire);
-            self.deliver_one(&delivery)?;
+            if self.publish(&delivery)? {
+                each(delivery.wire);
+            }
         }
         Ok(())
     }
 
-    fn deliver_one(&mut self, delivery: &Delivery) -> Result<(), DdsError> {
+    /// Publishes a message where it is delivered; false if it is not published anew, or cannot be.
+    fn publish(&mut self, delivery: &Delivery) -> Result<bool, DdsError> {
         let Delivery { wire, index, value, .. } = delivery;
         for connected in &self.lines {
             let Some(at) = connected.line.sinks.iter().position(|sink| sink.wire == *wire) else { continue };
             if !connected.line.takes(delivery) {
-                return Ok(());
+                return Ok(false);
             }
-            let Some(writer) = connected.writers[at] else { return Ok(()) };
+            let Some(writer) = connected.writers[at] else { return Ok(false) };
             let path = connected.line.sinks[at].path.clone();
             return match connected.codec.write(value) {
                 Ok(bytes) => {
                     if self.dds.write(writer, Sample(bytes), None)?.is_none() {
                         self.note(format!("a subscriber of `{path}` does not keep up: messages to it were given up"));
                     }
-                    Ok(())
+                    Ok(true)
                 }
                 Err(error) => {
                     self.note(format!("a message on `{path}` cannot be encoded and is dropped: {error}"));
-                    Ok(())
+                    Ok(false)
                 }
             };
         }
         for service in &mut self.services {
             let Some(direction) = service.direction(*wire) else { continue };
-            let Some(client) = service.client(direction, *index) else { return Ok(()) };
-            let path = service.path.clone();
+            let Some(client) = service.client(direction, *index) else { return Ok(false) };
+            let (path, cut) = (service.path.clone(), service.cut);
             return match service.codec(direction).write(value) {
                 Ok(bytes) => {
                     if !service.send(direction, client, Sample(bytes), &self.dds)? {
                         self.note(format!("calls of `{path}` are not taken: messages were given up"));
                     }
-                    Ok(())
+                    Ok(cut)
                 }
                 Err(error) => {
                     self.note(format!("a call of `{path}` cannot be encoded and is dropped: {error}"));
-                    Ok(())
+                    Ok(false)
                 }
             };
         }
-        Ok(())
+        Ok(false)
     }
 }

@@ -176,7 +176,7 @@ mod tests {
 
     /// What each look says, one every half a second.
     fn said(first: &[Present], looks: &[(&[Present], &[&str])]) -> Vec<Vec<String>> {
-        let (mut watch, mut now) = (Watch::default(), super::super::now());
+        let (mut watch, mut now) = (Watch::default(), super::super::wall_clock::now());
         watch.begin(|| first.to_vec());
         let look = |(present, absent): &(&[Present], &[&str])| {
             assert!(watch.is_due(now));
@@ -223,7 +223,7 @@ mod tests {
         watch.begin(|| vec![arm.clone()]);
         watch.forget(|guid| guid == arm.guid);
         let restarted = present(2, Role::Publishes, Some("/arm"));
-        let now = super::super::now();
+        let now = super::super::wall_clock::now();
         assert_eq!(watch.look(now, Vec::new(), &BTreeSet::new()), [""; 0]);
         assert_eq!(watch.look(now, vec![restarted], &BTreeSet::new()), [""; 0]);
     }
@@ -248,7 +248,7 @@ mod tests {
     #[test]
     fn what_lasts_is_said_again_in_the_next_run() {
         let arm = present(1, Role::Publishes, Some("/arm"));
-        let (mut watch, now) = (Watch::default(), super::super::now());
+        let (mut watch, now) = (Watch::default(), super::super::wall_clock::now());
         watch.begin(|| vec![arm]);
         let first = watch.look(now, Vec::new(), &BTreeSet::new());
         watch.begin(|| panic!("who was there is known"));

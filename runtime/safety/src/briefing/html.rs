@@ -1,7 +1,9 @@
 //! Briefing sheets as one page in HTML that is printed on A4, each test on a sheet of its own. The page loads nothing
 //! and runs nothing: everything that is not written here is escaped.
 
-use super::{Briefing, sections, visible};
+use sesame_base::visible::visible;
+
+use super::{Briefing, sections};
 
 /// How a page looks on the screen and on paper. Warnings have a border and not only a colour, as many print in grey.
 const STYLE: &str = "\

@@ -2,7 +2,9 @@
 
 use unicode_width::{UnicodeWidthChar as _, UnicodeWidthStr as _};
 
-use super::{Briefing, sections, visible};
+use sesame_base::visible::visible;
+
+use super::{Briefing, sections};
 
 /// The width of a sheet, in columns.
 pub const COLUMNS: usize = 80;
@@ -93,7 +95,7 @@ mod tests {
             let sheet = text(&briefing);
             for line in sheet.lines() {
                 prop_assert!(line.width() <= COLUMNS, "{line:?}");
-                prop_assert!(!line.chars().any(super::super::hidden), "{line:?}");
+                prop_assert!(!line.chars().any(sesame_base::visible::is_hidden), "{line:?}");
             }
             let solid = |text: &str| text.chars().filter(|c| !c.is_whitespace()).collect::<String>();
             prop_assert!(solid(&sheet).contains(&solid(&visible(&warning))));

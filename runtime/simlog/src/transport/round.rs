@@ -1,8 +1,6 @@
 //! The messages of one step: which are expected, and which have come.
 
-use std::collections::BTreeMap;
-
-use sesame_plan::CampaignPlan;
+use sesame_relay::transport::round::{Owed, Promises};
 use sesame_relay::wire::{Wire, WireTable};
 
 use super::lines::Lines;
@@ -12,8 +10,7 @@ use crate::client::{Heard, Stepped};
 pub(super) struct Round {
     pub(super) heard: Vec<Heard>,
     pub(super) stepped: Option<Stepped>,
-    /// Per wire: how many more messages are expected than have come. Only wires of which somebody says it are here.
-    owed: BTreeMap<Wire, i64>,
+    owed: Owed,
     /// The stream of the marker.
     marker: Option<usize>,
     marked: bool,
@@ -22,34 +19,15 @@ pub(super) struct Round {
 }
 
 impl Round {
-    pub(super) fn new(plan: &CampaignPlan, wires: &WireTable, marker: Option<usize>, before: Option<i128>) -> Self {
-        let mut owed = BTreeMap::new();
-        let answers = |topic| plan.nodes.iter().flat_map(|node| &node.answers).any(|answer| answer.with == topic);
-        let every = |topic| plan.nodes.iter().flat_map(|node| &node.every_step).filter(|&&it| it == topic).count();
-        for wire in wires.iter() {
-            let topic = wires.topic(wire);
-            let count = every(topic);
-            if count > 0 || answers(topic) {
-                owed.insert(wire, i64::try_from(count).unwrap_or(i64::MAX));
-            }
-        }
+    pub(super) fn new(promises: &Promises, marker: Option<usize>, before: Option<i128>) -> Self {
+        let mut owed = Owed::default();
+        owed.extend(promises.every_step().iter().copied());
         Round { heard: Vec::new(), stepped: None, owed, marker, marked: false, before }
     }
 
-    /// Counts the answers to a message that is delivered on this wire. Of groups of one size, one member answers
-    /// another; else all members answer.
-    pub(super) fn owe(&mut self, plan: &CampaignPlan, wires: &WireTable, wire: Wire) {
-        let to = wires.topic(wire);
-        let member = |wire: Wire| wires.iter().take_while(|&it| it != wire).filter(|&it| wires.topic(it) == to).count();
-        for answer in plan.nodes.iter().flat_map(|node| &node.answers).filter(|answer| answer.to == to) {
-            let with: Vec<Wire> = wires.iter().filter(|&it| wires.topic(it) == answer.with).collect();
-            let alike = with.len() == plan.topic(to).paths.len();
-            for (at, with) in with.into_iter().enumerate() {
-                if !alike || at == member(wire) {
-                    *self.owed.entry(with).or_default() += 1;
-                }
-            }
-        }
+    /// Counts the answers to a message that is delivered on this wire.
+    pub(super) fn owe(&mut self, promises: &Promises, delivered: Wire) {
+        self.owed.extend(promises.answers(delivered).iter().map(|&(_, with)| with));
     }
 
     pub(super) fn take(&mut self, lines: &Lines, heard: &mut Vec<Heard>) {
@@ -59,12 +37,8 @@ impl Round {
                 continue;
             }
             let late = self.before.zip(heard.message.stamp()).is_some_and(|(before, at)| i128::from(at) < before);
-            if late {
-                self.heard.push(heard);
-                continue;
-            }
-            if let Some(owed) = lines.of_stream(heard.stream).and_then(|line| self.owed.get_mut(&line.wire)) {
-                *owed -= 1;
+            if let Some(line) = lines.of_stream(heard.stream).filter(|_| !late) {
+                self.owed.pay(line.wire);
             }
             self.heard.push(heard);
         }
@@ -72,26 +46,22 @@ impl Round {
 
     /// Whether all that is expected has come.
     pub(super) fn is_complete(&self) -> bool {
-        if self.marker.is_some() { self.marked } else { self.owed.values().all(|&owed| owed <= 0) }
+        if self.marker.is_some() { self.marked } else { self.owed.is_empty() }
     }
 
     /// Whether nothing can come that is not expected.
-    pub(super) fn is_certain(&self, lines: &Lines) -> bool {
-        self.marker.is_some() || lines.iter().all(|line| self.owed.contains_key(&line.wire))
+    pub(super) fn is_certain(&self, promises: &Promises, lines: &Lines) -> bool {
+        self.marker.is_some() || lines.iter().all(|line| promises.is_counted(line.wire))
     }
 
     /// What has not come, as a phrase.
-    pub(super) fn awaited(&self, plan: &CampaignPlan, lines: &Lines) -> String {
+    pub(super) fn awaited(&self, wires: &WireTable) -> String {
         if self.stepped.is_none() {
             return "the end of a step".to_owned();
         }
         if self.marker.is_some() {
             return "the marker of the end of a step".to_owned();
         }
-        let owed = lines.iter().filter_map(|line| {
-            let &count = self.owed.get(&line.wire).filter(|&&count| count > 0)?;
-            Some(format!("{count} on `{}`", plan.topic(line.topic).name))
-        });
-        format!("a message of the step ({})", owed.collect::<Vec<_>>().join(", "))
+        self.owed.awaited(wires)
     }
 }

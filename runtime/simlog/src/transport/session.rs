@@ -4,6 +4,7 @@ use sesame_base::time::SimTime;
 use sesame_plan::CampaignPlan;
 use sesame_relay::relay::{Delivery, Exchange};
 use sesame_relay::transport::TransportError;
+use sesame_relay::transport::round::Promises;
 
 use super::lines::Lines;
 use super::round::Round;
@@ -58,7 +59,7 @@ impl Session {
     /// Publishes what is delivered, and notes who will answer it. What was only listened to is where it belongs.
     pub(super) fn deliver(
         &mut self,
-        plan: &CampaignPlan,
+        promises: &Promises,
         deliveries: &mut Vec<Delivery>,
         relay: &dyn Exchange,
         now: SimTime,
@@ -70,7 +71,7 @@ impl Session {
             match line.written(&delivery, now) {
                 Ok(None) => {}
                 Ok(Some(written)) => {
-                    round.owe(plan, relay.wires(), delivery.wire);
+                    round.owe(promises, delivery.wire);
                     published.push(written);
                 }
                 Err(mismatch) => {

@@ -3,13 +3,13 @@
 use std::path::PathBuf;
 
 use sesame_base::time::SimTime;
-use sesame_plan::testing::{minimal, node, topic};
-use sesame_plan::{Command, Launch, Lifecycle, Ready, ReadyWhen, SimlogVersion, TopicId, Type, WireNames};
+use sesame_plan::testing::{self, minimal, node, topic};
+use sesame_plan::{Command, Launch, Ready, ReadyWhen, TopicId, Type, WireNames};
 use sesame_relay::metric::MetricTable;
 use sesame_relay::relay::Relay;
-use sesame_relay::wire::WireTable;
 
 use super::*;
+use crate::client::Stepped;
 
 const STEP: u64 = 20_000_000;
 
@@ -33,21 +33,8 @@ fn launching(arguments: &[&str]) -> Option<CampaignPlan> {
     plan.nodes = vec![sesame_plan::Node { every_step: vec![TopicId(0)], ..node("simulator") }];
     let ready = Ready { when: ReadyWhen::Port { port: "{port}".to_owned() }, within: 20.0 };
     let launch = Launch { command: Command { program, arguments }, ready: Some(ready) };
-    plan.simulator = sesame_plan::Simulator {
-        name: "there".to_owned(),
-        transport: sesame_plan::Transport::Simlog(Simlog {
-            url: "http://127.0.0.1:{port}".to_owned(),
-            topics_url: None,
-            step_ns: STEP,
-            protocol: SimlogVersion::V2,
-            names: WireNames::default(),
-            marker: None,
-            cut: Vec::new(),
-            settle_ns: 0,
-            ca: None,
-        }),
-        lifecycle: Lifecycle { launch: Some(launch), ..Lifecycle::default() },
-    };
+    plan.simulator = testing::simlog("http://127.0.0.1:{port}");
+    plan.simulator.lifecycle.launch = Some(launch);
     plan.validate().expect("the plan is sound");
     Some(plan)
 }
@@ -92,6 +79,18 @@ mod real {
         let ended = run(&mut system(&plan), &plan, 50).unwrap_err();
         assert!(matches!(&ended, TransportError::Ended { what, .. } if what.contains("simulator2.py")), "{ended}");
     }
+}
+
+#[test]
+fn what_a_step_waits_for_is_named_by_its_path() {
+    let mut plan = minimal();
+    plan.topics = vec![topic("states", &["left/states", "right/states"], Type::Bool)];
+    plan.nodes = vec![sesame_plan::Node { every_step: vec![TopicId(0)], ..node("arms") }];
+    let wires = WireTable::new(&plan);
+    let mut round = Round::new(&Promises::new(&plan, &wires), None, None);
+    assert_eq!(round.awaited(&wires), "the end of a step");
+    round.stepped = Some(Stepped { ended: false, clock_ms: None });
+    assert_eq!(round.awaited(&wires), "a message of the step (1 on `left/states`, 1 on `right/states`)");
 }
 
 #[test]

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use sesame_base::time::SimTime;
-use sesame_plan::testing::{minimal, node, topic};
-use sesame_plan::{CampaignPlan, Lifecycle, NodeId, Simlog, SimlogVersion, TopicId, Type, WireNames};
+use sesame_plan::testing::{self, minimal, node, simlog_mut, topic};
+use sesame_plan::{CampaignPlan, NodeId, SimlogVersion, TopicId, Type, WireNames};
 use sesame_relay::fuzz::Order;
 use sesame_relay::relay::{Delivery, Exchange};
 use sesame_relay::simulator::Progress;
@@ -102,33 +102,19 @@ pub(crate) fn plan(url: &str, protocol: SimlogVersion, topics: &[(&str, Type)]) 
     all.every_step = (0..).take(topics.len()).map(TopicId).collect();
     plan.nodes = vec![all];
     let cut = (0..).map(TopicId).zip(topics).filter(|(_, (path, _))| *path == "joint").map(|(id, _)| id).collect();
-    let (names, marker) = match protocol {
-        SimlogVersion::V2 => (WireNames::default(), None),
-        SimlogVersion::V3 => (WireNames::of_version_3(), Some("SIMLOG://step".to_owned())),
-    };
-    plan.simulator = sesame_plan::Simulator {
-        name: "there".to_owned(),
-        transport: sesame_plan::Transport::Simlog(Simlog {
-            url: url.to_owned(),
-            topics_url: None,
-            step_ns: 20_000_000,
-            protocol,
-            names,
-            marker,
-            cut,
-            settle_ns: 20_000_000,
-            ca: None,
-        }),
-        lifecycle: Lifecycle::default(),
-    };
+    plan.simulator = testing::simlog(url);
+    let simlog = simlog_mut(&mut plan.simulator);
+    (simlog.protocol, simlog.cut, simlog.settle_ns) = (protocol, cut, 20_000_000);
+    if protocol == SimlogVersion::V3 {
+        (simlog.names, simlog.marker) = (WireNames::of_version_3(), Some("SIMLOG://step".to_owned()));
+    }
     plan
 }
 
 /// Ends a step when nothing has come for so many milliseconds, where nobody says how much comes: longer than a message
 /// is ever late on a machine that is busy.
 pub(crate) fn settles(plan: &mut CampaignPlan, milliseconds: u64) {
-    let sesame_plan::Transport::Simlog(simlog) = &mut plan.simulator.transport else { panic!("it speaks SimlogAPI") };
-    simlog.settle_ns = milliseconds * 1_000_000;
+    simlog_mut(&mut plan.simulator).settle_ns = milliseconds * 1_000_000;
 }
 
 /// The transport of a plan.

@@ -3,7 +3,7 @@
 //! If two operations have the same priority, the one that is declared first acts first, so each has a priority of its
 //! own here. Members of a group keep their order, since random numbers are drawn by it.
 
-use sesame_plan::Topic;
+use sesame_plan::{RequirementId, Topic};
 use sesame_rng::Stream;
 
 use super::{compare_ends, compare_metrics};
@@ -120,7 +120,12 @@ fn differences(case: &Case) -> Vec<String> {
     let mut wrong = Vec::new();
     compare_ends(&before, &now, false, &mut wrong);
     for (at, metric) in case.plan.metrics.iter().enumerate() {
-        compare_metrics(metric, &before.metrics[at], &now.metrics[places.metrics[at]], &mut wrong);
+        let mut before = before.metrics[at].clone();
+        for lost in &mut before.lost {
+            lost.requirement = RequirementId(u32::try_from(places.requirements[lost.requirement.index()]).unwrap());
+        }
+        before.lost.sort_by_key(|lost| lost.requirement);
+        compare_metrics(metric, &before, &now.metrics[places.metrics[at]], &mut wrong);
     }
     for (at, effect) in before.operations.iter().enumerate() {
         let now = &now.operations[used[at]];

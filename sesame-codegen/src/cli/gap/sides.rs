@@ -40,7 +40,7 @@ impl Sides {
             match &lab {
                 Some(lab) if lab.name != task.lab => {
                     bail!(
-                        "{} is of lab `{}`, and others are of lab `{}`; compare them apart",
+                        "{} is of lab `{}`, and others are of lab `{}`; compare them separately",
                         repository.path().display(),
                         task.lab,
                         lab.name

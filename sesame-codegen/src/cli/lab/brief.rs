@@ -48,26 +48,26 @@ pub(in crate::cli) struct Brief {
 /// What a sheet says that results do not.
 #[derive(Debug, Args)]
 pub(in crate::cli) struct Conditions {
-    /// Somebody who must be present: the role and what this person does, for example `safety pilot: holds the
-    /// enabling switch`. May be given several times.
+    /// A person who must be present, with role and task, for example `safety pilot: holds the enabling switch`. May be
+    /// repeated.
     #[arg(long, value_name = "ROLE: TASK", value_parser = person)]
     present: Vec<Person>,
-    /// A further condition that people can see, and in which they stop the test. May be given several times.
+    /// A further condition that people can see, and on which they stop the test. May be repeated.
     #[arg(long, value_name = "CONDITION")]
     stop: Vec<String>,
-    /// What passes before a robot begins to stop: detection, response and communication together.
+    /// The time until a robot begins to stop, in seconds: detection, response and communication together.
     #[arg(long, value_name = "SECONDS", requires = "deceleration")]
     reaction: Option<f64>,
-    /// How strongly a robot brakes, in metres per second squared.
+    /// The deceleration of a braking robot, in metres per second squared.
     #[arg(long, value_name = "M/S2", requires = "reaction")]
     deceleration: Option<f64>,
     /// How fast people approach, in metres per second: 1.6 for walking, 2 for reaching, 0 for things that do not move.
     #[arg(long, value_name = "M/S", default_value_t = WALKING_SPEED)]
     approach: f64,
-    /// How far a part of a body gets into a zone before it is detected, in metres.
+    /// How far a body part enters a zone before it is detected, in metres.
     #[arg(long, value_name = "METRES", default_value_t = 0.0)]
     intrusion: f64,
-    /// By how much positions may be wrong, of robots and people together, in metres.
+    /// The error of positions, of robots and people together, in metres.
     #[arg(long, value_name = "METRES", default_value_t = 0.0)]
     uncertainty: f64,
 }
@@ -111,7 +111,7 @@ pub(super) fn brief(shell: Shell, asked: &Brief) -> anyhow::Result<()> {
         }
     };
     if asked.conditions.reaction.is_none() {
-        shell.note("`--reaction` and `--deceleration` say by how much safety zones must be wider");
+        shell.note("with `--reaction` and `--deceleration`, the sheet shows how much wider safety zones must be");
     }
     match &asked.out {
         None => shell::asked_for(&written),
@@ -275,7 +275,7 @@ mod tests {
         let sheet = &sheets(&plan(-1.0), &["T17"])[0];
         let solid = sheet.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(solid.contains("WARNING: The lab excludes this test: it has collision_occurrence"), "{sheet}");
-        assert!(solid.contains("was not computed: nobody said how robots stop."), "{sheet}");
+        assert!(solid.contains("was not computed: it is not known how robots stop."), "{sheet}");
     }
 
     #[test]

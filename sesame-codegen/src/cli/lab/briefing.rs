@@ -226,7 +226,7 @@ fn zones(
     let mut said: Vec<String> =
         speeds.iter().map(|speed| format!("Up to {:.3} m/s: {}.", speed.metres_per_second, speed.of)).collect();
     let Some((approach, distance)) = separation(fastest.metres_per_second) else {
-        said.push("By how much safety zones must be wider was not computed: nobody said how robots stop.".to_owned());
+        said.push("How much wider safety zones must be was not computed: it is not known how robots stop.".to_owned());
         return (said, Vec::new());
     };
     said.push(format!(

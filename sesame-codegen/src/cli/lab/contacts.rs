@@ -30,23 +30,23 @@ pub(in crate::cli) struct Asked {
     /// A second recording of the same test, in which the other robot moved and the first one was parked.
     #[arg(requires = "second")]
     other: Option<PathBuf>,
-    /// The lab whose shapes are looked at; the only one of the space if omitted.
+    /// The lab with the shapes; the only one of the space if omitted.
     #[arg(long, value_name = "NAME")]
     lab: Option<String>,
     /// The shapes whose motion is taken from the second recording.
     #[arg(long, value_delimiter = ',', value_name = "SHAPES", requires = "other")]
     second: Vec<String>,
-    /// What the second recording calls 0 s is this time of the first one.
+    /// The time in the first recording at which the second one has its 0 s.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_negative_numbers = true)]
     offset: f64,
-    /// A recording of the same test, perhaps in simulation, in which nothing was missing: motions are compared with it,
-    /// to find out whether they depend on what was missing.
+    /// A recording of the same test, perhaps in simulation, in which nothing was missing. Comparing motions with it
+    /// shows whether they depend on what was missing.
     #[arg(long, value_name = "RECORDING")]
     together: Option<PathBuf>,
-    /// How far positions may be apart in two recordings of one motion.
+    /// Tolerated difference of positions in two recordings of one motion.
     #[arg(long, value_name = "METRES", default_value_t = 0.01)]
     position_tolerance: f64,
-    /// How far orientations may be apart in two recordings of one motion.
+    /// Tolerated difference of orientations in two recordings of one motion.
     #[arg(long, value_name = "RADIANS", default_value_t = 0.02)]
     angle_tolerance: f64,
     #[command(flatten)]

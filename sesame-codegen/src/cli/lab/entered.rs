@@ -54,7 +54,7 @@ pub(in super::super) struct Form {
     /// How often each test is run; if omitted, as often as the lab's `physical` block says, or else once.
     #[arg(short = 'n', long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     times: Option<u32>,
-    /// Print rows for tests that the lab excludes as too dangerous, too.
+    /// Also print rows for tests that the lab excludes as too dangerous.
     #[arg(long)]
     although_excluded: bool,
     /// Write the form into this file, which must not exist; if omitted, it is printed.
@@ -84,20 +84,20 @@ pub(in super::super) struct Add {
     /// The lab; the only one of the space if omitted.
     #[arg(long, value_name = "NAME")]
     lab: Option<String>,
-    /// Who ran the tests, unless the forms say it.
+    /// Who ran the tests, for forms that leave it empty.
     #[arg(long, value_name = "TEXT")]
     operator: Option<String>,
-    /// On which robots, unless the forms say it.
+    /// The robots, for forms that leave them empty.
     #[arg(long, value_name = "TEXT")]
     hardware: Option<String>,
-    /// With which software, unless the forms say it.
+    /// The software of the robots, for forms that leave it empty.
     #[arg(long, value_name = "TEXT")]
     software: Option<String>,
-    /// When, in any notation, unless the forms say it.
+    /// The date, in any notation, for forms that leave it empty.
     #[arg(long, value_name = "TEXT")]
     date: Option<String>,
-    /// The folder of the lab's results; runs that were added to it before stay. If omitted, it is beside the run, and
-    /// named after the run and the lab.
+    /// The folder for the lab's results; runs already in it stay. If omitted, a folder beside the run, named after the
+    /// run and the lab.
     #[arg(long, value_name = "FOLDER")]
     output: Option<PathBuf>,
 }

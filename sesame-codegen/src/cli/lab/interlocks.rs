@@ -30,7 +30,7 @@ pub(in crate::cli) struct Asked {
     /// The lab; the only one of the space if omitted.
     #[arg(long, value_name = "NAME")]
     lab: Option<String>,
-    /// How long before the contact the interlock has to act: what a robot needs to stand still.
+    /// How long before the contact the interlock must act: the time a robot needs to stop.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
     lead: f64,
     #[command(flatten)]
@@ -160,7 +160,7 @@ fn sentence((one, other, equivalence): &Pair) -> String {
     } else if differing.is_empty() {
         "It stands for the contact: it acts in exactly the tests that have one.".to_owned()
     } else {
-        format!("It does not stand for the contact: only one of both happens in {}.", names(differing))
+        format!("It does not stand for the contact: only one of the two happens in {}.", names(differing))
     };
     format!("`{one}` and `{other}`, {tests} {}: {early}. {stands}", if tests == 1 { "test" } else { "tests" })
 }
@@ -235,7 +235,7 @@ mod tests {
         assert_eq!(
             sentence,
             "`gripper` and `Z1`, 2 tests: an interlock acts too late or not at all in T1. It does not stand for the \
-             contact: only one of both happens in T3."
+             contact: only one of the two happens in T3."
         );
     }
 }

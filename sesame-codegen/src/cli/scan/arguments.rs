@@ -9,21 +9,21 @@ pub(super) const ROS_2: &str = "For example: sesamec scan ros2 --domain 40 --typ
                                 of types that no folder has.";
 
 pub(super) const ROS_1: &str = "For example: sesamec scan ros1 --master http://localhost:11311 > cell.sesame\n\n\
-                                Nothing is registered at the master and nothing is published. Publishers hand out the \
-                                layouts of their messages; layouts of services are in folders only.";
+                                Nothing is registered at the master and nothing is published. Publishers provide the \
+                                layouts of their messages; layouts of services come from folders only.";
 
 pub(super) const ROSBRIDGE: &str = "For example: sesamec scan rosbridge ws://localhost:9090 > hall.sesame\n\n\
-     A server with the services of rosapi says what is there. Of one without, only topics can be seen that are named \
-     with --topic; what their messages have in common is then their layout where no folder has it.";
+     A server with the services of rosapi lists the system. If it has none, name the topics with --topic; if no folder \
+     has their layout, it consists of the fields that all of their messages have.";
 
 pub(super) const MQTT: &str = "For example: sesamec scan mqtt mqtt://localhost:1883 --topics 'uagv/v2/#' > fleet.sesame\n\n\
-                               Nothing is published. A scan sees topics on which something comes meanwhile, or is \
-                               retained. A broker does not tell who publishes and who subscribes.";
+                               Nothing is published. A scan sees topics with retained messages, or with messages \
+                               that arrive meanwhile. A broker does not reveal publishers and subscribers.";
 
 pub(super) const SIMLOG: &str = "For example: sesamec scan simlog http://localhost:8089 --topic joints/R1/Link0/position --steps 10 > cell.sesame\n\n\
-     The protocol lists no topics in either version, so they are named here. Without --steps the simulation is left \
-     as it is, and what it does not publish by itself is not seen. The variable SESAME_SIMLOG_TOKEN has the token, \
-     if the simulator wants one.";
+     The protocol lists no topics in either version, so name them. Without --steps the simulation is not stepped, and \
+     the scan sees only what it publishes by itself. The variable SESAME_SIMLOG_TOKEN has the token, if the simulator \
+     needs one.";
 
 /// How nodes of ROS 2 are listened to.
 #[derive(Debug, clap::Args)]
@@ -38,7 +38,7 @@ pub(in crate::cli) struct Ros2 {
     /// folders of `AMENT_PREFIX_PATH`.
     #[arg(long, value_name = "FOLDER")]
     pub(super) types: Vec<PathBuf>,
-    /// Listen to other machines as well, not to this one only.
+    /// Also listen to other machines, not only to this one.
     #[arg(long)]
     pub(super) network: bool,
     /// A space, or what was found as one JSON object.
@@ -74,7 +74,7 @@ pub(in crate::cli) struct Rosbridge {
     /// server without rosapi lists none.
     #[arg(long = "topic", value_name = "NAME[:TYPE]")]
     pub(super) topics: Vec<String>,
-    /// Which ROS is behind the server; if omitted, as its types are named, or ROS 2 if it names none.
+    /// Which ROS is behind the server; if omitted, the one whose notation its types have, or ROS 2 if it lists none.
     #[arg(long, value_enum, value_name = "ROS")]
     pub(super) dialect: Option<RosDialect>,
     /// How long to listen, in seconds of wall time: 2 to 3600.
@@ -84,13 +84,13 @@ pub(in crate::cli) struct Rosbridge {
     /// folders of `AMENT_PREFIX_PATH`.
     #[arg(long, value_name = "FOLDER")]
     pub(super) types: Vec<PathBuf>,
-    /// The variable of the environment with the token that the server wants.
+    /// The environment variable with the server's token.
     #[arg(long, value_name = "NAME")]
     pub(super) token_env: Option<String>,
-    /// The file with the token that the server wants.
+    /// The file with the server's token.
     #[arg(long, value_name = "FILE", conflicts_with = "token_env")]
     pub(super) token_file: Option<String>,
-    /// A file with certificates of authorities, in PEM, that are trusted instead of those that the system trusts.
+    /// A file with certificates of authorities, in PEM, to trust instead of those of the system.
     #[arg(long, value_name = "FILE")]
     pub(super) trust: Option<String>,
     /// A space, or what was found as one JSON object.
@@ -113,22 +113,22 @@ pub(in crate::cli) struct Mqtt {
     /// The address of the broker, `mqtt://HOST:PORT` or `mqtts://HOST:PORT`.
     #[arg(value_name = "URL")]
     pub(super) url: String,
-    /// The topics to listen to, as a filter of MQTT; may be repeated.
+    /// The topics to listen to, as an MQTT filter; may be repeated.
     #[arg(long, value_name = "FILTER", default_value = "#")]
     pub(super) topics: Vec<String>,
     /// How long to listen, in seconds of wall time: 2 to 3600.
     #[arg(long, default_value_t = 5.0, value_name = "S", value_parser = seconds)]
     pub(super) seconds: f64,
-    /// As whom to log in.
+    /// The user name for the login.
     #[arg(long, value_name = "NAME")]
     pub(super) user: Option<String>,
-    /// The variable of the environment with the password.
+    /// The environment variable with the password.
     #[arg(long, value_name = "NAME", requires = "user")]
     pub(super) password_env: Option<String>,
     /// The file with the password.
     #[arg(long, value_name = "FILE", requires = "user", conflicts_with = "password_env")]
     pub(super) password_file: Option<String>,
-    /// A file with certificates of authorities, in PEM, that are trusted instead of those that the system trusts.
+    /// A file with certificates of authorities, in PEM, to trust instead of those of the system.
     #[arg(long, value_name = "FILE")]
     pub(super) trust: Option<String>,
     /// A space, or what was found as one JSON object.
@@ -148,29 +148,29 @@ pub(in crate::cli) struct Simlog {
     /// A topic to listen to, by its path in a space, without what `--prefix` and `--heard` add; may be repeated.
     #[arg(long = "topic", value_name = "NAME")]
     pub(super) topics: Vec<String>,
-    /// A file with such a path in each line.
+    /// A file with the path of a topic in each line.
     #[arg(long, value_name = "FILE")]
     pub(super) topics_from: Option<PathBuf>,
-    /// Take so many steps, 1 to 10000, and see what comes: the simulation goes on by that, and may begin anew. Without
-    /// it, no step is taken.
+    /// Take this many steps, 1 to 10000, and listen: the simulation advances, and may restart. If omitted, no step is
+    /// taken.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000))]
     pub(super) steps: Option<u64>,
     /// The length of a step in milliseconds of simulation time, 1 to 3600000.
     #[arg(long, value_name = "MS", default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=3_600_000))]
     pub(super) step: u64,
-    /// How long to listen, in seconds of wall time: 2 to 3600; with `--steps`, at most so long after the last one.
+    /// How long to listen, in seconds of wall time: 2 to 3600; with `--steps`, at most this long after the last step.
     #[arg(long, default_value_t = 5.0, value_name = "S", value_parser = seconds)]
     pub(super) seconds: f64,
     /// The address of the server of topics in version 3; if omitted, the port after that of the address.
     #[arg(long, value_name = "ADDRESS")]
     pub(super) topics_at: Option<String>,
-    /// What stands before each name on the wire; if omitted, nothing in version 2, `SIM://` in version 3.
+    /// The prefix of each name on the wire; if omitted, nothing in version 2, `SIM://` in version 3.
     #[arg(long, value_name = "TEXT")]
     pub(super) prefix: Option<String>,
-    /// What stands behind the name of a topic that is listened to; if omitted, `/in` in version 2, `/out` in version 3.
+    /// The suffix of the name of a topic that is listened to; if omitted, `/in` in version 2, `/out` in version 3.
     #[arg(long, value_name = "TEXT")]
     pub(super) heard: Option<String>,
-    /// What stands behind the name of a topic that is cut; if omitted, `/in`.
+    /// The suffix of the name of a topic that is cut; if omitted, `/in`.
     #[arg(long, value_name = "TEXT")]
     pub(super) cut: Option<String>,
     /// A file with certificates of authorities, in PEM, for an `https://` address.

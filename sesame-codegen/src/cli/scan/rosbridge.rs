@@ -41,7 +41,7 @@ pub(super) fn scan(shell: Shell, language: &Language, arguments: &Rosbridge) -> 
     shell.doing("Asking", format!("the bridge at {url} who is there"));
     if !scanner.ask(dialect)? && wanted.is_empty() {
         bail!(
-            "the bridge at {url} does not have the services of rosapi, which say what is there; start `rosapi_node` \
+            "the bridge at {url} does not have the services of rosapi, which list the system; start `rosapi_node` \
              beside it, or name topics to listen to with `--topic NAME:TYPE`, such as `--topic \
              /aim:std_msgs/msg/Float64`"
         );

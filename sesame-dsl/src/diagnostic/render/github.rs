@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::terminal::for_terminals;
-use crate::diagnostic::{Diagnostic, Severity, visible};
+use crate::diagnostic::{Diagnostic, Severity, visible_lines};
 use crate::source::SourceMap;
 
 /// One workflow command per diagnostic and line.
@@ -16,8 +16,14 @@ pub fn github(diagnostics: &[Diagnostic], sources: &SourceMap) -> String {
             Severity::Error => "error",
             Severity::Warning => "warning",
         };
-        write!(out, "::{severity} file={},line={},col={}", property(&visible(file.name())), start.line, start.column)
-            .expect("a string takes everything");
+        write!(
+            out,
+            "::{severity} file={},line={},col={}",
+            property(&visible_lines(file.name())),
+            start.line,
+            start.column
+        )
+        .expect("a string takes everything");
         // GitHub accepts columns only if the span ends on the line it begins on; the end column is inclusive.
         if start.line == end.line && start.column < end.column {
             write!(out, ",endColumn={}", end.column - 1).expect("a string takes everything");

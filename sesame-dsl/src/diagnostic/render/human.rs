@@ -5,7 +5,7 @@ use std::ops::Range;
 use annotate_snippets::{AnnotationKind, Group, Level, Patch, Renderer, Snippet};
 
 use super::terminal::for_terminals;
-use crate::diagnostic::{Diagnostic, Severity, hidden, visible};
+use crate::diagnostic::{Diagnostic, Severity, visible_lines};
 use crate::source::{SourceFile, SourceMap};
 use crate::span::Span;
 
@@ -18,7 +18,11 @@ pub fn human(diagnostics: &[Diagnostic], sources: &SourceMap, colour: bool) -> S
     let rendered: Vec<String> =
         diagnostics.iter().map(|diagnostic| one(&for_terminals(diagnostic), sources, &renderer)).collect();
     // The renderer replaces most control characters in source lines, but not all. Colours are its own.
-    rendered.join("\n").chars().map(|c| if hidden(c) && !(colour && c == '\x1b') { '\u{fffd}' } else { c }).collect()
+    let text = rendered.join("\n");
+    if !colour {
+        return visible_lines(&text).into_owned();
+    }
+    text.split('\x1b').map(visible_lines).collect::<Vec<_>>().join("\x1b")
 }
 
 /// The lines of a file that contain some spans. The renderer reads everything that it is given, and a large file may
@@ -48,7 +52,7 @@ impl<'a> Excerpt<'a> {
     }
 
     fn snippet<T: Clone>(&self) -> Snippet<'a, T> {
-        Snippet::source(self.text()).path(visible(self.file.name())).line_start(self.first as usize)
+        Snippet::source(self.text()).path(visible_lines(self.file.name())).line_start(self.first as usize)
     }
 }
 

@@ -1,10 +1,10 @@
 //! For programs: one JSON object per line.
 
-use std::fmt::Write as _;
-
 use serde::Serialize;
 
-use crate::diagnostic::{Applicability, Diagnostic, Severity, hidden};
+use sesame_base::visible::visible_json;
+
+use crate::diagnostic::{Applicability, Diagnostic, Severity};
 use crate::place::Place;
 use crate::source::SourceMap;
 
@@ -13,14 +13,14 @@ use crate::source::SourceMap;
 struct Label<'a> {
     /// Where it is.
     at: Place<'a>,
-    /// What is said about it; may be empty.
+    /// A note on it; may be empty.
     text: &'a str,
 }
 
 /// A diagnostic.
 #[derive(Serialize)]
 struct Line<'a> {
-    /// Its code, such as `E0203`; `sesamec explain` says more about it.
+    /// Its code, such as `E0203`, which `sesamec explain` explains.
     code: &'static str,
     /// `error` or `warning`.
     severity: &'static str,
@@ -28,11 +28,11 @@ struct Line<'a> {
     title: &'a str,
     /// The place that it is about.
     primary: Label<'a>,
-    /// Other places that have to do with it.
+    /// Other places that are related to it.
     secondary: Vec<Label<'a>>,
-    /// What else is good to know.
+    /// Further notes.
     notes: &'a [String],
-    /// Ways to mend it.
+    /// Ways to fix it.
     suggestions: Vec<Suggested<'a>>,
 }
 
@@ -53,7 +53,7 @@ struct Suggested<'a> {
 struct Edit<'a> {
     /// What is replaced; empty where something is inserted.
     at: Place<'a>,
-    /// By what.
+    /// The new text.
     replacement: &'a str,
 }
 
@@ -89,14 +89,7 @@ pub fn json(diagnostics: &[Diagnostic], sources: &SourceMap) -> String {
                 })
                 .collect(),
         };
-        // JSON leaves some characters unescaped that a terminal interprets. They occur only in texts.
-        for c in serde_json::to_string(&line).expect("strings and numbers serialise").chars() {
-            if hidden(c) {
-                write!(out, "\\u{:04x}", u32::from(c)).expect("a string takes everything");
-            } else {
-                out.push(c);
-            }
-        }
+        out.push_str(&visible_json(&serde_json::to_string(&line).expect("strings and numbers serialise")));
         out.push('\n');
     }
     out

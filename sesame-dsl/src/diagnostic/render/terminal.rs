@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use crate::diagnostic::{Diagnostic, visible};
+use crate::diagnostic::{Diagnostic, visible_lines};
 
 /// A diagnostic whose texts contain nothing that a terminal interprets.
 pub(super) fn for_terminals(diagnostic: &Diagnostic) -> Diagnostic {
@@ -13,7 +13,7 @@ pub(super) fn for_terminals(diagnostic: &Diagnostic) -> Diagnostic {
     let suggested = suggested
         .flat_map(|suggestion| suggestion.edits.iter_mut().map(|(_, text)| text).chain([&mut suggestion.message]));
     for text in texts.chain(suggested) {
-        if let Cow::Owned(cleaned) = visible(text) {
+        if let Cow::Owned(cleaned) = visible_lines(text) {
             *text = cleaned;
         }
     }

@@ -3,7 +3,7 @@
 use super::lifecycle::{Command, Launch, RelayBudget};
 use super::words::{Count, Head, Name, Quantity, Text, UnitName};
 use crate::span::Span;
-use sesame_plan::{Compression, Dialect, Quality};
+use sesame_plan::{Compression, Dialect, Quality, SimulatorKind};
 
 #[derive(Debug)]
 pub(crate) struct System {
@@ -27,53 +27,37 @@ pub(crate) struct Simulator {
     pub(crate) transport: Option<Transport>,
 }
 
+/// How a simulator is reached.
 #[derive(Debug)]
-pub(crate) enum Transport {
-    InProcess(InProcess),
-    Process(Process),
-    Ros2(Ros2),
-    Bus(Box<Bus>),
+pub(crate) struct Transport {
+    pub(crate) kind: SimulatorKind,
+    /// What stands behind the word of the kind: the path of a type, a program with its arguments, or an address;
+    /// nothing behind that of ROS 2.
+    pub(crate) texts: Vec<Text>,
+    pub(crate) settings: Settings,
 }
 
-#[derive(Debug)]
-pub(crate) struct InProcess {
-    pub(crate) path: Text,
+impl Transport {
+    /// The first text behind the word of the kind.
+    pub(crate) fn first_text(&self) -> &Text {
+        self.texts.first().expect("the grammar puts a text behind this word")
+    }
+}
+
+/// The settings of a simulator. Which there can be is the grammar's: each kind has its own.
+#[derive(Debug, Default)]
+pub(crate) struct Settings {
     pub(crate) crates: Vec<(Span, Text)>,
     pub(crate) steps: Vec<(Span, Quantity)>,
-    pub(crate) has_errors: bool,
-}
-
-#[derive(Debug)]
-pub(crate) struct Process {
-    pub(crate) program: Text,
-    pub(crate) arguments: Vec<Text>,
-    pub(crate) steps: Vec<(Span, Quantity)>,
+    /// Steps that say what takes them.
+    pub(crate) steppings: Vec<(Span, Stepping)>,
     /// Where it says `free running`.
     pub(crate) free_running: Vec<(Span, ())>,
-    pub(crate) has_errors: bool,
-}
-
-/// Nodes of ROS 2.
-#[derive(Debug, Default)]
-pub(crate) struct Ros2 {
     pub(crate) domains: Vec<(Span, Count)>,
     /// Folders that hold packages with definitions of messages.
     pub(crate) types: Vec<(Span, Vec<Text>)>,
     pub(crate) clocks: Vec<(Span, Clock)>,
-    pub(crate) steps: Vec<(Span, Stepping)>,
     /// The service that resets the simulator.
-    pub(crate) resets: Vec<(Span, Text)>,
-    pub(crate) has_errors: bool,
-}
-
-/// A system whose messages go over a bus. Which settings there can be is the grammar's: each kind has its own.
-#[derive(Debug)]
-pub(crate) struct Bus {
-    pub(crate) kind: BusKind,
-    pub(crate) address: Text,
-    pub(crate) domains: Vec<(Span, Count)>,
-    pub(crate) types: Vec<(Span, Vec<Text>)>,
-    pub(crate) clocks: Vec<(Span, Clock)>,
     pub(crate) resets: Vec<(Span, Text)>,
     pub(crate) dialects: Vec<(Span, Dialect)>,
     pub(crate) compressions: Vec<(Span, Compression)>,
@@ -83,7 +67,6 @@ pub(crate) struct Bus {
     pub(crate) secrets: Vec<(Span, Secret)>,
     pub(crate) trusts: Vec<(Span, Text)>,
     pub(crate) proxies: Vec<Proxy>,
-    pub(crate) steps: Vec<(Span, Quantity)>,
     pub(crate) protocols: Vec<(Span, Count)>,
     /// The address of a server of topics.
     pub(crate) topics: Vec<(Span, Text)>,
@@ -96,14 +79,6 @@ pub(crate) struct Bus {
     pub(crate) injecteds: Vec<(Span, Text)>,
     pub(crate) bares: Vec<(Span, Vec<Text>)>,
     pub(crate) has_errors: bool,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum BusKind {
-    Rosbridge,
-    Ros1,
-    Mqtt,
-    Simlog,
 }
 
 /// An address at which clients of a bridge are one node.

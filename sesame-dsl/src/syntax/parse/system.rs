@@ -5,10 +5,11 @@ use sesame_grammar::Rule;
 use super::reader::{Pair, Reader, child, children, expect_child, first_of};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::syntax::ast::{
-    Answer, Bus, BusKind, Clock, Field, Head, InProcess, Message, Name, Node, Process, Proxy, Ros2, Secret, Service,
-    Simulator, StepBy, StepChannel, Stepping, System, Text, Topic, Transport, Type, TypeKind,
+    Answer, Clock, Field, Head, Message, Name, Node, Proxy, Secret, Service, Settings, Simulator, StepBy, StepChannel,
+    Stepping, System, Text, Topic, Transport, Type, TypeKind,
 };
-use sesame_plan::{Compression, Dialect, Quality};
+use crate::syntax::blocks;
+use sesame_plan::{Compression, Dialect, Quality, SimulatorKind};
 
 impl Reader<'_> {
     pub(super) fn system(&mut self, pair: &Pair<'_>) -> System {
@@ -48,65 +49,34 @@ impl Reader<'_> {
             self.unsupported(&unsupported);
             return Simulator { head, transport: None };
         }
-        let kinds =
-            [Rule::in_process, Rule::process, Rule::ros2, Rule::rosbridge, Rule::ros1, Rule::mqtt, Rule::simlog];
-        let kind = first_of(pair, &kinds).expect("a simulator has a kind");
-        let transport = match kind.as_rule() {
-            Rule::process => Transport::Process(self.process(&kind)),
-            Rule::ros2 => Transport::Ros2(self.ros2(&kind)),
-            Rule::rosbridge => Transport::Bus(Box::new(self.bus(&kind, BusKind::Rosbridge, Rule::rosbridge_settings))),
-            Rule::ros1 => Transport::Bus(Box::new(self.bus(&kind, BusKind::Ros1, Rule::ros1_settings))),
-            Rule::simlog => Transport::Bus(Box::new(self.bus(&kind, BusKind::Simlog, Rule::simlog_settings))),
-            Rule::mqtt => Transport::Bus(Box::new(self.bus(&kind, BusKind::Mqtt, Rule::mqtt_settings))),
-            _ => Transport::InProcess(self.in_process(&kind)),
-        };
-        Simulator { head, transport: Some(transport) }
+        Simulator { head, transport: Some(self.transport(pair)) }
     }
 
-    fn in_process(&mut self, pair: &Pair<'_>) -> InProcess {
-        let path = self.text_of(&expect_child(pair, Rule::text));
-        let mut transport = InProcess { path, crates: vec![], steps: vec![], has_errors: false };
-        let settings = expect_child(pair, Rule::simulator_settings);
-        transport.has_errors = self.members(&settings, |reader, setting| {
-            let span = reader.keyword_span(&setting);
-            match setting.as_rule() {
-                Rule::setting_crate => {
-                    transport.crates.push((span, reader.text_of(&expect_child(&setting, Rule::text))));
-                }
-                _ => transport.steps.push((span, reader.signed(&expect_child(&setting, Rule::signed)))),
-            }
+    /// How a simulator is reached: after its name stands the word of its kind.
+    fn transport(&mut self, simulator: &Pair<'_>) -> Transport {
+        let of_kind = simulator.clone().into_inner().find_map(|part| {
+            let word = part.clone().into_inner().next()?;
+            SimulatorKind::from_keyword(word.as_str()).map(|kind| (kind, part))
         });
-        transport
+        let (kind, written) = of_kind.expect("a simulator has a kind");
+        let texts = children(&written, Rule::text).map(|text| self.text_of(&text)).collect();
+        let block = written.into_inner().find(|part| blocks::find(part.as_rule()).is_some());
+        let settings = block.map(|block| self.settings(&block)).unwrap_or_default();
+        Transport { kind, texts, settings }
     }
 
-    fn process(&mut self, pair: &Pair<'_>) -> Process {
-        let mut texts = children(pair, Rule::text).map(|text| self.text_of(&text)).collect::<Vec<_>>().into_iter();
-        let program = texts.next().expect("a process has a program");
-        let mut transport =
-            Process { program, arguments: texts.collect(), steps: vec![], free_running: vec![], has_errors: false };
-        let settings = expect_child(pair, Rule::process_settings);
-        transport.has_errors = self.members(&settings, |reader, setting| {
-            let span = reader.keyword_span(&setting);
-            match setting.as_rule() {
-                Rule::free_running => transport.free_running.push((reader.span(&setting), ())),
-                _ => transport.steps.push((span, reader.signed(&expect_child(&setting, Rule::signed)))),
-            }
-        });
-        transport
-    }
-
-    fn ros2(&mut self, pair: &Pair<'_>) -> Ros2 {
-        let mut ros2 = Ros2::default();
-        let Some(settings) = child(pair, Rule::ros2_settings) else { return ros2 };
-        ros2.has_errors = self.members(&settings, |reader, setting| {
+    fn settings(&mut self, block: &Pair<'_>) -> Settings {
+        let mut settings = Settings::default();
+        let has_errors = self.members(block, |reader, setting| {
             let span = reader.keyword_span(&setting);
             let text = |reader: &mut Self| reader.text_of(&expect_child(&setting, Rule::text));
+            let quantity = |reader: &mut Self| reader.signed(&expect_child(&setting, Rule::signed));
+            let has = |rule| child(&setting, rule).is_some();
             match setting.as_rule() {
-                Rule::setting_domain => ros2.domains.push((span, reader.count(&expect_child(&setting, Rule::number)))),
-                Rule::setting_types => ros2.types.push((span, reader.folders(&setting))),
-                Rule::setting_clock => ros2.clocks.push((span, reader.clock(&setting))),
+                Rule::setting_crate => settings.crates.push((span, text(reader))),
+                Rule::setting_step => settings.steps.push((span, quantity(reader))),
                 Rule::step_by => {
-                    let time = reader.signed(&expect_child(&setting, Rule::signed));
+                    let time = quantity(reader);
                     let by = first_of(&setting, &[Rule::k_service, Rule::k_topic]).map(|channel| {
                         let topic = channel.as_rule() == Rule::k_topic;
                         StepBy {
@@ -115,58 +85,21 @@ impl Reader<'_> {
                             span: reader.span(&channel),
                         }
                     });
-                    ros2.steps.push((span, Stepping { time, by }));
+                    settings.steppings.push((span, Stepping { time, by }));
                 }
-                _ => ros2.resets.push((span, text(reader))),
-            }
-        });
-        ros2
-    }
-
-    fn bus(&mut self, pair: &Pair<'_>, kind: BusKind, settings: Rule) -> Bus {
-        let address = self.text_of(&expect_child(pair, Rule::text));
-        let mut bus = Bus {
-            kind,
-            address,
-            domains: vec![],
-            types: vec![],
-            clocks: vec![],
-            resets: vec![],
-            dialects: vec![],
-            compressions: vec![],
-            qualities: vec![],
-            users: vec![],
-            secrets: vec![],
-            trusts: vec![],
-            proxies: vec![],
-            steps: vec![],
-            protocols: vec![],
-            topics: vec![],
-            markers: vec![],
-            settles: vec![],
-            prefixes: vec![],
-            cuts: vec![],
-            heards: vec![],
-            injecteds: vec![],
-            bares: vec![],
-            has_errors: false,
-        };
-        let Some(settings) = child(pair, settings) else { return bus };
-        bus.has_errors = self.members(&settings, |reader, setting| {
-            let span = reader.keyword_span(&setting);
-            let text = |reader: &mut Self| reader.text_of(&expect_child(&setting, Rule::text));
-            let quantity = |reader: &mut Self| reader.signed(&expect_child(&setting, Rule::signed));
-            let has = |rule| child(&setting, rule).is_some();
-            match setting.as_rule() {
-                Rule::setting_domain => bus.domains.push((span, reader.count(&expect_child(&setting, Rule::number)))),
-                Rule::setting_types => bus.types.push((span, reader.folders(&setting))),
-                Rule::setting_clock => bus.clocks.push((span, reader.clock(&setting))),
-                Rule::setting_reset => bus.resets.push((span, text(reader))),
+                Rule::free_running => settings.free_running.push((reader.span(&setting), ())),
+                Rule::setting_domain => {
+                    settings.domains.push((span, reader.count(&expect_child(&setting, Rule::number))));
+                }
+                Rule::setting_types => settings.types.push((span, reader.folders(&setting))),
+                Rule::setting_clock => settings.clocks.push((span, reader.clock(&setting))),
+                Rule::setting_reset => settings.resets.push((span, text(reader))),
                 Rule::setting_dialect => {
-                    bus.dialects.push((span, if has(Rule::k_ros1) { Dialect::Ros1 } else { Dialect::Ros2 }));
+                    settings.dialects.push((span, if has(Rule::k_ros1) { Dialect::Ros1 } else { Dialect::Ros2 }));
                 }
                 Rule::setting_compression => {
-                    bus.compressions.push((span, if has(Rule::k_cbor) { Compression::Cbor } else { Compression::Png }));
+                    let compression = if has(Rule::k_cbor) { Compression::Cbor } else { Compression::Png };
+                    settings.compressions.push((span, compression));
                 }
                 Rule::setting_quality => {
                     let quality = if has(Rule::k_at_most_once) {
@@ -176,27 +109,26 @@ impl Reader<'_> {
                     } else {
                         Quality::ExactlyOnce
                     };
-                    bus.qualities.push((span, quality));
+                    settings.qualities.push((span, quality));
                 }
-                Rule::setting_user => bus.users.push((span, text(reader))),
-                Rule::setting_trust => bus.trusts.push((span, text(reader))),
-                Rule::proxy => bus.proxies.push(reader.proxy(&setting)),
-                Rule::setting_step => bus.steps.push((span, quantity(reader))),
+                Rule::setting_user => settings.users.push((span, text(reader))),
+                Rule::setting_trust => settings.trusts.push((span, text(reader))),
+                Rule::proxy => settings.proxies.push(reader.proxy(&setting)),
                 Rule::setting_protocol => {
-                    bus.protocols.push((span, reader.count(&expect_child(&setting, Rule::number))));
+                    settings.protocols.push((span, reader.count(&expect_child(&setting, Rule::number))));
                 }
-                Rule::setting_topics => bus.topics.push((span, text(reader))),
-                Rule::setting_marker => bus.markers.push((span, text(reader))),
-                Rule::setting_settle => bus.settles.push((span, quantity(reader))),
-                Rule::setting_prefix => bus.prefixes.push((span, text(reader))),
-                Rule::setting_cut => bus.cuts.push((span, text(reader))),
-                Rule::setting_heard => bus.heards.push((span, text(reader))),
-                Rule::setting_injected => bus.injecteds.push((span, text(reader))),
-                Rule::setting_bare => bus.bares.push((span, reader.folders(&setting))),
-                _ => bus.secrets.push((span, reader.secret(&expect_child(&setting, Rule::secret)))),
+                Rule::setting_topics => settings.topics.push((span, text(reader))),
+                Rule::setting_marker => settings.markers.push((span, text(reader))),
+                Rule::setting_settle => settings.settles.push((span, quantity(reader))),
+                Rule::setting_prefix => settings.prefixes.push((span, text(reader))),
+                Rule::setting_cut => settings.cuts.push((span, text(reader))),
+                Rule::setting_heard => settings.heards.push((span, text(reader))),
+                Rule::setting_injected => settings.injecteds.push((span, text(reader))),
+                Rule::setting_bare => settings.bares.push((span, reader.folders(&setting))),
+                _ => settings.secrets.push((span, reader.secret(&expect_child(&setting, Rule::secret)))),
             }
         });
-        bus
+        Settings { has_errors, ..settings }
     }
 
     fn proxy(&mut self, pair: &Pair<'_>) -> Proxy {

@@ -13,9 +13,9 @@ use proptest::prelude::*;
 use sesame_base::observation::{MetricValue, Observation, Outcome};
 use sesame_base::silence::{distrust, silences};
 use sesame_base::verdict::{Verdict, verdict};
-use sesame_plan::testing::{metric, minimal, operation_with, requirement, test_of, topic, use_of};
+use sesame_plan::testing::{metric, minimal, operation_with, requirement, ros2, test_of, topic, use_of};
 use sesame_plan::{
-    Bound, CampaignPlan, Clock, FieldRef, MetricSource, OperationKind, Ros2, Span, TopicId, Type, Wiring,
+    Bound, CampaignPlan, Clock, FieldRef, MetricSource, OperationKind, Ros, Simulator, Span, TopicId, Type, Wiring,
 };
 
 use super::{Bus, Event, Settings, on_bus};
@@ -187,14 +187,7 @@ fn plan() -> CampaignPlan {
     plan.campaign.end_after = 5.0;
     let wiring = vec![Wiring::default(), Wiring { cut: true, ..Wiring::default() }];
     let clock = Clock::Topic { path: "clock".to_owned() };
-    plan.simulator.transport = sesame_plan::Transport::Ros2(Ros2 {
-        domain: 0,
-        clock,
-        step: None,
-        reset: None,
-        interfaces: Vec::new(),
-        wiring,
-    });
+    plan.simulator = Simulator { ros: Some(Ros { clock, ..Ros::default() }), ..ros2(0, wiring) };
     plan
 }
 

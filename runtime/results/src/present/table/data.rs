@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use serde_json::{Map, Value};
+use sesame_base::visible::visible_json;
 
 use super::{Datum, Table, shares_in_words};
 
@@ -47,7 +48,7 @@ impl Table {
             let _ = write!(text, "{}\n  {}", if at > 0 { "," } else { "" }, Value::Object(object));
         }
         text.push_str(if self.is_empty() { "]\n" } else { "\n]\n" });
-        text
+        visible_json(&text).into_owned()
     }
 }
 

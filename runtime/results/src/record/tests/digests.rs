@@ -7,9 +7,7 @@ use sesame_base::observation::{Outcome, WallTime};
 use sesame_plan::{Activation, CampaignPlan, Choice, KnownTestId, Type, testing};
 
 use super::{conditional_record, digest_of, folder};
-use crate::record::{
-    DATABASE, Event, EventKind, Origin, Recorder, Repository, ResultSet, SCHEMA, Status, TestRecord, sample,
-};
+use crate::record::{DATABASE, Event, EventKind, Origin, Recorder, Repository, ResultSet, Status, TestRecord, sample};
 
 #[test]
 fn the_digest_does_not_depend_on_wall_times_sessions_and_the_order_of_writing() {
@@ -250,8 +248,7 @@ fn the_digest_is_over_all_of_a_plan_but_what_is_only_for_people() {
     plan.validate().unwrap();
     let folder = folder();
     let repository = sample::campaign(folder.path(), &plan, 20);
-    let digest =
-        |plan: &CampaignPlan| super::super::digest::of_connection(&repository.connection, SCHEMA, plan).unwrap();
+    let digest = |plan: &CampaignPlan| super::super::digest::of_connection(&repository.connection, plan).unwrap();
     let whole = digest(&plan);
     assert_eq!(whole, repository.digest().unwrap());
     let json = serde_json::to_value(&plan).unwrap();

@@ -2,6 +2,9 @@
 
 use rusqlite::Connection;
 
+use sesame_base::observation::Lost;
+use sesame_plan::RequirementId;
+
 use super::folder;
 use crate::record::{DATABASE, Origin, Recorder, Repository, sample};
 
@@ -47,4 +50,39 @@ fn another_table_in_its_place_is_refused() {
     drop(open);
     let said = Repository::open(folder.path()).err().unwrap().to_string();
     assert!(said.contains("the table `robustness_pieces` is not the one that a run makes"), "{said}");
+}
+
+#[test]
+fn when_a_requirement_was_lost_comes_back_with_its_test() {
+    let (with, without) = (folder(), folder());
+    let plan = sample::plan();
+    let lost = Lost { requirement: RequirementId(1), at: 60.0 };
+    let metric = plan.requirement(lost.requirement).metric.index();
+    let mut recorder = Recorder::create(with.path(), &plan, 1, 1).unwrap();
+    for number in [3, 4] {
+        let mut record = sample::record(&plan, number, Origin::Search, plan.tests[0].test.clone());
+        record.observation.metrics[4].robustness = SIGNAL.to_vec();
+        record.observation.metrics[metric].lost.extend((number == 3).then_some(lost));
+        recorder.commit(&record).unwrap();
+    }
+    let repository = recorder.finish("done").unwrap();
+    assert_eq!(repository.test(3).unwrap().observation.metrics[metric].lost, [lost]);
+    assert!(repository.test(4).unwrap().observation.metrics.iter().all(|metric| metric.lost.is_empty()));
+    // The digest is of what was measured. Results without a lost requirement have no table of them.
+    let two = |folder: &std::path::Path| {
+        let mut recorder = Recorder::create(folder, &plan, 1, 1).unwrap();
+        for number in [3, 4] {
+            recorder.commit(&sample::record(&plan, number, Origin::Search, plan.tests[0].test.clone())).unwrap();
+        }
+        recorder.finish("done").unwrap()
+    };
+    assert_eq!(repository.digest().unwrap(), two(without.path()).digest().unwrap());
+    drop(repository);
+    let open = Connection::open(with.path().join(DATABASE)).unwrap();
+    open.execute_batch("PRAGMA foreign_keys = OFF; UPDATE lost_requirements SET requirement = 99").unwrap();
+    let said = Repository::open(with.path()).unwrap().test(3).unwrap_err().to_string();
+    assert!(said.contains("T3 has a lost requirement that is not there"), "{said}");
+    open.execute_batch("DROP TABLE lost_requirements; CREATE VIEW lost_requirements AS SELECT 1 AS test").unwrap();
+    let said = Repository::open(with.path()).err().unwrap().to_string();
+    assert!(said.contains("`lost_requirements` is not a table, but a view"), "{said}");
 }

@@ -15,11 +15,11 @@ use crate::record::{Origin, RecordError, Repository, ScannedTest};
 pub struct CoverageSummary {
     /// The grid's axes, in its order.
     pub axes: Vec<GridAxis>,
-    /// Tests that a cell must have seen to be covered.
+    /// Tests that must have hit a cell for it to be covered.
     pub hits: u32,
     /// Cells covered.
     pub covered: usize,
-    /// Cells there are.
+    /// All cells.
     pub cells: usize,
     /// The share of all cells that is covered, in `0..=1`.
     pub coverage: f64,
@@ -29,7 +29,7 @@ pub struct CoverageSummary {
     pub feasible_coverage: f64,
     /// Whether exactly these cells can be reached; otherwise some of them perhaps cannot.
     pub feasible_exact: bool,
-    /// The share of all cells at which the search was to stop.
+    /// The share of all cells at which the search stops.
     pub stop_at: Option<f64>,
     /// Coverage over evaluations: where a cell became covered, and at the end.
     pub curve: Vec<CurvePoint>,

@@ -5,13 +5,13 @@ use serde::Serialize;
 /// What the monitors of a plan decide on two recordings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MonitorsCompared {
-    /// The first recording, with which the second is compared: that of a simulation, say.
+    /// The first recording, for example of a simulation.
     pub first: ComparedRecording,
-    /// The second: that of a lab, say.
+    /// The second recording, for example of a lab, which is compared with the first.
     pub second: ComparedRecording,
-    /// By how much the times of a decision may differ, in seconds; `None` if only the decisions count.
+    /// How far the times of a decision may differ, in seconds; `None` if only the decisions count.
     pub within: Option<f64>,
-    /// Whether all monitors decide the same in the same order, and as close as that.
+    /// Whether all monitors decide the same in the same order, at times that differ by no more.
     pub same: bool,
     /// Per monitor, in the order of their demands.
     pub monitors: Vec<ComparedMonitor>,
@@ -26,7 +26,7 @@ pub struct MonitorsCompared {
 pub struct ComparedRecording {
     /// The file.
     pub recording: std::path::PathBuf,
-    /// The run it is of, as in `T17 of coverage_experiment (completed)`; `None` where no runner recorded it.
+    /// The run that it records, as in `T17 of coverage_experiment (completed)`; `None` if no runner recorded it.
     pub run: Option<String>,
     /// Messages that evidence hears.
     pub messages: usize,
@@ -45,9 +45,9 @@ pub struct ComparedMonitor {
     pub second: usize,
     /// The first decision that differs; `None` if all decisions are the same, whatever their times.
     pub difference: Option<DecisionDifference>,
-    /// Of the decisions before that, the one whose times are furthest apart; `None` if all are at the same time.
+    /// The decision before that whose times are furthest apart; `None` if all are at the same time.
     pub furthest: Option<ShiftedDecision>,
-    /// The times in which it is in different states, in order; the first 1,000.
+    /// The periods in which it is in different states, in order; the first 1,000.
     pub disagreements: Vec<MonitorDisagreement>,
     /// How many more there are.
     pub omitted: usize,
@@ -62,7 +62,7 @@ pub struct DecisionDifference {
     pub first: Option<TimedState>,
     /// The decision on the second.
     pub second: Option<TimedState>,
-    /// The evidence that made the difference; none where only the order within one instant did.
+    /// The evidence that made the difference; none if only the order within one instant did.
     pub because: Vec<EvidenceDeviation>,
 }
 
@@ -114,7 +114,7 @@ pub struct EvidenceDeviation {
     pub first: EvidenceValue,
     /// Its value on the second.
     pub second: EvidenceValue,
-    /// The change by which the recording that is behind comes to the value of the other, if it does.
+    /// The change by which the later recording reaches the value of the other, if it does.
     pub follows: Option<EvidenceCause>,
     /// By how much the second is later, in seconds; negative if it is earlier; `None` if nothing follows.
     pub late: Option<f64>,
@@ -156,7 +156,7 @@ pub struct DelayTolerance {
 pub struct Tolerated {
     /// Every delay up to this one, in seconds, keeps all decisions; `None` if every delay does.
     pub delay: Option<f64>,
-    /// The decision that a delay changes that is a nanosecond longer; `None` if none does.
+    /// The decision that a delay of a nanosecond more changes; `None` if it changes none.
     pub breaks: Option<BrokenDecision>,
     /// Whether the search was given up: then longer delays may keep all decisions, too.
     pub given_up: bool,

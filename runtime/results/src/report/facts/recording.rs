@@ -9,7 +9,7 @@ use crate::record::MetricValue;
 pub struct RecordingReplay {
     /// The recording.
     pub recording: std::path::PathBuf,
-    /// The run it is of, as in `T17 of coverage_experiment (completed)`; `None` where no runner recorded it.
+    /// The run that it records, as in `T17 of coverage_experiment (completed)`; `None` if no runner recorded it.
     pub run: Option<String>,
     /// Messages fed.
     pub messages: u64,
@@ -28,9 +28,9 @@ pub struct FedMetric {
     pub metric: String,
     /// Its unit; `None` for a plain number.
     pub unit: Option<String>,
-    /// What it is now.
+    /// Its value now.
     pub now: MetricValue,
-    /// What it was; `None` where the recording does not say, or for no value.
+    /// Its recorded value; `None` if the recording does not contain it, or for no value.
     pub recorded: Option<f64>,
     /// How the two compare, bit for bit.
     pub sameness: Sameness,

@@ -38,7 +38,7 @@ pub struct ListedTest {
     /// What a run is called in a campaign that repeats a test or observes, instead of searching; `None` for others.
     #[serde(skip)]
     pub(crate) repeats: Option<&'static str>,
-    /// `completed`, `no_effect`, `unknown`, `crash` or `timeout`; of the environment `launch_failed`,
+    /// `completed`, `no_effect`, `unknown`, `crash` or `timeout`; if the environment broke it off, `launch_failed`,
     /// `disconnect` or `wrong_clock`.
     pub outcome: String,
     /// The equal test whose result stands for this one.
@@ -92,7 +92,7 @@ pub struct TestReport {
     pub simulator_seed: u64,
     /// The equal test whose result stands for this one.
     pub duplicate_of: Option<TestNumber>,
-    /// `completed`, `no_effect`, `unknown`, `crash` or `timeout`; of the environment `launch_failed`,
+    /// `completed`, `no_effect`, `unknown`, `crash` or `timeout`; if the environment broke it off, `launch_failed`,
     /// `disconnect` or `wrong_clock`.
     pub outcome: String,
     /// What is known of a crash or timeout.
@@ -112,7 +112,7 @@ pub struct TestReport {
     pub metrics: Vec<MetricReport>,
     /// All requirements of the space.
     pub requirements: Vec<VerdictReport>,
-    /// All monitors of the space, if it has any and what they did was recorded.
+    /// All monitors of the space, if it has any and their decisions were recorded.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub monitors: Vec<MonitorReport>,
     /// Findings of its fresh runs, if it was run again.
@@ -122,7 +122,7 @@ pub struct TestReport {
     pub warnings: Vec<String>,
     /// Notes of the session in which it ran, such as the last stderr lines of its worker.
     pub notes: Vec<String>,
-    /// Its trace, or that of the test whose result stands for it, where there is one.
+    /// Its trace, or that of the test whose result stands for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trace: Option<PathBuf>,
 }
@@ -168,7 +168,7 @@ pub struct ChoiceReport {
     pub unit: Option<String>,
     /// The value, sub-range, point or text.
     pub choice: Choice,
-    /// Both in words, as in `offset 0.27…0.29 rad`.
+    /// Parameter and choice in words, as in `offset 0.27…0.29 rad`.
     pub text: String,
 }
 
@@ -181,12 +181,12 @@ pub struct MetricReport {
     pub unit: Option<String>,
     /// Its value.
     pub value: Option<f64>,
-    /// Whether the value is one that was set, not the default.
+    /// Whether the value was set; otherwise it is the default.
     pub set: bool,
     /// How often it changed.
     pub changes: usize,
-    /// Of a robustness its signal over time, as change points `[seconds, value]`; the last one ends it and repeats the
-    /// value before. The least value is the robustness (of an `eventually`, the greatest).
+    /// For a robustness: its signal over time, as change points `[seconds, value]`; the last one ends it and repeats
+    /// the value before. The least value is the robustness (for an `eventually`, the greatest).
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub robustness: Vec<(f64, f64)>,
 }
@@ -211,10 +211,10 @@ pub struct VerdictReport {
     pub fresh: Option<FreshVerdicts>,
     /// The metric's value in the first run, in words.
     pub value: String,
-    /// When the metric's series was outside the bound in the first run, in seconds; of a robustness, when its signal
+    /// When the metric's series was outside the bound in the first run, in seconds; for a robustness, when its signal
     /// was.
     pub outside: Vec<Span>,
-    /// Of a robustness: when its signal had the value of the whole in the first run, in seconds.
+    /// For a robustness: when its signal had the value of the whole in the first run, in seconds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub decided_at: Option<f64>,
     /// Whether it is not known when the bound was violated, since the results were recorded without robustness signals.

@@ -23,7 +23,7 @@ pub struct Shrinking {
     pub test: String,
     /// How it fails: `violates R1 and R3`, `crashes`, `times out`.
     pub fails: String,
-    /// The simulator's runs that a test had to fail in.
+    /// The number of runs in which a test had to fail.
     pub runs: u32,
     /// Whether no single step shrinks the smallest test further: all of them were tried.
     pub minimal: bool,
@@ -55,14 +55,14 @@ pub struct TestSize {
     pub intensity: Option<f64>,
     /// How strong its operations are in total, each from 0 to 1 ([`sesame_search::shrink::strength`]).
     pub strength: f64,
-    /// The values of its run, of each metric that its failing is about.
+    /// The values in its run of the metrics that its failure concerns.
     pub values: Vec<NamedValue>,
 }
 
 /// A test that was tried.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ShrinkStep {
-    /// Its name in these results; of several runs, that of the first.
+    /// Its name in these results; with several runs, the name of the first.
     pub test: TestNumber,
     /// The test that it was made of.
     pub base: Option<TestNumber>,
@@ -74,7 +74,7 @@ pub struct ShrinkStep {
     pub failed: u32,
     /// Whether it was accepted: the next tests were made of it.
     pub kept: bool,
-    /// The values of its first run, of each metric that its failing is about.
+    /// The values in its first run of the metrics that its failure concerns.
     pub values: Vec<NamedValue>,
 }
 

@@ -39,15 +39,15 @@ pub struct Summary {
     pub space: String,
     /// The campaign's name.
     pub campaign: String,
-    /// The one seed that decided everything.
+    /// The one seed that determined everything.
     pub seed: u64,
     /// Why the run ended; `None` while it is unfinished.
     pub stop: Option<String>,
-    /// How many tests there are of what kind.
+    /// How many tests there are of each kind.
     pub counts: Counts,
     /// What the search optimised, in the campaign's order.
     pub objectives: Vec<Objective>,
-    /// The tests no other is better than: most dangerous first.
+    /// The tests that no other test dominates, most dangerous first.
     pub front: Vec<FrontTest>,
     /// How the campaign confirms the tests of its front, if it does.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -55,11 +55,11 @@ pub struct Summary {
     /// Tests that were run again, by number.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub confirmed: Vec<ConfirmedTest>,
-    /// Tests that violate a requirement and were run once only.
+    /// Tests that violate a requirement and were run only once.
     pub once: usize,
     /// All requirements of the space, in its order.
     pub requirements: Vec<RequirementSummary>,
-    /// What the monitors of the space were worth, if it has any and what they did was recorded.
+    /// How well the monitors of the space did, if it has any and their decisions were recorded.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub monitors: Option<MonitorsSummary>,
     /// How the monitors did in the same tests before, if these results are compared with others.
@@ -67,8 +67,8 @@ pub struct Summary {
     pub mend: Option<Mend>,
     /// Expectations of regression tests, in the order of the tests.
     pub expectations: Vec<ExpectationSummary>,
-    /// Crashes and timeouts, and runs that the environment broke off, by test: of its first run, and those that only
-    /// fresh runs showed.
+    /// Crashes and timeouts, and runs that the environment broke off, by test: those of its first run, and those that
+    /// only fresh runs showed.
     pub failures: Vec<Failure>,
     /// Tests that crashed in each of their first three runs and are not run again, by test.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -80,7 +80,7 @@ pub struct Summary {
     /// space.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub without_effect: Vec<WithoutEffect>,
-    /// In what the reference run after the campaign differs from the one before it, in a sentence.
+    /// How the reference run after the campaign differs from the one before it, in a sentence.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub closing_run: Option<String>,
     /// How often requirements were violated, if the campaign repeats one test.
@@ -105,18 +105,18 @@ pub struct Summary {
 pub struct Counts {
     /// Tests that ended: those of the search, and regression tests.
     pub evaluations: usize,
-    /// Of these, exact duplicates, which were not simulated again.
+    /// How many of these are exact duplicates, which were not simulated again.
     pub duplicates: usize,
-    /// Of these, tests in which no operation had any effect.
+    /// In how many of these no operation had any effect.
     pub no_effect: usize,
-    /// Of these, completed ones in which an objective or requirement has neither value nor default.
+    /// How many of these completed, but lack a value and a default of an objective or requirement.
     pub unmeasured: usize,
-    /// Of these, crashes.
+    /// How many of these crashed.
     pub crashes: usize,
-    /// Of these, timeouts.
+    /// How many of these timed out.
     pub timeouts: usize,
-    /// Of these, tests that the environment broke off each time they were run: failed launches, disconnects, wrong
-    /// clocks. They say nothing about the system.
+    /// How many of these the environment broke off each time they were run: failed launches, disconnects, wrong clocks.
+    /// They show nothing about the system.
     #[serde(skip_serializing_if = "number::is_zero")]
     pub environment: usize,
 }
@@ -141,7 +141,7 @@ pub struct FrontTest {
     pub test: TestNumber,
     /// Its number.
     pub number: u32,
-    /// A value per objective: that by which it is on the front, of its repetitions where the campaign confirms.
+    /// The value of each objective by which it is on the front: that of its repetitions if the campaign confirms.
     pub values: Vec<Option<f64>>,
     /// Its operations, as in `jitter_link0 ×2, lose_link0 (no effect)`.
     pub operations: String,
@@ -166,15 +166,15 @@ pub struct RequirementSummary {
     pub bound: String,
     /// Tests that satisfy it.
     pub satisfied: usize,
-    /// Tests that violate it: those whose violation is confirmed or flaky, and those that were run once only.
+    /// Tests that violate it: those whose violation is confirmed or flaky, and those that were run only once.
     pub violated: usize,
-    /// Of these, tests of which every conclusive fresh run violates it.
+    /// How many of these violate it in every conclusive fresh run.
     pub confirmed: usize,
-    /// Of these, tests of which some fresh runs violate it and some do not.
+    /// How many of these violate it in some fresh runs and not in others.
     pub flaky: usize,
-    /// Of these, tests without a conclusive fresh run; most were run once only.
+    /// How many of these have no conclusive fresh run; most were run only once.
     pub once: usize,
-    /// Of these, tests whose first run did not violate it.
+    /// How many of these did not violate it in their first run.
     pub fresh_only: usize,
     /// Tests whose first run violates it, and no fresh one does. They do not count as violated.
     pub not_confirmed: usize,
@@ -182,7 +182,7 @@ pub struct RequirementSummary {
     pub inconclusive: usize,
     /// The verdict of the reference run; `None` without one.
     pub reference: Option<Verdict>,
-    /// The test farthest outside the bound; of equal ones the one with the smallest number.
+    /// The test farthest outside the bound; among equals, the one with the smallest number.
     pub worst: Option<Worst>,
 }
 
@@ -219,7 +219,7 @@ pub struct ExpectationSummary {
 pub struct Failure {
     /// The test.
     pub test: TestNumber,
-    /// `crash` or `timeout`; of the environment `launch_failed`, `disconnect` or `wrong_clock`.
+    /// `crash` or `timeout`; if the environment broke it off, `launch_failed`, `disconnect` or `wrong_clock`.
     pub outcome: String,
     /// Simulation time at which it broke off, in seconds.
     pub at: f64,
@@ -267,7 +267,7 @@ pub struct NotFinite {
 pub struct WithoutEffect {
     /// The operation's name in the space.
     pub operation: String,
-    /// In how many tests that ran to their end it was used.
+    /// How many tests that ran to their end used it.
     pub uses: usize,
 }
 
@@ -282,7 +282,7 @@ pub struct Spread {
     pub count: usize,
     /// The smallest value.
     pub min: f64,
-    /// The median; the mean of the two in the middle of an even number.
+    /// The median; with an even number of values, the mean of the two in the middle.
     pub median: f64,
     /// The largest value.
     pub max: f64,

@@ -35,7 +35,7 @@ pub struct Twin {
 /// A mitigation that was sent.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SentMitigation {
-    /// By which monitor.
+    /// The monitor that sent it.
     pub monitor: String,
     /// When, in seconds.
     pub at: f64,
@@ -46,9 +46,9 @@ pub struct SentMitigation {
 pub struct TwinRequirement {
     /// The requirement.
     pub requirement: String,
-    /// When it was violated for the first time in the test, in seconds.
+    /// The first moment of the test from which nothing could satisfy it, in seconds.
     pub hazard: Option<f64>,
-    /// When it was violated for the first time in the twin, in seconds.
+    /// The first moment of the twin from which nothing could satisfy it, in seconds.
     pub hazard_of_twin: Option<f64>,
     /// When mitigation was sent for the first time, in seconds: until then, the two runs are the same.
     pub mitigation: Option<f64>,

@@ -17,7 +17,7 @@ pub struct KnownTesting {
     pub lab: Option<String>,
     /// The tests, in declaration order.
     pub tests: Vec<KnownSides>,
-    /// All that is not as required, a sentence each.
+    /// Each deviation from what is required, as a sentence.
     pub objections: Vec<String>,
 }
 
@@ -47,11 +47,11 @@ pub struct ExpectationSides {
     pub bound: String,
     /// The value in simulation.
     pub simulation_value: Option<f64>,
-    /// What the run in simulation says; `None` where there was none.
+    /// The verdict of the run in simulation; `None` if there was none.
     pub simulation: Option<Verdict>,
     /// The value in the lab.
     pub lab_value: Option<f64>,
-    /// What the run in the lab says.
+    /// The verdict of the run in the lab.
     pub lab: Option<Verdict>,
 }
 

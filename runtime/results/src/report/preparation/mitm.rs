@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use sesame_base::latency::Latencies;
-use sesame_plan::{CampaignPlan, Channel, MetricId, Test, TopicId, Transport};
+use sesame_plan::{CampaignPlan, Channel, MetricId, Test, TopicId};
 
 use crate::present::number::{number, plural};
 use crate::record::{RecordError, Repository, TestRecord, differences};
@@ -20,28 +20,28 @@ const FEWEST: u64 = 100;
 pub struct MitmTesting {
     /// The lab; `None` for the simulation.
     pub lab: Option<String>,
-    /// Whether the simulator is stepped: time stands still while the relay works, so that nothing it adds is measured.
+    /// Whether the simulator is stepped: time stands still while the relay works, so nothing that it adds is measured.
     pub lock_stepped: bool,
-    /// Whether topics that are not relayed go past the relay, as those of ROS 2 nodes do. Other simulators have no way
-    /// for their messages but the runner.
+    /// Whether topics that are not relayed bypass the relay, as with ROS 2 nodes. With other simulators, all messages
+    /// pass through the runner.
     pub bypass: bool,
     /// The declared `relay budget`, if there is one.
     pub budget: Option<Budget>,
-    /// The stages, in which one topic more each is relayed; the first relays none.
+    /// The stages: each relays one more topic than the one before, and the first relays none.
     pub stages: Vec<Stage>,
     /// Whether the budget was exceeded in any stage.
     pub over_budget: bool,
-    /// All that is not as required, a sentence each.
+    /// Each deviation from what is required, as a sentence.
     pub objections: Vec<String>,
 }
 
 /// What the relay may add, in seconds of wall time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Budget {
-    /// To all but one message in a hundred, at most; `None` if nothing is declared.
+    /// The most that may be added to 99 of 100 messages, in seconds; `None` if nothing is declared.
     pub latency: Option<f64>,
-    /// The difference between what it adds to every second message and to all but one in a hundred, at most; `None` if
-    /// nothing is declared.
+    /// The largest permitted difference between the 99th percentile and the median of what is added, in seconds; `None`
+    /// if nothing is declared.
     pub jitter: Option<f64>,
 }
 
@@ -58,30 +58,30 @@ pub struct Stage {
     pub added: Vec<AddedToTopic>,
     /// All metrics, in declaration order.
     pub metrics: Vec<Drift>,
-    /// Runs that violate a requirement, by requirement; only those that any run violates.
+    /// The number of runs that violate a requirement, for each requirement that any run violates.
     pub violated: BTreeMap<String, usize>,
-    /// Whether all runs are equal, bit for bit; `None` of a single run.
+    /// Whether all runs are equal, bit for bit; `None` for a single run.
     pub deterministic: Option<bool>,
     /// The first difference of two runs, in words.
     pub difference: Option<String>,
     /// Whether the budget was exceeded.
     pub over_budget: bool,
-    /// All that is not as required, a sentence each.
+    /// Each deviation from what is required, as a sentence.
     pub objections: Vec<String>,
 }
 
 /// What the relay added to the way of a topic's messages, in seconds of wall time.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AddedToTopic {
-    /// The topic; a service is one.
+    /// The topic or service.
     pub topic: String,
     /// How many messages were measured, in all runs.
     pub messages: u64,
-    /// To every second message, at most.
+    /// The most that was added to half of the messages, in seconds.
     pub p50: Option<f64>,
-    /// To all but one message in a hundred; `None` below a hundred messages.
+    /// The most that was added to 99 of 100 messages, in seconds; `None` below a hundred messages.
     pub p99: Option<f64>,
-    /// To any message.
+    /// The most that was added to any message, in seconds.
     pub max: Option<f64>,
     /// How far `p99` is above `p50`.
     pub jitter: Option<f64>,
@@ -109,7 +109,8 @@ pub struct Drift {
 pub fn mitm(stages: &[Repository]) -> Result<MitmTesting, RecordError> {
     let plan = stages[0].plan();
     let budget = plan.simulator.lifecycle.relay_budget.map(|it| Budget { latency: it.latency, jitter: it.jitter });
-    let lock_stepped = is_stepped(plan);
+    // Then time stands still while the relay works.
+    let lock_stepped = plan.simulator.step_ns().is_some();
     let lab = stages[0].task().lab().map(str::to_owned);
     // Of the last stage: with fewer topics relayed, fewer are cut.
     let last = stages.last().map_or(plan, Repository::plan);
@@ -131,19 +132,9 @@ pub fn mitm(stages: &[Repository]) -> Result<MitmTesting, RecordError> {
         stages: found,
         lab,
         lock_stepped,
-        bypass: !plan.simulator.transport.wiring().is_empty(),
+        bypass: !plan.simulator.wiring.is_empty(),
         budget,
     })
-}
-
-/// Whether time stands still while the relay works.
-fn is_stepped(plan: &CampaignPlan) -> bool {
-    match &plan.simulator.transport {
-        Transport::InProcess { .. } | Transport::Simlog(_) => true,
-        Transport::Rosbridge(_) | Transport::Ros1(_) | Transport::Mqtt(_) => false,
-        Transport::Process { step_ns, .. } => step_ns.is_some(),
-        Transport::Ros2(ros2) => ros2.step.is_some(),
-    }
 }
 
 /// The name of a topic; that of a service is its path.

@@ -12,7 +12,7 @@ pub struct MonitorTesting {
     pub lab: String,
     /// Per test that was recorded on both sides.
     pub tests: Vec<MonitorTest>,
-    /// All that is not as required, a sentence each.
+    /// Each deviation from what is required, as a sentence.
     pub objections: Vec<String>,
 }
 

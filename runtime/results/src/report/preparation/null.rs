@@ -23,7 +23,7 @@ pub struct NullTesting {
     pub metrics: Vec<MetricSides>,
     /// All requirements, in declaration order.
     pub requirements: Vec<RequirementSides>,
-    /// All that is not as required, a sentence each.
+    /// Each deviation from what is required, as a sentence.
     pub objections: Vec<String>,
     /// The series of metrics in the course of the runs.
     #[serde(skip)]

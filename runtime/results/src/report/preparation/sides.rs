@@ -25,7 +25,7 @@ pub struct Values {
     pub runs: usize,
     /// The mean.
     pub mean: f64,
-    /// The standard deviation of a sample (with `n − 1`); `None` of a single run.
+    /// The standard deviation of a sample (with `n − 1`); `None` for a single run.
     pub deviation: Option<f64>,
     /// The smallest value.
     pub min: f64,
@@ -67,7 +67,7 @@ pub struct MetricSides {
     pub lab: Option<Values>,
     /// The mean in the lab minus that in simulation.
     pub difference: Option<f64>,
-    /// The difference that the lab tolerates; `None` if it says none, and of metrics of an interlock.
+    /// The difference that the lab tolerates; `None` if it declares none, and for metrics of an interlock.
     pub tolerance: Option<f64>,
     /// Whether the difference is greater than that, or only one side has values.
     pub beyond: bool,
@@ -168,9 +168,9 @@ pub struct RequirementSides {
     pub metric: String,
     /// Its bound, in words.
     pub bound: String,
-    /// What the runs in simulation say.
+    /// The verdicts of the runs in simulation.
     pub simulation: VerdictCounts,
-    /// What the runs in the lab say.
+    /// The verdicts of the runs in the lab.
     pub lab: Option<VerdictCounts>,
 }
 

@@ -89,7 +89,7 @@ impl<'c> Taken<'c> {
         match sheet.head.get(tests) {
             None => mistakes.say(0, || {
                 format!(
-                    "it does not say of which campaign the tests are; begin with `# {tests}: {digest}` in CSV, or \
+                    "it does not name the campaign of the tests; begin with `# {tests}: {digest}` in CSV, or \
                      `\"{tests}\": \"{digest}\"` in JSON"
                 )
             }),

@@ -110,7 +110,7 @@ fn comment(at: usize, text: &str, sheet: &mut Sheet, mistakes: &mut Mistakes<'_>
             mistakes.say(at, || format!("`# {name}:` is there twice; remove one"));
         }
     } else if let Some(meant) = most_similar(name, HEAD) {
-        mistakes.say(at, || format!("{} says nothing; did you mean `# {meant}:`?", quoted(&format!("# {name}:"))));
+        mistakes.say(at, || format!("{} is unknown; did you mean `# {meant}:`?", quoted(&format!("# {name}:"))));
     }
 }
 

@@ -28,17 +28,17 @@ const AT_ONCE: usize = 500;
 pub struct MonitorsSummary {
     /// Tests with decisions.
     pub tests: usize,
-    /// Of these, tests that were run again.
+    /// How many of these were run again.
     pub run_again: usize,
-    /// Of all of them, tests in which nobody can tell about a requirement whether it had a hazard, because it is
+    /// In how many of all tests nobody can tell about a requirement whether it had a hazard, because it is
     /// inconclusive.
     #[serde(skip_serializing_if = "number::is_zero")]
     pub unknown: usize,
     /// Tests in which a monitor missed a hazard, by number, the reference run among them.
     pub missed: Vec<MissedHazard>,
-    /// For each monitor and each requirement whose hazards it is to foresee.
+    /// One entry for each monitor and each requirement whose hazards it should foresee.
     pub hazards: Vec<HazardSummary>,
-    /// For each monitor.
+    /// One entry for each monitor.
     pub monitors: Vec<MonitorSummary>,
 }
 
@@ -56,7 +56,7 @@ pub struct MissedHazard {
     pub at: f64,
     /// The state of the monitor then; `None` in a fresh run, whose decisions are not kept.
     pub state: Option<String>,
-    /// How often it was missed in fresh runs; `None` of a test that was not run again.
+    /// How often it was missed in fresh runs, if the test was run again.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub again: Option<FindingAgain>,
 }
@@ -71,7 +71,7 @@ pub struct HazardSummary {
     pub requirement: String,
     /// Tests with a hazard that it foresaw.
     pub foreseen: usize,
-    /// Tests with a hazard that it only detected: it went into its safe state in the very instant.
+    /// Tests with a hazard that it only detected: it went into its safe state in the same instant.
     pub detected: usize,
     /// Tests with a hazard that it missed.
     pub missed: usize,
@@ -94,7 +94,7 @@ pub struct MonitorSummary {
     pub monitor: String,
     /// The median number of changes of its state in a test.
     pub median_changes: f64,
-    /// The test with the most changes, and how many; of equal ones that with the smallest number.
+    /// The test with the most changes, and how many; among equals, the test with the smallest number.
     pub most_changes: Option<(TestNumber, u32)>,
     /// The shortest stay in a state that ended, in seconds.
     pub shortest_stay: Option<f64>,
@@ -102,7 +102,7 @@ pub struct MonitorSummary {
     pub alarms: u64,
     /// How often its mitigation was sent; `None` if it has none.
     pub mitigations: Option<u64>,
-    /// Tests in which it never left its safe state: it guaranteed nothing, so that it could miss nothing.
+    /// Tests in which it never left its safe state: it guaranteed nothing, so it could miss nothing.
     pub never_vouched: usize,
     /// The time in each of its states, the strongest first; the last one is the safe state.
     pub states: Vec<StateShare>,
@@ -113,11 +113,11 @@ pub struct MonitorSummary {
 pub struct StateShare {
     /// The state.
     pub state: String,
-    /// Its integrity: 0 of the safe state.
+    /// Its integrity; 0 for the safe state.
     pub integrity: u32,
-    /// In seconds.
+    /// The time, in seconds.
     pub time: f64,
-    /// As a share of all the time.
+    /// The share of the whole time.
     pub share: f64,
 }
 

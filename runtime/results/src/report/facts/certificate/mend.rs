@@ -15,15 +15,15 @@ use crate::report::facts::certificate::campaign::missed_by_test;
 /// How the monitors of two results did in the same tests.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Mend {
-    /// The results of before.
+    /// The earlier results.
     pub before: PathBuf,
-    /// In what the spaces differ beside their monitors, in words, if in anything.
+    /// How the spaces differ in anything but their monitors, in words; `None` if they do not.
     pub difference: Option<String>,
     /// Tests that are in both results.
     pub tests: usize,
-    /// Of these, tests in which a hazard was missed before.
+    /// In how many of these a hazard was missed before.
     pub missed_before: usize,
-    /// Of these, tests in which one is missed now.
+    /// In how many of these a hazard is missed now.
     pub missed_after: usize,
     /// The tests in which a hazard was or is missed, by number: those that still miss one first.
     pub changed: Vec<MendedTest>,
@@ -34,7 +34,7 @@ pub struct Mend {
 pub struct MendedTest {
     /// The test.
     pub test: TestNumber,
-    /// The same test in the results of before.
+    /// The same test in the earlier results.
     pub before: TestNumber,
     /// Whether the simulator had the same seed in both.
     pub same_seed: bool,

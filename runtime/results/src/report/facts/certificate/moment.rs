@@ -52,7 +52,7 @@ pub enum MomentError {
 pub struct MomentReport {
     /// The test.
     pub test: TestNumber,
-    /// The moment, in seconds: all that happened at it has happened.
+    /// The moment, in seconds; everything that happens at this time has happened.
     pub at: f64,
     /// All monitors of the space.
     pub monitors: Vec<MonitorMoment>,
@@ -65,7 +65,7 @@ pub struct MonitorMoment {
     pub monitor: String,
     /// Its state.
     pub state: String,
-    /// The integrity of that: 0 of the safe state.
+    /// The integrity of its state; 0 for the safe state.
     pub integrity: u32,
     /// Since when, in seconds.
     pub since: f64,
@@ -83,23 +83,23 @@ pub struct MonitorMoment {
 pub struct PartReport {
     /// `monitor`, `guarantee`, `gate`, `evidence` or `demand`.
     pub kind: &'static str,
-    /// Its name; `None` of a gate.
+    /// Its name; `None` for a gate.
     pub name: Option<String>,
-    /// Of a demand: the monitor whose guarantee it is.
+    /// For a demand: the monitor whose guarantee it is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub from: Option<String>,
-    /// Of a guarantee: its integrity.
+    /// For a guarantee: its integrity.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub integrity: Option<u32>,
-    /// Of a gate: how many of its parts must hold.
+    /// For a gate: how many of its parts must hold.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub needs: Option<u32>,
-    /// `true`, `false` or `unknown`; of a monitor, whether any guarantee holds.
+    /// `true`, `false` or `unknown`; for a monitor, whether any guarantee holds.
     pub is: String,
-    /// Of evidence: since when it has had this value, in seconds.
+    /// For evidence: since when it has had this value, in seconds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub since: Option<f64>,
-    /// Of evidence: what made it so; `None` also if it has been unknown from the beginning.
+    /// For evidence: what made it so, unless it has been unknown from the beginning.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cause: Option<ChangeCause>,
     /// What it depends on.

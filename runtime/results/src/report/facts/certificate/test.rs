@@ -32,7 +32,7 @@ pub struct MonitorReport {
     pub alarms: u32,
     /// The shortest stay in a state that ended, in seconds.
     pub shortest_stay: Option<f64>,
-    /// The hazards that it was to foresee.
+    /// The hazards that it should foresee.
     pub hazards: Vec<HazardReport>,
     /// Its decisions, in order of time.
     pub decisions: Vec<DecisionReport>,
@@ -47,7 +47,7 @@ pub struct MonitorReport {
 pub struct StateReport {
     /// Its name.
     pub state: String,
-    /// Its integrity: 0 of the safe state.
+    /// Its integrity; 0 for the safe state.
     pub integrity: u32,
     /// The time that the monitor spent in it, in seconds.
     pub time: f64,
@@ -64,7 +64,7 @@ pub struct HazardReport {
     pub at: f64,
     /// Whether the monitor had been in its safe state before.
     pub foreseen: bool,
-    /// Whether it went into its safe state in the very instant.
+    /// Whether it went into its safe state in the same instant.
     pub detected: bool,
     /// For how long it had been in its safe state, in seconds; `None` if it was not.
     pub lead: Option<f64>,
@@ -79,12 +79,12 @@ pub struct DecisionReport {
     pub until: f64,
     /// The state from then on.
     pub state: String,
-    /// Its integrity: 0 of the safe state.
+    /// Its integrity; 0 for the safe state.
     pub integrity: u32,
     /// The mitigation that was sent, as in `drive.speed = 0m/s`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mitigation: Option<String>,
-    /// What changed the evidence that led to it; `None` of the decision at time zero.
+    /// What changed the evidence that led to it; `None` for the decision at time zero.
     pub cause: Option<ChangeCause>,
     /// The evidence that changed then, with the monitor's name before a dot.
     pub changed: Vec<String>,

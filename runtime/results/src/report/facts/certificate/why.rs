@@ -41,8 +41,8 @@ pub struct BecauseReport {
     pub since: f64,
     /// What made it so; `None` if it has been unknown from the beginning.
     pub cause: Option<ChangeCause>,
-    /// The demands by which it matters, from the monitor of the guarantee on, each with the monitor that has it:
-    /// `transport.sees`. Empty for that monitor's own evidence.
+    /// The demands through which it matters, beginning at the monitor of the guarantee, each with the monitor that has
+    /// it, as in `transport.sees`. Empty for that monitor's own evidence.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub through: Vec<String>,
 }

@@ -1,0 +1,65 @@
+//! Where the layouts of two sides differ, in words for the user.
+
+use sesame_plan::Primitive;
+use sesame_relay::value::Text;
+
+use crate::layout::{Layout, Meaning, Shape, Ty};
+
+/// Where their layout differs from ours, in a phrase. What is hidden in one of them only makes no difference.
+pub(crate) fn difference(ours: &Layout, theirs: &Layout) -> Option<String> {
+    of_shapes((ours, ours.message()), (theirs, theirs.message()))
+}
+
+fn of_shapes((our_layout, ours): (&Layout, &Shape), (their_layout, theirs): (&Layout, &Shape)) -> Option<String> {
+    if ours.meaning == theirs.meaning && matches!(ours.meaning, Meaning::Time(_)) {
+        return None;
+    }
+    let ([our_names, our_types], [their_names, their_types]) = (shown(ours), shown(theirs));
+    if our_names != their_names {
+        return Some(format!("fields `{our_names}`, not `{their_names}`"));
+    }
+    if our_types != their_types {
+        return Some(format!("types `{our_types}` of `{our_names}`, not `{their_types}`"));
+    }
+    // One of them may have among its fields what the other one hides.
+    let skip = |shape: &Shape, other: &Shape| usize::from(shape.hidden.is_none() && other.hidden.is_some());
+    let our_fields = ours.types.iter().zip(ours.fields.names()).skip(skip(ours, theirs));
+    let their_fields = theirs.types.iter().skip(skip(theirs, ours));
+    our_fields.zip(their_fields).find_map(|((our, name), their)| {
+        let (our, their) = (&our_layout.shapes[innermost(our)?], &their_layout.shapes[innermost(their)?]);
+        let inside = of_shapes((our_layout, our), (their_layout, their))?;
+        Some(format!("in `{name}`: {inside}"))
+    })
+}
+
+/// The names of its fields, and their types without those of messages, as they are on the wire.
+fn shown(shape: &Shape) -> [String; 2] {
+    let hidden = shape.hidden.iter();
+    let names = hidden.clone().map(|hidden| hidden.name).chain(shape.fields.names().iter().map(Text::as_str));
+    let types = hidden.map(|hidden| written(&Ty::Primitive(hidden.primitive))).chain(shape.types.iter().map(written));
+    [names.collect::<Vec<_>>().join(", "), types.collect::<Vec<_>>().join(", ")]
+}
+
+/// A type as `.msg` files write it.
+fn written(ty: &Ty) -> String {
+    match ty {
+        // A `byte` has a sign in ROS 1, and none in ROS 2.
+        Ty::Primitive(Primitive::Int8 | Primitive::Uint8) => "int8".to_owned(),
+        Ty::Primitive(primitive) => primitive.name().to_owned(),
+        Ty::String => "string".to_owned(),
+        Ty::WString => "wstring".to_owned(),
+        Ty::Shape(_) => "message".to_owned(),
+        Ty::Array(of, length) => format!("{}[{length}]", written(of)),
+        // At most how many elements there are makes no difference on the wire.
+        Ty::Sequence(of, _) => format!("{}[]", written(of)),
+    }
+}
+
+/// The message in a type.
+fn innermost(ty: &Ty) -> Option<usize> {
+    match ty {
+        Ty::Shape(at) => Some(*at),
+        Ty::Array(of, _) | Ty::Sequence(of, _) => innermost(of),
+        Ty::Primitive(_) | Ty::String | Ty::WString => None,
+    }
+}

@@ -1,0 +1,163 @@
+//! What a step owes, beside a naive rule that knows nothing of wires.
+
+use proptest::collection::vec;
+use proptest::prelude::*;
+use sesame_plan::testing::{minimal, node, ros2, topic};
+use sesame_plan::{Answer, Node, Type, Wiring};
+
+use super::*;
+
+/// A plan with groups of these sizes; by topic, the nodes to which its messages go by links.
+fn plan(sizes: &[usize], nodes: Vec<Node>, links: &[Vec<NodeId>]) -> CampaignPlan {
+    let group = |(at, &size): (usize, &usize)| {
+        let paths: Vec<String> = (0..size).map(|member| format!("t{at}/{member}")).collect();
+        let paths: Vec<&str> = paths.iter().map(String::as_str).collect();
+        topic(&format!("t{at}"), &paths, Type::Bool)
+    };
+    let wiring = links.iter().map(|links| Wiring { cut: true, subscribers: links.clone(), ..Wiring::default() });
+    let mut plan = minimal();
+    plan.topics = sizes.iter().enumerate().map(group).collect();
+    plan.nodes = nodes;
+    plan.simulator = ros2(0, wiring.collect());
+    plan
+}
+
+fn topics(topics: &[u32]) -> Vec<TopicId> {
+    topics.iter().copied().map(TopicId).collect()
+}
+
+fn answers(pairs: &[(u32, u32)]) -> Vec<Answer> {
+    pairs.iter().map(|&(to, with)| Answer { to: TopicId(to), with: TopicId(with) }).collect()
+}
+
+#[test]
+fn a_node_that_publishes_twice_never_ends_a_step_early() {
+    let both = Node { every_step: topics(&[0]), ..node("robots") };
+    let plan = plan(&[2, 1], vec![both, Node { answers: answers(&[(1, 0)]), ..node("arms") }], &[]);
+    let wires = WireTable::new(&plan);
+    let [first, second, asked] = wires.iter().collect::<Vec<_>>()[..] else { panic!("there are three wires") };
+    let promises = Promises::new(&plan, &wires);
+    let mut owed = Owed::default();
+    owed.extend(promises.every_step().iter().copied());
+    owed.pay(first);
+    owed.pay(first);
+    assert!(!owed.is_empty(), "two messages of one do not stand for a message of the other");
+    assert_eq!(owed.awaited(&wires), "a message of the step (1 on `t0/1`)");
+    owed.pay(second);
+    assert!(owed.is_empty());
+    // The surplus message does not stand for one that is owed later either.
+    owed.extend(promises.answers(asked).iter().map(|&(_, with)| with));
+    owed.pay(second);
+    assert_eq!(owed.awaited(&wires), "a message of the step (1 on `t0/0`)");
+}
+
+#[test]
+fn a_member_answers_a_member_of_a_group_of_the_same_size_and_otherwise_all_do() {
+    let arms = Node { answers: answers(&[(0, 1), (0, 2), (2, 0)]), ..node("arms") };
+    let plan = plan(&[2, 2, 1], vec![arms], &[]);
+    let wires = WireTable::new(&plan);
+    let promises = Promises::new(&plan, &wires);
+    let owed = |path: &str| {
+        let answers = promises.answers(wires.find(path).expect("it is a wire")).iter();
+        answers.map(|&(_, with)| wires.path(with)).collect::<Vec<_>>()
+    };
+    assert_eq!(owed("t0/0"), ["t1/0", "t2/0"]);
+    assert_eq!(owed("t0/1"), ["t1/1", "t2/0"]);
+    assert_eq!(owed("t1/0"), [""; 0]);
+    assert_eq!(owed("t2/0"), ["t0/0", "t0/1"]);
+    let said = |is: fn(&Promises, Wire) -> bool| wires.iter().map(|wire| is(&promises, wire)).collect::<Vec<_>>();
+    assert_eq!(said(Promises::is_answered), [true, true, false, false, true]);
+    assert_eq!(said(Promises::is_counted), [true; 5], "of each of them nodes say how many messages it has");
+}
+
+/// A member of a group: the position of its topic, and its own.
+type Member = (usize, usize);
+
+/// What happens in a step.
+#[derive(Debug, Clone, Copy)]
+enum Event {
+    Begins,
+    /// A message of this member reaches one node over its link, or all nodes that have none.
+    Delivered(Member, Option<NodeId>),
+    Comes(Member),
+}
+
+/// How many messages of a member are owed after all these events, from what nodes declare and nothing else.
+fn naive(plan: &CampaignPlan, links: &[Vec<NodeId>], events: &[Event], (topic, member): Member) -> u32 {
+    let mut owed: u32 = 0;
+    for &event in events {
+        for (at, node) in (0u32..).map(NodeId).zip(&plan.nodes) {
+            match event {
+                Event::Begins => {
+                    owed += node.every_step.iter().map(|it| u32::from(it.index() == topic)).sum::<u32>();
+                }
+                Event::Delivered(to, only) if only == Some(at) || only.is_none() && !links[to.0].contains(&at) => {
+                    let sizes = [topic, to.0].map(|topic| plan.topics[topic].paths.len());
+                    let is_its = sizes[0] != sizes[1] || member == to.1;
+                    let answer = |it: &Answer| it.to.index() == to.0 && it.with.index() == topic && is_its;
+                    owed += node.answers.iter().map(|it| u32::from(answer(it))).sum::<u32>();
+                }
+                Event::Delivered(..) | Event::Comes(_) => {}
+            }
+        }
+        if matches!(event, Event::Comes(which) if which == (topic, member)) {
+            owed = owed.saturating_sub(1);
+        }
+    }
+    owed
+}
+
+proptest! {
+    #[test]
+    fn what_is_owed_is_what_a_naive_rule_says(
+        sizes in vec(1usize..4, 1..5),
+        nodes in vec((vec(any::<prop::sample::Index>(), 0..3), vec(any::<[prop::sample::Index; 2]>(), 0..4)), 1..4),
+        told_apart in vec(vec(any::<bool>(), 4), 5),
+        happens in vec((0..3, any::<prop::sample::Index>()), 0..30),
+    ) {
+        let some = |index: &prop::sample::Index| TopicId(u32::try_from(index.index(sizes.len())).unwrap());
+        let nodes: Vec<Node> = nodes.iter().map(|(every_step, pairs)| Node {
+            every_step: every_step.iter().map(some).collect(),
+            answers: pairs.iter().map(|[to, with]| Answer { to: some(to), with: some(with) }).collect(),
+            ..node("one")
+        }).collect();
+        let links: Vec<Vec<NodeId>> = told_apart[..sizes.len()].iter().map(|told_apart| {
+            (0u32..).map(NodeId).zip(told_apart).take(nodes.len()).filter(|(_, it)| **it).map(|(id, _)| id).collect()
+        }).collect();
+        let plan = plan(&sizes, nodes, &links);
+        let wires = WireTable::new(&plan);
+        let promises = Promises::new(&plan, &wires);
+        let members: Vec<Member> =
+            sizes.iter().enumerate().flat_map(|(topic, &size)| (0..size).map(move |member| (topic, member))).collect();
+        let wire = |(topic, member): Member| wires.find(&format!("t{topic}/{member}")).unwrap();
+        let reached: Vec<(Member, Option<NodeId>)> = members.iter().flat_map(|&member| {
+            std::iter::once((member, None)).chain(links[member.0].iter().map(move |&node| (member, Some(node))))
+        }).collect();
+
+        let (mut owed, mut events) = (Owed::default(), Vec::new());
+        for (kind, index) in happens {
+            let event = match kind {
+                0 => Event::Begins,
+                1 => { let (member, only) = *index.get(&reached); Event::Delivered(member, only) }
+                _ => Event::Comes(*index.get(&members)),
+            };
+            match event {
+                Event::Begins => owed.extend(promises.every_step().iter().copied()),
+                Event::Delivered(member, only) => {
+                    let link = wires.links().iter().find(|link| link.of == wire(member) && Some(link.to) == only);
+                    let delivered = link.map_or(wire(member), |link| link.wire);
+                    prop_assert_eq!(link.is_some(), only.is_some());
+                    owed.extend(promises.answers(delivered).iter().map(|&(_, with)| with));
+                }
+                Event::Comes(member) => owed.pay(wire(member)),
+            }
+            events.push(event);
+            let counts = members.iter().map(|&member| (member, naive(&plan, &links, &events, member)));
+            let counts: Vec<(Member, u32)> = counts.filter(|(_, count)| *count > 0).collect();
+            prop_assert_eq!(owed.is_empty(), counts.is_empty());
+            let named: Vec<String> =
+                counts.iter().map(|((topic, member), count)| format!("{count} on `t{topic}/{member}`")).collect();
+            prop_assert_eq!(owed.awaited(&wires), format!("a message of the step ({})", named.join(", ")));
+        }
+    }
+}
