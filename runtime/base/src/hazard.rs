@@ -10,8 +10,8 @@ use crate::verdict::{Verdict, breaks, verdict};
 /// last one counts.
 ///
 /// A metric that only gets worse, such as a maximum with an upper bound, is lost when it leaves its bound. For all
-/// others, only the end decides: a mean may recover, and a count may yet be reached. Whoever evaluated a temporal
-/// formula says when a bound on its robustness was lost: for `eventually [0s, 60s]` that is at 60 s.
+/// others, only the end decides: a mean may recover, and a count may yet be reached. A run records when it
+/// lost a bound on the robustness of a temporal formula: for `eventually [0s, 60s]` that is at 60 s.
 pub fn hazard(
     plan: &CampaignPlan,
     requirement: RequirementId,

@@ -196,7 +196,7 @@ pub struct Counters {
     /// Side effects it had in addition to those on messages.
     pub side_effects: u64,
     /// Messages it changed, dropped, held back or created on wires without a receiver. No other counter contains them,
-    /// and they are no effect.
+    /// and they do not count as effects.
     pub unheard: u64,
 }
 
@@ -225,8 +225,8 @@ pub struct MetricObservation {
     /// else, and explains the value; it is neither part of the digest nor compared when a run is repeated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub robustness: Vec<(f64, f64)>,
-    /// Of the robustness of a formula: when requirements on it were lost before the run ended, in order of declaration.
-    /// Empty for other metrics, whose series shows it. Like the signal, it explains the value, and is neither part of
+    /// When requirements on the robustness of a formula were lost before the run ended, in order of declaration. Empty
+    /// for other metrics, whose series shows it. Like the signal, it explains the value, and is neither part of
     /// the digest nor compared when a run is repeated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lost: Vec<Lost>,

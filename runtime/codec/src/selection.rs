@@ -12,7 +12,7 @@ use crate::layout::{Layout, Meaning, Shape, Ty};
 pub(crate) enum Selection {
     Nothing,
     All,
-    /// Of a message: some of its fields, with their names.
+    /// Some fields of a message, with their names.
     Fields(Arc<Fields>, Vec<Selection>),
 }
 

@@ -340,7 +340,7 @@ mod tests {
     use sesame_base::observation::MetricObservation;
     use sesame_plan::stl::{Formula, Interval};
     use sesame_plan::testing::{plan, requirement};
-    use sesame_plan::{Comparison, FieldRef, Input, MetricSource, Side};
+    use sesame_plan::{Comparison, FieldRef, Input, MetricSource, Requirement, Side};
 
     use super::*;
     use crate::metric::MetricTable;
@@ -392,9 +392,20 @@ mod tests {
     }
 
     fn observed(robustness: Robustness, sent: &[Sent], end: Option<i64>) -> (MetricObservation, Vec<String>) {
+        observed_with(Vec::new(), robustness, sent, end)
+    }
+
+    /// The same with what is required of it.
+    fn observed_with(
+        required: Vec<Requirement>,
+        robustness: Robustness,
+        sent: &[Sent],
+        end: Option<i64>,
+    ) -> (MetricObservation, Vec<String>) {
         let mut plan = plan(Vec::new());
         plan.metrics.truncate(1);
         plan.metrics[0].source = MetricSource::Robustness { robustness };
+        plan.requirements = required;
         let wires = WireTable::new(&plan);
         let table = MetricTable::new(&plan, &wires, &[]).unwrap();
         let mut metrics = table.start();
@@ -545,22 +556,8 @@ mod tests {
 
     /// When a run that ends at this time in milliseconds lost a bound on a robustness, in seconds.
     fn lost(robustness: Robustness, bound: Bound, sent: &[Sent], end: Option<i64>) -> Option<f64> {
-        let mut plan = plan(Vec::new());
-        plan.metrics.truncate(1);
-        plan.metrics[0].source = MetricSource::Robustness { robustness };
-        plan.requirements = vec![requirement("R1", 0, bound)];
-        let wires = WireTable::new(&plan);
-        let table = MetricTable::new(&plan, &wires, &[]).unwrap();
-        let mut metrics = table.start();
-        metrics.begin();
-        for &(time, path, number) in sent {
-            let wire = wires.find(PATHS[path]).unwrap();
-            metrics.message(SimTime::from_nanos(time * 1_000_000), wire, &payload(path, number));
-        }
-        if let Some(end) = end {
-            metrics.end(SimTime::from_nanos(end * 1_000_000));
-        }
-        metrics.finish(&[]).0[0].lost.first().map(|lost| lost.at)
+        let required = vec![requirement("R1", 0, bound)];
+        observed_with(required, robustness, sent, end).0.lost.first().map(|lost| lost.at)
     }
 
     #[test]
