@@ -333,11 +333,25 @@ mod tests {
     use serde_json::json;
     use tokio::net::TcpListener;
     use tokio_tungstenite::accept_hdr_async;
-    use tokio_tungstenite::tungstenite::handshake::server::{ErrorResponse, Request, Response};
+    use tokio_tungstenite::tungstenite::handshake::server::{Callback, ErrorResponse, Request, Response};
 
     use super::*;
 
     const SECRET: &str = "s3cret-of-the-hall";
+
+    struct WantsSecret;
+
+    impl Callback for WantsSecret {
+        fn on_request(self, request: &Request, response: Response) -> Result<Response, ErrorResponse> {
+            let shown = request.headers().get(AUTHORIZATION).and_then(|it| it.to_str().ok());
+            if shown == Some(&format!("Bearer {SECRET}")) {
+                return Ok(response);
+            }
+            let mut refused = ErrorResponse::new(None);
+            *refused.status_mut() = StatusCode::UNAUTHORIZED;
+            Err(refused)
+        }
+    }
 
     /// A server that wants the secret, sends these frames to each client, and tells what it is told.
     fn server(frames: Vec<Frame>) -> (SocketAddr, Receiver<String>) {
@@ -349,17 +363,7 @@ mod tests {
         let serve = async move {
             let listener = TcpListener::from_std(listener).unwrap();
             while let Ok((stream, _)) = listener.accept().await {
-                #[expect(clippy::result_large_err, reason = "the signature is the library's")]
-                let check = |request: &Request, response: Response| -> Result<Response, ErrorResponse> {
-                    let shown = request.headers().get(AUTHORIZATION).and_then(|it| it.to_str().ok());
-                    if shown == Some(&format!("Bearer {SECRET}")) {
-                        return Ok(response);
-                    }
-                    let mut refused = ErrorResponse::new(None);
-                    *refused.status_mut() = StatusCode::UNAUTHORIZED;
-                    Err(refused)
-                };
-                let Ok(mut socket) = accept_hdr_async(stream, check).await else { continue };
+                let Ok(mut socket) = accept_hdr_async(stream, WantsSecret).await else { continue };
                 for frame in &frames {
                     socket.send(frame.clone()).await.unwrap();
                 }

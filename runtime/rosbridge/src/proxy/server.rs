@@ -23,7 +23,7 @@ use tokio::sync::{Semaphore, oneshot};
 use tokio_rustls::TlsAcceptor;
 use tokio_rustls::rustls::ServerConfig;
 use tokio_tungstenite::accept_hdr_async_with_config;
-use tokio_tungstenite::tungstenite::handshake::server::{ErrorResponse, Request, Response};
+use tokio_tungstenite::tungstenite::handshake::server::{Callback, ErrorResponse, Request, Response};
 use tokio_tungstenite::tungstenite::http::StatusCode;
 use tokio_tungstenite::tungstenite::http::header::AUTHORIZATION;
 use tokio_tungstenite::tungstenite::protocol::WebSocketConfig;
@@ -213,16 +213,7 @@ impl Listening {
 
     async fn let_in<S: AsyncRead + AsyncWrite + Unpin>(&self, stream: S, from: SocketAddr) {
         let mut problem = None;
-        #[expect(clippy::result_large_err, reason = "the signature is the library's")]
-        let check = |request: &Request, response: Response| -> Result<Response, ErrorResponse> {
-            problem = self.proxy.token.as_ref().and_then(|token| objection(request, token));
-            if problem.is_none() {
-                return Ok(response);
-            }
-            let mut refused = ErrorResponse::new(None);
-            *refused.status_mut() = StatusCode::UNAUTHORIZED;
-            Err(refused)
-        };
+        let check = Check { token: self.proxy.token.as_ref(), problem: &mut problem };
         let limits = WebSocketConfig::default().max_message_size(Some(Limits::default().operation));
         let accepting = accept_hdr_async_with_config(stream, check, Some(limits));
         let socket = match tokio::time::timeout(LET_IN_WITHIN, accepting).await {
@@ -268,6 +259,25 @@ impl Connected<'_> {
 impl Drop for Connected<'_> {
     fn drop(&mut self) {
         self.set(false);
+    }
+}
+
+/// Lets in clients that show the token, if there is one.
+struct Check<'a> {
+    token: Option<&'a Token>,
+    /// Why the client was not let in.
+    problem: &'a mut Option<&'static str>,
+}
+
+impl Callback for Check<'_> {
+    fn on_request(self, request: &Request, response: Response) -> Result<Response, ErrorResponse> {
+        *self.problem = self.token.and_then(|token| objection(request, token));
+        if self.problem.is_none() {
+            return Ok(response);
+        }
+        let mut refused = ErrorResponse::new(None);
+        *refused.status_mut() = StatusCode::UNAUTHORIZED;
+        Err(refused)
     }
 }
 

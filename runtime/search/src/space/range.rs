@@ -167,12 +167,8 @@ impl Range {
         let ratio = steps.boldest / steps.finest;
         let deviation = (self.high - self.low) * steps.finest * libm::pow(ratio, stream.unit());
         let step = deviation * stream.normal();
-        match self.integer {
-            // Away from zero, as a step of no length is none.
-            true if step < 0.0 => libm::floor(step),
-            true => libm::ceil(step),
-            false => step,
-        }
+        // Whole steps go away from zero, as a step of no length is none.
+        if self.integer { libm::copysign(libm::ceil(step.abs()), step) } else { step }
     }
 }
 

@@ -33,8 +33,8 @@ fn least_impurity(columns: &Columns, rows: &[usize], labels: &[Option<bool>], le
     for column in &columns.values {
         for &at in rows {
             for at_most in [true, false] {
-                let holds = |&&row: &&usize| if at_most { column[row] <= column[at] } else { column[row] > column[at] };
-                let (yes, no): (Vec<usize>, Vec<usize>) = rows.iter().partition(|row| holds(row));
+                let holds = |&row: &usize| if at_most { column[row] <= column[at] } else { column[row] > column[at] };
+                let (yes, no): (Vec<usize>, Vec<usize>) = rows.iter().copied().partition(holds);
                 // A question that splits off exactly the rows without a number is none that lies between two numbers.
                 let numbers = rows.iter().filter(|&&row| !column[row].is_nan()).count();
                 if yes.len() >= least && no.len() >= least && yes.len() < numbers {
