@@ -2,31 +2,41 @@
 //!
 //! Results record exact words, since they are compared and hashed; only reports shorten them.
 
-use sesame_plan::CampaignPlan;
+use sesame_plan::{Bound, CampaignPlan, MetricId};
 
 use crate::present::number;
 
 /// Digits beyond which a number with a fraction is shortened.
 const DIGITS: usize = 6;
 
-/// A recorded sentence with short numbers, and with units where it says what a metric is.
+/// A recorded sentence with short numbers, and with units where it says what a metric is: ``` `reserve` is -2.24471```
+/// becomes ``` `reserve` is -2.245 m```. Such a value keeps as many more digits as show on which side of the metric's
+/// bounds it is.
 pub fn sentence(plan: &CampaignPlan, text: &str) -> String {
-    short_numbers(&with_units(plan, text))
+    let mut said = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some((begin, length, metric)) = first_value(plan, rest) {
+        let bounds = plan.requirements.iter().filter(|requirement| requirement.metric == metric).map(|it| it.bound);
+        let bounds: Vec<Bound> = bounds.collect();
+        let value: f64 = rest[begin..begin + length].parse().expect("its length is that of a number");
+        said.push_str(&short_numbers(&rest[..begin]));
+        said.push_str(&number::beside(value, &bounds, plan.metric(metric).unit.as_deref()));
+        rest = &rest[begin + length..];
+    }
+    said.push_str(&short_numbers(rest));
+    said
 }
 
-/// Adds units to what a sentence says of metrics: ``` `reserve` is -2.24``` becomes ``` `reserve` is -2.24 m```.
-fn with_units(plan: &CampaignPlan, text: &str) -> String {
-    let mut said = text.to_owned();
-    for metric in &plan.metrics {
-        let (Some(unit), lead) = (&metric.unit, format!("`{}` is ", metric.name)) else { continue };
-        let Some(begin) = said.find(&lead).map(|at| at + lead.len()) else { continue };
-        let length = number_length(&said[begin..]);
-        let ends = said[begin + length..].chars().next().is_none_or(|next| matches!(next, ',' | ';' | '.'));
-        if length > 0 && ends {
-            said.insert_str(begin + length, &format!(" {unit}"));
-        }
-    }
-    said
+/// Where a sentence first says what a metric is: the number's place, its length, and the metric.
+fn first_value(plan: &CampaignPlan, text: &str) -> Option<(usize, usize, MetricId)> {
+    let values = (0..).map(MetricId).zip(&plan.metrics).filter_map(|(id, metric)| {
+        let lead = format!("`{}` is ", metric.name);
+        let begin = text.find(&lead)? + lead.len();
+        let length = number_length(&text[begin..]);
+        let ends = text[begin + length..].chars().next().is_none_or(|next| matches!(next, ',' | ';' | '.'));
+        (length > 0 && ends).then_some((begin, length, id))
+    });
+    values.min_by_key(|&(begin, ..)| begin)
 }
 
 /// The same words with numbers of many digits as numbers are shown everywhere: `18.927509254124797s` is `18.93s`.
@@ -82,6 +92,20 @@ mod tests {
         assert_eq!(said("`collision_occurrence` is 3"), "`collision_occurrence` is 3", "a plain number");
         assert_eq!(said("`arm_distance` has no value"), "`arm_distance` has no value");
         assert_eq!(said("`arm_distance` is 5 of a kind"), "`arm_distance` is 5 of a kind");
+        assert_eq!(
+            said("`arm_distance` is 1.23456789, `collision_occurrence` is 2; end"),
+            "`arm_distance` is 1.235 mm, `collision_occurrence` is 2; end"
+        );
+    }
+
+    #[test]
+    fn a_value_that_breaks_a_bound_by_rounding_does_not_read_as_one_that_keeps_it() {
+        let mut plan = sample::plan();
+        let metric = plan.metrics.iter().position(|metric| metric.name == "arm_distance").unwrap();
+        plan.requirements[0].metric = MetricId(u32::try_from(metric).unwrap());
+        plan.requirements[0].bound = Bound::AtMost { value: 1.0 };
+        let warning = "requirement R1 is violated before anything is fuzzed: `arm_distance` is 1.0000000000000002";
+        assert!(sentence(&plan, warning).ends_with("`arm_distance` is 1.0000000000000002 mm"));
     }
 
     #[test]
