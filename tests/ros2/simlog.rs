@@ -131,7 +131,7 @@ fn cells(name: &str, disturbed: &Disturbed, evaluations: u32) -> Option<[Example
     let program = grpc.folder().join("simlog_cell.py");
     fs::copy(workspace().join("tests/ros2/peers/simlog_cell.py"), program).expect("a program can be copied");
     let packages = Vendor::environment(&simlog).join("lib/python3.11/site-packages");
-    let stubs = workspace().join("runtime/simlog/tests/stubs.py");
+    let stubs = workspace().join("runtime/middleware/simlog/tests/stubs.py");
     let beside = ["grpc", "grpc_tools", "google"].map(|name| packages.join(name));
     for path in beside.into_iter().chain([stubs]) {
         let name = path.file_name().expect("it has a name");

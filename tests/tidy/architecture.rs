@@ -76,6 +76,68 @@ fn crates_link_each_other_as_the_architecture_says() {
     assert!(objections.is_empty(), "{objections:#?}");
 }
 
+/// The crates of the runtime in the order of the map in ARCHITECTURE.md, each with its folder.
+fn map(text: &str) -> Vec<(String, String)> {
+    let rows = text.lines().filter_map(|line| line.strip_prefix("| `runtime/"));
+    rows.map(|row| {
+        let (folder, rest) = row.split_once("` | `").expect("a row of the map names a folder and a crate");
+        let (name, _) = rest.split_once('`').expect("names of crates are code");
+        (name.to_owned(), format!("runtime/{folder}").trim_end_matches('/').to_owned())
+    })
+    .collect()
+}
+
+/// What the map says against the crates that there are, and which wings link one that stands below them.
+fn objections_to_wings(map: &[(String, String)], crates: &BTreeMap<String, BTreeSet<String>>) -> Vec<String> {
+    let wing = |folder: &str| folder.split('/').nth(1).unwrap_or("").to_owned();
+    let mut wings = Vec::new();
+    for (_, folder) in map {
+        if wings.last() != Some(&wing(folder)) {
+            wings.push(wing(folder));
+        }
+    }
+    let mut objections: Vec<String> = (1..wings.len())
+        .filter(|&at| wings[..at].contains(&wings[at]))
+        .map(|at| format!("the crates of {} are not together in the map", wings[at]))
+        .collect();
+    let at = |name: &str| {
+        let (_, folder) = map.iter().find(|row| row.0 == name)?;
+        wings.iter().position(|other| *other == wing(folder))
+    };
+    for (name, folder) in map {
+        for link in &crates[name] {
+            if at(link).is_some_and(|link| Some(link) > at(name)) {
+                objections.push(format!("{name} in {folder} links {link}, which is in a later wing"));
+            }
+        }
+    }
+    objections
+}
+
+#[test]
+fn no_wing_links_a_later_one() {
+    let map = map(&fs::read_to_string(workspace().join("ARCHITECTURE.md")).unwrap());
+    let runtime: BTreeSet<String> = members().into_iter().filter(|folder| folder.starts_with("runtime")).collect();
+    assert_eq!(map.iter().map(|row| row.1.clone()).collect::<BTreeSet<_>>(), runtime, "the map, and the manifest");
+    let objections = objections_to_wings(&map, &manifests());
+    assert!(objections.is_empty(), "{objections:#?}");
+}
+
+#[test]
+fn a_wing_that_links_a_later_one_is_objected_to() {
+    let row = |name: &str, folder: &str| (name.to_owned(), folder.to_owned());
+    let map = [row("plan", "runtime/model/plan"), row("base", "runtime/model/base"), row("relay", "runtime/run/relay")];
+    let links = |of: &[(&str, &str)]| -> BTreeMap<String, BTreeSet<String>> {
+        let of_one = |name: &str| of.iter().filter(|link| link.0 == name).map(|link| link.1.to_owned()).collect();
+        map.iter().map(|row| (row.0.clone(), of_one(&row.0))).collect()
+    };
+    assert_eq!(objections_to_wings(&map, &links(&[("relay", "plan"), ("plan", "base")])), Vec::<String>::new());
+    let up = objections_to_wings(&map, &links(&[("plan", "relay")]));
+    assert_eq!(up, ["plan in runtime/model/plan links relay, which is in a later wing"]);
+    let apart = [map[0].clone(), map[2].clone(), map[1].clone()];
+    assert_eq!(objections_to_wings(&apart, &links(&[])), ["the crates of model are not together in the map"]);
+}
+
 /// Features named `testing` are for the tests of other crates: in `[dependencies]` they would be part of runners.
 #[test]
 fn no_crate_links_what_is_for_tests() {
@@ -134,8 +196,11 @@ fn modules(crate_folder: &Path) -> BTreeSet<String> {
 #[test]
 fn the_table_lists_each_room_of_the_runtime_and_no_other() {
     let listed = listed_rooms(&fs::read_to_string(workspace().join("docs/rooms.md")).unwrap());
+    let members = members();
     for (name, rooms) in &listed {
-        let folder = if name == "runtime" { "runtime".to_owned() } else { format!("runtime/{name}") };
+        let folder =
+            members.iter().find(|folder| folder.starts_with("runtime") && folder.rsplit('/').next() == Some(name));
+        let folder = folder.unwrap_or_else(|| panic!("docs/rooms.md lists {name}, which is no crate of the runtime"));
         assert_eq!(*rooms, modules(&workspace().join(folder)), "rooms of {name}: docs/rooms.md, and the crate");
     }
     assert_eq!(listed.len(), 19, "{listed:?}");

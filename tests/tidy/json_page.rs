@@ -44,7 +44,7 @@ const PRINTED: [(&str, &str, &str, &str); 15] = [
         "sesame-dsl/src/diagnostic/render/json.rs",
     ),
     ("`sesamec explain NAME FILE`", "One object.", "Explained", "sesame-codegen/src/uses.rs"),
-    ("`sesamec scan`", "One object.", "Facts", "runtime/scan/src/facts.rs"),
+    ("`sesamec scan`", "One object.", "Facts", "runtime/middleware/scan/src/facts.rs"),
 ];
 
 /// Crates whose types may be printed, by the folder of their sources.
@@ -52,9 +52,9 @@ const CRATES: [(&str, &str); 8] = [
     ("sesame_runtime", "runtime/src"),
     ("sesame_results", "runtime/results/src"),
     ("sesame_search", "runtime/search/src"),
-    ("sesame_base", "runtime/base/src"),
-    ("sesame_plan", "runtime/plan/src"),
-    ("sesame_scan", "runtime/scan/src"),
+    ("sesame_base", "runtime/model/base/src"),
+    ("sesame_plan", "runtime/model/plan/src"),
+    ("sesame_scan", "runtime/middleware/scan/src"),
     ("sesame_dsl", "sesame-dsl/src"),
     ("sesame_codegen", "sesame-codegen/src"),
 ];

@@ -133,7 +133,7 @@ fn vendored(folder: &Path, more: &[(&str, &str)]) -> Result<Environment, Vec<Err
             (
                 "checkout/Cargo.toml",
                 "[workspace]\npackage.version = \"1.2.3\"\npackage.edition = \"2024\"\nlints.rust.unsafe_code = \"forbid\"\n\
-                 [workspace.dependencies]\nsesame-plan = { path = \"runtime/plan\", version = \"1.2.3\" }\n\
+                 [workspace.dependencies]\nsesame-plan = { path = \"runtime/model/plan\", version = \"1.2.3\" }\n\
                  libm = { version = \"0.2\", features = [\"a\"] }\nserde = \"1\"\ninsta = \"1\"\n",
             ),
             (
@@ -147,8 +147,8 @@ fn vendored(folder: &Path, more: &[(&str, &str)]) -> Result<Environment, Vec<Err
             ("checkout/runtime/tests/suite.rs", "// tests"),
             ("checkout/runtime/target/debug/junk", "junk"),
             ("checkout/runtime/.hidden", "hidden"),
-            ("checkout/runtime/plan/Cargo.toml", "[package]\nname = \"sesame-plan\"\nversion.workspace = true\n"),
-            ("checkout/runtime/plan/src/lib.rs", "// the plan"),
+            ("checkout/runtime/model/plan/Cargo.toml", "[package]\nname = \"sesame-plan\"\nversion.workspace = true\n"),
+            ("checkout/runtime/model/plan/src/lib.rs", "// the plan"),
             (
                 "project/simulator/Cargo.toml",
                 "[package]\nname = \"kuka_cell_sim\"\n[workspace]\n[profile.dev]\nopt-level = 3\n\

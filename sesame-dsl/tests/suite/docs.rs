@@ -175,7 +175,7 @@ fn code_in_the_guide_is_that_of_files_that_are_tested() {
 
 #[test]
 fn what_hooks_are_said_to_call_exists() {
-    let contexts = read("runtime/relay/src/metric.rs") + &read("runtime/relay/src/fuzz/custom.rs");
+    let contexts = read("runtime/run/relay/src/metric.rs") + &read("runtime/run/relay/src/fuzz/custom.rs");
     let mut seen = BTreeSet::new();
     for (page, text) in pages() {
         for call in text.split("ctx.").skip(1) {
