@@ -117,6 +117,7 @@ kuka_cell_sim = { opt-level = 2 }
 libm = { opt-level = 1 }
 serde_json = { opt-level = 1 }
 sesame-base = { opt-level = 1 }
+sesame-lifecycle = { opt-level = 0 }
 sesame-notation = { opt-level = 0 }
 sesame-plan = { opt-level = 0 }
 sesame-relay = { opt-level = 1 }
@@ -124,6 +125,7 @@ sesame-results = { opt-level = 0 }
 sesame-rng = { opt-level = 1 }
 sesame-runtime = { opt-level = 0 }
 sesame-search = { opt-level = 1 }
+sesame-stl = { opt-level = 1 }
 sha2 = { opt-level = 1 }
 ";
 

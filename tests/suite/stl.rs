@@ -15,7 +15,7 @@ use proptest::test_runner::TestRunner;
 use sesame_base::time::SimTime;
 use sesame_plan::Comparison;
 use sesame_plan::stl::{Formula, Interval};
-use sesame_relay::stl::Monitor;
+use sesame_stl::Monitor;
 use sesame_tests::rtamt::{Case, PYTHON, answers};
 
 const CASES: usize = 1_000;

@@ -14,7 +14,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use sesame_base::observation::{Observation, Outcome};
-use sesame_relay::lifecycle::process_group::was_killed;
+use sesame_lifecycle::process_group::was_killed;
 
 use crate::campaign::executor::{Executor, ExecutorError, Job, JobResult};
 use crate::campaign::link::{self, Stream};

@@ -4,9 +4,9 @@ use std::sync::{Mutex, mpsc};
 use std::time::Duration;
 use std::{io, thread};
 
+use sesame_lifecycle::descendants;
 use sesame_plan::CampaignPlan;
 use sesame_relay::evaluate::Custom;
-use sesame_relay::lifecycle::descendants;
 use sesame_relay::metric::MetricTable;
 use sesame_relay::panic_capture;
 use sesame_relay::wire::WireTable;
@@ -64,7 +64,7 @@ pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: &Address) -> io::
 /// How long it may take to end what the plan launches, beside its simulator.
 fn end_limit(plan: &CampaignPlan) -> Duration {
     #[cfg(feature = "process")]
-    return sesame_relay::lifecycle::launch::end_limit(plan);
+    return sesame_lifecycle::launch::end_limit(plan);
     #[cfg(not(feature = "process"))]
     {
         let _ = plan;

@@ -13,7 +13,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use std::{io, thread};
 
-use sesame_relay::lifecycle::{descendants, process_group};
+use sesame_lifecycle::{descendants, process_group};
 
 /// The environment variable with a worker's number, which everything inherits that the worker starts.
 pub(super) const WORKER: &str = "SESAME_WORKER";

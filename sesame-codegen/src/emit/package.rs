@@ -8,11 +8,12 @@ use toml::{Table, Value};
 /// What a campaign hardly uses and the compiler would optimise for long, with the level it gets instead of 3.
 ///
 /// SQLite's is that of the workspace, which builds it for `sesamec` in the same way: runners in a checkout share that.
-const LESS_OPTIMISED: [(&str, u8); 8] = [
+const LESS_OPTIMISED: [(&str, u8); 9] = [
     ("clap_builder", 0),
     ("console", 0),
     ("indicatif", 0),
     ("libsqlite3-sys", 1),
+    ("sesame-lifecycle", 1),
     ("sesame-notation", 1),
     ("sesame-plan", 1),
     ("sesame-results", 1),
@@ -20,7 +21,8 @@ const LESS_OPTIMISED: [(&str, u8); 8] = [
 ];
 
 /// The same of a monitor, which links less.
-const LESS_OPTIMISED_IN_MONITORS: [(&str, u8); 3] = [("clap_builder", 0), ("sesame-plan", 1), ("sesame-runtime", 1)];
+const LESS_OPTIMISED_IN_MONITORS: [(&str, u8); 4] =
+    [("clap_builder", 0), ("sesame-lifecycle", 1), ("sesame-plan", 1), ("sesame-runtime", 1)];
 
 /// What a crate is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

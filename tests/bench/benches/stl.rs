@@ -9,8 +9,8 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use sesame_base::time::SimTime;
 use sesame_plan::Comparison;
 use sesame_plan::stl::{Formula, Interval};
-use sesame_relay::stl::Monitor;
 use sesame_rng::Stream;
+use sesame_stl::Monitor;
 use sesame_tests::rtamt::{Case, answers};
 
 const WINDOWS: [u32; 4] = [20, 200, 2_000, 20_000];

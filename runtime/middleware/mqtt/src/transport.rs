@@ -9,9 +9,9 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use rumqttc::v5::mqttbytes::v5::{Publish, PublishProperties};
+use sesame_lifecycle::launch::Place;
 use sesame_plan::{BrokerAt, CampaignPlan, Mqtt};
 use sesame_relay::json::Codec;
-use sesame_relay::lifecycle::launch::Place;
 use sesame_relay::transport::bus::echo::Echoes;
 use sesame_relay::transport::bus::secret::{Token, trusted};
 use sesame_relay::transport::bus::{Bus, Event, Settings, on_bus, tls};

@@ -14,8 +14,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use sesame_lifecycle::launch::Place;
 use sesame_plan::{CampaignPlan, Channel, Clock, Ros};
-use sesame_relay::lifecycle::launch::Place;
 use sesame_relay::transport::bus::{Bus, Event, FOUND_AGAIN_WITHIN, Settings, on_bus};
 use sesame_relay::transport::{Connect, Transport, TransportError};
 use sesame_relay::value::Value;

@@ -23,8 +23,8 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use sesame_base::time::SimTime;
+use sesame_lifecycle::launch::{Launched, Place};
 use sesame_plan::{CampaignPlan, NodeId, Ros};
-use sesame_relay::lifecycle::launch::{Launched, Place};
 use sesame_relay::relay::{Delivery, Exchange};
 use sesame_relay::simulator::Progress;
 use sesame_relay::transport::added::{AddedOnWire, join, objections};

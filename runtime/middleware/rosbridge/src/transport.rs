@@ -7,8 +7,8 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use sesame_lifecycle::launch::Place;
 use sesame_plan::{CampaignPlan, Channel, Clock, Dialect, Ros, Rosbridge};
-use sesame_relay::lifecycle::launch::Place;
 use sesame_relay::transport::bus::echo::Echoes;
 use sesame_relay::transport::bus::secret::{Token, identity, trusted};
 use sesame_relay::transport::bus::{Bus, Event, FOUND_AGAIN_WITHIN, Settings, on_bus, tls};

@@ -21,8 +21,8 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use sesame_base::time::SimTime;
+use sesame_lifecycle::launch::{Launched, Place};
 use sesame_plan::{CampaignPlan, Simlog};
-use sesame_relay::lifecycle::launch::{Launched, Place};
 use sesame_relay::relay::{Delivery, Exchange};
 use sesame_relay::simulator::Progress;
 use sesame_relay::transport::bus::secret::trusted;
@@ -129,7 +129,7 @@ impl System {
             return Err(TransportError::Wiring(problem));
         }
         self.session = None;
-        self.launch(seed)?;
+        self.launched.start_first(seed, "once it is connected")?;
         let mut client = Client::connect(&self.options()?).map_err(fault)?;
         client.set_step(milliseconds(self.settings.step_ns)).map_err(fault)?;
         let lines = Lines::open(&self.plan, &self.settings, relay.wires(), &mut client).map_err(fault)?;
@@ -150,26 +150,6 @@ impl System {
             }
         }
         session.relay(&self.plan, SimTime::ZERO, heard, relay, &mut self.deliveries)
-    }
-
-    fn launch(&mut self, seed: u64) -> Result<(), TransportError> {
-        self.launched.start(seed)?;
-        let mut asked = false;
-        self.launched.await_ready(&mut |_| {
-            asked = true;
-            true
-        })?;
-        if asked {
-            self.launched.end();
-            return Err(TransportError::LaunchFailed {
-                what: "a program".to_owned(),
-                problem: "is awaited by a topic or the clock, which a simulator of this kind has only once it is \
-                          connected; await a port or a line instead"
-                    .to_owned(),
-                last_lines: String::new(),
-            });
-        }
-        Ok(())
     }
 
     /// Takes one step, unless it would lead beyond `until`.

@@ -331,9 +331,6 @@ mod tests {
             (run.outcome, run.end)
         };
         let text = str::to_owned;
-        let launch = TransportError::LaunchFailed { what: text("`x`"), problem: text("hangs"), last_lines: text("a") };
-        let message = text("the launch failed: `x` hangs; the last lines that it wrote:\na");
-        assert_eq!(ended(launch), (Outcome::LaunchFailed { message }, 3.0));
         let lost = TransportError::ConnectionLost { to: text("the bridge"), how: text("it closed") };
         let message = text("the connection to the bridge was lost: it closed");
         assert_eq!(ended(lost), (Outcome::Disconnect { message }, 3.0));
@@ -342,8 +339,16 @@ mod tests {
         assert_eq!(ended(back), (Outcome::WrongClock { message }, 3.0));
         let silent = TransportError::Silent { awaited: text("the clock"), limit: 20.0 };
         assert_eq!(ended(silent), (Outcome::Timeout { limit: 20.0 }, 3.0));
-        let gone = TransportError::Ended { what: text("`x`"), how: text("ended"), last_lines: String::new() };
-        assert_eq!(ended(gone), (Outcome::Crash { message: text("`x` ended") }, 3.0));
+        #[cfg(feature = "process")]
+        {
+            use sesame_lifecycle::launch::LaunchError::{Ended, Failed};
+            let (what, last_lines) = (text("`x`"), text("a"));
+            let failed = Failed { what: what.clone(), problem: text("hangs"), last_lines };
+            let message = text("the launch failed: `x` hangs; the last lines that it wrote:\na");
+            assert_eq!(ended(failed.into()), (Outcome::LaunchFailed { message }, 3.0));
+            let gone = Ended { what, how: text("ended"), last_lines: String::new() };
+            assert_eq!(ended(gone.into()), (Outcome::Crash { message: text("`x` ended") }, 3.0));
+        }
     }
 
     #[test]

@@ -1,9 +1,9 @@
 //! One run of one test.
 //!
 //! Messages and simulation time go in, messages and an [`Observation`](sesame_base::observation::Observation) come out.
-//! The core is sans-IO: the [`relay`], the fuzzing operations ([`fuzz`]), the metrics ([`metric`], [`stl`]).
-//! `clippy.toml` enforces it. The adapters around it expect the lint: [`transport`]s reach simulators, [`lifecycle`]
-//! starts and ends programs, [`trace`]s are written to files, and [`evaluate`] puts one run together.
+//! The core is sans-IO: the [`relay`], the fuzzing operations ([`fuzz`]), the metrics
+//! ([`metric`]). `clippy.toml` enforces it. The adapters around it expect the lint: [`transport`]s reach simulators,
+//! [`trace`]s are written to files, and [`evaluate`] puts one run together.
 
 // These macros panic where nothing can be written: on a full disk, or after the reader has gone.
 #![warn(clippy::print_stdout, clippy::print_stderr)]
@@ -13,15 +13,12 @@ pub mod files;
 pub mod fuzz;
 #[cfg(any(feature = "process", feature = "mcap", feature = "serve"))]
 pub mod json;
-#[cfg(feature = "programs")]
-pub mod lifecycle;
 pub mod message;
 pub mod metric;
 pub mod monitor;
 pub mod panic_capture;
 pub mod relay;
 pub mod simulator;
-pub mod stl;
 #[cfg(feature = "mcap")]
 pub mod trace;
 pub mod transport;

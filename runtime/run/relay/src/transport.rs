@@ -22,6 +22,9 @@ use serde::{Deserialize, Serialize};
 use sesame_base::time::SimTime;
 use sesame_plan::CampaignPlan;
 
+#[cfg(feature = "process")]
+use sesame_lifecycle::launch::LaunchError;
+
 use crate::relay::Exchange;
 use crate::simulator::Progress;
 use crate::transport::added::AddedOnWire;
@@ -143,26 +146,10 @@ pub enum TransportError {
         /// The last lines of its standard error.
         last_lines: String,
     },
-    /// A program that the plan launches could not be started, or was not ready in time.
-    #[error("the launch failed: {what} {problem}{}", words(last_lines))]
-    LaunchFailed {
-        /// The program, and whose it is.
-        what: String,
-        /// The problem, as a phrase.
-        problem: String,
-        /// The last lines that it wrote.
-        last_lines: String,
-    },
-    /// A program that the plan launches ended in the middle of a run.
-    #[error("{what} {how}{}", words(last_lines))]
-    Ended {
-        /// The program, and whose it is.
-        what: String,
-        /// How it ended, as a phrase.
-        how: String,
-        /// The last lines that it wrote.
-        last_lines: String,
-    },
+    /// A program that the plan launches did not start, or did not stay.
+    #[cfg(feature = "process")]
+    #[error(transparent)]
+    Launch(#[from] LaunchError),
     /// The connection to the simulator was lost, although nothing says that the simulator has ended.
     #[error("the connection to {to} was lost: {how}")]
     ConnectionLost {
@@ -234,7 +221,10 @@ impl TransportError {
     /// Whose fault it is.
     pub fn fault(&self) -> Fault {
         match self {
-            TransportError::LaunchFailed { .. } => Fault::LaunchFailed,
+            #[cfg(feature = "process")]
+            TransportError::Launch(LaunchError::Failed { .. }) => Fault::LaunchFailed,
+            #[cfg(feature = "process")]
+            TransportError::Launch(LaunchError::Ended { .. }) => Fault::Crash,
             TransportError::ConnectionLost { .. } => Fault::Disconnect,
             TransportError::ClockBack { .. } | TransportError::ClockLeap { .. } => Fault::WrongClock,
             TransportError::Silent { limit, .. } => Fault::Timeout { limit: *limit },
@@ -244,15 +234,10 @@ impl TransportError {
             | TransportError::WrongType { .. }
             | TransportError::NotStarted { .. }
             | TransportError::Disconnected { .. }
-            | TransportError::Ended { .. }
             | TransportError::Wiring(_)
             | TransportError::Protocol { .. } => Fault::Crash,
         }
     }
-}
-
-fn words(last_lines: &str) -> String {
-    if last_lines.is_empty() { String::new() } else { format!("; the last lines that it wrote:\n{last_lines}") }
 }
 
 fn quoted(last_lines: &str) -> String {

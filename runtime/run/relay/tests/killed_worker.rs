@@ -14,10 +14,10 @@ mod linux {
     use std::time::Duration;
     use std::{env, fs, thread};
 
+    use sesame_lifecycle::launch::{Launched, Place};
     use sesame_patience as patience;
     use sesame_plan::testing::{minimal, node};
     use sesame_plan::{CampaignPlan, Launch, Ready, ReadyWhen};
-    use sesame_relay::lifecycle::launch::{Launched, Place};
     use sesame_relay::transport::{become_simulator, end_simulators, keep_simulator};
 
     /// Starts a process in a session of its own, writes both numbers, and waits without listening to anybody.

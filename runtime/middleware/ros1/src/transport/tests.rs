@@ -1,11 +1,11 @@
 //! Systems that the runner launches: a master on a port of its own, and nodes at it.
 
 use sesame_base::time::SimTime;
+use sesame_lifecycle::launch::Part;
 use sesame_plan::testing::{minimal, node, test_of, topic};
 use sesame_plan::{
     Command, Interface, InterfaceField, Launch, Node, NodeId, Ready, ReadyWhen, Ros1, TopicId, Type, WireType, Wiring,
 };
-use sesame_relay::lifecycle::launch::Part;
 use sesame_relay::metric::MetricTable;
 use sesame_relay::relay::{Exchange as _, Relay};
 use sesame_relay::wire::WireTable;

@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
+use sesame_lifecycle::launch::{LaunchError, Launched, Probe};
 use sesame_plan::CampaignPlan;
-use sesame_relay::lifecycle::launch::{Launched, Probe};
 use sesame_relay::transport::TransportError;
 
 use super::service::Client;
@@ -144,11 +144,11 @@ impl Session {
                         if missing.is_empty() { "its nodes keep changing".to_owned() } else { missing.join("; ") };
                     let wrong = self.named(|session, name| session.wrong_types(false, name))?;
                     let why: Vec<String> = std::iter::once(missing).chain(wrong).chain(self.notes.drain(..)).collect();
-                    return Err(TransportError::LaunchFailed {
+                    return Err(TransportError::from(LaunchError::Failed {
                         what: "the system".to_owned(),
                         problem: format!("is not complete after {} s: {}", within.as_secs(), why.join("; ")),
                         last_lines: String::new(),
-                    });
+                    }));
                 }
             }
             for incoming in self.wait(Some(LOOK))? {

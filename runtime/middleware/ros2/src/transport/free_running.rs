@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use sesame_base::time::SimTime;
-use sesame_relay::lifecycle::launch::Launched;
+use sesame_lifecycle::launch::Launched;
 use sesame_relay::relay::Exchange;
 use sesame_relay::simulator::Progress;
 use sesame_relay::transport::TransportError;

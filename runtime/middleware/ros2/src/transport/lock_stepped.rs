@@ -7,8 +7,8 @@
 use std::time::Instant;
 
 use sesame_base::time::SimTime;
+use sesame_lifecycle::launch::Launched;
 use sesame_plan::NodeId;
-use sesame_relay::lifecycle::launch::Launched;
 use sesame_relay::relay::Exchange;
 use sesame_relay::simulator::Progress;
 use sesame_relay::transport::TransportError;

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
 use rustdds::GUID;
+use sesame_lifecycle::launch::LaunchError;
 use sesame_plan::{CampaignPlan, NodeId, TopicId};
 use sesame_relay::transport::TransportError;
 
@@ -118,10 +119,12 @@ impl Session {
             return Some(TransportError::Wiring(not_cut));
         }
         let wrong = self.wrong_types(true, name);
-        (!wrong.is_empty()).then(|| TransportError::LaunchFailed {
-            what: "the system".to_owned(),
-            problem: format!("cannot become complete: {}", wrong.join("; ")),
-            last_lines: String::new(),
+        (!wrong.is_empty()).then(|| {
+            TransportError::from(LaunchError::Failed {
+                what: "the system".to_owned(),
+                problem: format!("cannot become complete: {}", wrong.join("; ")),
+                last_lines: String::new(),
+            })
         })
     }
 

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use sesame_base::time::SimTime;
+use sesame_lifecycle::launch::LaunchError;
 use sesame_plan::testing::{self, minimal, node, topic};
 use sesame_plan::{Command, Launch, Ready, ReadyWhen, TopicId, Type, WireNames};
 use sesame_relay::metric::MetricTable;
@@ -77,7 +78,10 @@ mod real {
     fn a_program_that_ends_is_named() {
         let Some(plan) = launching(&["--die-at", "5"]) else { return };
         let ended = run(&mut system(&plan), &plan, 50).unwrap_err();
-        assert!(matches!(&ended, TransportError::Ended { what, .. } if what.contains("simulator2.py")), "{ended}");
+        assert!(
+            matches!(&ended, TransportError::Launch(LaunchError::Ended { what, .. }) if what.contains("simulator2.py")),
+            "{ended}"
+        );
     }
 }
 

@@ -16,9 +16,9 @@ use crate::metric::aggregate::FormulaState;
 use crate::metric::robustness::RobustnessState;
 use crate::metric::{Context, Hook, HookEntry};
 use crate::relay::{beyond, reaching};
-use crate::stl::FormulaError;
 use crate::value::{Text, Value};
 use crate::wire::{Wire, WireTable};
+use sesame_stl::FormulaError;
 
 /// The metrics of a plan with their wiring; shared by all runs.
 pub struct MetricTable<'p> {

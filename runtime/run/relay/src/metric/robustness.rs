@@ -14,8 +14,8 @@ use crate::metric::aggregate::pairs_of;
 use crate::metric::attendance::Attendance;
 use crate::metric::expression::{Held, Moment, least, number};
 use crate::metric::held::{HeldInputs, hear};
-use crate::stl::{FormulaError, Monitor, Signal};
 use crate::value::Value;
+use sesame_stl::{FormulaError, Monitor, Signal};
 
 /// A robustness in one run.
 pub(super) struct RobustnessState<'p> {

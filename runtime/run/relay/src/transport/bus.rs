@@ -24,10 +24,10 @@ use std::time::{Duration, Instant};
 
 use sesame_plan::CampaignPlan;
 
-use crate::lifecycle::launch::Place;
 use crate::transport::{Transport, TransportError};
 use crate::value::Value;
 use crate::wire::Line;
+use sesame_lifecycle::launch::Place;
 
 use self::system::System;
 

@@ -30,11 +30,10 @@ use sesame_plan::CampaignPlan;
 
 use self::free_running::FreeRunning;
 use self::lock_stepped::LockStepped;
-#[cfg(target_os = "linux")]
-use crate::lifecycle::Kept;
-use crate::lifecycle::launch::{Launched, Place};
-use crate::lifecycle::{self, Program};
 use crate::transport::{Connect, Transport};
+#[cfg(target_os = "linux")]
+use sesame_lifecycle::launch::{Launched, Place};
+use sesame_lifecycle::{Kept, Program};
 
 pub use self::beside::{Beside, BesideError, beside};
 
@@ -43,8 +42,8 @@ pub use self::beside::{Beside, BesideError, beside};
 ///
 /// Before that, it runs the commands with which spaces end what they launch.
 pub fn end_simulators() {
-    lifecycle::launch::terminate_all();
-    lifecycle::end_programs();
+    sesame_lifecycle::launch::terminate_all();
+    sesame_lifecycle::end_programs();
 }
 
 /// Starts a simulator, or a program in the background that a plan launches, waits until it has ended, and ends
@@ -57,14 +56,14 @@ pub fn keep_simulator(
     arguments: &[OsString],
     background: bool,
 ) -> ExitCode {
-    lifecycle::keep(worker, report, &Kept { program, arguments, background }, refused(background))
+    sesame_lifecycle::keep(worker, report, &Kept { program, arguments, background }, refused(background))
 }
 
 /// Replaces this process by a simulator, or a program in the background, that ends when its keeper does, even if the
 /// keeper is killed while it hangs. Only returns if that fails.
 #[cfg(target_os = "linux")]
 pub fn become_simulator(keeper: u32, program: &OsStr, arguments: &[OsString], background: bool) -> ExitCode {
-    lifecycle::become_program(keeper, program, arguments, refused(background))
+    sesame_lifecycle::become_program(keeper, program, arguments, refused(background))
 }
 
 /// How the worker is told that a program cannot be started.

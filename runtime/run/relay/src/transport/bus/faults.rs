@@ -20,11 +20,11 @@ use sesame_plan::{
 
 use super::{Bus, Event, Settings, on_bus};
 use crate::evaluate::{Custom, evaluate};
-use crate::lifecycle::launch::Place;
 use crate::metric::MetricTable;
 use crate::transport::TransportError;
 use crate::value::Value;
 use crate::wire::{Line, WireTable};
+use sesame_lifecycle::launch::Place;
 
 /// The system ticks each twentieth of a second for five seconds, and says how far it is from a wall and how fast it is.
 const TICK: i64 = 50_000_000;

@@ -7,7 +7,6 @@ use std::time::{Duration, Instant};
 use sesame_base::time::SimTime;
 use sesame_plan::{CampaignPlan, Channel, TopicId, is_shared};
 
-use crate::lifecycle::launch::{Launched, Place, Probe};
 use crate::relay::{Delivery, Exchange};
 use crate::simulator::Progress;
 use crate::transport::added::{Added, AddedOnWire, FEWEST, objections};
@@ -15,6 +14,7 @@ use crate::transport::bus::{Bus, Event, Settings};
 use crate::transport::clock::Ticks;
 use crate::transport::{Capabilities, Incidents, Transport, TransportError, wall_time_since};
 use crate::wire::{Line, Wire, WireTable, lines, service_lines};
+use sesame_lifecycle::launch::{LaunchError, Launched, Place, Probe};
 
 /// How long a system may take until it is complete, where nothing else is declared.
 const COMPLETE_WITHIN: Duration = Duration::from_secs(30);
@@ -211,11 +211,11 @@ impl System {
                 return Ok(());
             }
             if Instant::now() >= limit && !missing.is_empty() {
-                return Err(TransportError::LaunchFailed {
+                return Err(TransportError::from(LaunchError::Failed {
                     what: "the system".to_owned(),
                     problem: format!("is not complete after {} s: {}", COMPLETE_WITHIN.as_secs(), missing.join("; ")),
                     last_lines: String::new(),
-                });
+                }));
             }
             if !self.connected {
                 std::thread::sleep(Duration::from_millis(20));
@@ -441,7 +441,7 @@ impl System {
         }
         // The connection may have been lost because a program has ended: then that is what happened.
         let error = match (&error, self.launched.check()) {
-            (TransportError::ConnectionLost { .. } | TransportError::Silent { .. }, Err(ended)) => ended,
+            (TransportError::ConnectionLost { .. } | TransportError::Silent { .. }, Err(ended)) => ended.into(),
             _ => error,
         };
         self.incidents.killed |= self.launched.was_killed();

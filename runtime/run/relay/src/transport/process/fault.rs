@@ -1,8 +1,8 @@
 //! What is said of a simulator that cannot be started, or has a fault.
 
-use crate::lifecycle::{PostMortem, Program, Running, StartError};
 use crate::transport::process::session::Fault;
 use crate::transport::{Incidents, TransportError};
+use sesame_lifecycle::{PostMortem, Program, Running, StartError};
 
 impl From<StartError> for TransportError {
     fn from(StartError { command, folder, reason }: StartError) -> Self {

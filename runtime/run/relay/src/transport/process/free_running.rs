@@ -18,18 +18,18 @@ use std::time::{Duration, Instant};
 use sesame_base::time::SimTime;
 use sesame_plan::CampaignPlan;
 
-use crate::lifecycle::launch::Launched;
-use crate::lifecycle::{Alarm, Input, Program, Running};
 use crate::relay::Exchange;
 use crate::simulator::Progress;
 use crate::transport::added::{Added, AddedOnWire, join, objections};
 use crate::transport::clock::Ticks;
 use crate::transport::process::fault::{explain, note_restart};
-use crate::transport::process::launched::{health, launch};
+use crate::transport::process::launched::health;
 use crate::transport::process::protocol::{LINE_LIMIT, Line, Read, SimulatorMessage, read_line, request};
 use crate::transport::process::session::{Fault, Topics};
 use crate::transport::{Capabilities, Incidents, Transport, TransportError, wall_time_since};
 use crate::wire::WireTable;
+use sesame_lifecycle::launch::Launched;
+use sesame_lifecycle::{Alarm, Input, Program, Running};
 
 /// How many lines are read ahead. The simulator's output is read while a line to it is written, so a simulator that
 /// writes before it reads does not block the runner.
@@ -135,7 +135,7 @@ impl FreeRunning {
         let (connection, was_used) = match &mut self.connection {
             Some(connection) => (connection, true),
             empty => {
-                launch(&mut self.launched, seed)?;
+                self.launched.start_first(seed, "after its reset").map_err(TransportError::from)?;
                 (empty.insert(Connection::start(&self.program, self.launched.alarm())?), false)
             }
         };

@@ -14,14 +14,14 @@ use std::time::{Duration, Instant};
 use sesame_base::time::SimTime;
 use sesame_plan::CampaignPlan;
 
-use crate::lifecycle::launch::Launched;
-use crate::lifecycle::{Alarm, Input, Program, Running};
 use crate::relay::Exchange;
 use crate::simulator::Progress;
 use crate::transport::process::fault::{explain, note_restart};
-use crate::transport::process::launched::{health, launch};
+use crate::transport::process::launched::health;
 use crate::transport::process::session::{Fault, Session};
 use crate::transport::{Capabilities, Incidents, Transport, TransportError};
+use sesame_lifecycle::launch::Launched;
+use sesame_lifecycle::{Alarm, Input, Program, Running};
 
 /// How long the end of a run waits for a surplus answer: two steps, within these limits.
 const SHORTEST_WAIT: Duration = Duration::from_millis(1);
@@ -91,7 +91,7 @@ impl LockStepped {
         let connection = match &mut self.connection {
             Some(connection) => connection,
             empty => {
-                launch(&mut self.launched, seed)?;
+                self.launched.start_first(seed, "after its reset").map_err(TransportError::from)?;
                 let (running, input, output) = self.program.start().map_err(TransportError::from)?;
                 let output = Attended { pipe: output, alarm: self.launched.alarm() };
                 let session = Session::new(BufReader::with_capacity(1 << 16, output), input);

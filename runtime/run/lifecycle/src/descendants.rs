@@ -52,8 +52,8 @@ pub fn adopted(is_own: impl Fn(u32) -> bool) -> Vec<Process> {
 }
 
 /// The living processes below a process.
-#[cfg(all(feature = "process", target_os = "linux"))]
-pub(crate) fn below(id: u32) -> Vec<Process> {
+#[cfg(target_os = "linux")]
+pub fn below(id: u32) -> Vec<Process> {
     linux::below(&linux::all(), vec![id])
 }
 

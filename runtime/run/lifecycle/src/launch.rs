@@ -18,19 +18,48 @@ use std::thread;
 use std::time::Duration;
 
 use sesame_plan::{CampaignPlan, Command, Launch, NodeId, ReadyWhen, TopicId};
+use thiserror::Error;
 
 use self::part::{Problem, Started};
 use self::placeholders::{Own, asks_for_port};
 use self::port::Port;
 use self::terminate::Terminate;
-use crate::lifecycle::limits::BACKGROUND_END_LIMIT;
-use crate::lifecycle::program::{Alarm, Program};
-use crate::transport::TransportError;
+use crate::limits::BACKGROUND_END_LIMIT;
+use crate::program::{Alarm, Program};
 
-pub(crate) use self::terminate::terminate_all;
+pub use self::terminate::terminate_all;
 
 /// How often it is looked whether a program is ready.
 const PAUSE: Duration = Duration::from_millis(10);
+
+/// A program that did not start, or did not stay.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum LaunchError {
+    /// One could not be started, or was not ready in time.
+    #[error("the launch failed: {what} {problem}{}", quoted(last_lines))]
+    Failed {
+        /// The program, and whose it is.
+        what: String,
+        /// The problem, as a phrase.
+        problem: String,
+        /// The last lines that it wrote.
+        last_lines: String,
+    },
+    /// One ended in the middle of a run.
+    #[error("{what} {how}{}", quoted(last_lines))]
+    Ended {
+        /// The program, and whose it is.
+        what: String,
+        /// How it ended, as a phrase.
+        how: String,
+        /// The last lines that it wrote.
+        last_lines: String,
+    },
+}
+
+fn quoted(last_lines: &str) -> String {
+    if last_lines.is_empty() { String::new() } else { format!("; the last lines that it wrote:\n{last_lines}") }
+}
 
 /// What is launched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -174,7 +203,7 @@ impl Launched {
 
     /// Ends what is running, and starts the programs for a run with this seed: what starts the system as a whole, or,
     /// if there is no such program, all nodes. [`poll_ready`](Self::poll_ready) starts the others.
-    pub fn start(&mut self, seed: u64) -> Result<(), TransportError> {
+    pub fn start(&mut self, seed: u64) -> Result<(), LaunchError> {
         self.end();
         if self.parts.is_empty() {
             self.ready = true;
@@ -190,10 +219,33 @@ impl Launched {
         self.begin()
     }
 
+    /// Starts them and waits until all are ready, for a simulator that has neither topics nor a clock before `until_then`,
+    /// a phrase: a program that awaits either would never be ready, so that is an error.
+    pub fn start_first(&mut self, seed: u64, until_then: &str) -> Result<(), LaunchError> {
+        self.start(seed)?;
+        let mut asked = false;
+        self.await_ready(&mut |_| {
+            asked = true;
+            true
+        })?;
+        if asked {
+            self.end();
+            return Err(LaunchError::Failed {
+                what: "a program".to_owned(),
+                problem: format!(
+                    "is awaited by a topic or the clock, which a simulator of this kind has only {until_then}; await a \
+                     port or a line instead"
+                ),
+                last_lines: String::new(),
+            });
+        }
+        Ok(())
+    }
+
     /// Reserves the port that `{port}` stands for, if programs ask for it and there is none yet.
-    pub fn reserve_port(&mut self) -> Result<(), TransportError> {
+    pub fn reserve_port(&mut self) -> Result<(), LaunchError> {
         if self.port.is_none() && self.asks_for_port() {
-            let reserved = Port::reserve(self.place.worker).map_err(|error| TransportError::LaunchFailed {
+            let reserved = Port::reserve(self.place.worker).map_err(|error| LaunchError::Failed {
                 what: "`{port}`".to_owned(),
                 problem: format!("cannot be replaced: {error}"),
                 last_lines: String::new(),
@@ -205,7 +257,7 @@ impl Launched {
 
     /// Whether all programs are ready; to be asked until they are. Starts programs whose turn has come. `asked` is
     /// called for what only the transport knows. After an error, everything is ended.
-    pub fn poll_ready(&mut self, asked: &mut dyn FnMut(Probe) -> bool) -> Result<bool, TransportError> {
+    pub fn poll_ready(&mut self, asked: &mut dyn FnMut(Probe) -> bool) -> Result<bool, LaunchError> {
         let mut ready = true;
         for at in 0..self.begun {
             let port = self.awaited_port(at)?;
@@ -223,7 +275,7 @@ impl Launched {
     }
 
     /// Waits until all programs are ready.
-    pub fn await_ready(&mut self, asked: &mut dyn FnMut(Probe) -> bool) -> Result<(), TransportError> {
+    pub fn await_ready(&mut self, asked: &mut dyn FnMut(Probe) -> bool) -> Result<(), LaunchError> {
         while !self.poll_ready(asked)? {
             thread::sleep(PAUSE);
         }
@@ -232,7 +284,7 @@ impl Launched {
 
     /// That no program has ended, apart from those that [`kill`](Self::kill) ended. After an error, everything is
     /// ended.
-    pub fn check(&mut self) -> Result<(), TransportError> {
+    pub fn check(&mut self) -> Result<(), LaunchError> {
         for at in 0..self.begun {
             if let Err(problem) = self.parts[at].1.check() {
                 return Err(self.failed(at, problem));
@@ -243,7 +295,7 @@ impl Launched {
 
     /// Set as soon as a program of the current start has ended, until the next start: then [`check`](Self::check) says
     /// which. For a transport that waits elsewhere; `None` if the plan launches nothing.
-    pub(crate) fn alarm(&self) -> Option<Alarm> {
+    pub fn alarm(&self) -> Option<Alarm> {
         (!self.is_empty()).then(|| Alarm::clone(&self.alarm))
     }
 
@@ -289,7 +341,7 @@ impl Launched {
 
     /// Kills a node if it runs, and starts it again. [`poll_ready`](Self::poll_ready) says when it is ready. False if
     /// the plan does not launch it.
-    pub fn restart(&mut self, node: NodeId) -> Result<bool, TransportError> {
+    pub fn restart(&mut self, node: NodeId) -> Result<bool, LaunchError> {
         let Some(at) = self.parts[..self.begun].iter().position(|(part, _)| *part == Part::Node(node)) else {
             return Ok(false);
         };
@@ -320,7 +372,7 @@ impl Launched {
     }
 
     /// Starts the programs whose turn it is: what starts the system, or all nodes.
-    fn begin(&mut self) -> Result<(), TransportError> {
+    fn begin(&mut self) -> Result<(), LaunchError> {
         let system = self.begun == 0 && self.parts.first().is_some_and(|(part, _)| *part == Part::System);
         let until = if system { 1 } else { self.parts.len() };
         for at in self.begun..until {
@@ -330,7 +382,7 @@ impl Launched {
         Ok(())
     }
 
-    fn launch(&mut self, at: usize) -> Result<(), TransportError> {
+    fn launch(&mut self, at: usize) -> Result<(), LaunchError> {
         let (part, started) = &self.parts[at];
         let program = self.program(&started.launch.command, *part);
         let alarm = Alarm::clone(&self.alarm);
@@ -338,16 +390,16 @@ impl Launched {
     }
 
     /// The error for a problem of a program; everything is ended.
-    fn failed(&mut self, at: usize, problem: Problem) -> TransportError {
+    fn failed(&mut self, at: usize, problem: Problem) -> LaunchError {
         let Problem { what: problem, last_lines, not_started, killed } = problem;
         let what = self.parts[at].1.shown.clone();
         let were_ready = self.ready;
         self.killed |= killed;
         self.end();
         if were_ready && !not_started {
-            TransportError::Ended { what, how: problem, last_lines }
+            LaunchError::Ended { what, how: problem, last_lines }
         } else {
-            TransportError::LaunchFailed { what, problem, last_lines }
+            LaunchError::Failed { what, problem, last_lines }
         }
     }
 
@@ -393,7 +445,7 @@ impl Launched {
     }
 
     /// The port on which a program is awaited, if one is.
-    fn awaited_port(&mut self, at: usize) -> Result<Option<u16>, TransportError> {
+    fn awaited_port(&mut self, at: usize) -> Result<Option<u16>, LaunchError> {
         let started = &self.parts[at].1;
         let Some(ReadyWhen::Port { port }) = started.launch.ready.as_ref().map(|ready| &ready.when) else {
             return Ok(None);

@@ -3,7 +3,7 @@
 
 use std::collections::VecDeque;
 
-use crate::stl::piece::{Piece, Span, Window, put};
+use crate::piece::{Piece, Span, Window, put};
 
 /// The minimum of a signal over a window, at each time of a span. Constant time per piece, amortised: a piece enters
 /// and leaves the deque once.

@@ -26,8 +26,8 @@ use rustix::process::{
     wait, waitid,
 };
 
-use crate::lifecycle::descendants;
-use crate::lifecycle::limits::{BACKGROUND_END_LIMIT, END_LIMIT, NOT_FOUND, reason};
+use crate::descendants;
+use crate::limits::{BACKGROUND_END_LIMIT, END_LIMIT, NOT_FOUND, reason};
 
 /// How often a keeper checks that its worker is alive: the program itself may hold its input open.
 const CHECK: Timespec = Timespec { tv_sec: 0, tv_nsec: 250_000_000 };
@@ -36,14 +36,14 @@ const CHECK: Timespec = Timespec { tv_sec: 0, tv_nsec: 250_000_000 };
 const STOPPED: &str = "stopped";
 
 /// The pipe on which a keeper reports to its worker how the program ended.
-pub(super) struct Report {
+pub(crate) struct Report {
     reader: PipeReader,
     /// The keeper opens it by its name.
     writer: PipeWriter,
 }
 
 impl Report {
-    pub(super) fn new() -> io::Result<Self> {
+    pub(crate) fn new() -> io::Result<Self> {
         let (reader, writer) = io::pipe()?;
         Ok(Report { reader, writer })
     }
@@ -54,7 +54,7 @@ impl Report {
 
     /// The status of a program that exited by itself, as its keeper reported it; the keeper has ended. Without a
     /// report, because the keeper was killed or could not open the pipe, the keeper's own status is used.
-    pub(super) fn read(mut self, of_keeper: Option<ExitStatus>) -> Option<ExitStatus> {
+    pub(crate) fn read(mut self, of_keeper: Option<ExitStatus>) -> Option<ExitStatus> {
         drop(self.writer);
         // Another process may have opened the pipe and hold it open.
         if rustix::io::ioctl_fionread(&self.reader).is_ok_and(|waiting| waiting == 0) {
@@ -68,7 +68,7 @@ impl Report {
 }
 
 /// The command of a keeper, without the program and its arguments.
-pub(super) fn command(report: &Report, background: bool) -> Command {
+pub(crate) fn command(report: &Report, background: bool) -> Command {
     // This is the running executable even if its file was replaced.
     let mut command = Command::new("/proc/self/exe");
     if let Some(name) = std::env::args_os().next() {
@@ -84,13 +84,13 @@ pub(super) fn command(report: &Report, background: bool) -> Command {
 
 /// What a keeper starts.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Kept<'a> {
+pub struct Kept<'a> {
     /// The program.
-    pub(crate) program: &'a OsStr,
+    pub program: &'a OsStr,
     /// Its arguments.
-    pub(crate) arguments: &'a [OsString],
+    pub arguments: &'a [OsString],
     /// Whether it has no input of its own.
-    pub(crate) background: bool,
+    pub background: bool,
 }
 
 /// The state of a program.
@@ -103,7 +103,7 @@ enum Stage {
 
 /// Starts a program, waits until it has ended, and ends everything it leaves behind. If it cannot be started, `failed`
 /// is called with the reason, with the program's standard output and standard error.
-pub(crate) fn keep(worker: u32, report: &Path, kept: &Kept<'_>, failed: fn(&str)) -> ExitCode {
+pub fn keep(worker: u32, report: &Path, kept: &Kept<'_>, failed: fn(&str)) -> ExitCode {
     let &Kept { program, arguments, background } = kept;
     descendants::adopt_orphans();
     // Without it the keeper's own status is used.
@@ -198,7 +198,7 @@ fn reap_until_ended(child: Pid, (stage, changed): &(Mutex<Stage>, Condvar)) -> O
 
 /// Replaces this process by a program that ends when its keeper does, even if the keeper is killed while the program
 /// hangs. Only returns if that fails, after it has called `failed` with the reason.
-pub(crate) fn become_program(keeper: u32, program: &OsStr, arguments: &[OsString], failed: fn(&str)) -> ExitCode {
+pub fn become_program(keeper: u32, program: &OsStr, arguments: &[OsString], failed: fn(&str)) -> ExitCode {
     if let Err(error) = set_parent_process_death_signal(Some(Signal::KILL)) {
         failed(&format!("it cannot be made to end with its keeper: {error}"));
         return ExitCode::FAILURE;

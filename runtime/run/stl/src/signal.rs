@@ -5,14 +5,14 @@ use std::collections::VecDeque;
 use sesame_base::robustness::Quantifier;
 use sesame_base::time::SimTime;
 
-use crate::stl::piece::Piece;
+use crate::piece::Piece;
 
 /// Columns into which the time of a run is divided: of each one the least and the greatest value are kept.
 const COLUMNS: i64 = 200;
 
 /// Change points in rising order of time. The last one ends the signal and repeats the value before. All finite.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Signal(Vec<(SimTime, f64)>);
+pub struct Signal(Vec<(SimTime, f64)>);
 
 impl Signal {
     /// The signal of a trace that begins at `start`, from `from` nanoseconds later on, in a run that ends at `end`.
@@ -39,7 +39,7 @@ impl Signal {
     }
 
     /// The signal of several formulas, of which the least robustness counts; each comes with its robustness.
-    pub(crate) fn of_least(signals: Vec<(f64, Signal)>, quantifier: Option<Quantifier>) -> Signal {
+    pub fn of_least(signals: Vec<(f64, Signal)>, quantifier: Option<Quantifier>) -> Signal {
         if quantifier == Some(Quantifier::Always) {
             return signals.into_iter().map(|(_, signal)| signal).reduce(|a, b| a.least(&b)).unwrap_or_default();
         }
@@ -81,7 +81,7 @@ impl Signal {
 
     /// The points in seconds that make a difference to the eye, and all at which the signal crosses one of these
     /// values: so what is said of times at which it was beyond them is exact.
-    pub(crate) fn thinned(&self, crossed: &[f64]) -> Vec<(f64, f64)> {
+    pub fn thinned(&self, crossed: &[f64]) -> Vec<(f64, f64)> {
         let points = &self.0;
         let Some(&(end, _)) = points.last() else { return Vec::new() };
         let width = (end.nanos() / COLUMNS).max(1);

@@ -1,6 +1,6 @@
 //! Signals to a launched program and to everything that it started.
 
-use crate::lifecycle::program::Running;
+use crate::program::Running;
 
 #[cfg(target_os = "linux")]
 pub(super) use self::linux::{kill, pause, resume};
@@ -14,7 +14,7 @@ mod linux {
     use rustix::process::{Pid, Signal, kill_process};
 
     use super::Running;
-    use crate::lifecycle::descendants;
+    use crate::descendants;
 
     /// How often it is looked for processes that were started meanwhile.
     const ROUNDS: usize = 16;

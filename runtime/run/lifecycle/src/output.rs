@@ -22,7 +22,7 @@ const READ_LIMIT: Duration = Duration::from_secs(10);
 
 /// Reads what a program writes in threads and copies it to this process's own standard error, up to a limit for each
 /// test.
-pub(super) struct OutputTail {
+pub(crate) struct OutputTail {
     captured: Arc<Mutex<Captured>>,
     end: mpsc::Receiver<()>,
 }
@@ -55,19 +55,19 @@ enum Stream {
 
 /// Looks for a text in the lines that a program writes.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Watch {
+pub(crate) struct Watch {
     wanted: Option<Arc<str>>,
     seen: Arc<AtomicBool>,
 }
 
 impl Watch {
     /// One that looks for this text, if there is one.
-    pub(super) fn new(wanted: Option<&str>) -> Self {
+    pub(crate) fn new(wanted: Option<&str>) -> Self {
         Watch { wanted: wanted.map(Arc::from), seen: Arc::default() }
     }
 
     /// Whether a line contained it.
-    pub(super) fn seen(&self) -> bool {
+    pub(crate) fn seen(&self) -> bool {
         self.seen.load(Ordering::Relaxed)
     }
 
@@ -87,14 +87,14 @@ impl Watch {
 
 impl OutputTail {
     /// Of a stream whose writer the log calls so.
-    pub(super) fn capture(from: impl Read + Send + 'static, writer: &str) -> Self {
+    pub(crate) fn capture(from: impl Read + Send + 'static, writer: &str) -> Self {
         let (tail, sender) = OutputTail::of(writer);
         tail.read(Stream::Error, from, io::stderr(), Watch::default(), sender);
         tail
     }
 
     /// Of both streams of a program.
-    pub(super) fn capture_both(
+    pub(crate) fn capture_both(
         output: impl Read + Send + 'static,
         error: impl Read + Send + 'static,
         writer: &str,
@@ -141,18 +141,18 @@ impl OutputTail {
     }
 
     /// A new test begins: forgets everything written so far.
-    pub(super) fn clear(&self) {
+    pub(crate) fn clear(&self) {
         lock(&self.captured).clear();
     }
 
     /// The last lines of a program that has ended.
-    pub(super) fn last_lines(&self) -> String {
+    pub(crate) fn last_lines(&self) -> String {
         self.end.recv_timeout(READ_LIMIT).ok();
         self.last_lines_so_far()
     }
 
     /// The last lines of a program that is running.
-    pub(super) fn last_lines_so_far(&self) -> String {
+    pub(crate) fn last_lines_so_far(&self) -> String {
         let captured = lock(&self.captured);
         let text = |line: &Line| String::from_utf8_lossy(&line.text).trim_end_matches('\r').to_owned();
         let lines: Vec<String> = captured.lines.iter().filter(|line| !line.is_blank()).map(text).collect();

@@ -4,10 +4,10 @@ use std::time::{Duration, Instant};
 
 use sesame_plan::{Launch, ReadyWhen};
 
-use crate::lifecycle::launch::Probe;
-use crate::lifecycle::launch::signals;
-use crate::lifecycle::output::Watch;
-use crate::lifecycle::program::{Alarm, PostMortem, Program, Running};
+use crate::launch::Probe;
+use crate::launch::signals;
+use crate::output::Watch;
+use crate::program::{Alarm, PostMortem, Program, Running};
 
 /// A program that is launched, and how far it is.
 pub(super) struct Started {

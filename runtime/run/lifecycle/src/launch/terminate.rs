@@ -7,8 +7,8 @@ use std::io::Write as _;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::time::Duration;
 
-use crate::lifecycle::output::Watch;
-use crate::lifecycle::program::{Alarm, Program};
+use crate::output::Watch;
+use crate::program::{Alarm, Program};
 
 /// How long the command may take; then it is ended, and so is what it should have ended.
 pub(super) const LIMIT: Duration = Duration::from_secs(10);
@@ -56,7 +56,7 @@ impl Terminate {
 }
 
 /// Runs those of all systems of this process, because it ends.
-pub(crate) fn terminate_all() {
+pub fn terminate_all() {
     let pending: Vec<Arc<Terminate>> =
         PENDING.lock().unwrap_or_else(PoisonError::into_inner).iter().filter_map(Weak::upgrade).collect();
     for note in pending.iter().filter_map(|terminate| terminate.run()) {

@@ -6,7 +6,7 @@
 
 use std::collections::VecDeque;
 
-use crate::stl::piece::{Piece, Span, put};
+use crate::piece::{Piece, Span, put};
 
 /// What is known of a stretch of time.
 #[derive(Debug, Clone, Copy, PartialEq)]

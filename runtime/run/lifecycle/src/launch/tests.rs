@@ -96,7 +96,7 @@ impl System {
         fs::write(self.folder.path().join(file), "").unwrap();
     }
 
-    fn started(&mut self) -> Result<(), TransportError> {
+    fn started(&mut self) -> Result<(), LaunchError> {
         self.launched.start(5)?;
         self.launched.await_ready(&mut |_| false)
     }
@@ -202,7 +202,7 @@ fn a_failed_launch_says_which_program_what_was_awaited_for_how_long_and_its_last
         });
         let error = error.unwrap_err();
         assert!(!system.launched.is_started(), "it is ended");
-        assert_eq!(error.fault(), crate::transport::Fault::LaunchFailed);
+        assert!(matches!(error, LaunchError::Failed { .. }), "{error}");
         error.to_string().replace(&*system.folder.path().to_string_lossy(), "FOLDER")
     };
     let ready = |when| Some((when, 0.5));
@@ -219,7 +219,7 @@ fn a_failed_launch_says_which_program_what_was_awaited_for_how_long_and_its_last
 }
 
 #[test]
-fn a_launched_program_that_ends_later_is_named_with_its_last_lines_and_is_the_systems_fault() {
+fn a_launched_program_that_ends_later_is_named_with_its_last_lines() {
     if !python() {
         return;
     }
@@ -232,7 +232,7 @@ fn a_launched_program_that_ends_later_is_named_with_its_last_lines_and_is_the_sy
     system.launched.check().unwrap();
     system.let_go("end");
     let error = patience::until_some("the end of the program", || system.launched.check().err());
-    assert_eq!(error.fault(), crate::transport::Fault::Crash);
+    assert!(matches!(error, LaunchError::Ended { .. }), "{error}");
     let error = error.to_string();
     assert!(error.starts_with("the program `python3 -u -c "), "{error}");
     let ended = "` of node `n0` ended (exit status: 9); the last lines that it wrote:\nup\nout of memory";

@@ -15,10 +15,10 @@ use std::thread;
 use std::time::Duration;
 
 #[cfg(target_os = "linux")]
-use crate::lifecycle::keeper::Report;
-use crate::lifecycle::limits::{BACKGROUND_END_LIMIT, END_LIMIT, NOT_FOUND, reason};
-use crate::lifecycle::output::{OutputTail, Watch};
-use crate::lifecycle::process_group;
+use crate::keeper::Report;
+use crate::limits::{BACKGROUND_END_LIMIT, END_LIMIT, NOT_FOUND, reason};
+use crate::output::{OutputTail, Watch};
+use crate::process_group;
 
 /// How much longer a keeper may take to end everything that the program started, and then itself.
 #[cfg(target_os = "linux")]
@@ -28,27 +28,27 @@ const KEEPER_LIMIT: Duration = Duration::from_secs(7);
 static RUNNING: Mutex<Vec<Weak<Handle>>> = Mutex::new(Vec::new());
 
 /// Set when a program in the background ends that was not asked to.
-pub(crate) type Alarm = Arc<AtomicBool>;
+pub type Alarm = Arc<AtomicBool>;
 
 /// A program that can be started.
 #[derive(Debug, Clone)]
-pub(crate) struct Program {
+pub struct Program {
     /// A name on `PATH`, or a path relative to the folder.
-    pub(crate) name: String,
+    pub name: String,
     /// Its arguments.
-    pub(crate) arguments: Vec<String>,
+    pub arguments: Vec<String>,
     /// The folder it runs in.
-    pub(crate) folder: PathBuf,
+    pub folder: PathBuf,
     /// What is in its environment beside what it inherits.
-    pub(crate) environment: Vec<(String, String)>,
+    pub environment: Vec<(String, String)>,
     /// Whether this process is a runner, whose executable can be the keeper.
     #[cfg_attr(not(target_os = "linux"), expect(dead_code, reason = "only Linux has keepers"))]
-    pub(crate) in_runner: bool,
+    pub in_runner: bool,
 }
 
 impl Program {
     /// The program with its arguments, for messages.
-    pub(crate) fn shown(&self) -> String {
+    pub fn shown(&self) -> String {
         self.arguments.iter().fold(self.name.clone(), |mut shown, argument| {
             let plain = !argument.is_empty() && !argument.contains(|c: char| c.is_whitespace() || c.is_control());
             let written =
@@ -59,7 +59,7 @@ impl Program {
     }
 
     /// Starts it, to be spoken to on its standard input and heard on its standard output.
-    pub(crate) fn start(&self) -> Result<(Running, Input, ChildStdout), StartError> {
+    pub fn start(&self) -> Result<(Running, Input, ChildStdout), StartError> {
         let (mut child, keeper) = self.spawn(false)?;
         let input = child.stdin.take().expect("it is piped");
         let output = child.stdout.take().expect("it is piped");
@@ -70,7 +70,7 @@ impl Program {
 
     /// Starts it in the background: its standard input is empty, and all that it writes is logged. `watch` sees that
     /// too, and `alarm` is set if it ends unasked.
-    pub(super) fn start_in_background(&self, watch: &Watch, alarm: &Alarm) -> Result<Running, StartError> {
+    pub(crate) fn start_in_background(&self, watch: &Watch, alarm: &Alarm) -> Result<Running, StartError> {
         let (mut child, keeper) = self.spawn(true)?;
         let output = OutputTail::capture_both(
             child.stdout.take().expect("it is piped"),
@@ -125,7 +125,7 @@ impl Program {
             return Ok((plain(self), None));
         }
         // If the keeper is killed, this process becomes the parent of its children.
-        crate::lifecycle::descendants::adopt_orphans();
+        crate::descendants::adopt_orphans();
         let report = Report::new()?;
         let mut command = super::keeper::command(&report, background);
         command.arg(self.path()).args(&self.arguments);
@@ -150,18 +150,18 @@ fn plain(program: &Program) -> Command {
 
 /// Why a program cannot be started.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct StartError {
+pub struct StartError {
     /// The program with its arguments.
-    pub(crate) command: String,
+    pub command: String,
     /// The folder it was to run in.
-    pub(crate) folder: PathBuf,
+    pub folder: PathBuf,
     /// The reason, in words for the user.
-    pub(crate) reason: String,
+    pub reason: String,
 }
 
 /// Ends all programs that this process started, with everything they started. It does the same as closing each of them,
 /// but may be called from any thread, even while another one communicates with them.
-pub(crate) fn end_programs() {
+pub fn end_programs() {
     let running: Vec<Arc<Handle>> = lock(&RUNNING).iter().filter_map(Weak::upgrade).collect();
     // All are asked first, so that the programs exit at the same time.
     let closed: Vec<bool> = running.iter().map(|handle| handle.ask_to_end()).collect();
@@ -174,7 +174,7 @@ pub(crate) fn end_programs() {
 }
 
 /// A program's standard input. Dropping it closes the input.
-pub(crate) struct Input(Arc<Handle>);
+pub struct Input(Arc<Handle>);
 
 impl Write for Input {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
@@ -196,22 +196,22 @@ impl Drop for Input {
 }
 
 /// How a program ended.
-pub(crate) struct PostMortem {
+pub struct PostMortem {
     /// The way it ended, as a phrase.
-    pub(crate) how: String,
+    pub how: String,
     /// The last lines of its standard error; of a program in the background, of all that it wrote.
-    pub(crate) last_lines: String,
+    pub last_lines: String,
     /// Whether it cannot have been started: the exit status says so by the convention of shells.
-    pub(crate) not_found: bool,
+    pub not_found: bool,
     /// Whether it exited with status 0.
-    pub(crate) success: bool,
+    pub success: bool,
     /// Whether it was killed by another process or the system.
-    pub(crate) killed: bool,
+    pub killed: bool,
 }
 
 /// A program that was started. Dropping it ends the program and everything it started. Close its input first; otherwise
 /// the program has no time to exit by itself.
-pub(crate) struct Running {
+pub struct Running {
     handle: Arc<Handle>,
     output: OutputTail,
     #[cfg_attr(not(target_os = "linux"), expect(dead_code, reason = "only Linux has keepers"))]
@@ -220,7 +220,7 @@ pub(crate) struct Running {
 
 impl Running {
     /// How a program ended that has closed its output. Its input must be closed.
-    pub(crate) fn post_mortem(mut self) -> PostMortem {
+    pub fn post_mortem(mut self) -> PostMortem {
         let in_time = self.handle.wait();
         let status = self.handle.end();
         let status = self.ended_by_itself(status.filter(|_| in_time));
@@ -238,38 +238,38 @@ impl Running {
     }
 
     /// A new test begins: forgets everything written so far.
-    pub(crate) fn clear_output(&mut self) {
+    pub fn clear_output(&mut self) {
         self.output.clear();
     }
 
     /// The last lines of a program that is running.
-    pub(crate) fn last_lines_so_far(&self) -> String {
+    pub fn last_lines_so_far(&self) -> String {
         self.output.last_lines_so_far()
     }
 
     /// Whether it has ended, with everything that it left behind.
-    pub(crate) fn has_ended(&self) -> bool {
+    pub fn has_ended(&self) -> bool {
         lock(&self.handle.process).ended
     }
 
     /// Waits at most this long until it has ended; whether it has.
-    pub(crate) fn wait_for_end(&self, limit: Duration) -> bool {
+    pub fn wait_for_end(&self, limit: Duration) -> bool {
         self.handle.wait_for(limit)
     }
 
     /// Its end is expected from now on: it sets no alarm.
-    pub(crate) fn expect_end(&self) {
+    pub fn expect_end(&self) {
         self.handle.asked.store(true, Ordering::Relaxed);
     }
 
     /// Asks it to end: closes its input, or sends `SIGTERM` to a program in the background. Dropping it then waits.
-    pub(crate) fn ask_to_end(&self) {
+    pub fn ask_to_end(&self) {
         self.handle.ask_to_end();
     }
 
     /// The process of the program, or of its keeper, and whether it is the keeper's.
     #[cfg(target_os = "linux")]
-    pub(crate) fn process(&self) -> (u32, bool) {
+    pub fn process(&self) -> (u32, bool) {
         (self.handle.id, self.handle.kept)
     }
 
@@ -399,10 +399,7 @@ impl Handle {
         #[cfg(target_os = "linux")]
         if self.kept {
             let own: Vec<u32> = lock(&RUNNING).iter().filter_map(Weak::upgrade).map(|handle| handle.id).collect();
-            crate::lifecycle::descendants::end_adopted(
-                |id| own.contains(&id) || process_group::is_ours(id),
-                Duration::ZERO,
-            );
+            crate::descendants::end_adopted(|id| own.contains(&id) || process_group::is_ours(id), Duration::ZERO);
         }
     }
 

@@ -60,7 +60,7 @@ mod signal;
 mod tests;
 mod until;
 
-pub(crate) use signal::Signal;
+pub use signal::Signal;
 
 /// A time after everything, in nanoseconds.
 const FOREVER: i64 = i64::MAX / 2;
@@ -103,7 +103,7 @@ pub enum FormulaError {
 /// use sesame_plan::Comparison;
 /// use sesame_plan::stl::{Formula, Interval};
 /// use sesame_base::time::SimTime;
-/// use sesame_relay::stl::Monitor;
+/// use sesame_stl::Monitor;
 ///
 /// let clear = Formula::Predicate { signal: 0, comparison: Comparison::Above, constant: 0.5 };
 /// let always_clear = Formula::Always { interval: Interval::UNBOUNDED, of: Box::new(clear) };
@@ -112,7 +112,7 @@ pub enum FormulaError {
 /// monitor.push(SimTime::from_seconds(1.5), 0, 0.75);
 /// monitor.push(SimTime::from_seconds(3.0), 0, 1.0);
 /// assert_eq!(monitor.finish(SimTime::from_seconds(10.0)), Some(0.25));
-/// # Ok::<(), sesame_relay::stl::FormulaError>(())
+/// # Ok::<(), sesame_stl::FormulaError>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct Monitor {
@@ -154,7 +154,7 @@ impl Monitor {
     }
 
     /// The same monitor, which keeps the signal of its formula for [`Monitor::finish_with_signal`].
-    pub(crate) fn keeping_its_signal(mut self) -> Self {
+    pub fn keeping_its_signal(mut self) -> Self {
         if self.quantifier.is_some() {
             self.root.keep_signal();
         }
@@ -198,7 +198,7 @@ impl Monitor {
     }
 
     /// The same with the signal of the formula, if the monitor [keeps](Monitor::keeping_its_signal) it.
-    pub(crate) fn finish_with_signal(mut self, end: SimTime) -> Option<(f64, Signal)> {
+    pub fn finish_with_signal(mut self, end: SimTime) -> Option<(f64, Signal)> {
         let (start, robustness) = self.close(end)?;
         let signal = match self.quantifier {
             Some(_) => {

@@ -8,10 +8,10 @@ use sesame_base::time::SimTime;
 use sesame_plan::Comparison;
 use sesame_plan::stl::{Formula, Interval};
 
-use crate::stl::FormulaError;
-use crate::stl::minimum::SlidingMinimum;
-use crate::stl::piece::{Pair, Piece, Span, Window, put};
-use crate::stl::until::SlidingUntil;
+use crate::FormulaError;
+use crate::minimum::SlidingMinimum;
+use crate::piece::{Pair, Piece, Span, Window, put};
+use crate::until::SlidingUntil;
 
 /// The next part of the trace, in which no signal changes.
 #[derive(Debug, Clone, Copy)]

@@ -11,19 +11,14 @@
 )]
 
 pub mod descendants;
-#[cfg(all(feature = "process", target_os = "linux"))]
+#[cfg(target_os = "linux")]
 mod keeper;
-#[cfg(feature = "process")]
 pub mod launch;
-#[cfg(feature = "process")]
 mod limits;
-#[cfg(feature = "process")]
 mod output;
 pub mod process_group;
-#[cfg(feature = "process")]
 mod program;
 
-#[cfg(all(feature = "process", target_os = "linux"))]
-pub(crate) use keeper::{Kept, become_program, keep};
-#[cfg(feature = "process")]
-pub(crate) use program::{Alarm, Input, PostMortem, Program, Running, StartError, end_programs};
+#[cfg(target_os = "linux")]
+pub use keeper::{Kept, become_program, keep};
+pub use program::{Alarm, Input, PostMortem, Program, Running, StartError, end_programs};
