@@ -20,10 +20,10 @@ mod fitting;
 mod interpreted;
 #[cfg(all(feature = "campaign", feature = "process"))]
 mod lab;
+#[cfg(any(feature = "campaign", feature = "standalone"))]
+mod output;
 #[cfg(feature = "campaign")]
 mod runner;
-#[cfg(any(feature = "campaign", feature = "standalone"))]
-mod said;
 #[cfg(feature = "standalone")]
 pub mod standalone;
 #[cfg(feature = "campaign")]

@@ -22,7 +22,7 @@ use sesame_relay::trace::feed_telling;
 use sesame_relay::transport::Connect;
 use sesame_relay::wire::WireTable;
 
-use crate::said::{Failure, Format, say};
+use crate::output::{Failure, Format, say};
 use crate::standalone::show::Shown;
 
 /// A monitor: what a generated crate hands to the runtime.

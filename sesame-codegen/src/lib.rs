@@ -25,7 +25,7 @@ pub mod plan;
 pub mod project;
 #[cfg(feature = "cli")]
 pub mod scan;
-pub mod unfilled;
+pub mod stubs;
 #[cfg(feature = "cli")]
 pub mod uses;
 pub mod wiring;

@@ -7,12 +7,12 @@
 mod blocks;
 mod checked;
 mod comments;
+mod expressible;
 mod groups;
 mod named;
 mod nodes;
 mod origin;
 mod payloads;
-mod sayable;
 mod simulator;
 #[cfg(test)]
 mod tests;

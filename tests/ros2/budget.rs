@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use sesame_plan::{CampaignPlan, RelayBudget, Test};
-use sesame_relay::transport::added::FEWEST;
+use sesame_relay::transport::relay_latency::FEWEST;
 
 use crate::environment::{Domain, Vendor};
 use crate::peer::Peer;

@@ -12,7 +12,7 @@ use sesame_relay::evaluate::{Custom, Run, evaluate_tapped};
 use sesame_relay::metric::MetricTable;
 use sesame_relay::relay::{Exchange as _, Finished, Listener, Relay};
 use sesame_relay::transport::Transport;
-use sesame_relay::transport::added::AddedOnWire;
+use sesame_relay::transport::relay_latency::AddedOnWire;
 use sesame_relay::wire::{Wire, WireTable};
 use sesame_tests::workspace;
 

@@ -28,7 +28,7 @@ mod strategy;
 pub mod test_key;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
-pub mod vary;
+pub mod variation;
 
 pub use catalogue::{strategy, strategy_of_task};
 pub use confirmed_front::{ConfirmedFront, GenerationTest, aggregate};

@@ -2,11 +2,11 @@
 //!
 //! It is defined in one place, [`TestSpace`]. All strategies draw from it, and crossover and mutation return to it.
 
-pub(crate) mod apart;
 pub(crate) mod condition;
 pub(crate) mod initial;
 pub(crate) mod parameter_space;
 pub(crate) mod range;
+pub(crate) mod separation;
 pub(crate) mod test_space;
 
 pub use initial::fresh_test;

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use sesame_base::observation::Observation;
 use sesame_plan::{Compensation, MonitorId, Recorded, Test};
-use sesame_relay::transport::added::AddedOnWire;
+use sesame_relay::transport::relay_latency::AddedOnWire;
 
 /// Carries out tests, in any order.
 pub trait Executor {

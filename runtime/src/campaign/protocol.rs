@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use sesame_base::observation::Observation;
 use sesame_relay::transport::Incidents;
-use sesame_relay::transport::added::AddedOnWire;
+use sesame_relay::transport::relay_latency::AddedOnWire;
 
 /// The largest frame either side accepts; time series of a long test are the largest thing sent.
 const FRAME_LIMIT: u32 = 1 << 30;

@@ -1,6 +1,6 @@
 //! How a command ends when it does not simply succeed.
 
-pub(super) use crate::said::Failure;
+pub(super) use crate::output::Failure;
 
 /// Exit code of a command that did its work and found that something is not as required: what `--fail-on` names was
 /// found, a campaign says too little, or a test came out different.

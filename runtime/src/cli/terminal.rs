@@ -7,7 +7,7 @@ use sesame_results::report::TextOptions;
 
 use crate::cli::failure::Failure;
 
-pub(super) use crate::said::{Format, print, say};
+pub(super) use crate::output::{Format, print, say};
 
 /// Prints a value as JSON, indented.
 pub(super) fn print_json(value: &impl serde::Serialize) -> Result<ExitCode, Failure> {

@@ -10,7 +10,7 @@ use sesame_plan::CampaignPlan;
 use sesame_relay::monitor::Decided;
 use sesame_relay::transport::{Beside, beside};
 
-use crate::said::Failure;
+use crate::output::Failure;
 use crate::standalone::show::Shown;
 
 /// How long the simulator may take to exit after the end of its input; the runner gives as long to both.

@@ -19,7 +19,7 @@ use sesame_relay::transport::{Capabilities, Connect, Incidents, Transport, Trans
 use sesame_relay::value::Value;
 use sesame_relay::wire::{Wire, WireTable};
 
-use crate::said::{Failure, say};
+use crate::output::{Failure, say};
 use crate::standalone::show::Shown;
 
 /// How often it is asked whether there is something to note.

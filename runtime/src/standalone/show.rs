@@ -12,7 +12,7 @@ use sesame_base::visible::{visible, visible_json};
 use sesame_plan::CampaignPlan;
 use sesame_relay::monitor::{Cause, Decided};
 
-use crate::said::{Failure, Format, print};
+use crate::output::{Failure, Format, print};
 
 /// Where decisions are shown.
 pub(super) struct Shown<'p> {

@@ -17,7 +17,7 @@ use crate::frontend::{Checked, Language};
 use crate::input;
 use crate::output::{self, Change, Mode, Orphan, Report};
 use crate::plan::{OperationPlan, RunnerPlan};
-use crate::{emit, names, project, unfilled};
+use crate::{emit, names, project, stubs};
 
 /// `sesamec new`
 pub(super) fn new(
@@ -339,7 +339,7 @@ pub(super) fn all(errors: &[impl std::fmt::Display]) -> anyhow::Error {
 
 /// What is said of a new hook: a stub is to be filled in, a copy of one that is filled in is not.
 fn created_hook(path: &Path, contents: &str) -> (&'static str, String) {
-    if unfilled::is_stub(contents) {
+    if stubs::is_stub(contents) {
         ("Stub", format!("{}: fill this in", path.display()))
     } else {
         ("Copied", path.display().to_string())

@@ -23,7 +23,7 @@ use crate::frontend::{Checked, Language};
 use crate::names;
 use crate::output::Mode;
 use crate::plan::RunnerPlan;
-use crate::unfilled::unfilled_objectives;
+use crate::stubs::unfilled_objectives;
 
 /// Names of the arguments that say which campaign it is.
 const FILE: &str = "space_file";

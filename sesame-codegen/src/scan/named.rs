@@ -7,8 +7,8 @@ use sesame_notation::quoted;
 use sesame_scan::{Facts, FoundNode, FoundService, FoundTopic};
 
 use super::comments::LeftOut;
+use super::expressible::is_ros_name;
 use super::groups::{Line, fold};
-use super::sayable::is_ros_name;
 
 /// All names.
 pub(super) struct Named<'a> {

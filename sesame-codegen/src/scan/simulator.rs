@@ -7,8 +7,8 @@ use sesame_plan::Dialect;
 use sesame_scan::{CLOCK, Facts, FoundService, System};
 
 use super::comments::{LeftOut, on_one_line};
+use super::expressible::is_ros_name;
 use super::origin::Origin;
-use super::sayable::is_ros_name;
 
 /// The first line of the space, which says what was looked at.
 pub(super) fn heading(facts: &Facts) -> String {

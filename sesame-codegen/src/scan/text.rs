@@ -11,15 +11,15 @@ use super::nodes::nodes;
 use super::origin::Origin;
 use super::topics::{service_lines, topic_lines};
 use super::types::Types;
-use super::{blocks, sayable, simulator};
+use super::{blocks, expressible, simulator};
 
 /// A space with its system, in need of formatting.
 pub(super) fn space(facts: &Facts, types: &Types, origin: Origin<'_>) -> String {
     let mut left_out = LeftOut::default();
     let system = &facts.system;
     let clock = simulator::clock(facts);
-    let topics = sayable::topics(facts, types, origin, clock, &mut left_out);
-    let services = sayable::services(facts, origin, &mut left_out);
+    let topics = expressible::topics(facts, types, origin, clock, &mut left_out);
+    let services = expressible::services(facts, origin, &mut left_out);
     for action in &facts.actions {
         left_out.decide(&format!(
             "the language has no actions: {} of type {}",

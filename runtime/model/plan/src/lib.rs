@@ -9,7 +9,6 @@
 //! every other quantity is in the unit its field, metric or topic declares (the unit on the wire), probabilities are in
 //! `0..=1`.
 
-mod alone;
 mod brokers;
 mod bus;
 mod campaign;
@@ -20,15 +19,16 @@ mod coverage;
 mod exploration;
 mod formula;
 mod id;
-mod kind;
 mod lab;
 mod lifecycle;
 mod meaning;
 mod metric;
 mod model;
 mod monitor;
+mod monitor_program;
 mod objective;
 mod operation;
+mod operation_kind;
 mod ros2;
 mod score;
 mod search;
@@ -44,7 +44,6 @@ pub mod testing;
 mod validate;
 mod wiring;
 
-pub use alone::NotAlone;
 pub use brokers::*;
 pub use bus::*;
 pub use campaign::*;
@@ -54,14 +53,15 @@ pub use coverage::*;
 pub use exploration::*;
 pub use formula::*;
 pub use id::*;
-pub use kind::*;
 pub use lab::*;
 pub use lifecycle::*;
 pub use metric::*;
 pub use model::*;
 pub use monitor::*;
+pub use monitor_program::NotAlone;
 pub use objective::Objective;
 pub use operation::*;
+pub use operation_kind::*;
 pub use ros2::*;
 pub use score::*;
 pub use search::*;

@@ -19,7 +19,7 @@ use sesame_gap::split::{Located, Range, Split};
 use sesame_gap::violations::{Confusion, Frequencies, Occurrence, Occurrences, frequencies};
 use sesame_plan::{CampaignPlan, Dimension, Lab, LabTask, MetricId, Requirement, Task};
 use sesame_search::sspr::Convention;
-use sesame_search::vary;
+use sesame_search::variation;
 
 use crate::analysis::Datum;
 use crate::present::number::{fixed, plural, quantity};
@@ -315,7 +315,7 @@ pub fn points(
     if matches!(campaign.task(), Task::Variations(_)) {
         for &number in tests {
             let test = campaign.row(number)?.test;
-            let at = dimensions.iter().map(|&dimension| vary::coordinate(campaign.plan(), &test, dimension));
+            let at = dimensions.iter().map(|&dimension| variation::coordinate(campaign.plan(), &test, dimension));
             points.insert(number, at.collect());
         }
         return Ok(points);

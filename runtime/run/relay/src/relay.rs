@@ -15,11 +15,11 @@
 //! other wires are counted separately.
 
 mod compensation;
+mod crossings;
 mod exchange;
 mod finished;
 mod fuzzing_time;
 mod listener;
-mod marks;
 mod monitors;
 mod pass;
 mod publishing;
@@ -48,10 +48,10 @@ use crate::monitor::Monitors;
 use crate::value::Value;
 use crate::wire::{Wire, WireTable};
 
+pub(crate) use crossings::{beyond, reaching};
 pub use exchange::{Delivery, Exchange};
 pub use finished::Finished;
 pub use listener::{Listener, MessageRef, OperationEvent};
-pub(crate) use marks::{beyond, reaching};
 
 /// The most copies that operations may make in one event; beyond it, no more are made, with a warning.
 pub const COPIES_LIMIT: u32 = 10_000;

@@ -3,7 +3,6 @@
 //! A transport is a thin adapter: it advances the simulation, passes every message and every moment of time to the
 //! relay, and carries out the relay's deliveries. It decides nothing.
 
-pub mod added;
 #[cfg(feature = "process")]
 pub mod bus;
 #[cfg(feature = "process")]
@@ -12,6 +11,7 @@ pub mod clock;
 mod in_process;
 #[cfg(feature = "process")]
 mod process;
+pub mod relay_latency;
 pub mod round;
 
 use std::path::{Path, PathBuf};
@@ -27,7 +27,7 @@ use sesame_lifecycle::launch::LaunchError;
 
 use crate::relay::Exchange;
 use crate::simulator::Progress;
-use crate::transport::added::AddedOnWire;
+use crate::transport::relay_latency::AddedOnWire;
 
 #[cfg(feature = "in-process")]
 pub use in_process::in_process;

@@ -3,10 +3,10 @@
 use sesame_plan::{Activation, Choice, Shape, Test, TestOperation};
 use sesame_rng::derive_seed;
 
-use crate::space::apart;
 use crate::space::initial::{fresh_kinds, place};
 use crate::space::parameter_space::ParameterSpace;
 use crate::space::range::Range;
+use crate::space::separation;
 use crate::space::test_space::{ActivationSpace, TestSpace};
 
 /// The test of these numbers, given by the place of the choice: first how many operations there are and which, then of
@@ -36,7 +36,7 @@ pub(super) fn decoded(test_space: &TestSpace, seed: u64, index: u32, mut number:
         })
         .collect();
     let mut test = Test { operations };
-    test_space.settle_windows(&mut test, apart::spread);
+    test_space.settle_windows(&mut test, separation::spread);
     test
 }
 

@@ -10,16 +10,16 @@
 //! sort, and one with fewer kinds than places is shorter, as far as that is permitted.
 //!
 //! Windows and sub-ranges are uniform over all feasible pairs of ends, values uniform over their range; windows of
-//! copies that must not overlap are uniform over all [disjoint ones](crate::space::apart). The order of the list is
+//! copies that must not overlap are uniform over all [disjoint ones](crate::space::separation). The order of the list is
 //! random. Where conditions switch, start and end are grown independently, and lengths are uniform.
 
 use sesame_plan::condition::ConditionEnd;
 use sesame_plan::{Activation, Copies, Test, TestOperation};
 use sesame_rng::Stream;
 
-use crate::space::apart;
 use crate::space::condition::grown;
 use crate::space::range::Range;
+use crate::space::separation;
 use crate::space::test_space::{ActivationSpace, OperationSpace, TestSpace};
 
 /// The share of fresh tests in which each place is drawn for itself.
@@ -29,7 +29,7 @@ const EACH_FOR_ITSELF: f64 = 0.25;
 pub fn fresh_test(test_space: &TestSpace, stream: &mut Stream) -> Test {
     let kinds = fresh_kinds(test_space, &mut || stream.unit());
     let mut test = Test { operations: kinds.into_iter().map(|kind| fresh_operation(kind, stream)).collect() };
-    test_space.settle_windows(&mut test, apart::spread);
+    test_space.settle_windows(&mut test, separation::spread);
     test
 }
 

@@ -19,11 +19,11 @@ use sesame_plan::{
 use sesame_rng::Stream;
 
 use crate::SearchError;
-use crate::space::apart;
 use crate::space::condition::grown;
 use crate::space::initial::fresh_operation;
 use crate::space::parameter_space::ParameterSpace;
 use crate::space::range::Range;
+use crate::space::separation;
 
 /// How often a first condition is tried before a campaign is said to have none; so rarely does one try fail where there
 /// are any that this is certain enough.
@@ -186,7 +186,7 @@ impl TestSpace {
                 let Some(windows) = self.windows_apart(test, kind, &copies) else { return true };
                 let mut settled = windows.clone();
                 if let ActivationSpace::Time(range) = kind.activation {
-                    apart::nearest(range, &mut settled);
+                    separation::nearest(range, &mut settled);
                 }
                 settled == windows
             })
@@ -210,7 +210,7 @@ impl TestSpace {
             let place = stream.below(test.operations.len() + 1);
             test.operations.insert(place, fresh_operation(kind, stream));
         }
-        self.settle_windows(test, apart::nearest);
+        self.settle_windows(test, separation::nearest);
         let mut draws = BTreeSet::new();
         for operation in &mut test.operations {
             while !draws.insert((operation.operation, operation.operation_seed)) {

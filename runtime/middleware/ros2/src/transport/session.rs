@@ -9,7 +9,7 @@ use rustdds::policy::{Durability, History, Reliability};
 use rustdds::rpc::SampleIdentity;
 use sesame_codec::cdr::Codec;
 use sesame_plan::{CampaignPlan, Clock, Fitted, NodeId, OperationKind, Ros, StepBy, TopicId};
-use sesame_relay::transport::added::Added;
+use sesame_relay::transport::relay_latency::Added;
 use sesame_relay::wire::{Line, Wire, WireTable, wanted};
 
 use crate::dds::{DdsError, Endpoint, Participant, ReaderId, Received, Sample, WriterId, mirrored};

@@ -9,9 +9,9 @@ use sesame_plan::{CampaignPlan, Channel, TopicId, is_shared};
 
 use crate::relay::{Delivery, Exchange};
 use crate::simulator::Progress;
-use crate::transport::added::{Added, AddedOnWire, FEWEST, objections};
 use crate::transport::bus::{Bus, Event, Settings};
 use crate::transport::clock::Ticks;
+use crate::transport::relay_latency::{Added, AddedOnWire, FEWEST, objections};
 use crate::transport::{Capabilities, Incidents, Transport, TransportError, wall_time_since};
 use crate::wire::{Line, Wire, WireTable, lines, service_lines};
 use sesame_lifecycle::launch::{LaunchError, Launched, Place, Probe};

@@ -20,12 +20,12 @@ use sesame_plan::CampaignPlan;
 
 use crate::relay::Exchange;
 use crate::simulator::Progress;
-use crate::transport::added::{Added, AddedOnWire, join, objections};
 use crate::transport::clock::Ticks;
 use crate::transport::process::fault::{explain, note_restart};
 use crate::transport::process::launched::health;
 use crate::transport::process::protocol::{LINE_LIMIT, Line, Read, SimulatorMessage, read_line, request};
 use crate::transport::process::session::{Fault, Topics};
+use crate::transport::relay_latency::{Added, AddedOnWire, join, objections};
 use crate::transport::{Capabilities, Incidents, Transport, TransportError, wall_time_since};
 use crate::wire::WireTable;
 use sesame_lifecycle::launch::Launched;

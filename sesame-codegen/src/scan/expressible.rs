@@ -18,7 +18,7 @@ pub(super) fn topics<'a>(
     clock: Option<&str>,
     left_out: &mut LeftOut,
 ) -> Vec<&'a FoundTopic> {
-    let (mut paths, mut sayable) = (BTreeSet::new(), Vec::new());
+    let (mut paths, mut expressible) = (BTreeSet::new(), Vec::new());
     for topic in &facts.topics {
         let path = quoted(&topic.path);
         let ty = topic.ty.as_deref();
@@ -37,7 +37,7 @@ pub(super) fn topics<'a>(
         } else if let Some(ty) = ty {
             if types.is_plain(ty) || types.source(ty) != TypeSource::Unknown {
                 if paths.insert(topic.path.as_str()) {
-                    sayable.push(topic);
+                    expressible.push(topic);
                 } else {
                     left_out.decide(&format!("topic {what} is used with another type as well"));
                 }
@@ -55,12 +55,12 @@ pub(super) fn topics<'a>(
             left_out.decide(&format!("nobody said the type of topic {what}"));
         }
     }
-    sayable
+    expressible
 }
 
 /// Services that the space can have.
 pub(super) fn services<'a>(facts: &'a Facts, origin: Origin<'_>, left_out: &mut LeftOut) -> Vec<&'a FoundService> {
-    let (mut paths, mut sayable) = (BTreeSet::new(), Vec::new());
+    let (mut paths, mut expressible) = (BTreeSet::new(), Vec::new());
     for service in &facts.services {
         let path = quoted(&service.path);
         let Some(ty) = &service.ty else {
@@ -75,10 +75,10 @@ pub(super) fn services<'a>(facts: &'a Facts, origin: Origin<'_>, left_out: &mut 
         } else if !paths.insert(service.path.as_str()) {
             left_out.decide(&format!("service {what} is used with another type as well"));
         } else {
-            sayable.push(service);
+            expressible.push(service);
         }
     }
-    sayable
+    expressible
 }
 
 /// Whether this can be the path of a topic.
