@@ -1,4 +1,6 @@
-//! Search on vectors, and what measures it: no plan, no robots, usable as it is.
+#![doc = include_str!("../README.md")]
+//!
+//! # Modules
 //!
 //! - [`nsga2`], with its parts: [`dominance`], [`sorting`], [`crowding`], [`selection`].
 //! - [`nsga3`]: survival by reference points, for three and more objectives.
@@ -7,9 +9,6 @@
 //! - [`sobol`]: low-discrepancy points.
 //! - [`falsify`]: looking for a violation where evaluations are expensive, by a Gaussian process.
 //! - [`problems`]: functions with known answers, for tests and benchmarks.
-//!
-//! All objectives are minimised. Everything is a function of its arguments and a seed; equal seeds give equal results
-//! on every machine.
 
 pub mod crowding;
 pub mod dominance;
