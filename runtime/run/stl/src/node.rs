@@ -184,7 +184,7 @@ impl Node {
             Operator::Not { of, input } => {
                 let unknown = stretch.unknown.map(|unknown| Unknown { extreme: -unknown.extreme, ..*unknown });
                 of.extend(Stretch { unknown: unknown.as_ref(), ..stretch }, values, input);
-                for piece in input.drain(..) {
+                while let Some(piece) = input.pop_front() {
                     put(out, piece.end, -piece.value);
                 }
             }
@@ -198,22 +198,28 @@ impl Node {
             }
             Operator::Always { of, input, minimum, kept } => {
                 of.extend(stretch, values, input);
-                // Where all is known, which is for every sample, it says directly what it says.
-                let mut undecided = stretch.unknown.map(|unknown| (unknown, VecDeque::new()));
-                let minima = undecided.as_mut().map_or(&mut *out, |(_, minima)| minima);
-                for piece in input.drain(..) {
-                    if let Some(kept) = kept {
-                        put(kept, piece.end, piece.value);
+                let finishes = stretch.cuts() || stretch.last && !minimum.is_bounded();
+                let mut minima = |out: &mut VecDeque<Piece>| {
+                    while let Some(piece) = input.pop_front() {
+                        if let Some(kept) = kept {
+                            put(kept, piece.end, piece.value);
+                        }
+                        minimum.push(piece, out);
                     }
-                    minimum.push(piece, minima);
-                }
-                if stretch.cuts() || stretch.last && !minimum.is_bounded() {
-                    minimum.finish(of.told, minima);
-                }
-                if let Some((unknown, minima)) = undecided {
-                    let ahead = minimum.reaches_ahead(stretch.whole);
-                    let defined = of.defined(unknown.known, stretch.whole).saturating_sub(ahead);
-                    put_decided(unknown, defined, self.told, minima, out);
+                    if finishes {
+                        minimum.finish(of.told, out);
+                    }
+                };
+                match stretch.unknown {
+                    // For every sample: it says directly what it says.
+                    None => minima(out),
+                    Some(unknown) => {
+                        let mut all = VecDeque::new();
+                        minima(&mut all);
+                        let ahead = minimum.reaches_ahead(stretch.whole);
+                        let defined = of.defined(unknown.known, stretch.whole).saturating_sub(ahead);
+                        put_decided(unknown, defined, self.told, all, out);
+                    }
                 }
             }
             Operator::Until(until) => until.extend(stretch, values, self.told, out),
@@ -286,7 +292,7 @@ impl Until {
     /// `told` is the time up to which its robustness is known.
     fn extend(&mut self, stretch: Stretch<'_>, values: &[f64], told: i64, out: &mut VecDeque<Piece>) {
         self.left.extend(stretch, values, &mut self.lead);
-        for piece in self.lead.drain(..) {
+        while let Some(piece) = self.lead.pop_front() {
             self.before.push(piece, &mut self.parts.left);
             if self.within.asks(piece.end) {
                 put(&mut self.input.left, piece.end, piece.value);
@@ -301,7 +307,7 @@ impl Until {
         if stretch.cuts() || stretch.last && !self.within.is_bounded() {
             self.within.finish(self.left.told.min(self.right.told), ahead);
         }
-        for piece in self.ahead.drain(..) {
+        while let Some(piece) = self.ahead.pop_front() {
             put(&mut self.parts.right, piece.end - self.delay, piece.value);
         }
         match stretch.unknown {
