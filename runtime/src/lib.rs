@@ -42,7 +42,7 @@ pub use sesame_optimise as optimise;
 pub use sesame_plan as plan;
 #[cfg(feature = "mcap")]
 pub use sesame_relay::trace;
-pub use sesame_relay::{evaluate, fuzz, message, metric, relay, simulator, stl, value, wire};
+pub use sesame_relay::{evaluate, fuzz, message, metric, relay, simulator, value, wire};
 #[cfg(feature = "campaign")]
 pub use sesame_results::{analysis, record, report};
 pub use sesame_rng as rng;

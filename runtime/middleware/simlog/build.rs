@@ -1,5 +1,7 @@
 //! Makes Rust of the protocol's files, in Rust alone: no `protoc` is needed.
 
+#![expect(clippy::disallowed_methods, reason = "a build script: cargo speaks to it by variables")]
+
 use std::env::var_os;
 use std::error::Error;
 

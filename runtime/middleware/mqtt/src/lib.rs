@@ -7,11 +7,19 @@
 //! properties.
 
 mod address;
+#[expect(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    reason = "an adapter: it waits for a broker on a thread"
+)]
 mod connection;
 mod quick_ack;
 mod routes;
+#[expect(clippy::disallowed_methods, reason = "an adapter: it listens for a while")]
 pub mod scan;
+#[expect(clippy::disallowed_methods, reason = "an adapter: it waits for a broker")]
 mod session;
+#[expect(clippy::disallowed_methods, reason = "an adapter: it waits for brokers")]
 mod transport;
 
 pub use transport::mqtt;

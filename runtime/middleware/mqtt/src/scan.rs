@@ -221,6 +221,7 @@ impl Topic {
 }
 
 #[cfg(test)]
+#[expect(clippy::disallowed_types, reason = "a port that is free is one that was listened to")]
 mod tests {
     use super::*;
 
