@@ -51,7 +51,8 @@ use std::process::ExitCode;
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 use sesame_base::visible::visible_lines;
-use sesame_results::record::{self, Repository};
+use sesame_record as record;
+use sesame_record::Repository;
 
 use crate::campaign::WorkerProgram;
 use crate::cli::failure::Failure;
@@ -168,9 +169,9 @@ fn dispatch(session: &Session, arguments: impl Iterator<Item = std::ffi::OsStrin
 /// What commands ask of recorded results beside what reports do: whether a gate closes, how a test is shrunk, and
 /// how long it may take when it is run again.
 #[cfg(test)]
-pub(crate) fn asked_beside_reports(repository: &sesame_results::record::Repository, test: &str) -> Result<(), String> {
-    let words = |error: sesame_results::record::RecordError| error.to_string();
-    drop(gate::every_objection(&sesame_results::report::summary(repository).map_err(words)?, repository));
+pub(crate) fn asked_beside_reports(repository: &sesame_record::Repository, test: &str) -> Result<(), String> {
+    let words = |error: sesame_record::RecordError| error.to_string();
+    drop(gate::every_objection(&sesame_report::summary(repository).map_err(words)?, repository));
     let record = repository.find(test).and_then(|number| repository.test(number)).map_err(words)?;
     run_again::limit(&record);
     drop(shrink::failing(repository, &record, &[]).map_err(|Failure(words)| words)?);

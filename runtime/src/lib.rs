@@ -36,15 +36,19 @@ pub use cli::main;
 pub use interpreted::Interpreted;
 #[cfg(feature = "campaign")]
 pub use runner::Runner;
+#[cfg(feature = "campaign")]
+pub use sesame_analysis as analysis;
 pub use sesame_base::{activation, condition, observation, time, verdict};
 #[cfg(feature = "campaign")]
 pub use sesame_optimise as optimise;
 pub use sesame_plan as plan;
+#[cfg(feature = "campaign")]
+pub use sesame_record as record;
 #[cfg(feature = "mcap")]
 pub use sesame_relay::trace;
 pub use sesame_relay::{evaluate, fuzz, message, metric, relay, simulator, value, wire};
 #[cfg(feature = "campaign")]
-pub use sesame_results::{analysis, record, report};
+pub use sesame_report as report;
 pub use sesame_rng as rng;
 #[cfg(feature = "campaign")]
 pub use sesame_search as search;

@@ -16,7 +16,7 @@ use std::path::PathBuf;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
-use sesame_results::record::DATABASE;
+use sesame_record::DATABASE;
 
 use self::changes::tampered;
 use self::readers::read_all;

@@ -4,11 +4,11 @@
 use std::fs;
 use std::path::PathBuf;
 
+use sesame_record::Repository;
 use sesame_relay::metric::MetricTable;
 use sesame_relay::monitor::Decided;
 use sesame_relay::trace::feed_telling;
 use sesame_relay::wire::WireTable;
-use sesame_results::record::Repository;
 use sesame_tests::{Project, fresh_folder, workspace};
 
 use crate::environment::{Domain, Vendor};

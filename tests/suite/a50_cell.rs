@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use sesame_results::record::Repository;
+use sesame_record::Repository;
 use sesame_tests::{Project, command, done, fresh_folder, sesamec, workspace};
 
 /// A copy of the example.

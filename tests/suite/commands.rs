@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::Path;
 
-use sesame_results::record::{DATABASE, Repository};
+use sesame_record::{DATABASE, Repository};
 use sesame_tests::{Done, Project, Runner};
 
 /// A known test that does not come out as expected, beside the example's own.

@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::PathBuf;
 
+use sesame_analysis::gap::compensated_runs;
 use sesame_patience as patience;
-use sesame_results::analysis::gap::compensated_runs;
-use sesame_results::record::Repository;
+use sesame_record::Repository;
 use sesame_tests::{Done, command, done, fresh_folder, kuka_cell_lab, sesamec, workspace};
 
 /// The study of the example with few tests, and a lab that differs so.

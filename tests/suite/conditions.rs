@@ -8,7 +8,7 @@ use sesame_base::condition::depth;
 use sesame_base::observation::Outcome;
 use sesame_plan::condition::{Condition, ConditionSpace};
 use sesame_plan::{Activation, ActivationMode};
-use sesame_results::record::{Origin, Repository, TestRecord};
+use sesame_record::{Origin, Repository, TestRecord};
 use sesame_tests::{Project, Runner, shared};
 
 /// A short run of a campaign by condition, in `r/5`: what it may grow, and the tests that its search made.
@@ -114,7 +114,7 @@ fn a_campaign_by_condition_comes_out_the_same_on_any_number_of_workers_and_when_
     assert_eq!(run("two", "2"), digest);
     // As if it had been stopped in the middle of its third generation: what came later is not there.
     let folder = runner.folder.join("two/7");
-    let connection = rusqlite::Connection::open(folder.join(sesame_results::record::DATABASE)).unwrap();
+    let connection = rusqlite::Connection::open(folder.join(sesame_record::DATABASE)).unwrap();
     // The order in which rows go is of no interest here.
     connection.pragma_update(None, "foreign_keys", false).unwrap();
     let later = "SELECT number FROM tests WHERE origin = 'search' ORDER BY number LIMIT -1 OFFSET 25";

@@ -8,8 +8,8 @@ use std::process::{Child, Stdio};
 
 use sesame_base::observation::Outcome;
 use sesame_patience as patience;
-use sesame_results::record::{Repetition, Repository, TestRow, Verdict};
-use sesame_results::report::summary;
+use sesame_record::{Repetition, Repository, TestRow, Verdict};
+use sesame_report::summary;
 use sesame_tests::{Done, Project, Runner, command, done, sesamec, shared, workspace};
 
 use crate::interruption::no_worker_is_left;

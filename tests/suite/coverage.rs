@@ -4,7 +4,7 @@ use std::path::Path;
 
 use nix::sys::signal::Signal;
 
-use sesame_results::record::Repository;
+use sesame_record::Repository;
 use sesame_tests::{Done, Project, Runner, command, done, sesamec, shared};
 
 use crate::interruption::Running;

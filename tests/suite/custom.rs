@@ -10,7 +10,7 @@ use nix::unistd::Pid;
 use sesame_base::observation::Counters;
 use sesame_patience as patience;
 use sesame_plan::{Activation, Choice};
-use sesame_results::record::{Repository, TestRecord};
+use sesame_record::{Repository, TestRecord};
 use sesame_tests::{Project, Runner, workspace};
 
 use crate::interruption::no_worker_is_left;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use sesame_results::record::Repository;
+use sesame_record::Repository;
 use sesame_tests::Project;
 
 const SPACE: &str = r#"

@@ -7,7 +7,7 @@ use std::process::Command;
 use nix::sys::signal::Signal;
 use rusqlite::Connection;
 
-use sesame_results::record::Repository;
+use sesame_record::Repository;
 use sesame_tests::{Runner, done};
 
 use crate::faults::recording;

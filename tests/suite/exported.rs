@@ -8,8 +8,8 @@ use sesame_dsl::analyse;
 use sesame_dsl::source::SourceMap;
 use sesame_notation as notation;
 use sesame_plan::{Activation, Bound, CampaignPlan, Choice, Domain, OperationId, Test, TestOperation};
-use sesame_results::record::{Origin, Recorder, TestRecord};
-use sesame_results::report::{Expected, export};
+use sesame_record::{Origin, Recorder, TestRecord};
+use sesame_report::{Expected, export};
 use sesame_search as search;
 use sesame_tests::models::model;
 

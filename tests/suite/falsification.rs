@@ -14,7 +14,7 @@ use sesame_optimise::problems::FalsificationProblem;
 use sesame_optimise::problems::RealVariation;
 use sesame_optimise::sobol::SobolPoints;
 use sesame_plan::{Activation, CampaignPlan, Choice, Test, TestOperation};
-use sesame_results::record::Repository;
+use sesame_record::Repository;
 use sesame_rng::{Stream, keyed_unit};
 use sesame_search::Evaluated;
 use sesame_tests::Project;

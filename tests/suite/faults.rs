@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::fs;
 
 use sesame_base::observation::Outcome;
-use sesame_results::record::{Origin, Repository};
+use sesame_record::{Origin, Repository};
 use sesame_tests::{Done, Project, Runner, shared, workspace};
 
 /// The runner of this campaign, with the faulty simulator and the hook filled in. It is shared, so tests that use it

@@ -3,7 +3,7 @@
 use std::fs;
 
 use sesame_base::observation::Outcome;
-use sesame_results::record::{EventKind, Origin, Repository, Verdict};
+use sesame_record::{EventKind, Origin, Repository, Verdict};
 use sesame_tests::{Project, workspace};
 
 #[test]

@@ -11,7 +11,7 @@ use std::time::Duration;
 use std::{fs, thread};
 
 use sesame_base::observation::Outcome;
-use sesame_results::record::{Origin, Repository};
+use sesame_record::{Origin, Repository};
 use sesame_tests::{Done, Project, Runner, done, shared};
 
 /// What is to come of a mode.

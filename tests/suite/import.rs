@@ -6,8 +6,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use sesame_results::analysis::{self, Datum, Selection};
-use sesame_results::record::{DATABASE, Origin, Repository, Status};
+use sesame_analysis as analysis;
+use sesame_analysis::{Datum, Selection};
+use sesame_record::{DATABASE, Origin, Repository, Status};
 use sesame_tests::{Done, Project, command, done, fresh_folder, sesamec, turn, workspace};
 
 const LEGACY: &str = "SESAME_LEGACY_DIR";

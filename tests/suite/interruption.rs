@@ -15,7 +15,7 @@ use proptest::test_runner::{RngSeed, TestRunner};
 
 use sesame_base::observation::Outcome;
 use sesame_patience as patience;
-use sesame_results::record::{RecordError, Repository};
+use sesame_record::{RecordError, Repository};
 use sesame_tests::{Done, Runner};
 
 use crate::faults::faulty;

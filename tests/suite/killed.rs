@@ -17,7 +17,7 @@ use proptest::test_runner::{RngSeed, TestRunner};
 
 use sesame_base::observation::Outcome;
 use sesame_patience as patience;
-use sesame_results::record::{Repository, TestRow, Verdict};
+use sesame_record::{Repository, TestRow, Verdict};
 use sesame_tests::{Done, Project, Runner, workspace};
 
 use crate::interruption::Clock;

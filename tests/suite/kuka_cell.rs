@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use sesame_results::record::{Repository, TestRow};
+use sesame_record::{Repository, TestRow};
 use sesame_tests::{Done, Project, Runner};
 
 /// A run of the campaign; results in a folder of this name.

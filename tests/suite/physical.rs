@@ -4,9 +4,9 @@
 use std::fs;
 use std::path::PathBuf;
 
+use sesame_analysis::gap::lab_runs;
 use sesame_plan::Transport;
-use sesame_results::analysis::gap::lab_runs;
-use sesame_results::record::{Origin, Repository};
+use sesame_record::{Origin, Repository};
 use sesame_tests::{Project, Runner, command, done, kuka_cell_lab, sesamec};
 
 /// A campaign of a few tests of the noisy cell, and two labs: one as modelled, and one with other drives and zones.

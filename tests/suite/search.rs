@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use sesame_plan::Direction;
-use sesame_results::record::Repository;
+use sesame_record::Repository;
 use sesame_tests::{Project, Runner};
 
 /// What no test reaches: five operations that are active from 0 s to 65 s, and no collision.

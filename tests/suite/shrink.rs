@@ -6,7 +6,7 @@ use std::process::Stdio;
 use serde_json::Value;
 
 use sesame_patience as patience;
-use sesame_results::record::{Repository, Verdict, verdict};
+use sesame_record::{Repository, Verdict, verdict};
 use sesame_tests::{Project, Runner};
 
 use crate::interruption::no_worker_is_left;

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use sesame_base::observation::Outcome;
 use sesame_optimise::front::Front;
 use sesame_optimise::hypervolume::hypervolume;
-use sesame_results::record::Repository;
+use sesame_record::Repository;
 use sesame_search::fitness_of;
 use sesame_tests::{Project, Runner, command, done, sesamec};
 

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use nix::sys::signal::Signal;
 use serde_json::Value;
 
-use sesame_results::record::{Origin, Repository, TestRow};
+use sesame_record::{Origin, Repository, TestRow};
 use sesame_tests::{Project, Runner, python_mcap, workspace};
 
 use crate::faults::recording;

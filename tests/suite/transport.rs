@@ -4,8 +4,8 @@
 use std::fmt::Write as _;
 use std::fs;
 
-use sesame_results::analysis::rank_sum;
-use sesame_results::record::Repository;
+use sesame_analysis::rank_sum;
+use sesame_record::Repository;
 use sesame_tests::{Project, Runner, command, done, fresh_folder, sesamec, turn, workspace};
 
 use crate::search::quartiles;

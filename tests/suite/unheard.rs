@@ -1,7 +1,7 @@
 //! Campaigns in which no node subscribes to the disturbed topics: they end before they fuzz, and say why.
 
 use sesame_base::observation::Outcome;
-use sesame_results::record::{EventKind, Repository};
+use sesame_record::{EventKind, Repository};
 use sesame_tests::Project;
 
 /// Hides what only metrics listen to: in the cell, no robot subscribes to its zones and its speed.

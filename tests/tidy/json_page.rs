@@ -22,20 +22,20 @@ const PRINTED: [(&str, &str, &str, &str); 15] = [
         "runtime/src/cli/execution.rs",
     ),
     ("`null`, `mitm`, `known --lab`, `prepare`", "One object.", "Concluded", "runtime/src/cli/preparation.rs"),
-    ("`list`", "One object.", "TestList", "runtime/results/src/report/facts/show.rs"),
-    ("`show`", "One object.", "TestReport", "runtime/results/src/report/facts/show.rs"),
-    ("`show --at`", "One object.", "MomentReport", "runtime/results/src/report/facts/certificate/moment.rs"),
+    ("`list`", "One object.", "TestList", "runtime/results/report/src/facts/show.rs"),
+    ("`show`", "One object.", "TestReport", "runtime/results/report/src/facts/show.rs"),
+    ("`show --at`", "One object.", "MomentReport", "runtime/results/report/src/facts/certificate/moment.rs"),
     (
         "`confirm`",
         "A list with an object for each test that was run again.",
         "ConfirmedTest",
-        "runtime/results/src/analysis/confirmed.rs",
+        "runtime/results/analysis/src/confirmed.rs",
     ),
-    ("`replay`", "One object.", "Replay", "runtime/results/src/report/facts/replay.rs"),
-    ("`replay-recording`", "One object.", "RecordingReplay", "runtime/results/src/report/facts/recording.rs"),
-    ("`monitors`", "One object.", "MonitorsCompared", "runtime/results/src/report/facts/monitors.rs"),
-    ("`twin`", "One object.", "Twin", "runtime/results/src/report/facts/twin.rs"),
-    ("`export`", "One object.", "Exported", "runtime/results/src/report/export.rs"),
+    ("`replay`", "One object.", "Replay", "runtime/results/report/src/facts/replay.rs"),
+    ("`replay-recording`", "One object.", "RecordingReplay", "runtime/results/report/src/facts/recording.rs"),
+    ("`monitors`", "One object.", "MonitorsCompared", "runtime/results/report/src/facts/monitors.rs"),
+    ("`twin`", "One object.", "Twin", "runtime/results/report/src/facts/twin.rs"),
+    ("`export`", "One object.", "Exported", "runtime/results/report/src/export.rs"),
     ("`digest`", "One object.", "Digest", "runtime/src/cli/view.rs"),
     (
         "`sesamec check`, `fmt`, `generate`, `run`",
@@ -48,9 +48,12 @@ const PRINTED: [(&str, &str, &str, &str); 15] = [
 ];
 
 /// Crates whose types may be printed, by the folder of their sources.
-const CRATES: [(&str, &str); 8] = [
+const CRATES: [(&str, &str); 11] = [
     ("sesame_runtime", "runtime/src"),
-    ("sesame_results", "runtime/results/src"),
+    ("sesame_record", "runtime/results/record/src"),
+    ("sesame_present", "runtime/results/present/src"),
+    ("sesame_analysis", "runtime/results/analysis/src"),
+    ("sesame_report", "runtime/results/report/src"),
     ("sesame_search", "runtime/search/src"),
     ("sesame_base", "runtime/model/base/src"),
     ("sesame_plan", "runtime/model/plan/src"),

@@ -8,7 +8,8 @@ use std::sync::atomic::AtomicBool;
 use sesame_optimise::dominance::{Fitness, Unfit};
 use sesame_optimise::front::Front;
 use sesame_plan::{CampaignPlan, Confirmation, Test};
-use sesame_results::record::{self, Event, EventKind, QUARANTINE, Recorder, Repetition, TestRecord};
+use sesame_record as record;
+use sesame_record::{Event, EventKind, QUARANTINE, Recorder, Repetition, TestRecord};
 use sesame_rng::derive_seed;
 use sesame_search::{ConfirmedFront, Evaluated, GenerationTest};
 

@@ -1,6 +1,6 @@
 //! Why a campaign could not go on.
 
-use sesame_results::record::RecordError;
+use sesame_record::RecordError;
 use sesame_search::SearchError;
 use sesame_search::coverage::GridError;
 

@@ -8,7 +8,8 @@ use std::time::Duration;
 
 use sesame_base::observation::Observation;
 use sesame_plan::{CampaignPlan, Compensation, Recorded};
-use sesame_results::record::{self, Event, EventKind, Origin, RecordError, Recorder, Repetition, TestRecord};
+use sesame_record as record;
+use sesame_record::{Event, EventKind, Origin, RecordError, Recorder, Repetition, TestRecord};
 
 use crate::campaign::error::{CampaignError, Halt};
 use crate::campaign::executor::{Executor, Job, JobResult, TraceRequest};

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use sesame_optimise::front::Front;
-use sesame_results::record::TestRecord;
+use sesame_record::TestRecord;
 use sesame_search::coverage::Coverage;
 
 /// Something that happened in a campaign.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use sesame_base::observation::Observation;
 use sesame_plan::Test;
-use sesame_results::record::{Origin, TestRecord};
+use sesame_record::{Origin, TestRecord};
 use sesame_rng::derive_seed;
 use sesame_search::Candidate;
 use sesame_search::test_key::SeenTests;
@@ -115,7 +115,7 @@ impl Numbering {
 
 #[cfg(test)]
 mod tests {
-    use sesame_results::record::sample;
+    use sesame_record::sample;
 
     use super::*;
 

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 
 use sesame_optimise::dominance::Fitness;
 use sesame_optimise::front::Front;
-use sesame_results::record::{RecordError, Recorder, TestRecord};
+use sesame_record::{RecordError, Recorder, TestRecord};
 use sesame_search::Evaluated;
 use sesame_search::coverage::Coverage;
 use sesame_search::sspr::Point;

@@ -6,9 +6,9 @@ use std::fmt;
 use sesame_base::observation::Observation;
 use sesame_base::silence::wires;
 use sesame_plan::{CampaignPlan, OperationId, Requirement, Span, Task, Test};
+use sesame_record::{Difference, Verdict, differences, verdict};
 use sesame_relay::wire::WireTable;
-use sesame_results::record::{Difference, Verdict, differences, verdict};
-use sesame_results::report::CLOSING_RUN_DIFFERS as CLOSING;
+use sesame_report::CLOSING_RUN_DIFFERS as CLOSING;
 
 /// Why an operation cannot have an effect, as far as the reference run shows.
 #[derive(Debug, Clone, PartialEq)]
@@ -202,7 +202,7 @@ const FEWEST: u64 = 10;
 #[cfg(test)]
 mod tests {
     use sesame_base::observation::{Outcome, Reach, Traffic, Unreached};
-    use sesame_results::record::sample;
+    use sesame_record::sample;
 
     use super::*;
     use crate::campaign::error::CampaignError;

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use sesame_base::observation::{Observation, Outcome};
 use sesame_optimise::front::Front;
 use sesame_plan::{CampaignPlan, Task};
-use sesame_results::record::{Recorder, Repository, ResultSet, Status};
+use sesame_record::{Recorder, Repository, ResultSet, Status};
 use sesame_search as search;
 use sesame_search::{Evaluated, Neighbours, Strategy};
 

@@ -84,7 +84,7 @@ const NOT_BUILT_IN: &str = "this runner was built without traces: run `sesamec g
 
 #[cfg(feature = "mcap")]
 fn is_kept(plan: &CampaignPlan, keep: Recorded, observation: &Observation) -> bool {
-    use sesame_results::record::{Verdict, verdict};
+    use sesame_record::{Verdict, verdict};
 
     let failed = !observation.outcome.is_whole();
     let violated = || {

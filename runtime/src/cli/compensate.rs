@@ -9,12 +9,12 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use serde::Serialize;
 
+use sesame_analysis::compensation;
+use sesame_analysis::gap::{Gap, compensated_runs, gap, gap_after, lab_runs};
 use sesame_base::test_number::TestNumber;
 use sesame_plan::{CampaignPlan, Compensation, Fit, Lab, LabTask, Task};
-use sesame_results::analysis::compensation;
-use sesame_results::analysis::gap::{Gap, compensated_runs, gap, gap_after, lab_runs};
-use sesame_results::record::Repository;
-use sesame_results::report::quantity;
+use sesame_record::Repository;
+use sesame_report::quantity;
 use sesame_rng::derive_seed;
 
 use crate::campaign::{Pool, PoolSettings};

@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 
-use sesame_results::record::{Origin, Recorder, Repository, TestRow, Verdict};
-use sesame_results::report;
+use sesame_record::{Origin, Recorder, Repository, TestRow, Verdict};
+use sesame_report as report;
 
 use crate::campaign::{Confirmations, confirm_recorded};
 use crate::cli::execution::{ExecutionArgs, claim_files, interruptible, refuse_unfilled, shown};

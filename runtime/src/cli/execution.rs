@@ -11,11 +11,13 @@ use clap::Args;
 use serde::Serialize;
 
 use sesame_plan::{CampaignPlan, Domain, Task};
+use sesame_record as record;
+use sesame_record::{Recorder, Repository};
 use sesame_relay::files::SpaceFiles as _;
 use sesame_relay::fuzz::unimplemented_operations;
 use sesame_relay::metric::unimplemented_hooks;
-use sesame_results::record::{self, Recorder, Repository};
-use sesame_results::report::{self, Summary};
+use sesame_report as report;
+use sesame_report::Summary;
 
 use crate::campaign::{CampaignEnd, CampaignError, Settings, run_campaign};
 use crate::changed_files::ChangedFiles;

@@ -8,7 +8,7 @@ use clap::Args;
 
 use sesame_base::test_number::TestNumber;
 use sesame_plan::{CampaignPlan, Dimension, Task, Test, Variations};
-use sesame_results::record::{Origin, Repository};
+use sesame_record::{Origin, Repository};
 use sesame_search::variation::{coordinate, reach, vary};
 
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled};

@@ -7,7 +7,8 @@ use clap::Args;
 
 use sesame_base::visible::visible_lines;
 use sesame_notation::is_name;
-use sesame_results::report::{self, Expected};
+use sesame_report as report;
+use sesame_report::Expected;
 
 use crate::cli::failure::Failure;
 use crate::cli::results_folder::open;

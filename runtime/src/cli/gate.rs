@@ -10,8 +10,8 @@ use clap::{Args, ValueEnum};
 
 use sesame_base::test_number::TestNumber;
 use sesame_plan::{CampaignPlan, Task};
-use sesame_results::record::{Repository, Verdict};
-use sesame_results::report::Summary;
+use sesame_record::{Repository, Verdict};
+use sesame_report::Summary;
 
 use crate::cli::failure::NOT_AS_REQUIRED;
 use crate::cli::terminal::say;
@@ -186,8 +186,8 @@ fn insufficient(summary: &Summary, plan: &CampaignPlan, task: &Task) -> Vec<Stri
 #[cfg(test)]
 mod tests {
     use sesame_plan::KnownTestId;
-    use sesame_results::record::{Standing, sample};
-    use sesame_results::report::{ExpectationSummary, Failure, FindingAgain, NotFinite, WithoutEffect, summary};
+    use sesame_record::{Standing, sample};
+    use sesame_report::{ExpectationSummary, Failure, FindingAgain, NotFinite, WithoutEffect, summary};
 
     use super::*;
 

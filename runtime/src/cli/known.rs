@@ -9,9 +9,9 @@ use sesame_plan::{CampaignPlan, KnownTestId, Task};
 #[cfg(feature = "process")]
 use sesame_plan::{Lab, Recorded};
 #[cfg(feature = "process")]
-use sesame_results::record::Repository;
+use sesame_record::Repository;
 #[cfg(feature = "process")]
-use sesame_results::report::preparation;
+use sesame_report::preparation;
 #[cfg(feature = "process")]
 use sesame_rng::derive_seed;
 
@@ -178,7 +178,7 @@ fn chosen(plan: &CampaignPlan, names: &[String]) -> Result<Vec<KnownTestId>, Str
 
 #[cfg(test)]
 mod tests {
-    use sesame_results::record::sample;
+    use sesame_record::sample;
 
     use super::*;
 

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use clap::Args;
 
 use sesame_plan::{Task, TopicId, Undisturbed};
-use sesame_results::report::preparation;
+use sesame_report::preparation;
 
 use crate::cli::execution::{ExecutionArgs, refuse_unfilled};
 use crate::cli::failure::Failure;

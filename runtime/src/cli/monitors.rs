@@ -55,7 +55,7 @@ pub(super) fn monitors(session: &Session, options: &Options) -> Result<ExitCode,
 
 #[cfg(feature = "mcap")]
 pub(super) fn monitors(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
-    use sesame_results::report::monitors_text;
+    use sesame_report::monitors_text;
 
     use crate::cli::failure::NOT_AS_REQUIRED;
     use crate::cli::terminal::{print, print_json, say, text_options};
@@ -89,8 +89,8 @@ pub(super) fn of_both_sides(
     use std::collections::BTreeMap;
 
     use sesame_plan::KnownTestId;
-    use sesame_results::record::{Origin, Repository};
-    use sesame_results::report::preparation::{self, MonitorTest};
+    use sesame_record::{Origin, Repository};
+    use sesame_report::preparation::{self, MonitorTest};
 
     let (Some([simulation, in_lab]), Some(lab)) = (found.known, lab) else {
         let sentence = "`monitors` is left out: no regression test ran in simulation and in a lab.";

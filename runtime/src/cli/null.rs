@@ -5,8 +5,8 @@ use std::process::ExitCode;
 use clap::Args;
 
 use sesame_plan::{Lab, Task, Undisturbed};
-use sesame_results::record::Repository;
-use sesame_results::report::preparation;
+use sesame_record::Repository;
+use sesame_report::preparation;
 use sesame_rng::derive_seed;
 
 use crate::cli::execution::{ExecutionArgs, refuse_unfilled};

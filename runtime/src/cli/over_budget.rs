@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use sesame_plan::Undisturbed;
-use sesame_results::record::{DATABASE, Repository};
-use sesame_results::report::preparation;
+use sesame_record::{DATABASE, Repository};
+use sesame_report::preparation;
 
 use crate::cli::execution::shown;
 use crate::cli::failure::Failure;

@@ -6,11 +6,11 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 
+use sesame_analysis::choice::choice_for;
+use sesame_analysis::exclusions;
 use sesame_base::test_number::TestNumber;
 use sesame_plan::{Lab, LabTask, LabTest, Task};
-use sesame_results::analysis::choice::choice_for;
-use sesame_results::analysis::exclusions;
-use sesame_results::record::Repository;
+use sesame_record::Repository;
 use sesame_rng::derive_seed;
 
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled};

@@ -11,9 +11,10 @@ use clap::Args;
 use serde::Serialize;
 
 use sesame_plan::{CampaignPlan, Lab, Task};
-use sesame_results::record::{self, DATABASE, Recorder, Repository};
-use sesame_results::report::preparation::{self, Preparation};
-use sesame_results::report::write_aside;
+use sesame_record as record;
+use sesame_record::{DATABASE, Recorder, Repository};
+use sesame_report::preparation::{self, Preparation};
+use sesame_report::write_aside;
 
 use crate::cli::execution::{ExecutionArgs, begin, claim_files, interruptible, perform, shown};
 use crate::cli::failure::{Failure, NOT_AS_REQUIRED, STOPPED};

@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use sesame_plan::{CampaignPlan, Direction, MetricSource};
-use sesame_results::record::TestRecord;
-use sesame_results::report::{quantity, readable_sentence};
+use sesame_record::TestRecord;
+use sesame_report::{quantity, readable_sentence};
 
 use crate::campaign::{CampaignEvent, Progress};
 use crate::cli::progress_line::{Line, awaited, cost, countdown, warning};
@@ -212,7 +212,7 @@ mod tests {
 
     #[test]
     fn values_have_their_unit_and_no_more_digits_than_matter() {
-        let plan = sesame_results::record::sample::plan();
+        let plan = sesame_record::sample::plan();
         let mut display = Display::new(&plan, 7, 1);
         display.worst.fill(Some(-7.392_612_3));
         let front = Front::default();

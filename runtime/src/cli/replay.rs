@@ -7,8 +7,8 @@ use std::time::Duration;
 use clap::Args;
 
 use sesame_base::test_number::TestNumber;
-use sesame_results::record::{differences, trace_file};
-use sesame_results::report::{Replay, replay_text};
+use sesame_record::{differences, trace_file};
+use sesame_report::{Replay, replay_text};
 
 use crate::cli::execution::{seconds, shown};
 use crate::cli::failure::{Failure, NOT_AS_REQUIRED, STOPPED};

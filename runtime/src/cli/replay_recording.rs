@@ -40,7 +40,7 @@ pub(super) fn replay_recording(session: &Session, options: &Options) -> Result<E
     use sesame_relay::metric::MetricTable;
     use sesame_relay::wire::WireTable;
     use sesame_relay::{panic_capture, trace};
-    use sesame_results::report::recording_text;
+    use sesame_report::recording_text;
 
     use super::execution::refuse_unfilled;
     use super::failure::NOT_AS_REQUIRED;
@@ -67,14 +67,10 @@ pub(super) fn replay_recording(session: &Session, options: &Options) -> Result<E
 
 /// What metrics are now beside what was recorded.
 #[cfg(feature = "mcap")]
-fn compared(
-    plan: &CampaignPlan,
-    options: &Options,
-    fed: sesame_relay::trace::Fed,
-) -> sesame_results::report::RecordingReplay {
+fn compared(plan: &CampaignPlan, options: &Options, fed: sesame_relay::trace::Fed) -> sesame_report::RecordingReplay {
     use sesame_base::visible::visible;
-    use sesame_results::record::MetricValue;
-    use sesame_results::report::{FedMetric, RecordingReplay, Sameness};
+    use sesame_record::MetricValue;
+    use sesame_report::{FedMetric, RecordingReplay, Sameness};
 
     let recorded = fed.run.as_ref().map_or(&[][..], |run| &run.metrics);
     let metrics: Vec<FedMetric> = plan

@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use sesame_results::record::{self, Repository};
+use sesame_record as record;
+use sesame_record::Repository;
 
 use crate::cli::execution::shown;
 use crate::cli::failure::Failure;

@@ -6,7 +6,8 @@ use std::process::ExitCode;
 use clap::Args;
 
 use sesame_plan::Task;
-use sesame_results::record::{self, Recorder};
+use sesame_record as record;
+use sesame_record::Recorder;
 
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled, shown};
 use crate::cli::failure::Failure;

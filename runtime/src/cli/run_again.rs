@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use sesame_base::observation::{Observation, Outcome};
 use sesame_plan::{MonitorId, Recorded};
-use sesame_results::record::{Repository, TestRecord};
+use sesame_record::{Repository, TestRecord};
 
 use crate::campaign::silence;
 use crate::campaign::{Job, JobResult, SingleSettings, TraceRequest, default_timeout, run_single};

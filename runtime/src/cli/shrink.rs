@@ -9,7 +9,8 @@ use sesame_base::observation::{Observation, Outcome};
 use sesame_base::test_number::TestNumber;
 use sesame_base::verdict::margin;
 use sesame_plan::{CampaignPlan, Failing, RequirementId, Shrinking, Task};
-use sesame_results::record::{self, Origin, RecordError, Repository, TestRecord, Verdict, verdict};
+use sesame_record as record;
+use sesame_record::{Origin, RecordError, Repository, TestRecord, Verdict, verdict};
 
 use crate::cli::caller::Caller;
 use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled};
@@ -162,7 +163,7 @@ fn violated(plan: &CampaignPlan, observation: &Observation) -> Vec<RequirementId
 
 #[cfg(test)]
 mod tests {
-    use sesame_results::record::sample;
+    use sesame_record::sample;
 
     use super::*;
 

@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use sesame_base::visible::visible_json;
-use sesame_results::report::TextOptions;
+use sesame_report::TextOptions;
 
 use crate::cli::failure::Failure;
 

@@ -7,7 +7,7 @@ use std::time::Duration;
 use clap::Args;
 
 use sesame_base::test_number::TestNumber;
-use sesame_results::report::{Twin, twin as compare, twin_text};
+use sesame_report::{Twin, twin as compare, twin_text};
 
 use crate::cli::execution::{seconds, shown};
 use crate::cli::failure::{Failure, NOT_AS_REQUIRED, STOPPED};

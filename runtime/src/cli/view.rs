@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 use serde::Serialize;
 
-use sesame_results::report;
+use sesame_report as report;
 
 use crate::cli::failure::Failure;
 use crate::cli::results_folder::open;

@@ -7,7 +7,7 @@ use rusqlite::Connection;
 use rusqlite::types::Value as Sql;
 use serde_json::Value as Json;
 
-use sesame_results::record::DATABASE;
+use sesame_record::DATABASE;
 use sesame_rng::Stream;
 
 use super::whole::Whole;

@@ -9,7 +9,7 @@ use sesame_plan::{
     ShapeForm, ShapePlace, Simlog, SimlogVersion, Simulator, StepBy, Stepping, Strategy, Topic, TopicId, Type,
     WireNames, WireType, Wiring,
 };
-use sesame_results::record::sample;
+use sesame_record::sample;
 
 use super::whole::rich;
 

@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
+use sesame_analysis as analysis;
+use sesame_analysis::{Run, Selection, compare, coverage, front, indicators, regions, sspr, tests as tests_of};
 use sesame_base::observation::Observation;
 use sesame_base::visible::is_hidden;
 use sesame_plan::Dimension;
-use sesame_results::analysis::{
-    self, Run, Selection, compare, coverage, front, indicators, regions, sspr, tests as tests_of,
-};
-use sesame_results::record::{Repository, differences};
-use sesame_results::report::{self, TextOptions};
+use sesame_record::{Repository, differences};
+use sesame_report as report;
+use sesame_report::TextOptions;
 use sesame_search as search;
 use sesame_search::coverage::Grid;
 use sesame_search::sspr::Convention;
@@ -83,13 +83,10 @@ pub(super) fn read_all(folder: &Path) -> Read {
     for name in ["reference", "T1", "T17", "T20", "T44"] {
         ask!(report::show(&repository, name), |test| report::test_text(&test, options));
         ask!(report::export(&repository, name, None, report::Expected::Values), |exported| exported);
-        ask!(
-            repository.find(name).and_then(|number| repository.test(number)),
-            |record: sesame_results::record::TestRecord| {
-                let nothing = Observation { metrics: Vec::new(), operations: Vec::new(), ..record.observation.clone() };
-                differences(plan, &record.test, &record.observation, &nothing)
-            }
-        );
+        ask!(repository.find(name).and_then(|number| repository.test(number)), |record: sesame_record::TestRecord| {
+            let nothing = Observation { metrics: Vec::new(), operations: Vec::new(), ..record.observation.clone() };
+            differences(plan, &record.test, &record.observation, &nothing)
+        });
     }
     ask!(crate::cli::asked_beside_reports(&repository, "T17"), |answer| answer);
     let runs = [0, 1].map(|_| Repository::open(folder));

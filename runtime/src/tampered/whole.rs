@@ -12,7 +12,7 @@ use sesame_plan::{
     LabTolerance, MetricId, RankKey, RankOrder, RequirementId, ShapeForm, ShapePlace, Shrinking, Statistic, StopRule,
     Task, TopicId,
 };
-use sesame_results::record::{
+use sesame_record::{
     DATABASE, Entered, GenerationCoverage, Origin, Provenance, Recorder, Repetition, entered_outcome, sample,
 };
 use sesame_search as search;

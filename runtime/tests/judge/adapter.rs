@@ -12,12 +12,12 @@ use sesame_plan::{
     Aggregate, Campaign, CampaignPlan, Copies, Drain, Expression, Input, MessageId, Metric, MetricSource, Operation,
     OperationKind, Requirement, Side, Test, Topic, Trend, Type,
 };
+use sesame_record::{DATABASE, MetricValue, Origin, Recorder, TestRecord, Verdict, verdict};
 use sesame_relay::evaluate::{Custom, Run, evaluate_tapped};
 use sesame_relay::metric::MetricTable;
 use sesame_relay::relay::OperationEvent;
 use sesame_relay::transport::{Transport, in_process};
 use sesame_relay::wire::WireTable;
-use sesame_results::record::{DATABASE, MetricValue, Origin, Recorder, TestRecord, Verdict, verdict};
 
 use crate::hooks::{HookKind, entries};
 use crate::ledger::Ledger;
@@ -227,7 +227,7 @@ pub(crate) fn record(folder: &Path, plan: &CampaignPlan, test: &Test, observatio
 
 /// The digest of the results in a folder.
 pub(crate) fn digest(folder: &Path) -> String {
-    sesame_results::record::digest(&folder.join(DATABASE)).expect("what was recorded can be read")
+    sesame_record::digest(&folder.join(DATABASE)).expect("what was recorded can be read")
 }
 
 /// Takes all that a wider plan added out of the results in a folder, row by row: what is left is to be what the plan

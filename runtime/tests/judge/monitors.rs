@@ -7,7 +7,7 @@ use sesame_plan::{
     Bound, Evidence, Gate, Input, Members, Metric, MetricSource, Monitor, MonitorState, Requirement, Score, Side,
     StaleIs, Trend,
 };
-use sesame_results::record::Verdict;
+use sesame_record::Verdict;
 
 use crate::adapter::{STEP, said};
 use crate::case::Case;

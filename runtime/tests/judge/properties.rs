@@ -6,8 +6,8 @@ use sesame_base::observation::{Observation, Outcome};
 use sesame_plan::{
     Activation, Aggregate, Bound, Copies, Drain, Metric, MetricSource, OperationKind, Requirement, Span,
 };
+use sesame_record::Verdict;
 use sesame_relay::value::{Fields, Record, Value};
-use sesame_results::record::Verdict;
 use sesame_rng::Stream;
 
 use crate::adapter::{self, STEP, declares_trend, hung, said};

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use sesame_plan::{CampaignPlan, Domain, OperationId, Span};
-use sesame_results::record::OriginalExtent;
+use sesame_record::OriginalExtent;
 
 use crate::original::{self, Activation, Operation, OperationKind};
 use crate::parts::{Effect, Part};

@@ -29,7 +29,7 @@ use std::fs::File;
 use std::path::Path;
 
 use sesame_plan::CampaignPlan;
-use sesame_results::record::RecordError;
+use sesame_record::RecordError;
 
 pub use dialect::{Dialect, LEFT_OUT, LeftOut};
 pub use lacks::{LACKS, Lack};

@@ -6,9 +6,7 @@ use std::path::Path;
 
 use sesame_base::observation::{MetricObservation, Observation, OperationEffect, Outcome, WallTime};
 use sesame_plan::{CampaignPlan, Choice, MetricId, OperationId, Span, TestOperation, condition as plan_condition};
-use sesame_results::record::{
-    LeftOutOperations, Origin, RecordError, Recorder, ResultSet, SplitOperation, Status, TestRecord,
-};
+use sesame_record::{LeftOutOperations, Origin, RecordError, Recorder, ResultSet, SplitOperation, Status, TestRecord};
 
 use crate::extents;
 use crate::notes::{Counted, Kind, Notes};

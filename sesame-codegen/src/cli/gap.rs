@@ -9,9 +9,9 @@ use std::process::ExitCode;
 use anyhow::bail;
 use clap::Args;
 
-use sesame_results::analysis::extents;
-use sesame_results::analysis::gap::Gap;
-use sesame_results::analysis::traces::TraceGap;
+use sesame_analysis::extents;
+use sesame_analysis::gap::Gap;
+use sesame_analysis::traces::TraceGap;
 
 use super::results::{Format, Output, print};
 use super::shell::{self, Shell};

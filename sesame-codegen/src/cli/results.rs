@@ -7,10 +7,11 @@ use std::process::ExitCode;
 use anyhow::{Context as _, bail};
 use clap::{Args, Subcommand, ValueEnum};
 
+use sesame_analysis as analysis;
+use sesame_analysis::{GivenFront, Run, Scaling, Selection, Table, regions};
 use sesame_plan::{CampaignPlan, Dimension};
-use sesame_results::analysis::{self, GivenFront, Run, Scaling, Selection, Table, regions};
-use sesame_results::record::{DATABASE, Repository};
-use sesame_results::report::TextOptions;
+use sesame_record::{DATABASE, Repository};
+use sesame_report::TextOptions;
 use sesame_search::coverage::Grid;
 use sesame_search::sspr::Convention;
 

@@ -8,10 +8,10 @@ use std::time::{Duration, Instant};
 use anyhow::{bail, ensure};
 use clap::Args;
 
+use sesame_analysis::choice::{Choice, Choosing};
+use sesame_analysis::{Selection, Terms, TestNumber, candidates, first_of};
 use sesame_plan::{CampaignPlan, Dimension, Lab, LabBudget, LabCost, MetricId, RankKey, RankOrder};
-use sesame_results::analysis::choice::{Choice, Choosing};
-use sesame_results::analysis::{Selection, Terms, TestNumber, candidates, first_of};
-use sesame_results::record::Repository;
+use sesame_record::Repository;
 
 use super::results::{Compat, Format, Output, dimension, print};
 use super::shell::{self, Shell};

@@ -8,13 +8,13 @@ use std::time::{Duration, Instant};
 use anyhow::{Context as _, bail, ensure};
 use clap::Args;
 
+use sesame_analysis::choice::Choosing;
+use sesame_analysis::gap::{Gap, dimensions, points};
+use sesame_analysis::{Candidates, Selection, Terms, candidates};
 use sesame_plan::{Dimension, Lab, LabBudget};
-use sesame_results::analysis::choice::Choosing;
-use sesame_results::analysis::gap::{Gap, dimensions, points};
-use sesame_results::analysis::{Candidates, Selection, Terms, candidates};
-use sesame_results::record::Repository;
-use sesame_results::report::study::{Space, Study, Traces};
-use sesame_results::report::write_aside;
+use sesame_record::Repository;
+use sesame_report::study::{Space, Study, Traces};
+use sesame_report::write_aside;
 use sesame_safety::briefing::html::section;
 
 use super::gap::Sides;

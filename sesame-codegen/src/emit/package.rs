@@ -8,15 +8,18 @@ use toml::{Table, Value};
 /// What a campaign hardly uses and the compiler would optimise for long, with the level it gets instead of 3.
 ///
 /// SQLite's is that of the workspace, which builds it for `sesamec` in the same way: runners in a checkout share that.
-const LESS_OPTIMISED: [(&str, u8); 9] = [
+const LESS_OPTIMISED: [(&str, u8); 12] = [
     ("clap_builder", 0),
     ("console", 0),
     ("indicatif", 0),
     ("libsqlite3-sys", 1),
+    ("sesame-analysis", 1),
     ("sesame-lifecycle", 1),
     ("sesame-notation", 1),
     ("sesame-plan", 1),
-    ("sesame-results", 1),
+    ("sesame-present", 1),
+    ("sesame-record", 1),
+    ("sesame-report", 1),
     ("sesame-runtime", 1),
 ];
 

@@ -70,7 +70,7 @@ fn values_of_warnings_that_were_measured_are_kept() {
     let plan = plan(&imported, "first");
     let folder = tempfile::tempdir().unwrap();
     imported.record(0, &plan, folder.path()).unwrap();
-    let repository = sesame_results::record::Repository::open(folder.path()).unwrap();
+    let repository = sesame_record::Repository::open(folder.path()).unwrap();
     let tests = repository.tests().unwrap();
     let of = |name: &str| {
         let at = plan.metrics.iter().position(|metric| metric.name == name).unwrap();

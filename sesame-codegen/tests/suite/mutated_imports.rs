@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use sesame_codegen::cli::{Shell, run};
 use sesame_codegen::frontend::SESAME;
-use sesame_results::record::Repository;
+use sesame_record::Repository;
 
 const WHOLE: &str = include_str!("../originals/arm.model");
 

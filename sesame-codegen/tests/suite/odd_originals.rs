@@ -2,7 +2,7 @@
 
 use sesame_legacy::{Counted, Imported, Kind};
 use sesame_plan::Dimension;
-use sesame_results::record::{Repository, ScannedTest};
+use sesame_record::{Repository, ScannedTest};
 use sesame_search::sspr::Convention;
 use tempfile::TempDir;
 

@@ -8,7 +8,7 @@ use sesame_codegen::frontend::{Look, SESAME};
 use sesame_legacy::{Broken, Imported, Kind, Recorded};
 use sesame_plan::CampaignPlan;
 use sesame_plan::testing::compact::{Base, Tree};
-use sesame_results::record::Repository;
+use sesame_record::Repository;
 use sesame_search::sspr::Convention;
 use tempfile::TempDir;
 

@@ -11,7 +11,7 @@ use roxmltree::{Document, Node};
 
 use sesame_codegen::frontend::{Look, SESAME};
 use sesame_legacy::{Counted, Imported};
-use sesame_results::record::Repository;
+use sesame_record::Repository;
 
 use crate::mutated_imports::Draws;
 
@@ -472,7 +472,7 @@ fn in_file(text: &str) -> Counts {
 /// What is in the results that were imported.
 fn in_results(repository: &Repository) -> Counts {
     let mut counts = Counts::default();
-    let seen = &mut |test: sesame_results::record::ScannedTest| {
+    let seen = &mut |test: sesame_record::ScannedTest| {
         counts.tests += 1;
         counts.operations += test.operations.iter().filter(|operation| operation.part_of.is_none()).count();
         counts.values += test.values.iter().filter(|value| value.value.is_some()).count();

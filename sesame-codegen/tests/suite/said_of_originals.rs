@@ -4,12 +4,14 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
+use sesame_analysis as analysis;
+use sesame_analysis::Selection;
 use sesame_codegen::frontend::{Look, SESAME};
 use sesame_legacy::{Counted, Imported, LACKS, LEFT_OUT};
 use sesame_plan::Exploration;
-use sesame_results::analysis::{self, Selection};
-use sesame_results::record::{NoPoint, Repository};
-use sesame_results::report::{self, TextOptions};
+use sesame_record::{NoPoint, Repository};
+use sesame_report as report;
+use sesame_report::TextOptions;
 use sesame_search::sspr::Convention;
 
 use crate::odd_originals::{at, recorded, said, scanned, with};

@@ -5,10 +5,11 @@ use std::path::PathBuf;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 
+use sesame_analysis as analysis;
+use sesame_analysis::Selection;
 use sesame_base::observation::{Counters, MetricObservation, Observation, OperationEffect, Outcome, WallTime};
 use sesame_plan::{Activation, Dimension, Span};
-use sesame_results::analysis::{self, Selection};
-use sesame_results::record::{Origin, Recorder, Repository, TestRecord};
+use sesame_record::{Origin, Recorder, Repository, TestRecord};
 use sesame_rng::Stream;
 use sesame_search::coverage::Grid;
 use sesame_search::space::TestSpace;

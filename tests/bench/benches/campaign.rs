@@ -2,7 +2,7 @@
 //!
 //! A runner is generated, built and run with one worker; its database knows what the runs themselves took.
 
-use sesame_results::record::Repository;
+use sesame_record::Repository;
 use sesame_tests::Project;
 
 const SPACE: &str = r#"

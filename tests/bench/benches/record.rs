@@ -4,7 +4,7 @@ use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_ma
 
 use sesame_base::observation::{MetricObservation, Observation, Outcome, WallTime};
 use sesame_plan::Test;
-use sesame_results::record::{Origin, Recorder, TestRecord};
+use sesame_record::{Origin, Recorder, TestRecord};
 
 /// A test in which both metrics changed this often.
 fn test(number: u32, points: u32) -> TestRecord {

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use sesame_plan::{CampaignPlan, CoverageGoal};
-use sesame_results::record::{GenerationCoverage, RecordError, Recorder, TestRecord};
+use sesame_record::{GenerationCoverage, RecordError, Recorder, TestRecord};
 use sesame_search::coverage::{self, Coverage, Feasible, Grid, GridError};
 use sesame_search::sspr::{self, Point};
 
@@ -89,7 +89,7 @@ pub(in crate::campaign) fn counted_point(plan: &CampaignPlan, record: &TestRecor
 #[cfg(test)]
 mod tests {
     use sesame_plan::{Dimension, GridAxis};
-    use sesame_results::record::sample;
+    use sesame_record::sample;
 
     use super::*;
 

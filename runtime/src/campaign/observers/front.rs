@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use sesame_results::record::{RecordError, Recorder, ResultSet, Status};
+use sesame_record::{RecordError, Recorder, ResultSet, Status};
 
 use crate::campaign::observer::{Generation, Observer};
 

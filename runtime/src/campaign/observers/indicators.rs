@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use sesame_optimise::dominance::Fitness;
-use sesame_results::record::{RecordError, Recorder};
+use sesame_record::{RecordError, Recorder};
 use sesame_search::indicators::Indicators;
 
 use crate::campaign::observer::{EndedTest, Generation, Observer};

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 
 use sesame_plan::CampaignPlan;
-use sesame_results::record::{RecordError, Recorder};
+use sesame_record::{RecordError, Recorder};
 use sesame_search::StopRules;
 
 use crate::campaign::observer::{Generation, Observer};

@@ -6,7 +6,8 @@ use std::time::Duration;
 use sesame_plan::{
     Bound, Confirmation, Count, CoverageGoal, Dimension, GridAxis, KnownTest, KnownTestId, Search, Statistic,
 };
-use sesame_results::record::{self, sample};
+use sesame_record as record;
+use sesame_record::sample;
 use sesame_rng::Stream;
 
 use super::*;

@@ -13,7 +13,7 @@ use sesame_monitor::{EvidenceId, Network, State};
 use sesame_plan::{CampaignPlan, MonitorId, MonitorState};
 use sesame_relay::trace::{self, Heard, RecordedMonitors, RecordedRun};
 use sesame_relay::wire::WireTable;
-use sesame_results::report::{
+use sesame_report::{
     BrokenDecision, ComparedMonitor, ComparedRecording, DecisionDifference, DelayTolerance, EvidenceCause,
     EvidenceDeviation, EvidenceValue, MonitorDisagreement, MonitorsCompared, ShiftedDecision, TimedState, Tolerated,
 };

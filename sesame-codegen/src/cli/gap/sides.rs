@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 
+use sesame_analysis::gap::{Gap, LabRun, compensated_runs, dimensions, gap, gap_after, lab_runs};
+use sesame_analysis::traces::{Signals, TraceGap, TracedTest, compare};
 use sesame_plan::Lab;
-use sesame_results::analysis::gap::{Gap, LabRun, compensated_runs, dimensions, gap, gap_after, lab_runs};
-use sesame_results::analysis::traces::{Signals, TraceGap, TracedTest, compare};
-use sesame_results::record::{RecordError, Repository};
+use sesame_record::{RecordError, Repository};
 
 use super::traces::{self, Runs};
 

@@ -3,10 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+use sesame_analysis::gap::{LabRun, dimensions, points};
+use sesame_analysis::traces::{Signal, Signals, TracedTest};
 use sesame_plan::{CampaignPlan, Lab};
-use sesame_results::analysis::gap::{LabRun, dimensions, points};
-use sesame_results::analysis::traces::{Signal, Signals, TracedTest};
-use sesame_results::record::{Repository, trace_file};
+use sesame_record::{Repository, trace_file};
 use sesame_runtime::trace;
 use sesame_runtime::wire::WireTable;
 

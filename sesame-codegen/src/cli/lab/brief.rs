@@ -8,8 +8,8 @@ use anyhow::{Context as _, ensure};
 use clap::{Args, ValueEnum};
 
 use sesame_plan::{CampaignPlan, Lab, ShapePlace};
-use sesame_results::record::Repository;
-use sesame_results::report::show;
+use sesame_record::Repository;
+use sesame_report::show;
 use sesame_safety::briefing::{Briefing, Person, html, text};
 use sesame_safety::expansion::{Approach, Reaction, Stop, WALKING_SPEED, separation_distance};
 use sesame_safety::speed::greatest_speed;
@@ -211,7 +211,7 @@ mod tests {
 
     use sesame_plan::testing;
     use sesame_plan::{Bound, LabExclusion, LabShape, MetricId, ShapeForm};
-    use sesame_results::record::sample;
+    use sesame_record::sample;
 
     use super::*;
 

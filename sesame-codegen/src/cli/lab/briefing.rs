@@ -3,8 +3,8 @@
 use sesame_dsl::units::Unit;
 use sesame_notation as notation;
 use sesame_plan::{Bound, CampaignPlan, Lab, Metric, Requirement, ShapePlace};
-use sesame_results::record::{Repetition, Verdict as Recorded};
-use sesame_results::report::{OperationReport, TestReport, VerdictReport};
+use sesame_record::{Repetition, Verdict as Recorded};
+use sesame_report::{OperationReport, TestReport, VerdictReport};
 use sesame_safety::briefing::{
     Active, Briefing, Disturbance, ExpectedContact, ExpectedMetric, ExpectedVerdict, Verdict,
 };

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, bail, ensure};
 use clap::Args;
 
+use sesame_analysis::{Datum, Table};
 use sesame_plan::{CampaignPlan, Lab, LabShape, ShapePlace};
-use sesame_results::analysis::{Datum, Table};
 use sesame_runtime::trace;
 use sesame_runtime::wire::WireTable;
 use sesame_safety::contact::Interval;

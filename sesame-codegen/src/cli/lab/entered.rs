@@ -19,11 +19,11 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, anyhow, bail, ensure};
 use clap::{Args, ValueEnum};
 
+use sesame_analysis::gap::lab_runs;
+use sesame_analysis::{excluded, exclusions};
 use sesame_dsl::similar::most_similar;
 use sesame_plan::{CampaignPlan, LabTask, LabTest, Task};
-use sesame_results::analysis::gap::lab_runs;
-use sesame_results::analysis::{excluded, exclusions};
-use sesame_results::record::{DATABASE, Entered, EnteredRun, Provenance, Recorder, Repository};
+use sesame_record::{DATABASE, Entered, EnteredRun, Provenance, Recorder, Repository};
 use sesame_runtime::cli::Caller;
 
 use self::campaign::Campaign;

@@ -9,8 +9,8 @@ use std::path::PathBuf;
 use anyhow::{bail, ensure};
 use clap::Args;
 
-use sesame_results::analysis::{Datum, Table};
-use sesame_results::record::{Repository, trace_file};
+use sesame_analysis::{Datum, Table};
+use sesame_record::{Repository, trace_file};
 use sesame_safety::interlock::{Equivalence, Judgement, Response};
 
 use super::contacts::{moving_shapes, signals};

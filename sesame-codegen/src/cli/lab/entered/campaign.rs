@@ -7,7 +7,7 @@ use anyhow::{anyhow, bail};
 
 use sesame_dsl::similar::most_similar;
 use sesame_plan::{CampaignPlan, Test};
-use sesame_results::record::{Origin, Repository};
+use sesame_record::{Origin, Repository};
 
 use super::sheet::quoted;
 

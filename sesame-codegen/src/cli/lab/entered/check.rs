@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use sesame_dsl::similar::most_similar;
-use sesame_results::record::{ENTERED_OUTCOMES, Entered, EnteredRun, Outcome, Provenance, entered_outcome};
+use sesame_record::{ENTERED_OUTCOMES, Entered, EnteredRun, Outcome, Provenance, entered_outcome};
 
 use super::campaign::Campaign;
 use super::mistakes::Mistakes;

@@ -11,8 +11,8 @@ use sesame_plan::{CampaignPlan, Metric};
 pub(super) const FIRST_COLUMNS: [&str; 3] = ["test", "run", "outcome"];
 
 /// What a form says once for all its runs, in this order: of which tests they are
-/// ([`tests_digest`](sesame_results::record::Repository::tests_digest)), of which campaign, in which lab, and their
-/// [`Provenance`](sesame_results::record::Provenance).
+/// ([`tests_digest`](sesame_record::Repository::tests_digest)), of which campaign, in which lab, and their
+/// [`Provenance`](sesame_record::Provenance).
 pub(super) const HEAD: [&str; 7] = ["tests", "campaign", "lab", "operator", "hardware", "software", "date"];
 
 /// What stands in place of a value that could not be measured.

@@ -5,10 +5,10 @@ use std::path::PathBuf;
 
 use clap::Parser;
 use proptest::prelude::*;
+use sesame_analysis::gap::{gap, lab_runs};
+use sesame_analysis::{Selection, tests as tests_table};
 use sesame_plan::testing;
-use sesame_results::analysis::gap::{gap, lab_runs};
-use sesame_results::analysis::{Selection, tests as tests_table};
-use sesame_results::record::{EnteredRun, Origin, Repetition, Repository, sample};
+use sesame_record::{EnteredRun, Origin, Repetition, Repository, sample};
 
 use super::*;
 
@@ -464,4 +464,4 @@ proptest! {
     }
 }
 
-const ENTERED: [&str; 8] = sesame_results::record::ENTERED_OUTCOMES;
+const ENTERED: [&str; 8] = sesame_record::ENTERED_OUTCOMES;

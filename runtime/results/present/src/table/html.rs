@@ -1,0 +1,140 @@
+//! Tables as HTML.
+
+use sesame_base::test_number::TestNumber;
+
+use super::{Column, Datum, Style, Table, Tone, shares_in_words};
+use crate::markup::{Markup, coordinate};
+
+impl Table {
+    /// As HTML. Tests that are in `linked` are links to the elements that have their names as ids.
+    pub fn html(&self, markup: &mut Markup, linked: &[u32]) {
+        let words: Vec<Vec<String>> = (0..self.columns.len()).map(|column| self.words(column)).collect();
+        markup.open("div", &[("class", "scroll")]);
+        markup.open("table", &[]);
+        self.titles(markup);
+        markup.open("tbody", &[]);
+        for (at, row) in self.rows.iter().enumerate() {
+            markup.open("tr", &[]);
+            for (column, cell) in row.iter().enumerate() {
+                let class = self.class(column, cell.tone);
+                match self.columns[column].style {
+                    Style::Heading => markup.open("th", &[("scope", "row")]),
+                    _ if class.is_empty() => markup.open("td", &[]),
+                    _ => markup.open("td", &[("class", &class)]),
+                }
+                match &cell.datum {
+                    Datum::Test(test) => link(markup, *test, linked),
+                    Datum::OfTest(test, text) => {
+                        link(markup, *test, linked);
+                        markup.text(&format!(" {text}"));
+                    }
+                    Datum::Shares(shares) => bar(markup, shares),
+                    _ => markup.text(&words[column][at]),
+                }
+                markup.close();
+            }
+            markup.close();
+        }
+        markup.close();
+        markup.close();
+        markup.close();
+    }
+
+    /// A title for each column; those of columns of numbers stand to the right, as the numbers do.
+    fn titles(&self, markup: &mut Markup) {
+        markup.open("thead", &[]);
+        markup.open("tr", &[]);
+        for (at, Column { title, style, .. }) in self.columns.iter().enumerate() {
+            let mut title = title.clone();
+            // Names of metrics and of data stay as they are.
+            if let Some(first) = title.get_mut(..1).filter(|_| !matches!(style, Style::Metric | Style::Data)) {
+                first.make_ascii_uppercase();
+            }
+            let class = if self.is_right(at) { "number" } else { "words" };
+            markup.element("th", &[("scope", "col"), ("class", class)], &title);
+        }
+        markup.close();
+        markup.close();
+    }
+
+    fn class(&self, column: usize, tone: Tone) -> String {
+        let layout = match self.columns[column].style {
+            Style::Line => "keep",
+            Style::Sentence => "sentence",
+            _ if self.is_right(column) => "number",
+            Style::Data | Style::Heading | Style::Words | Style::Number | Style::Metric | Style::Picture => "",
+        };
+        let tone = match tone {
+            Tone::Plain => "",
+            Tone::Bad => "bad",
+            Tone::Quiet => "quiet",
+        };
+        [layout, tone].into_iter().filter(|class| !class.is_empty()).collect::<Vec<_>>().join(" ")
+    }
+}
+
+/// The name of a test, as a link if there is an element to lead to.
+fn link(markup: &mut Markup, test: TestNumber, linked: &[u32]) {
+    let name = test.to_string();
+    if linked.contains(&test.0) {
+        markup.element("a", &[("href", &format!("#{name}"))], &name);
+    } else {
+        markup.text(&name);
+    }
+}
+
+/// The shares as parts of a bar.
+fn bar(markup: &mut Markup, shares: &[(usize, &'static str)]) {
+    let total = shares.iter().map(|(count, _)| count).sum::<usize>().max(1) as f64;
+    let label = shares_in_words(shares);
+    markup.open("svg", &[("class", "bar"), ("viewBox", "0 0 100 10"), ("role", "img"), ("aria-label", &label)]);
+    let mut left = 0.0;
+    for &(count, class) in shares {
+        let width = 100.0 * count as f64 / total;
+        let (x, width_text) = (coordinate(left), coordinate(width));
+        markup.leaf("rect", &[("class", class), ("x", &x), ("y", "0"), ("width", &width_text), ("height", "10")]);
+        left += width;
+    }
+    markup.close();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_test_is_a_link_where_the_page_shows_it_and_findings_stand_out() {
+        let columns = [Column::heading("test"), Column::metric("cycle_time", Some("s")), Column::line("worst")];
+        let mut table = Table::with(columns.into_iter().chain([Column::picture("tests")]));
+        let shares = || Datum::Shares(vec![(1, "violated"), (3, "satisfied")]);
+        table.row([
+            Datum::test(1).into(),
+            Datum::Real(68.25).bad_if(true),
+            Datum::OfTest(TestNumber(2), "<5".to_owned()).into(),
+            shares().into(),
+        ]);
+        table.row([Datum::test(2), Datum::Real(7.0), Datum::Missing, shares()]);
+        let mut markup = Markup::default();
+        table.html(&mut markup, &[2]);
+        let html = markup.finish();
+        let document = roxmltree::Document::parse(&html).unwrap();
+        let texts = |name: &str| {
+            let cells = document.descendants().filter(|node| node.has_tag_name(name));
+            let text = |node: roxmltree::Node<'_, '_>| {
+                let texts = node.descendants().filter(roxmltree::Node::is_text).filter_map(|text| text.text());
+                texts.collect::<String>().trim().to_owned()
+            };
+            cells.map(text).collect::<Vec<String>>()
+        };
+        assert_eq!(texts("th"), ["Test", "cycle_time", "Worst", "Tests", "T1", "T2"]);
+        assert_eq!(texts("td"), ["68.25 s", "T2 <5", "", "7.00 s", "–", ""]);
+        let links: Vec<_> = document.descendants().filter_map(|node| node.attribute("href")).collect();
+        assert_eq!(links, ["#T2", "#T2"]);
+        let bad = document.descendants().find(|node| node.attribute("class") == Some("number bad")).unwrap();
+        assert_eq!(bad.text(), Some("68.25 s"));
+        let bar = document.descendants().find(|node| node.has_tag_name("svg")).unwrap();
+        assert_eq!(bar.attribute("aria-label"), Some("1 violated, 3 satisfied"));
+        let widths: Vec<_> = bar.children().map(|part| part.attribute("width").unwrap()).collect();
+        assert_eq!(widths, ["25", "75"]);
+    }
+}

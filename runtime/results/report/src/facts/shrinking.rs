@@ -1,0 +1,347 @@
+//! How a test was shrunk: the test before and after, and every test that was tried on the way.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use sesame_base::test_number::TestNumber;
+use sesame_notation as notation;
+use sesame_plan::{Activation, CampaignPlan, Dimension, Failing, MetricId, RequirementId, Test, TestOperation};
+use sesame_present::number::{self, fixed};
+use sesame_record::{MetricValue, RecordError, Repository, TestRow, fails};
+use sesame_search::shrink::Shrink;
+use sesame_search::shrink::strength;
+use sesame_search::{Strategy as _, sspr};
+
+use crate::export::shrunk_block;
+use crate::facts::wording::{bounds_on, operations, value_text};
+
+/// How a test was shrunk.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Shrinking {
+    /// The test's name in the results that it was found in.
+    pub test: String,
+    /// How it fails: `violates R1 and R3`, `crashes`, `times out`.
+    pub fails: String,
+    /// The number of runs in which a test had to fail.
+    pub runs: u32,
+    /// Whether no single step shrinks the smallest test further: all of them were tried.
+    pub minimal: bool,
+    /// The original test in these results; `None` if it has not run yet.
+    pub before: Option<TestSize>,
+    /// The smallest test that still fails; `None` if not even the original failed again.
+    pub after: Option<TestSize>,
+    /// The smallest test as a `test` block of the language.
+    pub block: Option<String>,
+    /// Every test that was tried, in the order in which they were asked for.
+    pub steps: Vec<ShrinkStep>,
+}
+
+/// How large a test is.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TestSize {
+    /// Its name in these results.
+    pub test: TestNumber,
+    /// Its number in these results.
+    pub number: u32,
+    /// How many operations it has.
+    pub operations: usize,
+    /// The same in words.
+    pub operations_text: String,
+    /// How long its operations were active in total, in seconds of simulation time, as observed; `None` where the run
+    /// could not report it.
+    pub active_time: Option<f64>,
+    /// P1 of its run: the mean of its parameters as shares of what is permitted.
+    pub intensity: Option<f64>,
+    /// How strong its operations are in total, each from 0 to 1 ([`sesame_search::shrink::strength`]).
+    pub strength: f64,
+    /// The values in its run of the metrics that its failure concerns.
+    pub values: Vec<NamedValue>,
+}
+
+/// A test that was tried.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ShrinkStep {
+    /// Its name in these results; with several runs, the name of the first.
+    pub test: TestNumber,
+    /// The test that it was made of.
+    pub base: Option<TestNumber>,
+    /// The phase of the shrink that tried it.
+    pub tried: String,
+    /// The difference from the test that it was made of.
+    pub change: String,
+    /// In how many of its runs it failed.
+    pub failed: u32,
+    /// Whether it was accepted: the next tests were made of it.
+    pub kept: bool,
+    /// The values in its first run of the metrics that its failure concerns.
+    pub values: Vec<NamedValue>,
+}
+
+/// The value of a metric in a run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NamedValue {
+    /// The metric.
+    pub metric: String,
+    /// Its value.
+    pub value: Option<f64>,
+    /// The value with its unit, in words.
+    #[serde(skip)]
+    pub(crate) text: String,
+}
+
+impl Shrinking {
+    /// Numbers of the original and of the smallest test, if there is a smaller one.
+    pub(crate) fn ends(&self) -> Vec<u32> {
+        let mut ends: Vec<u32> = self.before.iter().chain(&self.after).map(|size| size.number).collect();
+        ends.dedup();
+        ends
+    }
+}
+
+/// How a test was shrunk, if these results are of a shrink: the search is replayed over the recorded tests.
+pub(crate) fn shrinking(repository: &Repository, rows: &[TestRow]) -> Result<Option<Shrinking>, RecordError> {
+    let plan = repository.plan();
+    let Some(shrunk) = repository.task().shrinking() else { return Ok(None) };
+    let (name, failing) = (shrunk.name.clone(), &shrunk.failing);
+    let mut search = Shrink::new(plan, shrunk.clone());
+    let rows: BTreeMap<u32, &TestRow> = rows.iter().map(|row| (row.number, row)).collect();
+    let mut number = 0;
+    loop {
+        let asked = search.ask();
+        let mut results = Vec::with_capacity(asked.len());
+        for candidate in &asked {
+            number += 1;
+            let Some(row) = rows.get(&number).filter(|row| row.test == candidate.test) else { break };
+            results.push((number, fails(plan, failing, &row.outcome, |id| row.value(id))));
+        }
+        // Of an unfinished run, only whole generations count.
+        if asked.is_empty() || results.len() < asked.len() {
+            break;
+        }
+        search.learn(&results);
+    }
+    let metrics = metrics(plan, failing);
+    let kept = search.accepted();
+    let steps = search.tried().iter().enumerate().filter_map(|(at, tried)| {
+        let row = rows.get(&tried.number)?;
+        Some(ShrinkStep {
+            test: TestNumber(tried.number),
+            base: tried.base.map(|base| TestNumber(search.tried()[base].number)),
+            tried: tried.phase.words().to_owned(),
+            change: match tried.base {
+                Some(base) => change(plan, &search.tried()[base].test, &tried.test),
+                None => format!("{name} unchanged"),
+            },
+            failed: tried.failed?,
+            kept: kept.contains(&at),
+            values: values(plan, &metrics, |id| row.value(id)),
+        })
+    });
+    let steps: Vec<ShrinkStep> = steps.collect();
+    let size = |at: usize| size(repository, &rows, &metrics, search.tried()[at].number);
+    let before = if steps.is_empty() { None } else { Some(size(0)?) };
+    let after = kept.last().map(|&at| size(at)).transpose()?;
+    let block = match &after {
+        Some(after) => {
+            let record = repository.test(after.number)?;
+            Some(shrunk_block(plan, repository.campaign().seed, &record, &name))
+        }
+        None => None,
+    };
+    let (runs, minimal) = (search.runs(), search.is_minimal());
+    Ok(Some(Shrinking { fails: words(plan, failing), test: name, runs, minimal, before, after, block, steps }))
+}
+
+fn words(plan: &CampaignPlan, failing: &Failing) -> String {
+    match failing {
+        Failing::Crash => "crashes".to_owned(),
+        Failing::Timeout => "times out".to_owned(),
+        Failing::Violation { requirements, .. } => {
+            let names: Vec<String> = requirements.iter().map(|&id| plan.requirement(id).name.clone()).collect();
+            format!("violates {}", number::join_words(&names))
+        }
+    }
+}
+
+/// The metrics that a failing is about, each once.
+fn metrics(plan: &CampaignPlan, failing: &Failing) -> Vec<MetricId> {
+    let Failing::Violation { requirements, .. } = failing else { return Vec::new() };
+    let mut metrics: Vec<MetricId> =
+        requirements.iter().map(|&id: &RequirementId| plan.requirement(id).metric).collect();
+    metrics.sort_unstable();
+    metrics.dedup();
+    metrics
+}
+
+fn values(plan: &CampaignPlan, metrics: &[MetricId], value: impl Fn(MetricId) -> MetricValue) -> Vec<NamedValue> {
+    let named = |&id: &MetricId| {
+        let metric = plan.metric(id);
+        let shown = value(id);
+        let text = value_text(shown, metric.unit.as_deref(), &bounds_on(plan, id));
+        NamedValue { metric: metric.name.clone(), value: shown.value, text }
+    };
+    metrics.iter().map(named).collect()
+}
+
+fn size(
+    repository: &Repository,
+    rows: &BTreeMap<u32, &TestRow>,
+    metrics: &[MetricId],
+    number: u32,
+) -> Result<TestSize, RecordError> {
+    let plan = repository.plan();
+    let record = repository.test(number)?;
+    let effects = &record.observation.operations;
+    let spans = effects.iter().flat_map(|effect| &effect.intervals);
+    let active: f64 = spans.map(|span| span.length()).sum();
+    let row = rows.get(&number);
+    let point = sspr::observed_point(plan, &record.test, &record.observation);
+    Ok(TestSize {
+        test: TestNumber(number),
+        number,
+        operations: record.test.operations.len(),
+        operations_text: row.map_or_else(String::new, |row| operations(plan, row)),
+        active_time: (effects.len() == record.test.operations.len()).then_some(active),
+        intensity: point.and_then(|point| point.get(Dimension::P1)),
+        strength: strength(plan, &record.test),
+        values: values(plan, metrics, |id| row.map_or_else(MetricValue::default, |row| row.value(id))),
+    })
+}
+
+/// How a test differs from the one that it was made of.
+fn change(plan: &CampaignPlan, base: &Test, test: &Test) -> String {
+    let name = |used: &TestOperation| plan.operation(used.operation).name.as_str();
+    if test.operations.len() < base.operations.len() {
+        let mut left = test.operations.iter().peekable();
+        let mut out: Vec<(&str, usize)> = Vec::new();
+        for used in base.operations.iter().filter(|used| left.next_if(|kept| kept == used).is_none()) {
+            match out.iter_mut().find(|(known, _)| *known == name(used)) {
+                Some((_, times)) => *times += 1,
+                None => out.push((name(used), 1)),
+            }
+        }
+        let words = |(name, times): &(&str, usize)| match times {
+            1 => (*name).to_owned(),
+            times => format!("{name} ×{times}"),
+        };
+        return format!("without {}", number::join_words(&out.iter().map(words).collect::<Vec<_>>()));
+    }
+    let mut changes = Vec::new();
+    for (was, used) in base.operations.iter().zip(&test.operations) {
+        let kind = plan.operation(used.operation);
+        if was.activation != used.activation {
+            changes.push(format!("{} {}", name(used), activation(plan, &used.activation)));
+        }
+        for ((parameter, was), choice) in kind.parameters.iter().zip(&was.parameters).zip(&used.parameters) {
+            if was != choice {
+                changes.push(format!("{} {}", name(used), number::choice(&kind.kind, parameter, choice)));
+            }
+        }
+    }
+    changes.join("; ")
+}
+
+fn activation(plan: &CampaignPlan, activation: &Activation) -> String {
+    let words = |condition| notation::condition::write(condition, &plan.metrics);
+    let often = |times: u32| if times == 1 { String::new() } else { format!(" at most {times} times") };
+    match activation {
+        Activation::Time { start, end } => format!("from {} s to {} s", fixed(*start, 2), fixed(*end, 2)),
+        Activation::Condition { start, end, times } => {
+            format!("when {} until {}{}", words(start), words(end), often(*times))
+        }
+        Activation::ConditionFor { start, length, times } => {
+            format!("when {} for {} s{}", words(start), fixed(*length, 2), often(*times))
+        }
+        Activation::Offline => "before or after the run".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use sesame_plan::Task;
+    use sesame_record::{Origin, Recorder, TestRecord, sample};
+
+    use super::*;
+    use crate::{TextOptions, page, summary, summary_text};
+
+    /// A test of the sample campaign, shrunk as far as so many runs.
+    fn recorded(most: usize) -> (tempfile::TempDir, Repository) {
+        let plan = sample::plan();
+        let found = sample::records(&plan, 60);
+        let fails_r1 =
+            |record: &TestRecord| record.observation.metrics.first().and_then(|metric| metric.value) > Some(0.0);
+        let found = found.iter().find(|record| record.number > 20 && fails_r1(record)).unwrap();
+        assert!(found.test.operations.len() > 1);
+        let failing = Failing::Violation { requirements: vec![RequirementId(0)], margins: Vec::new() };
+        let task = Task::Shrink(sesame_plan::Shrinking {
+            name: format!("T{}", found.number),
+            test: found.test.clone(),
+            failing: failing.clone(),
+            simulator_seed: 9,
+            runs: 1,
+            evaluations: 200,
+        });
+        let plan = task.plan(&plan);
+        let folder = tempfile::tempdir().unwrap();
+        let mut recorder = Recorder::create_for(folder.path(), &plan, &task, 42, 1).unwrap();
+        recorder.commit(&sample::record(&plan, 0, Origin::Reference, Test::default())).unwrap();
+        let mut search = Shrink::new(&plan, task.shrinking().unwrap().clone());
+        let mut number = 0;
+        loop {
+            let asked = search.ask();
+            let mut told = Vec::new();
+            for candidate in &asked {
+                number += 1;
+                let observation = sample::observe(&plan, &candidate.test, 9);
+                let record = sample::record(&plan, number, Origin::Search, candidate.test.clone());
+                let record = TestRecord { parents: candidate.parents.clone(), observation, ..record };
+                let value = |id: MetricId| {
+                    let shown = &record.observation.metrics[id.index()];
+                    MetricValue::from(shown)
+                };
+                let failing = fails(&plan, &failing, &record.observation.outcome, value);
+                recorder.commit(&record).unwrap();
+                told.push((number, failing));
+                if number as usize == most {
+                    return (folder, recorder.finish("stopped").unwrap());
+                }
+            }
+            if asked.is_empty() {
+                return (folder, recorder.finish(&search.ended().unwrap()).unwrap());
+            }
+            search.learn(&told);
+        }
+    }
+
+    #[test]
+    fn what_became_of_a_test_is_told_with_the_way_there() {
+        let (_folder, repository) = recorded(usize::MAX);
+        let summary = summary(&repository).unwrap();
+        let shrinking = summary.shrinking.as_ref().unwrap();
+        let (before, after) = (shrinking.before.as_ref().unwrap(), shrinking.after.as_ref().unwrap());
+        assert!(shrinking.minimal && after.operations < before.operations && after.active_time < before.active_time);
+        assert!(after.strength < before.strength && after.values[0].value > Some(0.0));
+        assert_eq!(shrinking.steps.iter().rfind(|step| step.kept).unwrap().test, after.test);
+        insta::assert_snapshot!("shrinking", summary_text(&summary, TextOptions { width: Some(110), colour: false }));
+        let html = page(&repository).unwrap();
+        assert!(html.contains(" shrunk") && html.contains("Every test that was tried"));
+        for end in shrinking.ends() {
+            assert!(html.contains(&format!("id=\"T{end}\"")), "T{end} has a timeline");
+        }
+    }
+
+    #[test]
+    fn an_unfinished_way_is_told_as_far_as_it_went() {
+        let (_folder, whole) = recorded(usize::MAX);
+        let whole = summary(&whole).unwrap().shrinking.unwrap();
+        for most in 1..=whole.steps.len() {
+            let (_folder, repository) = recorded(most);
+            let part = summary(&repository).unwrap().shrinking.unwrap();
+            let steps = part.steps.iter().map(|step| (&step.test, &step.change, step.failed));
+            let expected = whole.steps.iter().map(|step| (&step.test, &step.change, step.failed));
+            assert!(part.steps.len() <= most && steps.eq(expected.take(part.steps.len())));
+            assert!(part.after.is_none_or(|after| after.number as usize <= most));
+        }
+    }
+}

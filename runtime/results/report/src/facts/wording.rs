@@ -1,0 +1,65 @@
+//! Tests and values in words, as several facts have them.
+
+use sesame_plan::{Bound, CampaignPlan, MetricId};
+use sesame_present::number;
+use sesame_record::{Judge, MetricValue, TestRow, Verdict, not_imported};
+
+/// Names of the requirements a test violates.
+pub(crate) fn violated(plan: &CampaignPlan, judge: &Judge<'_>, row: &TestRow) -> Vec<String> {
+    plan.requirements
+        .iter()
+        .filter(|requirement| judge.verdict(row, requirement) == Verdict::Violated)
+        .map(|requirement| requirement.name.clone())
+        .collect()
+}
+
+/// A test's operations with their counts, in the space's order, and those that had no effect after the others, as in
+/// `jitter_link0 ×2, lose_link0 (no effect)`. Those that could not be imported are counted behind them.
+pub(crate) fn operations(plan: &CampaignPlan, row: &TestRow) -> String {
+    let of = |idle: bool| {
+        plan.operations.iter().enumerate().filter_map(move |(id, operation)| {
+            let used = row.test.operations.iter().enumerate().filter(|(_, used)| used.operation.index() == id);
+            let used = used.filter(|(at, _)| row.idle.get(*at).copied().unwrap_or(false) == idle);
+            let times = match used.count() {
+                0 => return None,
+                1 => String::new(),
+                n => format!(" ×{n}"),
+            };
+            Some(format!("{}{times}{}", operation.name, if idle { " (no effect)" } else { "" }))
+        })
+    };
+    let named: Vec<String> = of(false).chain(of(true)).chain(not_imported(row.left_out)).collect();
+    if named.is_empty() { "without disturbance".to_owned() } else { named.join(", ") }
+}
+
+/// A sentence about tests with operations that could not be imported.
+pub(crate) fn tests_not_imported(rows: &[TestRow]) -> Option<String> {
+    let tests = rows.iter().filter(|row| row.left_out > 0).count();
+    let held = match tests {
+        0 => return None,
+        1 => "1 test held operations".to_owned(),
+        tests => format!("{tests} tests held operations"),
+    };
+    Some(format!("{held} that were not imported: more was disturbed than is shown, and such a test has no point"))
+}
+
+/// A metric's value with its unit, next to bounds to which it is compared; `(never set)` follows where it is the
+/// default.
+pub(crate) fn value_text(shown: MetricValue, unit: Option<&str>, bounds: &[Bound]) -> String {
+    match shown.value {
+        None => "unmeasured".to_owned(),
+        Some(value) if shown.set => number::beside(value, bounds, unit),
+        Some(value) => format!("{} (never set)", number::beside(value, bounds, unit)),
+    }
+}
+
+/// The bounds of a plan's requirements on a metric.
+pub(crate) fn bounds_on(plan: &CampaignPlan, metric: MetricId) -> Vec<Bound> {
+    let requirements = plan.requirements.iter().filter(|requirement| requirement.metric == metric);
+    requirements.map(|requirement| requirement.bound).collect()
+}
+
+/// The word of an outcome as prose has it.
+pub(crate) fn outcome_words(word: &str) -> String {
+    word.replace('_', " ")
+}

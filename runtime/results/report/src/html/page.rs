@@ -1,0 +1,225 @@
+//! The page with pictures: one file that needs nothing but itself.
+
+use std::path::Path;
+
+use sesame_present::chart::evenly;
+use sesame_present::markup::{Markup, fill};
+use sesame_present::table::Table;
+use sesame_record::{Origin, RecordError, Repository, TestRow};
+
+use crate::facts::shrinking::Shrinking;
+use crate::facts::summary::{Summary, summarise};
+use crate::file::write_aside;
+use crate::html::all_tests::all_tests;
+use crate::html::front::front;
+use crate::html::generations::generations;
+use crate::html::header::header;
+use crate::html::policy::policy;
+use crate::html::test::test;
+use crate::html::{cells, mend, monitors, regions, shrinking, tree};
+use crate::sentences::{QUARANTINED, once_sentence};
+use crate::tables;
+
+/// Timelines drawn at most; of a larger front evenly chosen ones.
+const TIMELINES: usize = 24;
+
+/// Writes the page to this path, beside the results or elsewhere.
+pub fn write_page(repository: &Repository, path: &Path) -> Result<(), RecordError> {
+    write_page_with(repository, path, &repository.digest()?)
+}
+
+/// The same for results whose digest is known already.
+pub fn write_page_with(repository: &Repository, path: &Path, digest: &str) -> Result<(), RecordError> {
+    write_page_against(repository, None, path, digest)
+}
+
+/// The same with results of before the certificates were mended: the page shows the same tests before and after.
+pub fn write_page_against(
+    repository: &Repository,
+    before: Option<&Repository>,
+    path: &Path,
+    digest: &str,
+) -> Result<(), RecordError> {
+    let beside = path.parent() == Some(repository.folder());
+    let folder = if beside { Path::new("") } else { repository.folder() };
+    let page = page_in(repository, before, folder, digest)?;
+    write_aside(path, &page).map_err(|e| RecordError::io("write the page", path, e))
+}
+
+/// The page, from a campaign's results; a run may still be going on. Links to traces lead from the run's folder.
+pub fn page(repository: &Repository) -> Result<String, RecordError> {
+    page_in(repository, None, Path::new(""), &repository.digest()?)
+}
+
+/// The page; `folder` is the path of the run's folder relative to the page.
+fn page_in(
+    repository: &Repository,
+    before: Option<&Repository>,
+    folder: &Path,
+    digest: &str,
+) -> Result<String, RecordError> {
+    let rows = repository.tests()?;
+    let members = repository.latest_result_set()?.map_or_else(Vec::new, |set| set.members);
+    let summary = summarise(repository, &rows, &members)?;
+    let groups = chosen(&summary, &rows);
+    let drawn: Vec<u32> = groups.iter().flat_map(|group| group.tests.iter().copied()).collect();
+
+    let mut body = Markup::default();
+    header(&mut body, repository, &summary, digest)?;
+    body.open("main", &[]);
+    if let Some(shrinking) = &summary.shrinking {
+        shrinking::shrinking(&mut body, shrinking, &drawn);
+    }
+    monitors::monitors(&mut body, &summary, &drawn);
+    if let Some(before) = before {
+        mend::before_and_after(&mut body, repository, before, &drawn)?;
+    }
+    requirements(&mut body, &summary, &drawn);
+    front(&mut body, repository, &summary, &rows, &drawn);
+    all_tests(&mut body, repository, &summary, &rows, &drawn)?;
+    generations(&mut body, repository, &summary, &rows, &drawn)?;
+    if let Some(coverage) = &summary.coverage {
+        cells::coverage(&mut body, repository.plan(), coverage, &drawn);
+    }
+    regions::regions(&mut body, repository)?;
+    tree::certificates(&mut body, repository.plan());
+    sections(&mut body, &summary, &drawn);
+    for group in groups.iter().filter(|group| !group.tests.is_empty()) {
+        body.open("section", &[]);
+        body.element("h2", &[], group.title);
+        body.element("p", &[("class", "quiet")], &group.caption);
+        for &number in &group.tests {
+            test(&mut body, repository, &summary, number, folder)?;
+        }
+        body.close();
+    }
+    body.close();
+    let title = format!("{} of {}, seed {}", summary.campaign, summary.space, summary.seed);
+    let mut escaped = Markup::default();
+    escaped.text(&title);
+    let shell = sesame_templates::report::page();
+    // The policy is of the shell alone: what is filled in is not permitted to hold styles or scripts.
+    let policy = policy(&shell);
+    Ok(fill(&shell, &[("policy", &policy), ("title", &escaped.finish()), ("body", &body.finish())]))
+}
+
+/// What the marks of a timeline mean.
+const MARKS: &str =
+    "Outlined: planned; filled: active. Red: the value up to then is outside the bound of a requirement.";
+
+/// What the lanes of a certificate mean.
+const MISSED: &str = "Of each monitor its state over time, the higher the stronger; dashed: its safe state. Below it its \
+                      evidence: filled: true; a line at the bottom: false; dashed: unknown. Vertical: a requirement was \
+                      violated, solid where the monitor had not foreseen it. ▼: mitigation was sent. Point at a state to \
+                      see why it was so.";
+
+/// Tests that get a timeline because monitors missed hazards in them.
+const MOST_MISSED: usize = 8;
+
+/// Tests in which monitors missed hazards.
+fn missed(summary: &Summary) -> Vec<u32> {
+    let mut tests: Vec<u32> =
+        summary.monitors.iter().flat_map(|monitors| &monitors.missed).map(|missed| missed.test.0).collect();
+    tests.dedup();
+    tests.truncate(MOST_MISSED);
+    tests
+}
+
+/// Tests that get a timeline, under a heading.
+struct Group {
+    title: &'static str,
+    caption: String,
+    tests: Vec<u32>,
+}
+
+fn chosen(summary: &Summary, rows: &[TestRow]) -> Vec<Group> {
+    let reference: Vec<u32> =
+        rows.iter().filter(|row| row.origin == Origin::Reference).map(|row| row.number).take(1).collect();
+    let all: Vec<u32> = summary.front.iter().map(|test| test.number).collect();
+    let missed = missed(summary);
+    let all: Vec<u32> = all.into_iter().filter(|number| !missed.contains(number)).collect();
+    let front = evenly(&all, TIMELINES);
+    let worst = summary.requirements.iter().filter_map(|requirement| requirement.worst.as_ref());
+    let worst = worst.filter_map(|worst| rows.iter().find(|row| row.number == worst.test.0));
+    let failed = rows.iter().filter(|row| !row.outcome.is_whole()).take(4);
+    let known = rows.iter().filter(|row| matches!(row.origin, Origin::Known(_))).take(8);
+    let mut more: Vec<u32> = Vec::new();
+    for row in worst.chain(failed).chain(known) {
+        if ![&front, &more, &missed].iter().any(|others| others.contains(&row.number)) {
+            more.push(row.number);
+        }
+    }
+    let front_caption = if front.len() < all.len() {
+        format!("{} of the {} tests on the front, evenly chosen. {MARKS}", front.len(), all.len())
+    } else {
+        MARKS.to_owned()
+    };
+    let shrunk = summary.shrinking.as_ref().map_or_else(Vec::new, Shrinking::ends);
+    more.retain(|number| !shrunk.contains(number));
+    let missed: Vec<u32> = missed.into_iter().filter(|it| !shrunk.contains(it) && !reference.contains(it)).collect();
+    let shrunk_caption = "The test before and after it was shrunk.".to_owned();
+    vec![
+        Group { title: "Before and after", caption: shrunk_caption, tests: shrunk },
+        Group {
+            title: "Reference run",
+            caption: "The run without disturbance, for comparison.".to_owned(),
+            tests: reference,
+        },
+        Group { title: "Tests with missed hazards", caption: MISSED.to_owned(), tests: missed },
+        Group { title: "Tests on the front", caption: front_caption, tests: front },
+        Group {
+            title: "More tests to look at",
+            caption: "The worst violation of each requirement, crashes and timeouts, and regression tests.".to_owned(),
+            tests: more,
+        },
+    ]
+}
+
+/// Rows of failures shown at most.
+const FAILURES: usize = 50;
+
+/// The requirements, with a sentence on violations that were seen once only.
+fn requirements(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
+    let table = tables::requirements(summary);
+    if table.is_empty() {
+        return;
+    }
+    body.open("section", &[]);
+    body.element("h2", &[], "Requirements");
+    table.html(body, drawn);
+    if let Some(sentence) = once_sentence(summary) {
+        body.element("p", &[("class", "quiet")], &format!("{sentence}."));
+    }
+    body.close();
+}
+
+/// The sections that are a table each.
+fn sections(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
+    if let Some(repetition) = &summary.repetition {
+        let caption = "How often each requirement was violated, with the 95 % Wilson interval.";
+        let table = tables::violation_rates(&repetition.requirements);
+        section(body, &repetition.title, Some(caption), table, drawn);
+    }
+    section(body, "Regression tests", None, tables::expectations(&summary.expectations), drawn);
+    section(body, tables::failures_title(&summary.failures), None, tables::failures(&summary.failures), drawn);
+    section(body, QUARANTINED, None, tables::quarantined(&summary.quarantined), drawn);
+    section(body, "Numbers that are not finite", None, tables::not_finite(&summary.not_finite), drawn);
+}
+
+/// A table under its title, with at most [`FAILURES`] rows; nothing if it has none.
+fn section(body: &mut Markup, title: &str, caption: Option<&str>, mut table: Table, drawn: &[u32]) {
+    if table.is_empty() {
+        return;
+    }
+    body.open("section", &[]);
+    body.element("h2", &[], title);
+    if let Some(caption) = caption {
+        body.element("p", &[("class", "quiet")], caption);
+    }
+    let more = table.truncate(FAILURES);
+    table.html(body, drawn);
+    if more > 0 {
+        body.element("p", &[("class", "quiet")], &format!("And {more} more; the report in JSON has all."));
+    }
+    body.close();
+}

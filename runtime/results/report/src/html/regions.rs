@@ -1,0 +1,47 @@
+//! Where tests fail, as a section of the page.
+
+use sesame_analysis::Selection;
+use sesame_analysis::regions::{Regions, all_regions};
+use sesame_plan::Dimension;
+use sesame_present::markup::Markup;
+use sesame_present::number;
+use sesame_record::{RecordError, Repository};
+
+use crate::html::legend::legend;
+use crate::tables;
+
+/// Tests that a rule is worth being made of.
+const FEWEST: usize = 20;
+
+/// Draws the trees of everything in which tests of a search fail, with their rules.
+pub(super) fn regions(body: &mut Markup, repository: &Repository) -> Result<(), RecordError> {
+    let plan = repository.plan();
+    // Elsewhere tests are not there to be compared with each other.
+    if !repository.task().searches(plan) {
+        return Ok(());
+    }
+    let mut found = all_regions(repository, &Selection::default())?;
+    found.retain(|regions| regions.rules.len() > 1 && regions.all.tests >= FEWEST);
+    if found.is_empty() {
+        return Ok(());
+    }
+    body.open("section", &[("id", "regions")]);
+    body.element("h2", &[], "Where tests fail");
+    let caption = "Regions of tests that a small decision tree separates, by the reduced space (T1 to O3) and the \
+                   operations; the redder, the more fail. Rules describe these tests; only further tests can show \
+                   whether they hold for others.";
+    body.element("p", &[("class", "quiet")], caption);
+    for regions in &found {
+        of_one(body, regions, repository);
+    }
+    legend(body, &Dimension::ALL);
+    body.close();
+    Ok(())
+}
+
+fn of_one(body: &mut Markup, regions: &Regions, repository: &Repository) {
+    let tests = number::plural(regions.all.tests, "test fails", "tests fail");
+    body.element("h3", &[], &format!("{}: {} of {tests}", regions.target, regions.all.failing));
+    regions.draw(body, repository.plan());
+    tables::regions(&regions.rules).html(body, &[]);
+}
