@@ -216,7 +216,7 @@ impl System {
         let limit = if lost { now() + NOTICED } else { now() };
         let error = loop {
             match self.launched.check() {
-                Err(ended) => break ended,
+                Err(ended) => break ended.into(),
                 Ok(()) if now() >= limit => break error,
                 Ok(()) => std::thread::sleep(Duration::from_millis(5)),
             }
