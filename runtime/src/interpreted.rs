@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use sesame_base::time::SimTime;
-use sesame_plan::{CampaignPlan, SimulatorKind};
+use sesame_plan::CampaignPlan;
 use sesame_relay::relay::Exchange;
 use sesame_relay::simulator::Progress;
-use sesame_relay::transport::{self, Capabilities, Connect, Transport, TransportError};
+use sesame_relay::transport::{Capabilities, Connect, Transport, TransportError};
 
 use crate::runner::Runner;
+use crate::transport;
 
 /// An interpreted runner as data: what a compiled one has in its crate.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -27,21 +28,10 @@ pub struct Interpreted {
 
 /// The transport to the simulator of a plan, which is not part of the runner.
 pub(crate) fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
-    let connect = match plan.simulator.transport.kind() {
-        #[cfg(feature = "mqtt")]
-        SimulatorKind::Mqtt => sesame_mqtt::mqtt(folder.to_owned()),
-        #[cfg(feature = "ros1")]
-        SimulatorKind::Ros1 => sesame_ros1::ros1(folder.to_owned()),
-        #[cfg(feature = "ros2")]
-        SimulatorKind::Ros2 => sesame_ros2::ros2(folder.to_owned()),
-        #[cfg(feature = "rosbridge")]
-        SimulatorKind::Rosbridge => sesame_rosbridge::rosbridge(folder.to_owned()),
-        #[cfg(feature = "simlog")]
-        SimulatorKind::Simlog => sesame_simlog::simlog(folder.to_owned()),
-        SimulatorKind::Process => transport::process(folder.to_owned()),
-        _ => return Box::new(Unavailable(plan.simulator.properties().keyword)),
-    };
-    connect.transport(plan)
+    match transport::of_kind(plan.simulator.transport.kind(), folder) {
+        Some(connect) => connect.transport(plan),
+        None => Box::new(Unavailable(plan.simulator.properties().keyword)),
+    }
 }
 
 /// In place of a transport that this program was built without. A campaign's own transport is always there: the

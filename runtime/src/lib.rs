@@ -29,6 +29,7 @@ pub mod standalone;
 #[cfg(feature = "campaign")]
 #[cfg(test)]
 mod tampered;
+pub mod transport;
 
 #[cfg(feature = "campaign")]
 pub use cli::main;
@@ -56,21 +57,6 @@ pub use sesame_search as search;
 pub use sesame_search::{coverage, sspr};
 #[cfg(feature = "simlog-server")]
 pub use sesame_simlog::server as simlog_server;
-
-/// How a runner reaches its simulator.
-pub mod transport {
-    #[cfg(feature = "mqtt")]
-    pub use sesame_mqtt::mqtt;
-    pub use sesame_relay::transport::*;
-    #[cfg(feature = "ros1")]
-    pub use sesame_ros1::ros1;
-    #[cfg(feature = "ros2")]
-    pub use sesame_ros2::ros2;
-    #[cfg(feature = "rosbridge")]
-    pub use sesame_rosbridge::rosbridge;
-    #[cfg(feature = "simlog")]
-    pub use sesame_simlog::simlog;
-}
 
 /// The version of the interface between generated code and this crate.
 pub const GENERATOR_ABI: u32 = 3;

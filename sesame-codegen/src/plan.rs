@@ -6,6 +6,8 @@
 use std::path::Path;
 
 use sesame_plan::{CampaignPlan, Direction, MetricSource, Parameter, Simulator, TopicId};
+#[cfg(feature = "cli")]
+use sesame_runtime::transport::is_built_in;
 
 /// The plan of one runner crate.
 #[derive(Debug, Clone, PartialEq)]
@@ -108,17 +110,10 @@ pub(crate) fn runtime_feature(simulator: &Simulator) -> Option<&'static str> {
     kind.feature_over_tls.filter(|_| over_tls).or(kind.feature)
 }
 
-/// Whether this command was built with a feature of the runtime: its own have the same names.
-fn is_built_in(feature: &str) -> bool {
-    let built_in = [
-        ("mqtt", cfg!(feature = "mqtt")),
-        ("ros1", cfg!(feature = "ros1")),
-        ("ros2", cfg!(feature = "ros2")),
-        ("rosbridge", cfg!(feature = "rosbridge")),
-        ("simlog", cfg!(feature = "simlog")),
-        ("simlog-tls", cfg!(feature = "simlog-tls")),
-    ];
-    built_in.contains(&(feature, true))
+/// As a library, the generator runs nothing.
+#[cfg(not(feature = "cli"))]
+fn is_built_in(_: &str) -> bool {
+    false
 }
 
 impl RunnerPlan {

@@ -155,7 +155,10 @@ fn each_thing_that_later_code_relies_on_is_asked_for() {
     let of_ros: &[Altered] = &[
         (|plan| in_domain(plan, 233), "simulator.transport.domain: is 233, more than 232"),
         (|plan| plan.simulator.ros = None, "simulator.transport: has no `clock`, or no `interfaces`"),
-        (|plan| ros(plan).proxies.push(proxy()), "simulator.transport: a simulator of kind `ros2` has no `proxies`"),
+        (
+            |plan| plan.simulator.proxies.push(proxy()),
+            "simulator.transport: a simulator of kind `ros2` has no `proxies`",
+        ),
         (|plan| ros(plan).step.as_mut().unwrap().step_ns = 0, "simulator.transport.step_ns: must be positive"),
         (|plan| ros(plan).interfaces.reverse(), "interfaces[0].fields[0].type: `test_msgs/msg/Inner` is not before it"),
         (

@@ -10,8 +10,9 @@ use super::ros2::{by_monitor, interfaces, wirings};
 
 /// A simulator of a space, that of its system or that of a lab, without what starts and ends it.
 pub(crate) fn simulator(space: &Space, simulator: &model::Simulator) -> plan::Simulator {
-    let model::Simulator { declaration, transport, crate_folder: _, ros } = simulator;
-    let mut plan = plan::Simulator { ros: ros.clone(), ..plan::Simulator::new(&declaration.name, transport.clone()) };
+    let model::Simulator { declaration, transport, crate_folder: _, ros, proxies } = simulator;
+    let (ros, proxies) = (ros.clone(), proxies.clone());
+    let mut plan = plan::Simulator { ros, proxies, ..plan::Simulator::new(&declaration.name, transport.clone()) };
     if plan.properties().bus.is_some() {
         plan.wiring = wirings(space, plan.stepping().is_some());
     }

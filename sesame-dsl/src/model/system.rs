@@ -4,7 +4,7 @@ use super::declaration::Declaration;
 use super::ids::{MessageId, TopicId};
 use crate::span::Span;
 use crate::units::Unit;
-use sesame_plan::{Channel, Ros, Transport};
+use sesame_plan::{Channel, Proxy, Ros, Transport};
 
 /// The simulator under test, or that of a lab.
 ///
@@ -23,6 +23,8 @@ pub struct Simulator {
     pub crate_folder: Option<String>,
     /// What systems of ROS have; `None` for others.
     pub ros: Option<Ros>,
+    /// Where clients connect that are one node each.
+    pub proxies: Vec<Proxy>,
 }
 
 /// What a system says beside its simulator.

@@ -1,7 +1,8 @@
 //! Systems whose messages go over a bus: addresses, and what is shown to whoever is there.
 
 use sesame_plan::{
-    Broker, Dialect, Mqtt, Remote, Ros1, Rosbridge, Schemes, Secret, Simlog, SimlogVersion, SimulatorKind, WireNames,
+    Broker, Dialect, Mqtt, Remote, Ros1, Ros2, Rosbridge, Schemes, Secret, Simlog, SimlogVersion, SimulatorKind,
+    WireNames,
 };
 
 use super::Resolver;
@@ -11,8 +12,20 @@ use crate::span::Span;
 use crate::syntax::ast::{self, Name, Text};
 
 impl<'a> Resolver<'a> {
+    /// A simulator that is neither a part of the runner nor a program with which it talks in lines.
+    pub(super) fn on_a_bus(&mut self, name: &Name, written: &'a ast::Transport) -> Option<Transport> {
+        match written.kind {
+            SimulatorKind::Ros2 => Some(Transport::Ros2(Ros2 { domain: self.first_domain(written)? })),
+            SimulatorKind::Rosbridge => self.rosbridge(written),
+            SimulatorKind::Ros1 => self.ros1(written),
+            SimulatorKind::Mqtt => self.mqtt(written),
+            SimulatorKind::Simlog => self.simlog(name, written),
+            SimulatorKind::InProcess | SimulatorKind::Process => unreachable!("it is on no bus"),
+        }
+    }
+
     /// Nodes of ROS behind a bridge.
-    pub(super) fn rosbridge(&mut self, written: &'a ast::Transport) -> Option<Transport> {
+    fn rosbridge(&mut self, written: &'a ast::Transport) -> Option<Transport> {
         let settings = &written.settings;
         let remote = self.remote(written, "token");
         let domain = self.first_domain(written);
@@ -28,13 +41,13 @@ impl<'a> Resolver<'a> {
     }
 
     /// Nodes of ROS 1.
-    pub(super) fn ros1(&mut self, written: &'a ast::Transport) -> Option<Transport> {
+    fn ros1(&mut self, written: &'a ast::Transport) -> Option<Transport> {
         let master = self.address(written.first_text(), written)?;
         Some(Transport::Ros1(Ros1 { master }))
     }
 
     /// A system whose messages go over brokers of MQTT.
-    pub(super) fn mqtt(&mut self, written: &'a ast::Transport) -> Option<Transport> {
+    fn mqtt(&mut self, written: &'a ast::Transport) -> Option<Transport> {
         let remote = self.remote(written, "password");
         let quality = self.single(&written.settings.qualities, "quality").copied().unwrap_or_default();
         let user = self.single(&written.settings.users, "user").map(|user| user.text.clone());
@@ -74,7 +87,7 @@ impl<'a> Resolver<'a> {
     }
 
     /// A simulator that speaks `SimlogAPI`.
-    pub(super) fn simlog(&mut self, name: &Name, written: &'a ast::Transport) -> Option<Transport> {
+    fn simlog(&mut self, name: &Name, written: &'a ast::Transport) -> Option<Transport> {
         const MILLISECOND: u64 = 1_000_000;
         let settings = &written.settings;
         let url = self.address(written.first_text(), written);

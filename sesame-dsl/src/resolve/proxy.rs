@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use sesame_plan::{Identity, Proxy, SimulatorKind};
+use sesame_plan::{Identity, Proxy, Schemes, SimulatorKind};
 
 use super::bus::is_here;
 use super::nodes::node_of_plans;
@@ -46,9 +46,15 @@ impl<'a> Resolver<'a> {
         let key = self.single(&proxy.keys, "key").map(|file| file.text.clone());
         let public = self.single(&proxy.publics, "public").is_some();
         let (scheme, host) = address?;
-        let encrypted = scheme == "wss://";
+        let Schemes { encrypted: tls, .. } = kind.properties().address?;
+        let encrypted = tls == Some(scheme);
+        let has_settings = token.is_some() || certificate.is_some() || key.is_some() || public;
         let problem = if !has_port_alone(&proxy.address.text[scheme.len()..]) {
             Some("expected a host and a port to listen at, and nothing after them")
+        } else if tls.is_none() && has_settings {
+            Some("whoever is on this machine may connect, and nobody else; remove the settings of the proxy")
+        } else if tls.is_none() && !is_here(host) {
+            Some("other machines could connect; expected `127.0.0.1`")
         } else if encrypted && (certificate.is_none() || key.is_none()) {
             Some("expected `{ certificate \"FILE\" key \"FILE\" }` after an address of TLS")
         } else if !encrypted && (certificate.is_some() || key.is_some()) {

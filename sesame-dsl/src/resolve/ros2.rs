@@ -1,10 +1,10 @@
 //! Systems of ROS: the settings of their simulator, and the names that ROS permits.
 
-use sesame_plan::{Dialect, Ros2, SimulatorKind, SimulatorProperties};
+use sesame_plan::{Dialect, SimulatorKind, SimulatorProperties};
 
 use super::Resolver;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{Clock, Ros, StepBy, Stepping, Transport};
+use crate::model::{Clock, Ros, StepBy, Stepping};
 use crate::span::Span;
 use crate::syntax::ast::{self, Name, StepChannel, Text};
 
@@ -76,12 +76,6 @@ impl<'a> Resolver<'a> {
         self.other_than_ros()
     }
 
-    /// Nodes of ROS 2.
-    pub(super) fn ros2(&mut self, written: &'a ast::Transport) -> Option<Transport> {
-        let domain = self.first_domain(written)?;
-        Some(Transport::Ros2(Ros2 { domain }))
-    }
-
     /// The domain of the first worker.
     pub(super) fn first_domain(&mut self, written: &'a ast::Transport) -> Option<u16> {
         match self.single(&written.settings.domains, "domain") {
@@ -100,8 +94,7 @@ impl<'a> Resolver<'a> {
             None => Some(None),
         };
         let reset = self.reset_service(&settings.resets);
-        let proxies = self.proxies(&settings.proxies, written.kind);
-        Some(Ros { clock: clock?, step: step?, reset: reset.ok()?, proxies: proxies?, interfaces: Vec::new() })
+        Some(Ros { clock: clock?, step: step?, reset: reset.ok()?, interfaces: Vec::new() })
     }
 
     fn simulator_clock(&mut self, clocks: &'a [(Span, ast::Clock)]) -> Option<Clock> {

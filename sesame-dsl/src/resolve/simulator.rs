@@ -20,14 +20,11 @@ impl<'a> Resolver<'a> {
         let transport = match written.kind {
             SimulatorKind::InProcess => self.in_process(name, written),
             SimulatorKind::Process => self.process(name, written),
-            SimulatorKind::Ros2 => self.ros2(written),
-            SimulatorKind::Rosbridge => self.rosbridge(written),
-            SimulatorKind::Ros1 => self.ros1(written),
-            SimulatorKind::Mqtt => self.mqtt(written),
-            SimulatorKind::Simlog => self.simlog(name, written),
+            _ => self.on_a_bus(name, written),
         };
+        let proxies = self.proxies(&written.settings.proxies, written.kind);
         let declaration = self.declaration(&simulator.head);
-        Some(Simulator { declaration, transport: transport?, crate_folder, ros: ros? })
+        Some(Simulator { declaration, transport: transport?, crate_folder, ros: ros?, proxies: proxies? })
     }
 
     fn in_process(&mut self, name: &Name, written: &'a ast::Transport) -> Option<Transport> {

@@ -1,6 +1,7 @@
 //! What messages call the rules of the grammar.
 
 use sesame_grammar::Rule;
+use sesame_plan::SimulatorKind;
 
 use super::blocks;
 
@@ -102,13 +103,6 @@ pub(super) fn phrases_of(rule: Rule) -> Vec<String> {
         Rule::direction => &["`maximise`", "`minimise`"],
         Rule::default_value => &["`default`"],
         Rule::value_mode => &["`offset`", "`absolute`"],
-        Rule::in_process => &["`in_process`"],
-        Rule::process => &["`process`"],
-        Rule::ros2 => &["`ros2`"],
-        Rule::rosbridge => &["`rosbridge`"],
-        Rule::ros1 => &["`ros1`"],
-        Rule::mqtt => &["`mqtt`"],
-        Rule::simlog => &["`simlog`"],
         Rule::secret => &["`from env` or `from file`"],
         Rule::k_at_most_once => &["`at_most_once`"],
         Rule::k_at_least_once => &["`at_least_once`"],
@@ -190,7 +184,10 @@ pub(super) fn phrases_of(rule: Rule) -> Vec<String> {
                 return members;
             }
             let block = blocks::find(rule).map(|_| "`{`".to_owned());
-            return block.or_else(|| keyword_of(rule).map(|word| format!("`{word}`"))).into_iter().collect();
+            // The rule of a kind of simulator is named like its word.
+            let kind = || SimulatorKind::from_keyword(rule_name(rule)).map(|kind| kind.properties().keyword);
+            let word = || keyword_of(rule).or_else(kind).map(|word| format!("`{word}`"));
+            return block.or_else(word).into_iter().collect();
         }
     };
     phrases.iter().map(|&phrase| phrase.to_owned()).collect()

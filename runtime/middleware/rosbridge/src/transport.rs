@@ -383,10 +383,10 @@ const RESET: &str = "sesame reset";
 
 impl Bus for Bridge {
     fn listen(&mut self, address: &dyn Fn(&str) -> String) -> Result<(), TransportError> {
-        if self.proxies.is_some() || self.ros.proxies.is_empty() {
+        if self.proxies.is_some() || self.plan.simulator.proxies.is_empty() {
             return Ok(());
         }
-        let proxies = self.ros.proxies.iter().map(|proxy| self.proxy(proxy, address));
+        let proxies = self.plan.simulator.proxies.iter().map(|proxy| self.proxy(proxy, address));
         self.proxies = Some(Proxies::listen(proxies.collect::<Result<_, _>>()?)?);
         Ok(())
     }

@@ -28,9 +28,11 @@ pub enum NotAlone {
         monitor: String,
     },
     /// Nobody but the runner may be connected to its simulator.
-    Simlog {
+    OneClient {
         /// The monitor.
         monitor: String,
+        /// The kind of the simulator.
+        kind: &'static str,
     },
 }
 
@@ -52,10 +54,10 @@ impl fmt::Display for NotAlone {
                 "the nodes of this system are at several brokers, and monitor `{monitor}` as a program of its own \
                  connects to one; declare a space whose simulator is the broker that has all of its topics"
             ),
-            NotAlone::Simlog { monitor } => write!(
+            NotAlone::OneClient { monitor, kind } => write!(
                 f,
-                "a simulator that speaks SimlogAPI is stepped by one client, so monitor `{monitor}` as a program of its \
-                 own cannot be another one; declare a space with the topics of the monitor and a `process` simulator"
+                "nobody but the runner may be connected to a `{kind}` simulator, so monitor `{monitor}` cannot be a program \
+                 of its own; declare a space with the topics of the monitor and a `process` simulator"
             ),
         }
     }
@@ -92,8 +94,9 @@ impl CampaignPlan {
         if self.simulator.brokers().is_some_and(|mqtt| mqtt.all().len() > 1) {
             return Err(NotAlone::Brokers { monitor: name() });
         }
-        if self.simulator.properties().one_client {
-            return Err(NotAlone::Simlog { monitor: name() });
+        let properties = self.simulator.properties();
+        if properties.one_client {
+            return Err(NotAlone::OneClient { monitor: name(), kind: properties.keyword });
         }
         let relied_on = self.relied_on_by(id);
         for monitor in relied_on.iter().map(|&monitor| self.monitor(monitor)) {
@@ -196,8 +199,8 @@ impl CampaignPlan {
         // A guest neither steps nor resets the system.
         if let Some(ros) = &mut self.simulator.ros {
             (ros.step, ros.reset) = (None, None);
-            ros.proxies.clear();
         }
+        self.simulator.proxies.clear();
         if let Some(mqtt) = self.simulator.brokers_mut() {
             mqtt.brokers.clear();
         }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{NodeId, Proxy};
+use crate::NodeId;
 
 /// What systems of ROS have in common, whichever way the runner reaches their nodes.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -15,9 +15,6 @@ pub struct Ros {
     /// The service that sets the simulator to time zero, of type `std_srvs/srv/Empty` or `std_srvs/srv/Trigger`; `None`
     /// for one that is launched again for each test.
     pub reset: Option<String>,
-    /// Where clients connect that do not connect to the server itself; empty where there
-    /// [are none](crate::SimulatorProperties::proxies).
-    pub proxies: Vec<Proxy>,
     /// The layouts of all messages, each after those that it contains.
     pub interfaces: Vec<Interface>,
 }

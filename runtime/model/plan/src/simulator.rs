@@ -17,6 +17,9 @@ pub struct Simulator {
     pub transport: Transport,
     /// What systems of ROS have in common; `None` for others.
     pub ros: Option<Ros>,
+    /// Where clients connect that do not connect to the server itself; empty where there
+    /// [are none](SimulatorProperties::proxies).
+    pub proxies: Vec<Proxy>,
     /// How each topic of the plan is cut, in their order; empty where the simulator itself brings all messages.
     pub wiring: Vec<Wiring>,
     /// What starts and ends the system around it.
@@ -70,7 +73,8 @@ pub enum Endpoint<'a> {
 impl Simulator {
     /// A simulator that has nothing but the settings of its kind.
     pub fn new(name: &str, transport: Transport) -> Simulator {
-        Simulator { name: name.to_owned(), transport, ros: None, wiring: Vec::new(), lifecycle: Lifecycle::default() }
+        let (proxies, wiring, lifecycle) = (Vec::new(), Vec::new(), Lifecycle::default());
+        Simulator { name: name.to_owned(), transport, ros: None, proxies, wiring, lifecycle }
     }
 
     /// What is fixed for its kind.
@@ -143,7 +147,7 @@ impl Simulator {
             _ => Vec::new(),
         };
         addresses.extend(self.brokers().into_iter().flat_map(Mqtt::all).map(|broker| broker.remote.url.as_str()));
-        addresses.extend(self.ros.iter().flat_map(|ros| &ros.proxies).map(|proxy| proxy.url.as_str()));
+        addresses.extend(self.proxies.iter().map(|proxy| proxy.url.as_str()));
         addresses
     }
 
@@ -202,27 +206,27 @@ struct Settings {
 impl From<Written> for Simulator {
     fn from(Written { name, transport, lifecycle }: Written) -> Self {
         let Settings { own, clock, step, reset, proxies, interfaces, wiring } = transport;
-        let ros = clock.zip(interfaces).map(|(clock, interfaces)| Ros { clock, step, reset, proxies, interfaces });
-        Simulator { name, transport: own, ros, wiring: wiring.unwrap_or_default(), lifecycle }
+        let ros = clock.zip(interfaces).map(|(clock, interfaces)| Ros { clock, step, reset, interfaces });
+        Simulator { name, transport: own, ros, proxies, wiring: wiring.unwrap_or_default(), lifecycle }
     }
 }
 
 impl From<Simulator> for Written {
     fn from(simulator: Simulator) -> Self {
         let on_a_bus = simulator.properties().bus.is_some();
-        let Simulator { name, transport, ros, wiring, lifecycle } = simulator;
+        let Simulator { name, transport, ros, proxies, wiring, lifecycle } = simulator;
         let mut settings = Settings {
             own: transport,
             clock: None,
             step: None,
             reset: None,
-            proxies: Vec::new(),
+            proxies,
             interfaces: None,
             wiring: (on_a_bus || !wiring.is_empty()).then_some(wiring),
         };
-        if let Some(Ros { clock, step, reset, proxies, interfaces }) = ros {
+        if let Some(Ros { clock, step, reset, interfaces }) = ros {
             let (clock, interfaces) = (Some(clock), Some(interfaces));
-            settings = Settings { clock, step, reset, proxies, interfaces, ..settings };
+            settings = Settings { clock, step, reset, interfaces, ..settings };
         }
         Written { name, transport: settings, lifecycle }
     }
@@ -299,6 +303,9 @@ pub struct SimulatorProperties {
     pub brokers: bool,
     /// Whether the runner can stand for its server towards some nodes.
     pub proxies: bool,
+    /// Whether a topic that is cut has a second name, on which its publishers are: `TOPIC/undisturbed`. Where it has
+    /// none, the runner is between the addresses of nodes, or brings the messages itself.
+    pub renames: bool,
     /// Whether the runner reaches its nodes themselves: it sets their parameters, pauses, slows and kills them, and
     /// asks them for a step.
     pub reaches_nodes: bool,
@@ -330,6 +337,7 @@ impl SimulatorKind {
                 feature: Some("ros2"),
                 bus: Some("as a node of ROS 2"),
                 ros: Some(Dialect::Ros2),
+                renames: true,
                 reaches_nodes: true,
                 ..properties("ros2")
             },
@@ -339,6 +347,7 @@ impl SimulatorKind {
                 bus: Some("as a client of the rosbridge server"),
                 ros: Some(Dialect::Ros2),
                 proxies: true,
+                renames: true,
                 ..properties("rosbridge")
             },
             SimulatorKind::Ros1 => SimulatorProperties {
@@ -346,6 +355,7 @@ impl SimulatorKind {
                 address: Some(Schemes { plain: "http://", encrypted: None, example: "http://127.0.0.1:11311" }),
                 bus: Some("as a node of ROS 1"),
                 ros: Some(Dialect::Ros1),
+                renames: true,
                 ..properties("ros1")
             },
             SimulatorKind::Mqtt => SimulatorProperties {
@@ -357,6 +367,7 @@ impl SimulatorKind {
                 }),
                 bus: Some("as a client of the MQTT broker"),
                 brokers: true,
+                renames: true,
                 ..properties("mqtt")
             },
             SimulatorKind::Simlog => SimulatorProperties {
@@ -387,6 +398,7 @@ const fn properties(keyword: &'static str) -> SimulatorProperties {
         one_client: false,
         brokers: false,
         proxies: false,
+        renames: false,
         reaches_nodes: false,
     }
 }

@@ -34,11 +34,12 @@ impl CampaignPlan {
     /// What a node is remapped to: what it publishes, and what it subscribes to where operations distinguish it. Of a
     /// service that is cut, the server is remapped. Each name once; where a node both publishes a topic and
     /// subscribes to it, that of a publisher counts. A node behind a proxy needs none: the proxy
-    /// [changes its names](CampaignPlan::renamed).
+    /// [changes its names](CampaignPlan::renamed). Nor does any node where the
+    /// kind of the simulator [has no second names](crate::SimulatorProperties::renames).
     pub fn remappings(&self, id: NodeId) -> Vec<Remapping> {
         let node = &self.nodes[id.index()];
         let mut remappings: Vec<Remapping> = Vec::new();
-        if self.proxy_of(id).is_some() {
+        if self.proxy_of(id).is_some() || !self.simulator.properties().renames {
             return remappings;
         }
         for (topic, declared, wiring) in self.cut() {
@@ -56,7 +57,7 @@ impl CampaignPlan {
 
     /// The proxy at which the programs of a node connect, if there is one.
     pub fn proxy_of(&self, id: NodeId) -> Option<&Proxy> {
-        self.simulator.ros.as_ref()?.proxies.iter().find(|proxy| proxy.node == id)
+        self.simulator.proxies.iter().find(|proxy| proxy.node == id)
     }
 
     /// What a proxy changes in the names that clients use who are this node. A node is told apart as a publisher and as
@@ -118,6 +119,9 @@ impl CampaignPlan {
     /// publishes, and services that are cut, and which no node offers. Each name once.
     pub fn unclaimed(&self) -> Vec<(Channel, Remapping)> {
         let mut unclaimed: Vec<(Channel, Remapping)> = Vec::new();
+        if !self.simulator.properties().renames {
+            return unclaimed;
+        }
         for (topic, declared, _) in self.cut() {
             let claimed = self.nodes.iter().any(|node| is_source(node, topic, declared.channel))
                 || self.is_published_by_monitor(topic);
@@ -307,7 +311,7 @@ mod tests {
             public: false,
         };
         plan.simulator = testing::rosbridge("ws://127.0.0.1:9090", plan.simulator.wiring);
-        plan.simulator.ros = Some(Ros { proxies: vec![proxy(0), proxy(1)], ..Ros::default() });
+        plan.simulator.proxies = vec![proxy(0), proxy(1)];
         assert!(rules(&plan, 0).is_empty() && rules(&plan, 1).is_empty());
         assert_eq!(rules(&plan, 2), ["/grip:=/grip/undisturbed"], "it is not behind a proxy");
         assert_eq!(plan.simulator.shared_address(), Some("ws://127.0.0.1:9090"));

@@ -19,7 +19,9 @@ impl CampaignPlan {
         at("name", name(&simulator.name))?;
         at("transport.step_ns", require(simulator.step_ns() != Some(0), || "must be positive".to_owned()))?;
         at("transport", self.sound_transport(&simulator.transport))?;
-        at("transport", self.sound_ros(simulator))?;
+        at("transport", each("addresses", &simulator.addresses(), |address| name(address)))?;
+        at("transport", self.sound_proxies(simulator))?;
+        at("transport", sound_ros(simulator))?;
         at("transport", self.sound_wiring(simulator))?;
         let Lifecycle { launch, terminate: _, relay_budget } = &simulator.lifecycle;
         at("lifecycle.launch", launch.as_ref().map_or(Ok(()), |launch| self.sound_launch(launch)))?;
@@ -35,36 +37,18 @@ impl CampaignPlan {
                 let beyond = || format!("is {domain}, more than {MOST_DOMAIN}");
                 at("domain", require(*domain <= MOST_DOMAIN, beyond))
             }
-            Transport::Rosbridge(rosbridge) => at("remote.url", name(&rosbridge.remote.url)),
-            Transport::Ros1(ros1) => at("master", name(&ros1.master)),
-            Transport::Mqtt(mqtt) => {
-                at("broker.remote.url", name(&mqtt.broker.remote.url))?;
-                each("brokers", &mqtt.brokers, |(node, broker)| {
-                    self.has_node(*node)?;
-                    name(&broker.remote.url)
-                })
-            }
+            Transport::Mqtt(mqtt) => each("brokers", &mqtt.brokers, |(node, _)| self.has_node(*node)),
             Transport::Simlog(simlog) => self.sound_simlog(simlog),
-            // The generator checks these, since a type becomes code.
-            Transport::InProcess { .. } | Transport::Process { .. } => Ok(()),
+            // Addresses are those of all kinds, and the generator checks programs and types, since these become code.
+            _ => Ok(()),
         }
     }
 
-    /// What systems of ROS have, and no others.
-    fn sound_ros(&self, simulator: &Simulator) -> Checked {
-        let properties = simulator.properties();
-        let Some(Ros { clock: _, step, reset: _, proxies, interfaces }) = &simulator.ros else {
-            return require(properties.ros.is_none(), || "has no `clock`, or no `interfaces`".to_owned());
-        };
-        let other = |part: &str| format!("a simulator of kind `{}` has no {part}", properties.keyword);
-        require(properties.ros.is_some(), || other("`clock` and no `interfaces`"))?;
-        require(step.is_none() || properties.reaches_nodes, || other("`step`"))?;
-        require(proxies.is_empty() || properties.proxies, || other("`proxies`"))?;
-        each("proxies", proxies, |proxy| {
-            at("node", self.has_node(proxy.node))?;
-            at("url", name(&proxy.url))
-        })?;
-        sound_interfaces(interfaces)
+    /// Where clients connect that are one node each, of a simulator whose kind has such addresses.
+    fn sound_proxies(&self, simulator: &Simulator) -> Checked {
+        let Simulator { proxies, .. } = simulator;
+        require(proxies.is_empty() || simulator.properties().proxies, || without(simulator, "`proxies`"))?;
+        each("proxies", proxies, |proxy| at("node", self.has_node(proxy.node)))
     }
 
     /// How topics are cut, of a system on a bus: each of them is.
@@ -146,6 +130,22 @@ impl CampaignPlan {
         let known = ros.interfaces.iter().any(|Interface { name, .. }| name == wanted);
         require(known, || format!("there is no interface `{wanted}`"))
     }
+}
+
+/// What systems of ROS have, and no others.
+fn sound_ros(simulator: &Simulator) -> Checked {
+    let properties = simulator.properties();
+    let Some(Ros { clock: _, step, reset: _, interfaces }) = &simulator.ros else {
+        return require(properties.ros.is_none(), || "has no `clock`, or no `interfaces`".to_owned());
+    };
+    require(properties.ros.is_some(), || without(simulator, "`clock` and no `interfaces`"))?;
+    require(step.is_none() || properties.reaches_nodes, || without(simulator, "`step`"))?;
+    sound_interfaces(interfaces)
+}
+
+/// That simulators of a kind do not have something.
+fn without(simulator: &Simulator, part: &str) -> String {
+    format!("a simulator of kind `{}` has no {part}", simulator.properties().keyword)
 }
 
 /// Each interface is there once, after those that it contains.
