@@ -39,6 +39,7 @@ macro_rules! middleware {
 }
 
 middleware! {
+    "mavlink" Mavlink sesame_mavlink::mavlink,
     "mqtt" Mqtt sesame_mqtt::mqtt,
     "ros1" Ros1 sesame_ros1::ros1,
     "ros2" Ros2 sesame_ros2::ros2,

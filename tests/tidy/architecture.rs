@@ -203,7 +203,7 @@ fn the_table_lists_each_room_of_the_runtime_and_no_other() {
         let folder = folder.unwrap_or_else(|| panic!("docs/rooms.md lists {name}, which is no crate of the runtime"));
         assert_eq!(*rooms, modules(&workspace().join(folder)), "rooms of {name}: docs/rooms.md, and the crate");
     }
-    assert_eq!(listed.len(), 24, "{listed:?}");
+    assert_eq!(listed.len(), 25, "{listed:?}");
 }
 
 /// A file of a crate as the path of its module.

@@ -5,7 +5,7 @@ use sesame_plan::{
     WireNames,
 };
 
-use super::Resolver;
+use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::Transport;
 use crate::span::Span;
@@ -20,6 +20,7 @@ impl<'a> Resolver<'a> {
             SimulatorKind::Ros1 => self.ros1(written),
             SimulatorKind::Mqtt => self.mqtt(written),
             SimulatorKind::Simlog => self.simlog(name, written),
+            SimulatorKind::Mavlink => self.mavlink(name, written),
             SimulatorKind::InProcess | SimulatorKind::Process => unreachable!("it is on no bus"),
         }
     }
@@ -53,6 +54,24 @@ impl<'a> Resolver<'a> {
         let user = self.single(&written.settings.users, "user").map(|user| user.text.clone());
         let broker = Broker { remote: remote?, user };
         Some(Transport::Mqtt(Mqtt { broker, brokers: Vec::new(), quality }))
+    }
+
+    /// Vehicles that speak `MAVLink`, and their ground station.
+    fn mavlink(&mut self, name: &Name, written: &'a ast::Transport) -> Option<Transport> {
+        let settings = &written.settings;
+        let url = self.address(written.first_text(), written);
+        let definitions = self.single(&settings.types, "types");
+        if definitions.is_none() && !settings.has_errors {
+            self.missing(name.span, &name.text, "the definitions of its messages", "types \"common.xml\"");
+        }
+        if settings.proxies.is_empty() && !settings.has_errors {
+            let node = self.declared_or(Kind::Node, "vehicle");
+            let example = format!("proxy {node} \"udp://127.0.0.1:14551\"");
+            self.missing(name.span, &name.text, "an address to which vehicles send", &example);
+            return None;
+        }
+        let definitions = definitions?.iter().map(|file| file.text.clone()).collect();
+        Some(Transport::Mavlink { url: url?, definitions })
     }
 
     /// Where a bus is, and what it wants to be shown, which the language calls so.

@@ -231,6 +231,11 @@ pub(super) const BLOCKS: &[Block] = &[
             Member::new(Rule::setting_bare, "bare"),
         ],
     ),
+    Block::settings(
+        Rule::mavlink_settings,
+        "mavlink",
+        &[Member::new(Rule::setting_types, "types"), Member::new(Rule::proxy, "proxy")],
+    ),
     Block::settings(Rule::launch_settings, "launch", &[Member::like(Rule::ready, "ready", "ready when")]),
     Block::settings(
         Rule::budget_settings,

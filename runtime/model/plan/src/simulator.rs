@@ -59,6 +59,14 @@ pub enum Transport {
     Mqtt(Mqtt),
     /// A simulator that speaks SimlogAPI.
     Simlog(Simlog),
+    /// Vehicles that speak `MAVLink` over UDP, each at a proxy, and their ground station.
+    Mavlink {
+        /// Where the ground station listens, for example `udp://127.0.0.1:14550`. It may contain placeholders as that
+        /// of a [`Remote`](crate::Remote).
+        url: String,
+        /// The files that define messages, relative to the folder of the `.sesame` file.
+        definitions: Vec<String>,
+    },
 }
 
 /// What a program has to know to find a system that it joins.
@@ -144,6 +152,7 @@ impl Simulator {
             Transport::Rosbridge(rosbridge) => vec![&rosbridge.remote.url],
             Transport::Ros1(ros1) => vec![&ros1.master],
             Transport::Simlog(simlog) => vec![&simlog.url],
+            Transport::Mavlink { url, .. } => vec![url],
             _ => Vec::new(),
         };
         addresses.extend(self.brokers().into_iter().flat_map(Mqtt::all).map(|broker| broker.remote.url.as_str()));
@@ -249,6 +258,8 @@ pub enum SimulatorKind {
     Mqtt,
     /// A simulator that speaks SimlogAPI.
     Simlog,
+    /// Vehicles that speak `MAVLink` over UDP, and their ground station.
+    Mavlink,
 }
 
 impl Transport {
@@ -262,6 +273,7 @@ impl Transport {
             Transport::Ros1(_) => SimulatorKind::Ros1,
             Transport::Mqtt(_) => SimulatorKind::Mqtt,
             Transport::Simlog(_) => SimulatorKind::Simlog,
+            Transport::Mavlink { .. } => SimulatorKind::Mavlink,
         }
     }
 }
@@ -313,7 +325,7 @@ pub struct SimulatorProperties {
 
 impl SimulatorKind {
     /// All of them.
-    pub const ALL: [SimulatorKind; 7] = [
+    pub const ALL: [SimulatorKind; 8] = [
         SimulatorKind::InProcess,
         SimulatorKind::Process,
         SimulatorKind::Ros2,
@@ -321,6 +333,7 @@ impl SimulatorKind {
         SimulatorKind::Ros1,
         SimulatorKind::Mqtt,
         SimulatorKind::Simlog,
+        SimulatorKind::Mavlink,
     ];
 
     /// The kind with this word.
@@ -380,6 +393,14 @@ impl SimulatorKind {
                 }),
                 one_client: true,
                 ..properties("simlog")
+            },
+            SimulatorKind::Mavlink => SimulatorProperties {
+                feature: Some("mavlink"),
+                address: Some(Schemes { plain: "udp://", encrypted: None, example: "udp://127.0.0.1:14550" }),
+                bus: Some("between vehicles and their ground station"),
+                proxies: true,
+                one_client: true,
+                ..properties("mavlink")
             },
         }
     }
