@@ -7,17 +7,28 @@ use std::net::{Ipv4Addr, TcpListener, UdpSocket};
 #[derive(Debug)]
 pub struct Port {
     number: u16,
-    /// Reserves the port: each test binds the UDP port of the same number, which no server uses.
-    _held: UdpSocket,
+    /// Reserves the port: each test binds the port of the same number of the other kind, UDP or TCP, which no server
+    /// uses.
+    _held: (Option<UdpSocket>, Option<TcpListener>),
 }
 
 impl Port {
     /// A port that nobody listens on. The range lies below the ports that the system assigns by itself, so nobody takes
     /// the port before the server does, or while the server is restarted.
     pub fn free() -> Self {
+        Port::where_both_are(|udp, _| (Some(udp), None))
+    }
+
+    /// The same for a server of UDP.
+    pub fn free_of_udp() -> Self {
+        Port::where_both_are(|_, tcp| (None, Some(tcp)))
+    }
+
+    fn where_both_are(held: fn(UdpSocket, TcpListener) -> (Option<UdpSocket>, Option<TcpListener>)) -> Self {
         let free = from_own_place(10_000..=14_999).into_iter().find_map(|number| {
-            let held = UdpSocket::bind((Ipv4Addr::LOCALHOST, number)).ok()?;
-            TcpListener::bind((Ipv4Addr::LOCALHOST, number)).is_ok().then_some(Port { number, _held: held })
+            let udp = UdpSocket::bind((Ipv4Addr::LOCALHOST, number)).ok()?;
+            let tcp = TcpListener::bind((Ipv4Addr::LOCALHOST, number)).ok()?;
+            Some(Port { number, _held: held(udp, tcp) })
         });
         free.expect("so many ports are enough for the tests of one machine")
     }

@@ -21,6 +21,7 @@ fn files() -> Vec<(PathBuf, String)> {
         "../examples/a50_cell",
         "../examples/kuka_cell",
         "../examples/transport",
+        "../examples/two_drones",
         "../examples/two_robots",
     ];
     let mut files = Vec::new();
