@@ -5,6 +5,14 @@
 //! simulator depend on `sesame-runtime` alone. Nothing here knows the `.sesame` language: a runner gets its campaign as
 //! a [`sesame_plan::CampaignPlan`].
 
+#![cfg_attr(
+    any(feature = "campaign", feature = "standalone"),
+    expect(
+        clippy::disallowed_methods,
+        clippy::disallowed_types,
+        reason = "an adapter: it drives processes, and reads and writes files"
+    )
+)]
 // These macros panic where nothing can be written: on a full disk, or after the reader has gone.
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 

@@ -1,7 +1,15 @@
 //! Campaigns on a simulator beside which programs are launched, by a runner with real workers: this program is the
 //! runner, and starts itself as its worker and keeper, so it has no test harness.
 
-#![cfg_attr(unix, expect(clippy::unwrap_used, reason = "a test of a runner and its processes"))]
+#![cfg_attr(
+    unix,
+    expect(
+        clippy::disallowed_methods,
+        clippy::disallowed_types,
+        clippy::unwrap_used,
+        reason = "a test of a runner and its processes"
+    )
+)]
 
 #[cfg(unix)]
 mod runner {

@@ -1,7 +1,15 @@
 //! Preparatory testing by a runner with real workers, on a simulator and a lab that run freely: this program is the
 //! runner, and starts itself as its worker and keeper, so it has no test harness.
 
-#![cfg_attr(unix, expect(clippy::unwrap_used, reason = "a test of a runner and its processes"))]
+#![cfg_attr(
+    unix,
+    expect(
+        clippy::disallowed_methods,
+        clippy::disallowed_types,
+        clippy::unwrap_used,
+        reason = "a test of a runner and its processes"
+    )
+)]
 
 #[cfg(unix)]
 mod runner {

@@ -24,6 +24,7 @@ mod hooks;
 mod ledger;
 mod metamorphic;
 mod monitors;
+#[expect(clippy::disallowed_methods, reason = "cases run side by side, as many as a variable says")]
 mod properties;
 mod robot;
 mod temporal;

@@ -9,8 +9,9 @@
         dead_code,
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
+        clippy::disallowed_methods,
         clippy::unwrap_used,
-        reason = "cases are made as the judge makes them, and the judge uses the rest"
+        reason = "cases are made as the judge makes them, and the judge uses the rest; it starts itself"
     )
 )]
 

@@ -270,4 +270,5 @@ fn contents(path: &Path) -> Result<String, String> {
 }
 
 #[cfg(test)]
+#[expect(clippy::disallowed_methods, clippy::disallowed_types, reason = "they write files and ask another program")]
 mod tests;

@@ -8,6 +8,11 @@
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 #[cfg(feature = "client")]
+#[expect(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    reason = "an adapter: it waits for a simulator on a thread"
+)]
 pub mod client;
 mod dynamic;
 mod json;
@@ -15,11 +20,14 @@ mod message;
 pub mod proto;
 mod ros;
 #[cfg(feature = "client")]
+#[expect(clippy::disallowed_methods, reason = "an adapter: it listens for a while")]
 pub mod scan;
 #[cfg(feature = "server")]
+#[expect(clippy::disallowed_types, reason = "an adapter: it serves on a thread")]
 pub mod server;
 mod shape;
 #[cfg(feature = "client")]
+#[expect(clippy::disallowed_methods, reason = "an adapter: it waits for a simulator")]
 mod transport;
 mod tree;
 

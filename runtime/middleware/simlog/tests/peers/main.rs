@@ -4,6 +4,7 @@
 //! says that it is skipped, and fails with `CI=true`.
 
 #![cfg(all(feature = "client", feature = "server"))]
+#![expect(clippy::disallowed_methods, clippy::disallowed_types, reason = "they start other programs and wait for them")]
 
 mod peer;
 mod recorder;
