@@ -1,10 +1,10 @@
 //! Analyses of a results file: what campaigns, tests, fronts, points and coverage there are in it, as tables.
 //!
-//! They read any results file, of any campaign, finished or not, and never write one. Each analysis reads the file
-//! once from beginning to end, and gives a [`Table`], which prints as a table, as CSV and as JSON. The same results give
-//! the same tables on every machine.
+//! They read any results file, of any campaign, finished or not, and never write one. Each analysis reads the file once
+//! from beginning to end, and gives a [`Table`], which prints as a table, as CSV and as JSON. The same results give the
+//! same tables on every machine.
 //!
-//! Beside them are those that a lab needs: [`choice`] of its tests, the reality [`gap`] in metrics and in [`traces`], and
+//! Beside them is what a lab needs: the [`choice`] of its tests, the reality [`gap`] in metrics and in [`traces`], and
 //! what [`compensation`] makes of it.
 
 // These macros panic where nothing can be written: on a full disk, or after the reader has gone.

@@ -219,8 +219,8 @@ impl Launched {
         self.begin()
     }
 
-    /// Starts them and waits until all are ready, for a simulator that has neither topics nor a clock before `until_then`,
-    /// a phrase: a program that awaits either would never be ready, so that is an error.
+    /// Starts them and waits until all are ready, for a simulator that has neither topics nor a clock before
+    /// `until_then`, a phrase: a program that awaits either would never be ready, so that is an error.
     pub fn start_first(&mut self, seed: u64, until_then: &str) -> Result<(), LaunchError> {
         self.start(seed)?;
         let mut asked = false;
