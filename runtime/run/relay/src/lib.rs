@@ -1,8 +1,8 @@
 //! One run of one test.
 //!
 //! Messages and simulation time go in, messages and an [`Observation`](sesame_base::observation::Observation) come out.
-//! The core is sans-IO: the [`relay`], the fuzzing operations ([`fuzz`]), the metrics
-//! ([`metric`]). `clippy.toml` enforces it. The adapters around it expect the lint: [`transport`]s reach simulators,
+//! The core is sans-IO: the [`relay`], the fuzzing operations ([`fuzz`]), the metrics ([`metric`]).
+//! `runtime/clippy.toml` enforces it. The adapters around it expect the lint: [`transport`]s reach simulators,
 //! [`trace`]s are written to files, and [`evaluate`] puts one run together.
 
 // These macros panic where nothing can be written: on a full disk, or after the reader has gone.
