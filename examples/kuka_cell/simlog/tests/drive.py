@@ -15,7 +15,7 @@ import time
 
 import grpc
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[4] / "runtime" / "simlog" / "tests"))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[4] / "runtime" / "middleware" / "simlog" / "tests"))
 import stubs  # noqa: E402 - it lies beside the protocol
 
 pb, services = stubs.load("simlog2")
