@@ -1,3 +1,5 @@
+//! Search on vectors, and what measures it: no plan, no robots, usable as it is.
+//!
 #![doc = include_str!("../README.md")]
 //!
 //! # Modules

@@ -10,8 +10,8 @@
 //! sort, and one with fewer kinds than places is shorter, as far as that is permitted.
 //!
 //! Windows and sub-ranges are uniform over all feasible pairs of ends, values uniform over their range; windows of
-//! copies that must not overlap are uniform over all [disjoint ones](crate::space::separation). The order of the list is
-//! random. Where conditions switch, start and end are grown independently, and lengths are uniform.
+//! copies that must not overlap are uniform over all [disjoint ones](crate::space::separation). The order of the list
+//! is random. Where conditions switch, start and end are grown independently, and lengths are uniform.
 
 use sesame_plan::condition::ConditionEnd;
 use sesame_plan::{Activation, Copies, Test, TestOperation};
