@@ -1,24 +1,18 @@
 //! A vehicle and a ground station in Python.
 
-use std::io::{BufRead as _, BufReader, Write as _};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::sync::mpsc::{Receiver, channel};
+use std::process::{Command, Stdio};
+use std::sync::mpsc::Receiver;
 
 use serde_json::Value;
 use sesame_patience::LIMIT;
+use sesame_peers::{Ended, lines};
 use sesame_tests::workspace;
 
-/// The Python with pymavlink. Without one the test is to be skipped, which is said here; with `CI=true` that is an
-/// error.
+/// The Python with pymavlink. Without one the test is to be skipped.
 pub(crate) fn python() -> Option<PathBuf> {
-    let python = std::env::var_os("SESAME_MAVLINK").map(PathBuf::from).filter(|python| python.is_file());
-    let insists = std::env::var("CI").is_ok_and(|ci| ci == "true");
-    assert!(python.is_some() || !insists, "SESAME_MAVLINK names no Python: `./test` makes it with Python 3.11");
-    if python.is_none() {
-        eprintln!("skipped: SESAME_MAVLINK names no Python with pymavlink, which `./test` makes");
-    }
-    python
+    sesame_peers::named("SESAME_MAVLINK")
 }
 
 /// The definitions that pymavlink brings.
@@ -30,16 +24,9 @@ pub(crate) fn common(python: &Path) -> PathBuf {
 
 /// A peer, which is ended when it is dropped.
 pub(crate) struct Peer {
-    child: Child,
+    child: Ended,
     said: Receiver<String>,
     lines: Vec<Value>,
-}
-
-impl Drop for Peer {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
 }
 
 impl Peer {
@@ -51,10 +38,8 @@ impl Peer {
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn();
-        let mut child = child.expect("Python starts");
-        let output = BufReader::new(child.stdout.take().expect("its output is a pipe"));
-        let (sender, said) = channel();
-        std::thread::spawn(move || output.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
+        let mut child = Ended(child.expect("Python starts"));
+        let said = lines(child.0.stdout.take().expect("its output is a pipe"));
         let mut peer = Peer { child, said, lines: Vec::new() };
         let ready = peer.said.recv_timeout(LIMIT).unwrap_or_else(|_| panic!("{arguments:?} did not get ready"));
         assert!(ready.contains("ready"), "{ready}");
@@ -64,7 +49,7 @@ impl Peer {
 
     /// Tells a vehicle to begin.
     pub(crate) fn go(&mut self) {
-        let input = self.child.stdin.as_mut().expect("its input is a pipe");
+        let input = self.child.0.stdin.as_mut().expect("its input is a pipe");
         input.write_all(b"\n").and_then(|()| input.flush()).expect("it listens");
     }
 

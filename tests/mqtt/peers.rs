@@ -1,31 +1,31 @@
 //! Brokers and clients.
 
 use std::fs;
-use std::io::{BufRead as _, BufReader, Write as _};
+use std::io::Write as _;
 use std::net::{Ipv4Addr, TcpStream};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::sync::mpsc::{Receiver, channel};
+use std::process::{Command, Stdio};
+use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
 // How long a client may take to say anything.
 pub(crate) use sesame_patience::LIMIT;
+use sesame_peers::{Ended, lines, named};
 use sesame_tests::{Port, workspace};
 
 /// The folder of the peers' packages. Without one the test is to be skipped, which is said here; with `CI=true` that is
 /// an error.
 pub(crate) fn packages() -> Option<PathBuf> {
-    let packages = std::env::var_os("SESAME_MQTT").map(PathBuf::from).filter(|folder| folder.is_dir());
+    let packages = named("SESAME_MQTT")?;
     let has_broker = Command::new("mosquitto").arg("-h").stdout(Stdio::null()).status().is_ok();
     let insists = std::env::var("CI").is_ok_and(|ci| ci == "true");
-    assert!(packages.is_some() || !insists, "SESAME_MQTT names no folder: `./test` makes it with npm");
     assert!(has_broker || !insists, "mosquitto is not installed");
-    if packages.is_none() || !has_broker {
-        eprintln!("skipped: SESAME_MQTT names no folder, which `./test` makes with npm, or there is no mosquitto");
+    if !has_broker {
+        eprintln!("skipped: mosquitto is not installed");
         return None;
     }
-    packages
+    Some(packages)
 }
 
 /// A broker, which is ended when it is dropped.
@@ -35,16 +35,6 @@ pub(crate) struct Broker {
     // Ended before somebody else may have its port.
     child: Option<Ended>,
     settings: PathBuf,
-}
-
-/// A program that is ended when it is dropped.
-struct Ended(Child);
-
-impl Drop for Ended {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
 }
 
 impl Broker {
@@ -103,9 +93,7 @@ impl Client {
             .stdout(Stdio::piped())
             .spawn();
         let mut child = Ended(child.expect("node starts"));
-        let output = BufReader::new(child.0.stdout.take().expect("its output is a pipe"));
-        let (sender, said) = channel();
-        std::thread::spawn(move || output.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
+        let said = lines(child.0.stdout.take().expect("its output is a pipe"));
         let ready = said.recv_timeout(LIMIT);
         assert_eq!(ready.as_deref(), Ok("ready"), "{arguments:?}");
         Client { child, said, count: 0, last: String::new() }

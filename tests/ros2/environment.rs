@@ -39,13 +39,7 @@ impl Vendor {
 
     /// Its Python. Without one the test is to be skipped, which is said here; with `CI=true` that is an error.
     pub(crate) fn python(self) -> Option<PathBuf> {
-        let python = std::env::var_os(self.variable()).map(PathBuf::from).filter(|python| python.is_file());
-        let insists = std::env::var("CI").is_ok_and(|ci| ci == "true");
-        assert!(python.is_some() || !insists, "{} names no Python: `./test` makes its environment", self.variable());
-        if python.is_none() {
-            eprintln!("skipped: {} names no Python; `./test` makes its environment", self.variable());
-        }
-        python
+        sesame_peers::named(self.variable())
     }
 
     /// The definitions of its messages.
@@ -62,13 +56,7 @@ impl Vendor {
 /// The folder of the packages of clients in JavaScript. Without them the test is to be skipped, which is said here;
 /// with `CI=true` that is an error.
 pub(crate) fn packages_of_roslib() -> Option<PathBuf> {
-    let packages = std::env::var_os("SESAME_ROSLIB").map(PathBuf::from).filter(|folder| folder.is_dir());
-    let insists = std::env::var("CI").is_ok_and(|ci| ci == "true");
-    assert!(packages.is_some() || !insists, "SESAME_ROSLIB names no folder: `./test` makes it with npm");
-    if packages.is_none() {
-        eprintln!("skipped: SESAME_ROSLIB names no folder; `./test` makes it with npm");
-    }
-    packages
+    sesame_peers::named("SESAME_ROSLIB")
 }
 
 /// A domain, and maybe the ones after it, that no other test on this machine uses meanwhile.

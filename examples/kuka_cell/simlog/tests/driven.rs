@@ -6,9 +6,10 @@
 use std::collections::BTreeMap;
 use std::io::{BufRead as _, BufReader};
 use std::path::PathBuf;
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 
 use kuka_cell_sim::Cell;
+use sesame_peers::Ended;
 use sesame_runtime::simulator::bench::Bench;
 use sesame_runtime::simulator::{Hosted, Setup, Simulator as _};
 use sesame_runtime::time::SimTime;
@@ -22,24 +23,8 @@ const DISTURBANCE: f64 = 0.25;
 /// What the driver heard, by name on the wire.
 type Heard = BTreeMap<String, Vec<f64>>;
 
-struct Served(Child);
-
-impl Drop for Served {
-    fn drop(&mut self) {
-        // It serves until it is ended.
-        self.0.kill().ok();
-        self.0.wait().ok();
-    }
-}
-
 fn python() -> Option<PathBuf> {
-    let python = std::env::var_os("SESAME_SIMLOG").map(PathBuf::from).filter(|python| python.is_file());
-    let insists = std::env::var("CI").is_ok_and(|ci| ci == "true");
-    assert!(python.is_some() || !insists, "SESAME_SIMLOG names no Python: `./test` makes its environment");
-    if python.is_none() {
-        eprintln!("skipped: SESAME_SIMLOG names no Python; `./test` makes its environment");
-    }
-    python
+    sesame_peers::named("SESAME_SIMLOG")
 }
 
 /// What Python hears in these many steps.
@@ -51,7 +36,7 @@ fn driven(arguments: &[&str]) -> Option<Heard> {
         .spawn()
         .expect("the program starts");
     let output = child.stdout.take().expect("it is a pipe");
-    let served = Served(child);
+    let served = Ended(child);
     let line = BufReader::new(output).lines().next().expect("it says where it listens").expect("in words");
     let port = line.rsplit(':').next().expect("there is a port").to_owned();
     let steps = STEPS.to_string();

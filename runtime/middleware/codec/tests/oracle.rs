@@ -3,27 +3,26 @@
 //! `SESAME_ROS2_CYCLONE` names a Python with rosbags, `SESAME_ROS2_KILTED` and `SESAME_ROS2_JAZZY` those of ROS 2.
 
 #![expect(clippy::unwrap_used, reason = "a test ends where something is missing")]
-#![expect(
-    clippy::disallowed_methods,
-    clippy::disallowed_types,
-    reason = "it asks other programs, and reads their files"
-)]
+#![expect(clippy::disallowed_methods, reason = "it reads the files of distributions")]
 
 use std::collections::BTreeMap;
-use std::io::{BufRead, BufReader};
-use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::path::Path;
 use std::sync::Arc;
 
 use serde::Deserialize;
 use serde_json::Value as Json;
 use sesame_codec::cdr::Codec;
 use sesame_interfaces::{Catalogue, msg, srv};
+use sesame_peers::named;
+use sesame_peers::oracle::{bytes, each_line, is};
 use sesame_plan::{Interface, Primitive, WireType};
 use sesame_relay::value::{Fields, Record, Value};
 use sesame_relay::wire::Wanted;
 
-/// A line of `cdr_oracle.py`.
+/// The script of both.
+const ORACLE: &str = "ros2/cdr_oracle.py";
+
+/// A line of it.
 #[derive(Deserialize)]
 struct Sample {
     /// The definitions, if they are not those of a distribution.
@@ -33,67 +32,6 @@ struct Sample {
     interface: String,
     cdr: String,
     fields: Json,
-}
-
-/// The Python that a variable names.
-fn python(variable: &str) -> Option<PathBuf> {
-    if let Some(python) = std::env::var_os(variable) {
-        return Some(python.into());
-    }
-    assert!(std::env::var("CI").as_deref() != Ok("true"), "{variable} names no Python");
-    eprintln!("skipped: {variable} names no Python");
-    None
-}
-
-/// Calls a function with each sample of the oracle, and returns how many there were.
-fn each_sample(python: &Path, by: &str, count: usize, seed: u64, mut check: impl FnMut(&Sample)) -> usize {
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../tests/ros2/cdr_oracle.py");
-    let mut oracle = Command::new(python);
-    oracle.arg(script).args([by, &count.to_string(), &seed.to_string()]).stdout(Stdio::piped());
-    let mut oracle = oracle.spawn().unwrap();
-    let lines = BufReader::new(oracle.stdout.take().unwrap()).lines();
-    let mut found = 0;
-    for line in lines {
-        check(&serde_json::from_str(&line.unwrap()).unwrap());
-        found += 1;
-    }
-    assert!(oracle.wait().unwrap().success(), "the oracle has a mistake");
-    found
-}
-
-fn bytes(hex: &str) -> Arc<[u8]> {
-    (0..hex.len()).step_by(2).map(|at| u8::from_str_radix(&hex[at..at + 2], 16).unwrap()).collect()
-}
-
-fn real(shown: &Json) -> u64 {
-    u64::from_str_radix(shown.as_str().unwrap(), 16).unwrap()
-}
-
-/// Whether a value is what the oracle says.
-fn is(value: &Value, shown: &Json) -> bool {
-    match (value, shown) {
-        (Value::Bool(value), Json::Bool(shown)) => value == shown,
-        (Value::Int(value), Json::Number(shown)) => Some(*value) == shown.as_i64(),
-        (Value::Real(value), Json::String(_)) => value.to_bits() == real(shown),
-        (Value::Text(value), Json::String(shown)) => *value == **shown,
-        (Value::List(values), Json::Array(shown)) => {
-            values.len() == shown.len() && values.iter().zip(shown).all(|(value, shown)| is(value, shown))
-        }
-        (Value::Record(record), Json::Object(shown)) => {
-            let mut fields = record.iter();
-            record.fields().names().len() == shown.len() && fields.all(|(name, value)| is(value, &shown[name.as_str()]))
-        }
-        // What the language has values of its own for.
-        (Value::Point(point), Json::Object(shown)) => {
-            let shown = ["x", "y", "z"].map(|axis| real(&shown[axis]));
-            point.map(f64::to_bits) == shown
-        }
-        (Value::Real(time), Json::Object(shown)) => {
-            let [seconds, nanos] = ["sec", "nanosec"].map(|part| shown[part].as_i64().unwrap() as f64);
-            *time == seconds + nanos * 1e-9
-        }
-        _ => false,
-    }
 }
 
 /// A sample without what follows its last field, and with zeros where fields are aligned: as it is when it is written
@@ -211,8 +149,8 @@ fn check(interfaces: &[Interface], sample: &Sample, cdr: &[u8]) {
 }
 
 fn check_rosbags(count: usize, seed: u64) {
-    let Some(python) = python("SESAME_ROS2_CYCLONE") else { return };
-    let found = each_sample(&python, "rosbags", count, seed, |sample| {
+    let Some(python) = named("SESAME_ROS2_CYCLONE") else { return };
+    let found = each_line(&python, ORACLE, ("rosbags", count, seed), |sample: &Sample| {
         let mut catalogue = Catalogue::default();
         for (name, text) in &sample.files {
             catalogue.add(msg("oracle", name, text).unwrap_or_else(|error| panic!("{error}: {text}")));
@@ -264,9 +202,9 @@ fn installed(python: &Path) -> Catalogue {
 #[test]
 fn all_installed_messages_are_read_and_written_as_rclpy_does() {
     for variable in ["SESAME_ROS2_KILTED", "SESAME_ROS2_JAZZY"] {
-        let Some(python) = python(variable) else { continue };
+        let Some(python) = named(variable) else { continue };
         let catalogue = installed(&python);
-        let found = each_sample(&python, "rclpy", 5, 7, |sample| {
+        let found = each_line(&python, ORACLE, ("rclpy", 5, 7), |sample: &Sample| {
             let interfaces = catalogue.layout(&sample.interface).unwrap();
             // `serialize_message` hands out a buffer of the size it estimated before. What nodes publish ends with the
             // last field.

@@ -156,12 +156,8 @@ proptest! {
 
 /// The folder of interfaces of an installed distribution, which an environment variable names by its Python.
 fn share(variable: &str) -> Option<PathBuf> {
-    let Some(python) = std::env::var_os(variable) else {
-        assert!(std::env::var("CI").as_deref() != Ok("true"), "{variable} names no Python with ROS 2");
-        eprintln!("skipped: {variable} names no Python with ROS 2");
-        return None;
-    };
-    Some(Path::new(&python).parent().unwrap().parent().unwrap().join("share"))
+    let python = sesame_peers::named(variable)?;
+    Some(python.parent().unwrap().parent().unwrap().join("share"))
 }
 
 /// All interfaces of a folder, from files with this ending.

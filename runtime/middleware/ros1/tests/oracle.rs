@@ -3,23 +3,24 @@
 //! `SESAME_ROS1` names a Python that has rospy.
 
 #![expect(clippy::unwrap_used, reason = "a test ends where something is missing")]
-#![expect(clippy::disallowed_methods, clippy::disallowed_types, reason = "it asks another program")]
 
 use std::collections::BTreeMap;
-use std::io::{BufRead, BufReader};
-use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
 use std::sync::Arc;
 
 use serde::Deserialize;
 use serde_json::Value as Json;
 use sesame_codec::ros1::Codec;
+use sesame_peers::named;
+use sesame_peers::oracle::{bytes, each_line, is};
 use sesame_plan::{Interface, WireType};
 use sesame_relay::value::{Fields, Record, Value};
 use sesame_relay::wire::Wanted;
 use sesame_ros1::definition::Texts;
 
-/// A line of `oracle.py`.
+/// The script of all.
+const ORACLE: &str = "ros1/oracle.py";
+
+/// A line of it.
 #[derive(Deserialize)]
 struct Described {
     #[serde(rename = "type")]
@@ -36,66 +37,6 @@ struct Described {
 struct Sample {
     bytes: String,
     fields: Json,
-}
-
-/// The Python that has rospy.
-fn python() -> Option<PathBuf> {
-    let python = std::env::var_os("SESAME_ROS1").map(PathBuf::from);
-    assert!(python.is_some() || std::env::var("CI").as_deref() != Ok("true"), "SESAME_ROS1 names no Python");
-    if python.is_none() {
-        eprintln!("skipped: SESAME_ROS1 names no Python that has rospy");
-    }
-    python
-}
-
-/// Calls a function with each line of the oracle, and returns how many there were.
-fn each(python: &Path, which: &str, count: usize, seed: u64, mut check: impl FnMut(&Described)) -> usize {
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../tests/ros1/oracle.py");
-    let mut oracle = Command::new(python);
-    oracle.arg(script).args([which, &count.to_string(), &seed.to_string()]).stdout(Stdio::piped());
-    let mut oracle = oracle.spawn().unwrap();
-    let mut found = 0;
-    for line in BufReader::new(oracle.stdout.take().unwrap()).lines() {
-        check(&serde_json::from_str(&line.unwrap()).unwrap());
-        found += 1;
-    }
-    assert!(oracle.wait().unwrap().success(), "the oracle has a mistake");
-    found
-}
-
-fn bytes(hex: &str) -> Arc<[u8]> {
-    (0..hex.len()).step_by(2).map(|at| u8::from_str_radix(&hex[at..at + 2], 16).unwrap()).collect()
-}
-
-fn real(shown: &Json) -> u64 {
-    u64::from_str_radix(shown.as_str().unwrap(), 16).unwrap()
-}
-
-/// Whether a value is what the oracle says.
-fn is(value: &Value, shown: &Json) -> bool {
-    match (value, shown) {
-        (Value::Bool(value), Json::Bool(shown)) => value == shown,
-        (Value::Int(value), Json::Number(shown)) => Some(*value) == shown.as_i64(),
-        (Value::Real(value), Json::String(_)) => value.to_bits() == real(shown),
-        (Value::Text(value), Json::String(shown)) => *value == **shown,
-        (Value::List(values), Json::Array(shown)) => {
-            values.len() == shown.len() && values.iter().zip(shown).all(|(value, shown)| is(value, shown))
-        }
-        (Value::Record(record), Json::Object(shown)) => {
-            let mut fields = record.iter();
-            record.fields().names().len() == shown.len() && fields.all(|(name, value)| is(value, &shown[name.as_str()]))
-        }
-        // What the language has values of its own for.
-        (Value::Point(point), Json::Object(shown)) => {
-            let shown = ["x", "y", "z"].map(|axis| real(&shown[axis]));
-            point.map(f64::to_bits) == shown
-        }
-        (Value::Real(time), Json::Object(shown)) => {
-            let [seconds, nanos] = ["sec", "nanosec"].map(|part| shown[part].as_i64().unwrap() as f64);
-            *time == seconds + nanos * 1e-9
-        }
-        _ => false,
-    }
 }
 
 /// Times are read as one number, which need not have all their digits.
@@ -176,20 +117,20 @@ fn check(described: &Described) {
 
 #[test]
 fn all_installed_types_and_their_messages_are_as_genmsg_and_genpy_have_them() {
-    let Some(python) = python() else { return };
-    let found = each(&python, "installed", 5, 7, check);
+    let Some(python) = named("SESAME_ROS1") else { return };
+    let found = each_line(&python, ORACLE, ("installed", 5, 7), check);
     assert!(found > 100, "{found}");
 }
 
 #[test]
 fn random_types_and_their_messages_are_as_genmsg_and_genpy_have_them() {
-    let Some(python) = python() else { return };
-    assert_eq!(each(&python, "random", 300, 7, check), 300);
+    let Some(python) = named("SESAME_ROS1") else { return };
+    assert_eq!(each_line(&python, ORACLE, ("random", 300, 7), check), 300);
 }
 
 #[test]
 #[ignore = "takes minutes"]
 fn many_random_types_and_their_messages_are_as_genmsg_and_genpy_have_them() {
-    let Some(python) = python() else { return };
-    assert_eq!(each(&python, "random", 5_000, 8, check), 5_000);
+    let Some(python) = named("SESAME_ROS1") else { return };
+    assert_eq!(each_line(&python, ORACLE, ("random", 5_000, 8), check), 5_000);
 }

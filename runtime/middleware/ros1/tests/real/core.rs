@@ -1,10 +1,10 @@
 //! A master of its own for each test, and programs at it.
 
-use std::io::{BufRead, BufReader, Write};
+use std::io::Write;
 use std::net::{Ipv4Addr, TcpListener, TcpStream, UdpSocket};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
 use nix::sys::signal::{Signal, kill};
@@ -16,12 +16,7 @@ pub(crate) const LIMIT: Duration = Duration::from_secs(120);
 
 /// The Python that has rospy. Without one the test is to be skipped, which is said here.
 pub(crate) fn python() -> Option<PathBuf> {
-    let python = std::env::var_os("SESAME_ROS1").map(PathBuf::from);
-    assert!(python.is_some() || std::env::var("CI").as_deref() != Ok("true"), "SESAME_ROS1 names no Python");
-    if python.is_none() {
-        eprintln!("skipped: SESAME_ROS1 names no Python that has rospy");
-    }
-    python
+    sesame_peers::named("SESAME_ROS1")
 }
 
 /// A port for a master that no other test on this machine uses meanwhile.
@@ -128,9 +123,7 @@ impl Core {
             .env("PYTHONDONTWRITEBYTECODE", "1")
             .env("PYTHONUNBUFFERED", "1");
         let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
-        let (sender, lines) = channel();
-        let output = BufReader::new(child.stdout.take().unwrap());
-        std::thread::spawn(move || output.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
+        let lines = sesame_peers::lines(child.stdout.take().unwrap());
         Program { name: name.to_owned(), child, lines }
     }
 }

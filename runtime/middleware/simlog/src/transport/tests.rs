@@ -15,13 +15,7 @@ use crate::client::Stepped;
 const STEP: u64 = 20_000_000;
 
 fn python() -> Option<PathBuf> {
-    let python = std::env::var_os("SESAME_SIMLOG").map(PathBuf::from).filter(|python| python.is_file());
-    let insists = std::env::var("CI").is_ok_and(|ci| ci == "true");
-    assert!(python.is_some() || !insists, "SESAME_SIMLOG names no Python: `./test` makes its environment");
-    if python.is_none() {
-        eprintln!("skipped: SESAME_SIMLOG names no Python; `./test` makes its environment");
-    }
-    python
+    sesame_peers::named("SESAME_SIMLOG")
 }
 
 /// A plan that launches the peer with these arguments.

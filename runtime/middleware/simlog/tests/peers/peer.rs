@@ -2,22 +2,18 @@
 
 use std::io::{BufRead as _, BufReader};
 use std::path::PathBuf;
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
+
+use sesame_peers::Ended;
 
 /// The Python of the peers. Without one the test is to be skipped, which is said here; with `CI=true` that is an error.
 pub(crate) fn python() -> Option<PathBuf> {
-    let python = std::env::var_os("SESAME_SIMLOG").map(PathBuf::from).filter(|python| python.is_file());
-    let insists = std::env::var("CI").is_ok_and(|ci| ci == "true");
-    assert!(python.is_some() || !insists, "SESAME_SIMLOG names no Python: `./test` makes its environment");
-    if python.is_none() {
-        eprintln!("skipped: SESAME_SIMLOG names no Python; `./test` makes its environment");
-    }
-    python
+    sesame_peers::named("SESAME_SIMLOG")
 }
 
 /// A simulator that listens.
 pub(crate) struct Peer {
-    child: Child,
+    _program: Ended,
     pub(crate) port: u16,
 }
 
@@ -36,18 +32,13 @@ impl Peer {
         let mut output = BufReader::new(child.stdout.take().expect("it is piped"));
         output.read_line(&mut line).expect("it says its port");
         let port = line.trim().strip_prefix("port ").and_then(|port| port.parse().ok());
-        Some(Peer { child, port: port.unwrap_or_else(|| panic!("{script} says {line:?} in place of its port")) })
+        Some(Peer {
+            _program: Ended(child),
+            port: port.unwrap_or_else(|| panic!("{script} says {line:?} in place of its port")),
+        })
     }
 
     pub(crate) fn url(&self) -> String {
         format!("http://127.0.0.1:{}", self.port)
-    }
-}
-
-impl Drop for Peer {
-    fn drop(&mut self) {
-        // It may have ended by itself.
-        self.child.kill().ok();
-        self.child.wait().ok();
     }
 }

@@ -1,0 +1,46 @@
+//! How tests reach programs that others wrote: where they are, what they print, and their end.
+//!
+//! `./test` finds or makes the peers, and names each by an environment variable; CONTRIBUTING.md lists them.
+
+pub mod oracle;
+
+use std::io::{BufRead as _, BufReader, Read};
+use std::path::PathBuf;
+use std::process::Child;
+use std::sync::mpsc::{Receiver, channel};
+
+/// The program or folder that an environment variable names. Without the variable the test is to be skipped, which is
+/// printed here; with `CI=true` that is an error. What is named has to exist.
+#[track_caller]
+pub fn named(variable: &str) -> Option<PathBuf> {
+    let named = std::env::var_os(variable).map(PathBuf::from);
+    let Some(path) = named else {
+        let insists = std::env::var_os("CI").is_some_and(|ci| ci == "true");
+        assert!(!insists, "{variable} is not set: `./test` finds or makes what it names");
+        eprintln!("skipped: {variable} is not set; `./test` finds or makes what it names");
+        return None;
+    };
+    assert!(path.exists(), "{variable} names {}, which does not exist", path.display());
+    Some(path)
+}
+
+/// A program that is ended when this is dropped.
+#[derive(Debug)]
+pub struct Ended(pub Child);
+
+impl Drop for Ended {
+    fn drop(&mut self) {
+        // It may have ended by itself.
+        self.0.kill().ok();
+        self.0.wait().ok();
+    }
+}
+
+/// The lines that a program writes, read on a thread of their own until the program closes its output or nobody wants
+/// them any more.
+pub fn lines(output: impl Read + Send + 'static) -> Receiver<String> {
+    let (sender, lines) = channel();
+    let output = BufReader::new(output);
+    std::thread::spawn(move || output.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
+    lines
+}
