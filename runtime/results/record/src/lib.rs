@@ -19,6 +19,11 @@ mod each_test;
 mod entered;
 mod error;
 mod files;
+#[expect(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    reason = "an adapter: it claims folders and locks files"
+)]
 mod folder;
 mod imported;
 mod lab_runs;
@@ -31,12 +36,15 @@ mod quarantine;
 mod read_monitors;
 mod read_tests;
 mod recognise;
+#[expect(clippy::disallowed_methods, reason = "an adapter: it makes the files of a run")]
 mod recorder;
 mod relay_latencies;
 mod repetitions;
+#[expect(clippy::disallowed_methods, reason = "an adapter: it opens the files of a run")]
 mod repository;
 #[cfg(any(test, feature = "testing"))]
 pub mod sample;
+#[expect(clippy::disallowed_methods, clippy::disallowed_types, reason = "an adapter: it reads the head of a file")]
 mod schema;
 mod series;
 mod series_views;

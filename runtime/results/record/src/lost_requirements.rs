@@ -1,6 +1,6 @@
 //! The table of when tests lost requirements on the robustness of temporal formulas.
 //!
-//! It follows from a run as its series do, and explains hazards. So it is no part of the digest. It is only there if
+//! It follows from a run as its series do, and explains hazards. So the digest leaves it out. It is only there if
 //! such a requirement was lost before a run ended.
 
 use rusqlite::{Transaction, params};

@@ -11,9 +11,9 @@ use sesame_base::observation::{Counters, MetricObservation, Observation, Operati
 use sesame_plan::condition::{Comparison, Condition, ConditionEnd, ConditionSpace, Integers, Operand, Variable};
 use sesame_plan::testing;
 use sesame_plan::{
-    Activation, ActivationMode, Bound, Campaign, CampaignPlan, Choice, Direction, Domain, KnownTestId, Metric,
-    MetricId, MetricSource, Moment, Operation, OperationId, OperationKind, Parameter, Requirement, Search, Shape, Span,
-    Strategy, Test, TestOperation, TopicId, Trend, Type, ValueMode,
+    Activation, ActivationMode, Bound, Campaign, CampaignPlan, Choice, CoverageGoal, Dimension, Direction, Domain,
+    GridAxis, KnownTestId, Metric, MetricId, MetricSource, Moment, Operation, OperationId, OperationKind, Parameter,
+    Requirement, Search, Shape, Span, Strategy, Test, TestOperation, TopicId, Trend, Type, ValueMode,
 };
 use sesame_rng::Stream;
 use sesame_search as search;
@@ -385,6 +385,15 @@ pub fn front(plan: &CampaignPlan, records: &[TestRecord]) -> Vec<u32> {
 /// Records a campaign as a runner does, but for the fronts of most generations, and finishes it.
 pub fn campaign(folder: &Path, plan: &CampaignPlan, searched: u32) -> Repository {
     recorded(folder, plan, searched, false)
+}
+
+/// Records a campaign of 60 tests that counts the cells it covers: six by six, of when tests disturb and for how long.
+pub fn covering(folder: &Path) -> Repository {
+    let mut plan = plan();
+    let axis = |dimension, high| GridAxis { dimension, low: 0.0, high, cells: 6 };
+    let axes = vec![axis(Dimension::T1, 1.0), axis(Dimension::T2, 0.5)];
+    plan.campaign.coverage = Some(CoverageGoal { axes, hits: 1, stop_at: None });
+    campaign(folder, &plan, 60)
 }
 
 /// Records a campaign with the fronts of all generations, and finishes it.

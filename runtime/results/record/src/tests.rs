@@ -1,6 +1,6 @@
 //! The repository as its users see it: what is written is read, by functions and by views.
 
-#![expect(clippy::disallowed_methods, reason = "tests of a record of wall time")]
+#![expect(clippy::disallowed_methods, reason = "tests of files, and of a record of wall time")]
 
 use std::path::Path;
 use std::sync::Arc;
@@ -25,6 +25,7 @@ mod earlier;
 mod environment;
 mod monitors;
 mod robustness;
+#[expect(clippy::disallowed_types, reason = "it holds locks as another process does")]
 mod runs;
 
 fn folder() -> TempDir {

@@ -9,6 +9,7 @@
 
 mod export;
 mod facts;
+#[expect(clippy::disallowed_methods, reason = "an adapter: it writes files")]
 mod file;
 mod html;
 mod junit;

@@ -1,5 +1,7 @@
 //! Reports on a made-up campaign, read as a user reads them.
 
+#![expect(clippy::disallowed_methods, reason = "they read files that were written, and show one to a browser")]
+
 use sesame_base::observation::Counters;
 use sesame_plan::{Activation, Choice, NodeId, OperationId, OperationKind, Task, Test, TestOperation};
 use sesame_record::{Origin, Repository, Standing, Verdict, sample};

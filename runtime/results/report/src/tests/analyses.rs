@@ -2,7 +2,6 @@
 
 use sesame_analysis as analysis;
 use sesame_analysis::{Datum, Selection, Table};
-use sesame_plan::{CoverageGoal, Dimension, GridAxis};
 use sesame_search::coverage::Grid;
 use sesame_search::sspr::Convention;
 
@@ -11,14 +10,7 @@ use super::*;
 /// A campaign that counts the cells that it covers.
 fn covering() -> (tempfile::TempDir, Repository) {
     let folder = tempfile::tempdir().unwrap();
-    let mut plan = sample::plan();
-    let axis = |dimension, high, cells| GridAxis { dimension, low: 0.0, high, cells };
-    plan.campaign.coverage = Some(CoverageGoal {
-        axes: vec![axis(Dimension::T1, 1.0, 6), axis(Dimension::T2, 0.5, 6)],
-        hits: 1,
-        stop_at: None,
-    });
-    let repository = sample::campaign(folder.path(), &plan, 60);
+    let repository = sample::covering(folder.path());
     (folder, repository)
 }
 

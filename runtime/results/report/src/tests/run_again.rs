@@ -1,13 +1,18 @@
 //! Reports of tests that were run again.
 
+use sesame_base::observation::{MetricObservation, Outcome};
+use sesame_record::{MetricValue, Recorder, Repetition};
+
 use super::*;
+
+/// A fresh run of a test, which ended like this after 70 s.
+fn again(test: u32, position: u32, simulator_seed: u64, outcome: Outcome, values: Vec<MetricValue>) -> Repetition {
+    Repetition { test, position, simulator_seed, outcome, end: 70.0, messages: 1, values, hazards: Vec::new() }
+}
 
 /// The sample's campaign, which confirms by three runs each: some findings come again always, some sometimes, some
 /// never.
 fn confirmed() -> (tempfile::TempDir, Repository) {
-    use sesame_base::observation::Outcome;
-    use sesame_record::{MetricValue, Recorder, Repetition};
-
     let folder = tempfile::tempdir().unwrap();
     let mut plan = sample::plan();
     plan.campaign.confirm =
@@ -33,18 +38,7 @@ fn confirmed() -> (tempfile::TempDir, Repository) {
                 (at, 3) if at == crash => outcome = Outcome::Crash { message: "it fell over".to_owned() },
                 _ => {}
             }
-            let seed = u64::from(position);
-            let run = Repetition {
-                test,
-                position,
-                simulator_seed: seed,
-                outcome,
-                end: 70.0,
-                messages: 1,
-                values,
-                hazards: Vec::new(),
-            };
-            recorder.put_repetition(&run, &[]).unwrap();
+            recorder.put_repetition(&again(test, position, u64::from(position), outcome, values), &[]).unwrap();
         }
     }
     // A crash is a finding too, whether or not a front has it.
@@ -56,17 +50,7 @@ fn confirmed() -> (tempfile::TempDir, Repository) {
                 *shown = MetricValue::whole(shown.value, shown.set);
             }
         }
-        let run = Repetition {
-            test: 17,
-            position,
-            simulator_seed: 9,
-            outcome,
-            end: 70.0,
-            messages: 1,
-            values,
-            hazards: Vec::new(),
-        };
-        recorder.put_repetition(&run, &[]).unwrap();
+        recorder.put_repetition(&again(17, position, 9, outcome, values), &[]).unwrap();
     }
     let repository = recorder.finish("all evaluations done").unwrap();
     (folder, repository)
@@ -137,9 +121,6 @@ fn the_views_of_findings_agree_with_the_report() {
 /// The results of a test that violates R1 in exactly these of its runs, the first one and fresh ones; `None` is a crash
 /// at the very beginning.
 fn run_again(first: bool, fresh: &[Option<bool>]) -> (tempfile::TempDir, Repository) {
-    use sesame_base::observation::{MetricObservation, Outcome};
-    use sesame_record::{MetricValue, Recorder, Repetition};
-
     let folder = tempfile::tempdir().unwrap();
     let plan = sample::plan();
     let mut recorder = Recorder::create(folder.path(), &plan, 42, 1).unwrap();
@@ -159,18 +140,7 @@ fn run_again(first: bool, fresh: &[Option<bool>]) -> (tempfile::TempDir, Reposit
             values.clear();
             outcome = Outcome::Crash { message: "it fell over".to_owned() };
         }
-        let seed = u64::from(position);
-        let run = Repetition {
-            test: 1,
-            position,
-            simulator_seed: seed,
-            outcome,
-            end: 70.0,
-            messages: 1,
-            values,
-            hazards: Vec::new(),
-        };
-        recorder.put_repetition(&run, &[]).unwrap();
+        recorder.put_repetition(&again(1, position, u64::from(position), outcome, values), &[]).unwrap();
     }
     let repository = recorder.finish("all evaluations done").unwrap();
     (folder, repository)
