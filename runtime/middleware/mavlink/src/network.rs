@@ -202,6 +202,8 @@ struct Network {
     url: String,
     files: Vec<String>,
     folder: PathBuf,
+    /// Those of the files, once they were read: a run does not change them.
+    definitions: Option<Definitions>,
     topics: Vec<Topic>,
     /// Lines by the sender and the number of their messages.
     lines: BTreeMap<(SaidSender, u32), usize>,
@@ -214,7 +216,7 @@ struct Network {
     parts: VecDeque<Part>,
     /// For each line the way, the system and the component of its latest message.
     latest: BTreeMap<usize, (Way, u8, u8)>,
-    /// How many messages the runner has made in the name of each sender.
+    /// The number of the next frame that the runner makes in the name of each sender.
     made: BTreeMap<(u8, u8), u8>,
     /// What was noted already, with the line if it concerns one.
     noted: BTreeSet<(Option<usize>, &'static str)>,
@@ -228,6 +230,7 @@ impl Network {
             url,
             files,
             folder,
+            definitions: None,
             topics: Vec::new(),
             lines: BTreeMap::new(),
             ground: None,
@@ -244,7 +247,11 @@ impl Network {
 
     /// Finds the message of each topic, and how its fields are read.
     fn start(&mut self, lines: &[Line]) -> Result<(), TransportError> {
-        let definitions = Definitions::read(&self.files, &self.folder).map_err(TransportError::Wiring)?;
+        let definitions = match self.definitions.take() {
+            Some(definitions) => definitions,
+            None => Definitions::read(&self.files, &self.folder).map_err(TransportError::Wiring)?,
+        };
+        let definitions = self.definitions.insert(definitions);
         self.topics.clear();
         self.lines.clear();
         for (at, line) in lines.iter().enumerate() {
@@ -425,9 +432,10 @@ impl Network {
 
     /// The number of the next frame that the runner makes in the name of a sender.
     fn next_number(&mut self, sender: (u8, u8)) -> u8 {
-        let made = self.made.entry(sender).or_default();
-        *made = made.wrapping_add(1);
-        made.wrapping_sub(1)
+        let next = self.made.entry(sender).or_default();
+        let number = *next;
+        *next = number.wrapping_add(1);
+        number
     }
 }
 
@@ -542,7 +550,7 @@ impl Bus for Network {
     }
 
     fn disconnect(&mut self) {
-        // All threads are told first, because each may take a moment to end.
+        // Every thread learns first that it should end, because each may take a moment.
         for link in &self.links {
             link.reader.stop.store(true, Ordering::Relaxed);
         }
