@@ -39,7 +39,7 @@ fn observed(fault: &Fault) -> Option<(String, Duration)> {
         Peer::start(&python, &domain, program, &arguments)
     };
     let peers: Vec<Peer> = fault.peers.iter().map(start).collect();
-    // How long programs take to start is no part of how long a system takes to become complete.
+    // How long programs take to start does not count in how long a system takes to become complete.
     peers.iter().for_each(Peer::await_up);
     let mut system = System::new(plan(&space(&domain, fault.kind, fault.nodes, "", fault.seconds)));
     let begin = Instant::now();

@@ -200,7 +200,8 @@ fn the_table_lists_each_room_of_the_runtime_and_no_other() {
     for (name, rooms) in &listed {
         let folder =
             members.iter().find(|folder| folder.starts_with("runtime") && folder.rsplit('/').next() == Some(name));
-        let folder = folder.unwrap_or_else(|| panic!("docs/rooms.md lists {name}, which is no crate of the runtime"));
+        let folder =
+            folder.unwrap_or_else(|| panic!("docs/rooms.md lists {name}, which is not a crate of the runtime"));
         assert_eq!(*rooms, modules(&workspace().join(folder)), "rooms of {name}: docs/rooms.md, and the crate");
     }
     assert_eq!(listed.len(), 25, "{listed:?}");

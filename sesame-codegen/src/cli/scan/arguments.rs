@@ -1,4 +1,4 @@
-//! What the commands of `sesamec scan` are told. They are the same in every build.
+//! The arguments of the commands of `sesamec scan`. They are the same in every build.
 
 use std::path::PathBuf;
 

@@ -4,7 +4,7 @@ use std::net::{IpAddr, Ipv4Addr, ToSocketAddrs as _};
 
 /// The address of a node.
 pub(super) struct Host {
-    /// The name that others are told.
+    /// The name by which others reach it.
     pub(super) name: String,
     /// The address of this machine that it binds.
     pub(super) bind: IpAddr,

@@ -22,7 +22,7 @@ const LONGEST_NOTE: usize = 600;
 /// What all threads of a node know.
 pub(crate) struct Shared {
     pub(crate) name: String,
-    /// The host that others are told.
+    /// The host by which others reach it.
     pub(super) host: String,
     /// The port for messages and calls.
     pub(super) port: u16,

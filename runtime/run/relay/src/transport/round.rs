@@ -56,12 +56,12 @@ impl Promises {
         &self.answers[delivered.index()]
     }
 
-    /// Whether some node answers the messages of this wire, which is no link.
+    /// Whether some node answers the messages of this wire, which is not a link.
     pub fn is_answered(&self, wire: Wire) -> bool {
         self.answered[wire.index()]
     }
 
-    /// Whether nodes say how many messages this wire, which is no link, has in a step.
+    /// Whether nodes say how many messages this wire, which is not a link, has in a step.
     pub fn is_counted(&self, wire: Wire) -> bool {
         self.counted[wire.index()]
     }
