@@ -294,6 +294,11 @@ impl<'p> Monitors<'p> {
 
     /// Records what has changed, because of messages or of time, and queues what is to be published.
     fn take_changes(&mut self, message: Option<(Wire, u64)>, by_messages: bool) {
+        self.due = self.run.due_not_before();
+        // Most messages change nothing.
+        if self.changes.is_empty() {
+            return;
+        }
         let mut changes = std::mem::take(&mut self.changes);
         for change in &changes.evidence {
             let latest = || self.latest[change.evidence.index()].filter(|_| by_messages);
@@ -311,13 +316,10 @@ impl<'p> Monitors<'p> {
             self.scores.decided(decision);
             self.outlets.publish(self.plan, decision, &mut self.outbox);
         }
-        if !changes.evidence.is_empty() || !changes.decisions.is_empty() {
-            self.scores.changed();
-        }
+        self.scores.changed();
         self.told.end_changes();
         changes.clear();
         self.changes = changes;
-        self.due = self.run.due_not_before();
     }
 
     /// The next message that is to be published.

@@ -49,6 +49,11 @@ pub struct Changes {
 }
 
 impl Changes {
+    /// Whether nothing changed.
+    pub fn is_empty(&self) -> bool {
+        self.evidence.is_empty() && self.decisions.is_empty()
+    }
+
     /// Forgets all changes.
     pub fn clear(&mut self) {
         self.evidence.clear();
