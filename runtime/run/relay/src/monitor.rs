@@ -45,7 +45,7 @@ pub(crate) struct Monitors<'p> {
     listeners: Listeners,
     evidence: Vec<EvidenceState<'p>>,
     /// What evidence with one source heard in the event at hand, each at most once, and of which message.
-    heard: Vec<Reading>,
+    heard: Vec<(EvidenceId, Truth)>,
     /// The event at hand, and per evidence the last one in which it heard something.
     event: u64,
     last_heard: Vec<u64>,
@@ -55,7 +55,8 @@ pub(crate) struct Monitors<'p> {
     /// Evidence with several sources that heard something in the instant at hand, each once.
     waiting: Vec<EvidenceId>,
     is_waiting: Vec<bool>,
-    /// Kept to be used again.
+    /// What these came to. Kept to be used again, like the next.
+    settled: Vec<Reading>,
     changes: Changes,
     /// Before this instant no evidence changes if nothing is heard until then.
     due: Option<SimTime>,
@@ -139,6 +140,7 @@ impl<'p> Monitors<'p> {
             is_waiting: vec![false; evidence.len()],
             evidence,
             heard: Vec::new(),
+            settled: Vec::new(),
             message: None,
             changes,
             due: None,
@@ -157,6 +159,12 @@ impl<'p> Monitors<'p> {
     /// From now on, decisions are kept until they are [taken](Monitors::take_decided); those of time zero are there.
     pub(crate) fn tell(&mut self) {
         self.told.ask();
+    }
+
+    /// Whether there is something to [take](Monitors::take_decided).
+    #[inline]
+    pub(crate) fn has_decided(&self) -> bool {
+        self.told.has_decided()
     }
 
     /// What was decided since the last call, if [somebody wants to be told](Monitors::tell).
@@ -198,15 +206,15 @@ impl<'p> Monitors<'p> {
                 Err(lacking) => {
                     self.note(id, wire, &lacking);
                 }
-                Ok(()) if evidence.sources().are_several() => {
+                Ok(None) => {
                     self.latest[id.index()] = Some((wire, index));
                     if !std::mem::replace(&mut self.is_waiting[id.index()], true) {
                         self.waiting.push(id);
                     }
                 }
-                Ok(()) => {
+                Ok(Some(truth)) => {
                     self.last_heard[id.index()] = self.event;
-                    self.heard.push(Reading::now(now, id, evidence.truth(now)));
+                    self.heard.push((id, truth));
                 }
             }
         }
@@ -224,17 +232,11 @@ impl<'p> Monitors<'p> {
 
     /// Ends an event: monitors decide on what was heard in it.
     pub(crate) fn decide(&mut self, now: SimTime) {
-        if let Some(message) = self.message.take() {
-            self.observe(now, Some(message));
-        }
-    }
-
-    /// Because of a message, or, for evidence with several sources, of the last one that each heard.
-    fn observe(&mut self, now: SimTime, message: Option<(Wire, u64)>) {
-        self.run.observe(now, &self.heard, &mut self.changes);
+        let Some(message) = self.message.take() else { return };
+        self.run.observe_alone(now, &self.heard, &mut self.changes);
         self.heard.clear();
         self.event += 1;
-        self.take_changes(message, true);
+        self.take_changes(Some(message), true);
     }
 
     /// Whether evidence waits for the end of this instant.
@@ -264,10 +266,13 @@ impl<'p> Monitors<'p> {
             self.is_waiting[evidence.index()] = false;
             let state = &self.evidence[evidence.index()];
             if let Some(oldest) = state.sources().oldest().filter(|&oldest| counts(oldest)) {
-                self.heard.push(Reading { evidence, truth: state.truth(now), oldest });
+                self.settled.push(Reading { evidence, truth: state.truth(now), oldest });
             }
         }
-        self.observe(now, None);
+        self.run.observe(now, &self.settled, &mut self.changes);
+        self.settled.clear();
+        self.event += 1;
+        self.take_changes(None, true);
         true
     }
 

@@ -102,9 +102,20 @@ impl Run {
     ///
     /// What was due until then comes first.
     pub fn observe(&mut self, at: SimTime, heard: &[Reading], changes: &mut Changes) {
+        self.take(at, heard.iter().copied(), changes);
+    }
+
+    /// As [`Run::observe`], of evidence that listens to no other topic.
+    pub fn observe_alone(&mut self, at: SimTime, heard: &[(EvidenceId, Truth)], changes: &mut Changes) {
+        let readings = heard.iter().map(|&(evidence, truth)| Reading::now(at, evidence, truth));
+        self.take(at, readings, changes);
+    }
+
+    #[inline]
+    fn take(&mut self, at: SimTime, readings: impl Iterator<Item = Reading>, changes: &mut Changes) {
         self.advance(at, changes);
         let at = self.now;
-        for &Reading { evidence, truth, oldest } in heard {
+        for Reading { evidence, truth, oldest } in readings {
             let rule = &self.network.rules[evidence.index()];
             let automaton = &mut self.automata[evidence.index()];
             let before = automaton.value();

@@ -33,6 +33,13 @@ impl Timers {
         if time == i64::MAX || (self.place[at] != ABSENT && self.time[at] <= time) {
             return;
         }
+        self.bring_forward(evidence, time);
+    }
+
+    /// Gives evidence a time before the one that it has, or a first one: seldom, as most messages put timers off.
+    #[inline(never)]
+    fn bring_forward(&mut self, evidence: u32, time: i64) {
+        let at = evidence as usize;
         self.time[at] = time;
         if self.place[at] == ABSENT {
             self.place[at] = place(self.heap.len());

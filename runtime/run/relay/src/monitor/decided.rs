@@ -79,6 +79,10 @@ impl Told {
         self.changes.clear();
     }
 
+    pub(super) fn has_decided(&self) -> bool {
+        !self.decided.is_empty()
+    }
+
     pub(super) fn take(&mut self) -> Vec<Decided> {
         std::mem::take(&mut self.decided)
     }

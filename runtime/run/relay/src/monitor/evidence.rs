@@ -28,20 +28,22 @@ impl<'p> EvidenceState<'p> {
         }
     }
 
-    /// Takes a message on the `member`th path of a topic. The error is a missing field; such a message is not heard.
+    /// Takes a message on the `member`th path of a topic. Returns what the condition comes to now; evidence with several
+    /// sources comes to nothing before the end of the instant. The error is a missing field; such a message is not heard.
     pub(super) fn hear(
         &mut self,
         wire: Wire,
         (topic, member): (TopicId, usize),
         now: SimTime,
         value: &Value,
-    ) -> Result<(), String> {
+    ) -> Result<Option<Truth>, String> {
         hear(&self.evidence.inputs, topic, value, &mut self.heard)?;
         self.held.hold(&self.evidence.inputs, &self.heard, member);
         if self.sources.are_several() {
             self.sources.spoke(wire, now);
+            return Ok(None);
         }
-        Ok(())
+        Ok(Some(self.truth(now)))
     }
 
     /// What the condition comes to now. It is unknown while a number that was read last is not finite, and where a

@@ -72,8 +72,10 @@ impl Relay<'_> {
     }
 
     /// Tells listeners what monitors decided.
+    #[inline]
     fn tell_decided(&mut self) {
-        let Some(monitors) = &mut self.monitors else { return };
+        // Most messages decide nothing.
+        let Some(monitors) = self.monitors.as_mut().filter(|monitors| monitors.has_decided()) else { return };
         for decided in monitors.take_decided() {
             self.taps.iter_mut().for_each(|tap| tap.decided(&decided));
         }

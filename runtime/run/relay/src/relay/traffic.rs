@@ -23,6 +23,7 @@ struct Heard {
     messages: u64,
     first: SimTime,
     last: SimTime,
+    /// The longest gap: how long it is, and when it ends.
     gap: (SimTime, SimTime),
     gaps: Sample,
 }
@@ -93,7 +94,7 @@ impl Recorder {
             messages: heard.messages,
             first: heard.first.seconds(),
             last: heard.last.seconds(),
-            gap: Span { start: heard.gap.0.seconds(), end: heard.gap.1.seconds() },
+            gap: Span { start: (heard.gap.1 - heard.gap.0).seconds(), end: heard.gap.1.seconds() },
             median_gap: SimTime::from_nanos(heard.gaps.median()).seconds(),
         });
         traffic.collect()
@@ -130,7 +131,7 @@ impl Reached {
 impl Heard {
     fn first(now: SimTime) -> Self {
         let gaps = Sample { kept: Vec::new(), stride: 1, seen: 0 };
-        Heard { messages: 1, first: now, last: now, gap: (now, now), gaps }
+        Heard { messages: 1, first: now, last: now, gap: (SimTime::ZERO, now), gaps }
     }
 
     #[inline]
@@ -139,8 +140,8 @@ impl Heard {
         // Several messages of one instant are no gap.
         if now > self.last {
             let gap = now - self.last;
-            if gap > self.gap.1 - self.gap.0 {
-                self.gap = (self.last, now);
+            if gap > self.gap.0 {
+                self.gap = (gap, now);
             }
             self.gaps.add(gap.nanos());
             self.last = now;
