@@ -70,7 +70,8 @@ def results_of(revision):
     folder = FOLDER / commit
     if not folder.exists():
         call("git", "worktree", "add", "--detach", folder, commit)
-    call("cargo", "build", "--quiet", "--locked", "--package", "sesame-codegen", folder=folder)
+    # Of `sesamec`, whatever its crate is called in that revision.
+    call("cargo", "build", "--quiet", "--locked", folder=folder)
     results = {}
     for example in EXAMPLES:
         for runner in campaigns(folder, example):

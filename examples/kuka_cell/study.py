@@ -28,7 +28,7 @@ FOUND = {"systematic", "range", "tests", "scattered"}
 
 def build():
     """Builds `sesamec` and the stand-in for the lab, and puts both on PATH."""
-    for package in ["sesame-codegen", "kuka_cell_lab"]:
+    for package in ["sesamec", "kuka_cell_lab"]:
         subprocess.run(["cargo", "build", "--release", "--package", package], cwd=ROOT, check=True)
     target = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release"
     os.environ["PATH"] = f"{target}{os.pathsep}{os.environ['PATH']}"

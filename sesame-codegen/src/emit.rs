@@ -433,7 +433,7 @@ fn by(plan: &CampaignPlan, command: &str) -> String {
 }
 
 /// The file of a runner with its plan.
-pub(crate) const CAMPAIGN_PLAN: &str = "campaign.plan.json";
+pub const CAMPAIGN_PLAN: &str = "campaign.plan.json";
 
 /// The plan of a runner, as the file `campaign.plan.json` holds it.
 pub fn plan_json(runner: &RunnerPlan) -> String {

@@ -6,26 +6,14 @@
 // These macros panic where nothing can be written: on a full disk, or after the reader has gone.
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
-#[cfg(feature = "cli")]
-pub mod certificate;
-#[cfg(feature = "cli")]
-pub mod cli;
 pub mod emit;
 pub mod environment;
-pub mod explain;
 pub mod files;
-#[cfg(feature = "cli")]
-pub mod frontend;
 pub mod input;
-pub mod interfaces;
 pub mod lower;
 pub mod names;
 pub mod output;
 pub mod plan;
 pub mod project;
-#[cfg(feature = "cli")]
-pub mod scan;
 pub mod stubs;
-#[cfg(feature = "cli")]
-pub mod uses;
 pub mod wiring;

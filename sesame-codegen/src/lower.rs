@@ -28,7 +28,7 @@ use sesame_plan as plan;
 use self::id::topic_id;
 use self::operation::custom_operations;
 use self::selection::{Selection, without_operations};
-pub(crate) use self::simulator::simulator;
+pub use self::simulator::simulator;
 use self::system::{lifecycle, message, node, topic, unit};
 use crate::plan::{HookPlan, MonitorPlan, RunnerPlan};
 

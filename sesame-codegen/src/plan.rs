@@ -6,8 +6,6 @@
 use std::path::Path;
 
 use sesame_plan::{CampaignPlan, Direction, MetricSource, Parameter, Simulator, TopicId};
-#[cfg(feature = "cli")]
-use sesame_runtime::transport::is_built_in;
 
 /// The plan of one runner crate.
 #[derive(Debug, Clone, PartialEq)]
@@ -110,21 +108,15 @@ pub(crate) fn runtime_feature(simulator: &Simulator) -> Option<&'static str> {
     kind.feature_over_tls.filter(|_| over_tls).or(kind.feature)
 }
 
-/// As a library, the generator runs nothing.
-#[cfg(not(feature = "cli"))]
-fn is_built_in(_: &str) -> bool {
-    false
-}
-
 impl RunnerPlan {
     /// The folder of the file that declares the simulator, as seen from that of the space; empty where they are one.
     pub fn system_folder(&self) -> &Path {
         Path::new(&self.system_file).parent().unwrap_or(Path::new(""))
     }
 
-    /// Whether a runner of this campaign contains Rust that this command does not: the user's simulator or hooks, or
-    /// a transport that the command was built without. Without, the plan says everything.
-    pub fn needs_rust(&self) -> bool {
+    /// Whether a runner of this campaign contains Rust that a command with these features of the runtime does not: the
+    /// user's simulator or hooks, or a transport that the command was built without. Without, the plan says everything.
+    pub fn needs_rust(&self, is_built_in: fn(feature: &str) -> bool) -> bool {
         let simulator = &self.plan.simulator;
         simulator.properties().in_runner
             || runtime_feature(simulator).is_some_and(|feature| !is_built_in(feature))

@@ -6,12 +6,12 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use sesame_base::time::SimTime;
-use sesame_codegen::frontend::{Look, SESAME};
 use sesame_plan::{CampaignPlan, Test};
 use sesame_relay::metric::MetricTable;
 use sesame_relay::relay::Relay;
 use sesame_relay::transport::Connect;
 use sesame_relay::wire::WireTable;
+use sesamec::frontend::{Look, SESAME};
 
 /// Latencies in nanoseconds, ascending, and how long all messages took.
 #[derive(Debug)]

@@ -4,7 +4,6 @@ use std::path::Path;
 use std::time::Instant;
 
 use sesame_base::time::SimTime;
-use sesame_codegen::frontend::{Look, SESAME};
 use sesame_patience::{LIMIT, Watch};
 use sesame_plan::{CampaignPlan, Test};
 use sesame_relay::metric::MetricTable;
@@ -12,6 +11,7 @@ use sesame_relay::relay::Relay;
 use sesame_relay::transport::Transport;
 use sesame_relay::wire::WireTable;
 use sesame_tests::{Port, fresh_folder};
+use sesamec::frontend::{Look, SESAME};
 
 use crate::peers::{Peer, common, python};
 

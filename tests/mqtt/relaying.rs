@@ -5,7 +5,6 @@ use std::path::Path;
 use std::time::Instant;
 
 use sesame_base::time::SimTime;
-use sesame_codegen::frontend::{Look, SESAME};
 use sesame_patience::Watch;
 use sesame_plan::{CampaignPlan, Test};
 use sesame_relay::metric::MetricTable;
@@ -13,6 +12,7 @@ use sesame_relay::relay::Relay;
 use sesame_relay::transport::Transport;
 use sesame_relay::wire::WireTable;
 use sesame_tests::fresh_folder;
+use sesamec::frontend::{Look, SESAME};
 
 use crate::peers::{Broker, Client, LIMIT, packages};
 

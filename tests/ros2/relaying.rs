@@ -5,7 +5,6 @@ use std::time::{Duration, Instant};
 
 use sesame_base::observation::Observation;
 use sesame_base::time::SimTime;
-use sesame_codegen::frontend::{Look, SESAME};
 use sesame_patience::Watch;
 use sesame_plan::{CampaignPlan, Test};
 use sesame_relay::evaluate::{Custom, Run, evaluate_tapped};
@@ -15,6 +14,7 @@ use sesame_relay::transport::Transport;
 use sesame_relay::transport::relay_latency::AddedOnWire;
 use sesame_relay::wire::{Wire, WireTable};
 use sesame_tests::workspace;
+use sesamec::frontend::{Look, SESAME};
 
 use crate::environment::Domain;
 use crate::peer::{LIMIT, Peer};

@@ -65,7 +65,7 @@ fn program(name: &str) -> PathBuf {
 pub fn optimised_sesamec() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     PROGRAM.get_or_init(|| {
-        built(&["--package", "sesame-codegen", "--features", "mavlink,mqtt,ros1,ros2,rosbridge,simlog", "--release"])
+        built(&["--package", "sesamec", "--features", "mavlink,mqtt,ros1,ros2,rosbridge,simlog", "--release"])
     })
 }
 

@@ -3,7 +3,6 @@
 use proptest::prelude::*;
 
 use sesame_base::observation::{MetricObservation, Observation, Outcome, WallTime};
-use sesame_codegen::frontend::{Look, SESAME};
 use sesame_dsl::analyse;
 use sesame_dsl::source::SourceMap;
 use sesame_notation as notation;
@@ -12,6 +11,7 @@ use sesame_record::{Origin, Recorder, TestRecord};
 use sesame_report::{Expected, export};
 use sesame_search as search;
 use sesame_tests::models::model;
+use sesamec::frontend::{Look, SESAME};
 
 /// Every kind of parameter in units that are awkward to write.
 const SPACE: &str = r#"

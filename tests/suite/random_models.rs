@@ -10,12 +10,12 @@ use proc_macro2::{TokenStream, TokenTree};
 use sesame_codegen::emit::emit;
 use sesame_codegen::environment::{Options, environment};
 use sesame_codegen::files::Tree;
-use sesame_codegen::frontend::{Look, SESAME};
 use sesame_codegen::output::{Mode, apply};
 use sesame_codegen::plan::RunnerPlan;
 use sesame_plan::CampaignPlan;
 use sesame_tests::models::{MARK, Model, model};
 use sesame_tests::{Done, cargo, command, copy, done, fresh_folder, target, turn, workspace};
+use sesamec::frontend::{Look, SESAME};
 
 /// The plans of a space in a folder, which has to be free of errors.
 fn plans(seed: u64, model: &Model, folder: &Path) -> Vec<RunnerPlan> {

@@ -27,7 +27,7 @@ fn manifests() -> BTreeMap<String, BTreeSet<String>> {
         let manifest = manifest(&member);
         let name = manifest["package"]["name"].as_str().unwrap().to_owned();
         let ours = |table: &toml::Table| -> BTreeSet<String> {
-            table.keys().filter(|name| name.starts_with("sesame-")).cloned().collect()
+            table.keys().filter(|name| name.starts_with("sesame-") || *name == "sesamec").cloned().collect()
         };
         crates.insert(name, manifest.get("dependencies").and_then(toml::Value::as_table).map(ours).unwrap_or_default());
     }

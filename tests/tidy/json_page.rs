@@ -43,7 +43,7 @@ const PRINTED: [(&str, &str, &str, &str); 15] = [
         "Line",
         "sesame-dsl/src/diagnostic/render/json.rs",
     ),
-    ("`sesamec explain NAME FILE`", "One object.", "Explained", "sesame-codegen/src/uses.rs"),
+    ("`sesamec explain NAME FILE`", "One object.", "Explained", "sesamec/src/uses.rs"),
     ("`sesamec scan`", "One object.", "Facts", "runtime/middleware/scan/src/facts.rs"),
 ];
 
@@ -59,7 +59,7 @@ const CRATES: [(&str, &str); 11] = [
     ("sesame_plan", "runtime/model/plan/src"),
     ("sesame_scan", "runtime/middleware/scan/src"),
     ("sesame_dsl", "sesame-dsl/src"),
-    ("sesame_codegen", "sesame-codegen/src"),
+    ("sesamec", "sesamec/src"),
 ];
 
 /// A type that can be printed.

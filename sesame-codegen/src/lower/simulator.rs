@@ -9,7 +9,7 @@ use super::id::{node_id, topic_id};
 use super::ros2::{by_monitor, interfaces, wirings};
 
 /// A simulator of a space, that of its system or that of a lab, without what starts and ends it.
-pub(crate) fn simulator(space: &Space, simulator: &model::Simulator) -> plan::Simulator {
+pub fn simulator(space: &Space, simulator: &model::Simulator) -> plan::Simulator {
     let model::Simulator { declaration, transport, crate_folder: _, ros, proxies } = simulator;
     let (ros, proxies) = (ros.clone(), proxies.clone());
     let mut plan = plan::Simulator { ros, proxies, ..plan::Simulator::new(&declaration.name, transport.clone()) };

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use sesame_codegen::frontend::{Look, SESAME};
+use sesamec::frontend::{Look, SESAME};
 
 /// A space with this many lines, all of which say something: topics, metrics, requirements, operations, known tests.
 fn space(lines: usize) -> String {

@@ -1,0 +1,5 @@
+//! The `sesamec` command.
+
+fn main() -> std::process::ExitCode {
+    sesamec::cli::main(&sesamec::frontend::SESAME)
+}

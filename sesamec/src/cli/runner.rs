@@ -1,0 +1,244 @@
+//! The runners of a project's campaigns, from the project: `run`, and the commands that every runner has.
+//!
+//! A campaign whose simulator is a program and that uses no hooks is interpreted: the runtime is linked into `sesamec`,
+//! and its plan says everything. The runner of any other campaign is a crate, which is generated and built first.
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+use std::process::{Command, ExitCode};
+
+use anyhow::{Context as _, bail};
+use clap::{Arg, ArgAction, ArgMatches};
+use sesame_runtime::Interpreted;
+use sesame_runtime::cli::{CALLER, Caller, EXIT_CODES, RUNNER, Running, Showing};
+use sesame_runtime::transport::is_built_in;
+
+use super::arguments::Generation;
+use super::build;
+use super::commands::{all, check, choose, write};
+use super::owner;
+use super::shell::{self, Shell};
+use crate::emit;
+use crate::environment;
+use crate::frontend::{Checked, Language};
+use crate::names;
+use crate::output::Mode;
+use crate::plan::RunnerPlan;
+use crate::stubs::unfilled_objectives;
+
+/// Names of the arguments that say which campaign it is.
+const FILE: &str = "space_file";
+const CAMPAIGN: &str = "space_campaign";
+const OUT: &str = "runners_folder";
+
+/// A command of runners, with the arguments that say whose.
+pub(super) fn of_a_campaign(mut command: clap::Command) -> clap::Command {
+    let others: Vec<clap::Id> =
+        command.get_arguments().filter(|arg| arg.is_positional()).map(|arg| arg.get_id().clone()).collect();
+    for (position, id) in (2..).zip(others) {
+        command = command.mut_arg(id, |arg| arg.index(position));
+    }
+    command.after_help(EXIT_CODES).args([
+        Arg::new(FILE)
+            .index(1)
+            .required(true)
+            .value_name("FILE")
+            .value_parser(clap::value_parser!(PathBuf))
+            .help("The `.sesame` file"),
+        Arg::new(CAMPAIGN)
+            .long("campaign")
+            .short('c')
+            .value_name("CAMPAIGN")
+            .help("The campaign; if omitted, the only one"),
+        Arg::new(OUT)
+            .long("out")
+            .short('o')
+            .value_name("FOLDER")
+            .value_parser(clap::value_parser!(PathBuf))
+            .help("The folder with the runners; if omitted, `runners` beside the file"),
+    ])
+}
+
+/// What those arguments say.
+fn named(matches: &ArgMatches) -> Generation {
+    Generation::of(
+        matches.get_one::<PathBuf>(FILE).expect("it is required").clone(),
+        matches.get_one::<String>(CAMPAIGN).cloned(),
+        matches.get_one::<PathBuf>(OUT).cloned(),
+    )
+}
+
+/// The runner of a campaign that was found in its space.
+struct Found<'a> {
+    generation: &'a Generation,
+    checked: Checked,
+    /// The campaign among the plans.
+    chosen: usize,
+    /// How commands of this runner are called, for hints that can be copied.
+    caller: Caller,
+}
+
+impl<'a> Found<'a> {
+    /// Checks the space.
+    fn find(shell: Shell, language: &Language, generation: &'a Generation) -> anyhow::Result<Self> {
+        let checked = check(shell, language, &generation.file, generation.diagnostics.format)?;
+        let chosen = choose(&checked, &generation.file, generation.campaign.as_deref())?;
+        let mut arguments = vec![generation.file.display().to_string()];
+        if checked.plans.len() > 1 {
+            arguments.extend(["--campaign".to_owned(), checked.plans[chosen].plan.campaign.name.clone()]);
+        }
+        if let Some(out) = &generation.out {
+            arguments.extend(["--out".to_owned(), out.display().to_string()]);
+        }
+        let caller = Caller { program: shell::command().to_owned(), arguments };
+        Ok(Found { generation, checked, chosen, caller })
+    }
+
+    fn plan(&self) -> &RunnerPlan {
+        &self.checked.plans[self.chosen]
+    }
+
+    /// The runner as data, if the campaign needs no Rust.
+    fn interpreted(&self) -> anyhow::Result<Option<Interpreted>> {
+        let file = &self.generation.file;
+        if self.plan().needs_rust(is_built_in) || environment::runtime_is_chosen(file, &self.generation.options())? {
+            return Ok(None);
+        }
+        let (space, simulator) = environment::program_folders(file, self.plan())?;
+        let campaign = &self.plan().plan.campaign.name;
+        let folder = self.generation.own_runners(&[campaign])?.join(names::campaign_folder(campaign));
+        let results = folder.join("results");
+        if let Some(link) = [&folder, &results].into_iter().find(|path| path.is_symlink()) {
+            bail!("{} is a link, and results are never written through links", link.display());
+        }
+        owner::check(file, &folder)?;
+        let directory = std::path::absolute(&folder).with_context(|| format!("cannot find {}", folder.display()))?;
+        Ok(Some(Interpreted { plan: emit::plan_json(self.plan()), directory, space, simulator }))
+    }
+}
+
+/// `sesamec run`
+pub(super) fn run(
+    shell: Shell,
+    language: &Language,
+    generation: &Generation,
+    build: bool,
+    arguments: &[OsString],
+) -> anyhow::Result<ExitCode> {
+    let found = Found::find(shell, language, generation)?;
+    // These concern the crate.
+    let build = build || generation.force || generation.templates.is_some();
+    if !build && let Some(interpreted) = found.interpreted()? {
+        return Ok(sesame_runtime::cli::interpret(&interpreted, found.caller, arguments));
+    }
+    let allowed = arguments.iter().any(|argument| argument == "--allow-unimplemented");
+    compiled(shell, &found, arguments, allowed)
+}
+
+/// A command that runs tests.
+pub(super) fn running(
+    shell: Shell,
+    language: &Language,
+    command: &Running,
+    (name, matches): (&str, &ArgMatches),
+) -> anyhow::Result<ExitCode> {
+    let generation = named(matches);
+    let found = Found::find(shell, language, &generation)?;
+    if let Some(interpreted) = found.interpreted()? {
+        return Ok(sesame_runtime::cli::carry_out(command, &interpreted, found.caller));
+    }
+    let mut arguments = vec![OsString::from(name)];
+    arguments.extend(passed_on(&super::runners(), name, matches));
+    compiled(shell, &found, &arguments, true)
+}
+
+/// A command that shows results. The space is read only if the campaign is not named.
+pub(super) fn showing(
+    shell: Shell,
+    language: &Language,
+    command: &Showing,
+    matches: &ArgMatches,
+) -> anyhow::Result<ExitCode> {
+    let generation = named(matches);
+    if let Some(run) = matches.try_get_one::<PathBuf>("results").ok().flatten().filter(|run| run.is_dir()) {
+        // It says which campaign it is of.
+        return Ok(sesame_runtime::cli::show(command, run));
+    }
+    let folder = |name: &str| generation.runners(&[name]).join(names::campaign_folder(name));
+    let named = generation.campaign.as_deref().map(folder).filter(|folder| folder.join("results").is_dir());
+    let folder = match named {
+        Some(folder) => folder,
+        None => folder(&Found::find(shell, language, &generation)?.plan().plan.campaign.name),
+    };
+    owner::check(&generation.file, &folder)?;
+    Ok(sesame_runtime::cli::show(command, &folder.join("results")))
+}
+
+/// The arguments of a runner's command, as a runner's own command line takes them.
+pub(super) fn passed_on(runners: &clap::Command, name: &str, matches: &ArgMatches) -> Vec<OsString> {
+    let command = runners.find_subcommand(name).expect("it is a command of runners");
+    let given =
+        |arg: &&Arg| matches.value_source(arg.get_id().as_str()) == Some(clap::parser::ValueSource::CommandLine);
+    let (positional, options): (Vec<&Arg>, Vec<&Arg>) =
+        command.get_arguments().filter(given).partition(|arg| arg.is_positional());
+    let values = |arg: &Arg| matches.get_raw(arg.get_id().as_str()).into_iter().flatten().map(OsString::from);
+    let mut passed = Vec::new();
+    for arg in options {
+        let flag = OsString::from(format!("--{}", arg.get_long().expect("options of runners have long names")));
+        if matches!(arg.get_action(), ArgAction::SetTrue) {
+            passed.push(flag);
+        } else {
+            // In one word, so that a value may begin with a hyphen.
+            passed.extend(values(arg).map(|value| [flag.clone(), "=".into(), value].into_iter().collect::<OsString>()));
+        }
+    }
+    if !positional.is_empty() {
+        passed.push("--".into());
+        passed.extend(positional.into_iter().flat_map(values));
+    }
+    passed
+}
+
+/// Generates and builds a runner, and becomes it.
+fn compiled(shell: Shell, found: &Found<'_>, arguments: &[OsString], allow_unfilled: bool) -> anyhow::Result<ExitCode> {
+    let Found { generation, checked, chosen, caller } = found;
+    let mode = if generation.force { Mode::Force } else { Mode::Write };
+    let (out, _) = write(shell, generation, &generation.options(), checked, &[*chosen], mode)?;
+    let runner = found.plan();
+    let campaign = &runner.plan.campaign.name;
+    if !allow_unfilled {
+        let unfilled = unfilled_objectives(runner, &out.join("hooks"));
+        if !unfilled.is_empty() {
+            let said = unfilled.iter().map(|(metric, file)| {
+                format!(
+                    "the hook of `{metric}` is not filled in yet, and `{campaign}` optimises it: fill in {}",
+                    file.display()
+                )
+            });
+            let mut said: Vec<String> = said.collect();
+            if let Some(last) = said.last_mut() {
+                last.push_str("\n  or pass `-- --allow-unimplemented` to see everything else work");
+            }
+            return Err(all(&said));
+        }
+    }
+    let folder = out.join(names::campaign_folder(campaign));
+    let program = build::build(shell, &folder, campaign)?;
+    let mut runner = Command::new(&program);
+    runner.args(arguments).env(CALLER, serde_json::to_string(caller)?).env(RUNNER, folder.canonicalize()?);
+    start(runner).with_context(|| format!("cannot run {}", program.display()))
+}
+
+/// Becomes the runner: Ctrl-C and exit code are then its own.
+#[cfg(unix)]
+fn start(mut runner: Command) -> std::io::Result<ExitCode> {
+    use std::os::unix::process::CommandExt as _;
+    Err(runner.exec())
+}
+
+/// Waits for the runner, which gets Ctrl-C from the console as well.
+#[cfg(not(unix))]
+fn start(mut runner: Command) -> std::io::Result<ExitCode> {
+    let code = runner.status()?.code().unwrap_or(1);
+    Ok(u8::try_from(code).map_or(ExitCode::FAILURE, ExitCode::from))
+}

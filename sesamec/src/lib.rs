@@ -1,0 +1,17 @@
+//! The command `sesamec`: what a command line asks for, from the check of a space to the study of a lab.
+//!
+//! The language checks ([`frontend`]), the generator writes runners, and the runtime runs, records and reports; what is
+//! here calls them and says what came of it ([`cli`]).
+
+// These macros panic where nothing can be written: on a full disk, or after the reader has gone.
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
+pub mod certificate;
+pub mod cli;
+pub mod explain;
+pub mod frontend;
+pub mod interfaces;
+pub mod scan;
+pub mod uses;
+
+use sesame_codegen::{emit, environment, files, input, lower, names, output, plan, project, stubs, wiring};
