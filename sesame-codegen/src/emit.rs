@@ -102,7 +102,7 @@ pub fn emit(plans: &[RunnerPlan], environment: &Environment) -> Result<Vec<Tree>
 }
 
 /// The simulator's type, part by part; `None` for a simulator that is none of Rust's.
-pub fn simulator_path(simulator: &Simulator) -> Option<Vec<&str>> {
+pub(crate) fn simulator_path(simulator: &Simulator) -> Option<Vec<&str>> {
     simulator.rust_type().map(|path| path.split("::").collect())
 }
 

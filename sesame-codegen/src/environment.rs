@@ -19,7 +19,7 @@ use crate::input::{self, Unreadable};
 use crate::plan::RunnerPlan;
 
 /// The name of the file beside a `.sesame` file that says what its runners need.
-pub const SETTINGS: &str = "sesame.toml";
+pub(crate) const SETTINGS: &str = "sesame.toml";
 
 /// The folder beside a `.sesame` file that its runners are in, if nothing else is said.
 pub const RUNNERS: &str = "runners";
@@ -326,7 +326,7 @@ fn home(source: &Path) -> &Path {
 }
 
 /// The runtime as a dependency of a crate in `folder`, which need not exist yet.
-pub fn runtime_for(folder: &Path, runtime: Option<&RuntimeChoice>) -> Result<Value, Error> {
+pub(crate) fn runtime_for(folder: &Path, runtime: Option<&RuntimeChoice>) -> Result<Value, Error> {
     runtime_dependency(&settled(folder)?, Path::new("."), runtime, None).map(|(value, _)| value)
 }
 

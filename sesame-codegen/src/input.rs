@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 pub const MOST_OF_A_TEXT: u64 = 8 << 20;
 
 /// The most that is read of a file that is copied, or compared with what is generated: 256 MiB.
-pub const MOST_OF_A_COPY: u64 = 256 << 20;
+pub(crate) const MOST_OF_A_COPY: u64 = 256 << 20;
 
 /// Why a file cannot be read: what was found, and what to do about it.
 #[derive(Debug, thiserror::Error)]

@@ -1,6 +1,6 @@
 //! Names of a space as names of Rust, files and packages.
 //!
-//! A name of the language is an ASCII identifier; [`check`] refuses anything else, so that no name can become code, a
+//! A name of the language is an ASCII identifier; `check` refuses anything else, so that no name can become code, a
 //! path or the structure of a file. What remains is the style (snake and camel case), keywords, and names that would
 //! hide something the generated code or a stub speaks of.
 
@@ -10,19 +10,19 @@ use heck::{ToSnakeCase, ToUpperCamelCase};
 use proc_macro2::{Ident, Span};
 
 /// Whether a name is an ASCII identifier, and short enough to be a file name.
-pub fn check(name: &str) -> bool {
+pub(crate) fn check(name: &str) -> bool {
     let mut bytes = name.bytes();
     let starts = bytes.next().is_some_and(|first| first.is_ascii_alphabetic() || first == b'_');
     starts && name.len() <= 200 && bytes.all(|byte| byte.is_ascii_alphanumeric() || byte == b'_')
 }
 
 /// A name in snake case, for modules, files, fields and functions. Never empty, never a name that Rust cannot escape.
-pub fn snake(name: &str) -> String {
+pub(crate) fn snake(name: &str) -> String {
     settled(name.to_snake_case())
 }
 
 /// A name in camel case, for types.
-pub fn camel(name: &str) -> String {
+pub(crate) fn camel(name: &str) -> String {
     settled(name.to_upper_camel_case())
 }
 
@@ -38,7 +38,7 @@ fn settled(name: String) -> String {
 }
 
 /// An identifier, raw if it is a keyword. Edition 2024 reserves `gen`, which syn does not know of.
-pub fn ident(name: &str) -> Ident {
+pub(crate) fn ident(name: &str) -> Ident {
     match syn::parse_str::<Ident>(name) {
         Ok(plain) if name != "gen" => plain,
         _ => Ident::new_raw(name, Span::call_site()),
@@ -46,22 +46,22 @@ pub fn ident(name: &str) -> Ident {
 }
 
 /// What a user would write for a name: with `r#` if it is a keyword.
-pub fn written(name: &str) -> String {
+pub(crate) fn written(name: &str) -> String {
     ident(name).to_string()
 }
 
 /// Gives out names that differ from each other and from reserved ones.
 #[derive(Debug, Default)]
-pub struct Scope(BTreeSet<String>);
+pub(crate) struct Scope(BTreeSet<String>);
 
 impl Scope {
     /// A scope in which these names are taken.
-    pub fn reserving(names: &[&str]) -> Self {
+    pub(crate) fn reserving(names: &[&str]) -> Self {
         Scope(names.iter().map(|&name| name.to_owned()).collect())
     }
 
     /// The wanted name, with `suffix` added until it is free.
-    pub fn take(&mut self, wanted: String, suffix: &str) -> String {
+    pub(crate) fn take(&mut self, wanted: String, suffix: &str) -> String {
         let mut name = wanted;
         while !self.0.insert(name.clone()) {
             name += suffix;
@@ -73,7 +73,7 @@ impl Scope {
 /// The struct of a metric's hook, for example `CollisionOccurrence`.
 ///
 /// It depends on the metric's name alone: a hook file is the user's, so nothing added to the space may rename it.
-pub fn hook_type(metric: &str) -> String {
+pub(crate) fn hook_type(metric: &str) -> String {
     // What a stub, or code a user is likely to write in it, speaks of.
     const SPOKEN_OF: [&str; 16] = [
         "Box",
@@ -102,12 +102,12 @@ pub fn hook_type(metric: &str) -> String {
 }
 
 /// The trait that a metric's hook implements, for example `CollisionOccurrenceHook`.
-pub fn hook_trait(metric: &str) -> String {
+pub(crate) fn hook_trait(metric: &str) -> String {
     hook_type(metric) + "Hook"
 }
 
 /// The struct of a custom operation's parameters, for example `BendPathParameters`.
-pub fn parameters_type(operation: &str) -> String {
+pub(crate) fn parameters_type(operation: &str) -> String {
     hook_type(operation) + "Parameters"
 }
 
@@ -125,7 +125,7 @@ pub fn campaign_folder(campaign: &str) -> String {
 }
 
 /// The package of a campaign's runner. The hyphen keeps it apart from every crate that a simulator or hook may bring.
-pub fn package(space: &str, campaign: &str) -> String {
+pub(crate) fn package(space: &str, campaign: &str) -> String {
     let start = if space.starts_with(|first: char| first.is_ascii_alphabetic()) { "" } else { "space" };
     format!("{start}{space}-{campaign}")
 }

@@ -125,7 +125,7 @@ impl RunnerPlan {
     }
 
     /// Whether a test of this campaign may hold a custom operation, and so needs its hook to be compiled.
-    pub fn applies(&self, operation: &OperationPlan) -> bool {
+    pub(crate) fn applies(&self, operation: &OperationPlan) -> bool {
         self.plan.operations.iter().any(|used| used.name == operation.operation)
     }
 

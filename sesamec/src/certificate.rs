@@ -15,7 +15,7 @@ use sesame_plan::TextTest;
 
 /// A part of a certificate.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct CertificatePart {
+pub(crate) struct CertificatePart {
     /// What it is.
     pub kind: PartKind,
     /// Its name; `None` for `and`, `or` and `at_least`.
@@ -39,7 +39,7 @@ pub struct CertificatePart {
 /// What a part of a certificate is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum PartKind {
+pub(crate) enum PartKind {
     /// A monitor.
     Monitor,
     /// A monitor that the system itself decides.
@@ -68,7 +68,12 @@ impl CertificatePart {
 }
 
 /// The certificate of the monitor whose name is declared here, if there is one.
-pub fn certificate(space: &Space, sources: &SourceMap, index: &Index, declared: Span) -> Option<CertificatePart> {
+pub(crate) fn certificate(
+    space: &Space,
+    sources: &SourceMap,
+    index: &Index,
+    declared: Span,
+) -> Option<CertificatePart> {
     let (id, monitor) = space.eddis.iter().find(|(_, eddi)| eddi.declaration.span == declared)?;
     let kind = if monitor.publishes.is_some() { PartKind::Monitor } else { PartKind::ExternalMonitor };
     let mut tree = Tree { space, sources, index, seen: BTreeSet::new() };
@@ -167,7 +172,7 @@ fn one_line(text: &str) -> String {
 }
 
 /// A certificate as text, one line for each part.
-pub fn text(certificate: &CertificatePart) -> String {
+pub(crate) fn text(certificate: &CertificatePart) -> String {
     let by = if certificate.kind == PartKind::ExternalMonitor { ", decided by the system" } else { "" };
     let mut text = format!("certificate{by}\n");
     for part in &certificate.parts {

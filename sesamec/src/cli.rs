@@ -22,12 +22,12 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
+use sesame_codegen::environment::{Options, RuntimeChoice};
+use sesame_codegen::project;
 use sesame_runtime::cli::{Internal, Running, Showing};
 
 use self::arguments::{Deny, Diagnostics, ExplainFormat, Generation, Purpose};
-use crate::environment::{Options, RuntimeChoice};
 use crate::frontend::Language;
-use crate::project;
 
 pub use shell::Shell;
 

@@ -189,7 +189,7 @@ mod tests {
         let analysis = sesame_dsl::analyse(&sources, file);
         let space = analysis.model.unwrap_or_else(|| panic!("{campaign}\n{:#?}", analysis.diagnostics));
         let id = space.campaigns.iter().next().expect("there is a campaign").0;
-        crate::lower::lower(&space, id, "cell.sesame", "sesamec 0.0.0").plan
+        sesame_codegen::lower::lower(&space, id, "cell.sesame", "sesamec 0.0.0").plan
     }
 
     #[test]

@@ -2,6 +2,9 @@
 
 use std::path::Path;
 
+use sesame_codegen::input::{self, Unreadable};
+use sesame_codegen::lower::{lower, lower_monitor, simulator};
+use sesame_codegen::plan::{MonitorPlan, RunnerPlan};
 use sesame_dsl::Analysis;
 use sesame_dsl::diagnostic::{Diagnostic, MEANINGS, Severity, page, render};
 use sesame_dsl::index::Kind;
@@ -11,10 +14,7 @@ use sesame_dsl::span::Span;
 use sesame_plan::NotAlone;
 
 use crate::certificate;
-use crate::input::{self, Unreadable};
 use crate::interfaces::Files;
-use crate::lower::{lower, lower_monitor, simulator};
-use crate::plan::{MonitorPlan, RunnerPlan};
 use crate::uses;
 
 /// The language as the command needs it.
@@ -211,6 +211,9 @@ fn summary(space: &Space) -> String {
 
 #[cfg(test)]
 mod tests {
+    use sesame_codegen::emit::Templates;
+    use sesame_codegen::environment::RuntimeChoice;
+    use sesame_codegen::project::{self, Simulator};
     use sesame_runtime::transport::is_built_in;
 
     use super::*;
@@ -218,16 +221,16 @@ mod tests {
     const PLAIN: Look = Look::Human { colour: false };
 
     /// The check of a new project's space.
-    fn new_project(simulator: crate::project::Simulator) -> Checked {
-        let runtime = crate::environment::RuntimeChoice::Version("1.0.0".into());
-        let templates = crate::emit::Templates::default();
-        let files = crate::project::files(Path::new("demo"), simulator, Some(&runtime), &templates).unwrap();
+    fn new_project(simulator: Simulator) -> Checked {
+        let runtime = RuntimeChoice::Version("1.0.0".into());
+        let templates = Templates::default();
+        let files = project::files(Path::new("demo"), simulator, Some(&runtime), &templates).unwrap();
         check("some/demo.sesame", &files["demo.sesame"], PLAIN)
     }
 
     #[test]
     fn the_space_of_a_new_project_is_correct() {
-        let checked = new_project(crate::project::Simulator::Rust);
+        let checked = new_project(Simulator::Rust);
         assert_eq!((checked.errors, checked.diagnostics.as_str()), (0, ""));
         assert_eq!(checked.summary, "1 campaign, 2 operations, 2 metrics, 1 requirement");
         assert_eq!(checked.plans[0].plan.source, "demo.sesame");
@@ -237,7 +240,7 @@ mod tests {
 
     #[test]
     fn the_space_of_a_new_project_in_python_is_correct_and_needs_no_rust() {
-        let checked = new_project(crate::project::Simulator::Python);
+        let checked = new_project(Simulator::Python);
         assert_eq!((checked.errors, checked.diagnostics.as_str()), (0, ""));
         assert_eq!(checked.summary, "1 campaign, 2 operations, 3 metrics, 1 requirement");
         assert!(!checked.plans[0].needs_rust(is_built_in));

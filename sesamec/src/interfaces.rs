@@ -8,10 +8,9 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use sesame_codegen::input::{self, Unreadable};
 use sesame_dsl::interfaces::{Folders, Interfaces, known};
 use sesame_plan::{Dialect, Interface, InterfaceField, WireType};
-
-use crate::input::{self, Unreadable};
 
 /// The most files that are read for one space.
 const MOST_FILES: usize = 2000;
@@ -21,7 +20,7 @@ const DEEPEST: usize = 64;
 
 /// A file that defines a message or a service.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Definition {
+pub(crate) struct Definition {
     /// Where it is.
     pub file: PathBuf,
     /// How it is written.
@@ -34,7 +33,7 @@ pub struct Definition {
 
 /// How a definition is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Format {
+pub(crate) enum Format {
     /// A message.
     Msg,
     /// A service.
@@ -45,13 +44,13 @@ pub enum Format {
 
 /// What a definition is of: of the interface `PACKAGE/msg/NAME` one layout, of `PACKAGE/srv/NAME` those of
 /// `PACKAGE/srv/NAME_Request` and `PACKAGE/srv/NAME_Response`. What they contain is named in full.
-pub type Parse = fn(name: &str, definition: &Definition) -> Result<Vec<Interface>, String>;
+pub(crate) type Parse = fn(name: &str, definition: &Definition) -> Result<Vec<Interface>, String>;
 
 /// The layouts of a definition; `None` where no folder has one.
 type Read = Result<Option<Vec<Interface>>, String>;
 
 /// Layouts from files.
-pub struct Files {
+pub(crate) struct Files {
     parse: Parse,
     /// By the name of the message or service.
     read: RefCell<BTreeMap<String, Read>>,
@@ -85,7 +84,7 @@ fn parse(name: &str, definition: &Definition) -> Result<Vec<Interface>, String> 
 
 impl Files {
     /// No file is read yet.
-    pub fn new(parse: Parse) -> Self {
+    pub(crate) fn new(parse: Parse) -> Self {
         Files { parse, read: RefCell::new(BTreeMap::new()) }
     }
 

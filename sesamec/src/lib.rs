@@ -6,12 +6,11 @@
 // These macros panic where nothing can be written: on a full disk, or after the reader has gone.
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
-pub mod certificate;
+mod certificate;
 pub mod cli;
 pub mod explain;
 pub mod frontend;
-pub mod interfaces;
+mod interfaces;
+// Public, because it depends on the features which parts of it the command itself uses.
 pub mod scan;
-pub mod uses;
-
-use sesame_codegen::{emit, environment, files, input, lower, names, output, plan, project, stubs, wiring};
+mod uses;

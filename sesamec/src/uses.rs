@@ -12,7 +12,7 @@ use sesame_dsl::span::Span;
 use crate::certificate::{self, CertificatePart};
 
 /// Finds what a name of the file `file` stands for. What is wrong with the name comes back as a sentence or several.
-pub fn find(sources: &SourceMap, index: &Index, file: &str, name: &str) -> Result<DefinitionId, String> {
+pub(crate) fn find(sources: &SourceMap, index: &Index, file: &str, name: &str) -> Result<DefinitionId, String> {
     let found = index.find(name);
     match found[..] {
         [id] => Ok(id),
@@ -69,7 +69,12 @@ fn place(sources: &SourceMap, span: Span) -> String {
 }
 
 /// A definition with its doc comment, and each use with its line.
-pub fn text(sources: &SourceMap, index: &Index, id: DefinitionId, certificate: Option<&CertificatePart>) -> String {
+pub(crate) fn text(
+    sources: &SourceMap,
+    index: &Index,
+    id: DefinitionId,
+    certificate: Option<&CertificatePart>,
+) -> String {
     let definition = index.definition(id);
     let mut out = String::new();
     let kind = definition.kind.word();
@@ -90,7 +95,7 @@ pub fn text(sources: &SourceMap, index: &Index, id: DefinitionId, certificate: O
 }
 
 /// The places that mention a definition, each with its line; empty where none does.
-pub fn uses(sources: &SourceMap, index: &Index, id: DefinitionId) -> String {
+pub(crate) fn uses(sources: &SourceMap, index: &Index, id: DefinitionId) -> String {
     let uses: Vec<_> = index.uses(id).collect();
     let mut out = match uses.len() {
         0 => String::new(),
@@ -169,7 +174,12 @@ struct Within {
 }
 
 /// A definition and its uses as one JSON object, in ASCII and on one line.
-pub fn json(sources: &SourceMap, index: &Index, id: DefinitionId, certificate: Option<&CertificatePart>) -> String {
+pub(crate) fn json(
+    sources: &SourceMap,
+    index: &Index,
+    id: DefinitionId,
+    certificate: Option<&CertificatePart>,
+) -> String {
     let at = |span| Place::with_utf16(sources, span);
     let definition = index.definition(id);
     let explained = Explained {

@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use anyhow::bail;
+use sesame_codegen::environment::{self, Options, RuntimeChoice};
+use sesame_codegen::names;
 
 use super::owner;
 use super::shell::Format;
-use crate::environment::{self, Options, RuntimeChoice};
-use crate::names;
 
 /// Which diagnostics fail the command besides errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]

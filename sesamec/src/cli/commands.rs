@@ -5,19 +5,19 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context as _, anyhow, bail};
+use sesame_codegen::emit::Templates;
+use sesame_codegen::environment::{self, Options, RuntimeChoice, environment};
+use sesame_codegen::files::{Owner, Tree};
+use sesame_codegen::input;
+use sesame_codegen::output::{self, Change, Mode, Orphan, Report};
+use sesame_codegen::plan::{OperationPlan, RunnerPlan};
+use sesame_codegen::{emit, names, project, stubs};
 use sesame_dsl::diagnostic::visible_lines;
 
 use super::arguments::{Deny, ExplainFormat, Generation, Purpose};
 use super::owner;
 use super::shell::{self, Format, Shell};
-use crate::emit::Templates;
-use crate::environment::{self, Options, RuntimeChoice, environment};
-use crate::files::{Owner, Tree};
 use crate::frontend::{Checked, Language};
-use crate::input;
-use crate::output::{self, Change, Mode, Orphan, Report};
-use crate::plan::{OperationPlan, RunnerPlan};
-use crate::{emit, names, project, stubs};
 
 /// `sesamec new`
 pub(super) fn new(
@@ -259,7 +259,7 @@ fn explain_wiring(shell: Shell, language: &Language, file: &Path, text: &str) ->
     let checked = check_text(shell, language, file, text, Format::Human)?;
     // All campaigns of a space need the same remappings.
     let Some(runner) = checked.plans.first() else { bail!("{} has no campaign", file.display()) };
-    shell::asked_for(&visible_lines(&crate::wiring::text(&runner.plan)))?;
+    shell::asked_for(&visible_lines(&sesame_codegen::wiring::text(&runner.plan)))?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context as _, anyhow, bail};
+use sesame_codegen::{input, output};
 use sesame_dsl::diagnostic::visible_lines;
 
 use super::commands;
 use super::shell::{self, Format, Shell};
 use crate::frontend::Language;
-use crate::{input, output};
 
 /// Standard input, among files.
 const STANDARD_INPUT: &str = "-";

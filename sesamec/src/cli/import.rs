@@ -5,13 +5,13 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use anyhow::{Context as _, anyhow, bail};
+use sesame_codegen::output::FreshFolder;
+use sesame_codegen::{input, output};
 use sesame_legacy::{Imported, Kind, Recorded};
 
 use super::commands;
 use super::shell::{self, Format, Shell};
 use crate::frontend::{Checked, Language};
-use crate::output::FreshFolder;
-use crate::{input, output};
 
 /// Notes of one kind that are shown at most; files repeat themselves.
 const MOST_NOTES: usize = 40;
@@ -84,7 +84,7 @@ fn record(imported: &mut Imported, checked: &Checked, out: &Path) -> anyhow::Res
     for (at, campaign) in performed {
         let plan = checked.plans.iter().find(|runner| runner.plan.campaign.name == campaign);
         let Some(plan) = plan else { bail!("the space has no campaign `{campaign}`") };
-        let name = crate::names::campaign_folder(&campaign);
+        let name = sesame_codegen::names::campaign_folder(&campaign);
         let folder = out.join(output::RESULTS).join(&name);
         let recorded = imported
             .record(at, &plan.plan, &folder)

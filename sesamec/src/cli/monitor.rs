@@ -4,16 +4,14 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use anyhow::bail;
+use sesame_codegen::environment::{Options, environment};
+use sesame_codegen::plan::MonitorPlan;
+use sesame_codegen::{emit, names, output};
 
 use super::arguments::{Generation, Purpose};
 use super::commands::{all, check, conclude, mode, tell_tree};
 use super::shell::Shell;
-use crate::emit;
-use crate::environment::{Options, environment};
 use crate::frontend::{Checked, Language};
-use crate::names;
-use crate::output;
-use crate::plan::MonitorPlan;
 
 pub(super) fn generate(
     shell: Shell,

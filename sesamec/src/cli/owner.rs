@@ -5,8 +5,7 @@ use std::io::Read as _;
 use std::path::Path;
 
 use anyhow::bail;
-
-use crate::emit;
+use sesame_codegen::emit;
 
 /// The most bytes of a plan that are read for its source.
 const LARGEST_PLAN: u64 = 64 << 20;

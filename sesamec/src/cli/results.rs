@@ -9,6 +9,7 @@ use clap::{Args, Subcommand, ValueEnum};
 
 use sesame_analysis as analysis;
 use sesame_analysis::{GivenFront, Run, Scaling, Selection, Table, regions};
+use sesame_codegen::input;
 use sesame_plan::{CampaignPlan, Dimension};
 use sesame_record::{DATABASE, Repository};
 use sesame_report::TextOptions;
@@ -16,7 +17,6 @@ use sesame_search::coverage::Grid;
 use sesame_search::sspr::Convention;
 
 use super::shell::{self, Shell};
-use crate::input;
 
 /// What is asked of results files.
 #[derive(Debug, Subcommand)]

@@ -9,6 +9,10 @@ use std::process::{Command, ExitCode};
 
 use anyhow::{Context as _, bail};
 use clap::{Arg, ArgAction, ArgMatches};
+use sesame_codegen::output::Mode;
+use sesame_codegen::plan::RunnerPlan;
+use sesame_codegen::stubs::unfilled_objectives;
+use sesame_codegen::{emit, environment, names};
 use sesame_runtime::Interpreted;
 use sesame_runtime::cli::{CALLER, Caller, EXIT_CODES, RUNNER, Running, Showing};
 use sesame_runtime::transport::is_built_in;
@@ -18,13 +22,7 @@ use super::build;
 use super::commands::{all, check, choose, write};
 use super::owner;
 use super::shell::{self, Shell};
-use crate::emit;
-use crate::environment;
 use crate::frontend::{Checked, Language};
-use crate::names;
-use crate::output::Mode;
-use crate::plan::RunnerPlan;
-use crate::stubs::unfilled_objectives;
 
 /// Names of the arguments that say which campaign it is.
 const FILE: &str = "space_file";

@@ -242,11 +242,11 @@ fn duration(seconds: f64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use sesame_codegen::lower::lower;
     use sesame_dsl::analyse;
     use sesame_dsl::source::SourceMap;
 
     use super::*;
-    use crate::lower::lower;
 
     const CELL: &str = r#"
         space cell

@@ -21,6 +21,8 @@ use clap::{Args, ValueEnum};
 
 use sesame_analysis::gap::lab_runs;
 use sesame_analysis::{excluded, exclusions};
+use sesame_codegen::input;
+use sesame_codegen::output::FreshFolder;
 use sesame_dsl::similar::most_similar;
 use sesame_plan::{CampaignPlan, LabTask, LabTest, Task};
 use sesame_record::{DATABASE, Entered, EnteredRun, Provenance, Recorder, Repository};
@@ -31,8 +33,6 @@ use self::check::Taken;
 use self::form::Wanted;
 use crate::cli::commands::all;
 use crate::cli::shell::{self, Shell};
-use crate::input;
-use crate::output::FreshFolder;
 
 /// The lab of a space that declares none.
 const ONLY: &str = "lab";

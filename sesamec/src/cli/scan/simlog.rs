@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use anyhow::{anyhow, bail};
+use sesame_codegen::input;
 use sesame_notation::quoted;
 use sesame_plan::{SimlogVersion, WireNames};
 use sesame_scan::System;
@@ -16,7 +17,6 @@ use super::arguments::Simlog;
 use super::common::{print, tell};
 use crate::cli::shell::Shell;
 use crate::frontend::Language;
-use crate::input;
 use crate::scan::{Origin, by_payloads, check_settings};
 
 /// The variable with the token that is sent with each call, if there is one.
