@@ -1,5 +1,5 @@
-//! A project from outside, with links, pipes and texts made to lead the command elsewhere: nothing is read that is not a
-//! file of its kind, nothing is quoted that is no space, and nothing that a terminal obeys is printed.
+//! A project from outside, with links, pipes and texts made to lead the command elsewhere: it reads only files of their
+//! kind, quotes only spaces, and prints nothing that a terminal obeys.
 #![cfg(unix)]
 
 use std::fs;
