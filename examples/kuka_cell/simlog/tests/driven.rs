@@ -103,6 +103,6 @@ fn what_is_injected_is_what_the_arm_hears() {
     let mut bench = Bench::<Cell>::start(&Setup::new(1, STEP)).expect("the cell starts");
     bench.run_until(SimTime::from_nanos(STEP.nanos() * i64::from(STEPS))).expect("it runs");
     let alone: Vec<f64> = bench.published("safetyzones/Z1").iter().map(|message| number(&message.value)).collect();
-    let apart = alone.iter().zip(&expected["safetyzones/Z1"]).map(|(alone, it)| (alone - it).abs());
+    let apart = alone.iter().zip(&expected["safetyzones/Z1"]).map(|(alone, fuzzed)| (alone - fuzzed).abs());
     assert!(apart.fold(0.0, f64::max) > 10.0, "a quarter of a radian moves the gripper by millimetres");
 }
