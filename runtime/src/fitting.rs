@@ -76,16 +76,16 @@ pub(crate) fn lab_traces(lab: &Repository, task: &LabTask) -> Result<Vec<LabTrac
     let (plan, wires) = (lab.plan(), WireTable::new(lab.plan()));
     let rows = lab.tests()?;
     let mut found = Vec::new();
-    for it in &task.tests {
+    for selected in &task.tests {
         let mut runs = Vec::new();
-        for row in rows.iter().filter(|row| row.test == it.test) {
+        for row in rows.iter().filter(|row| row.test == selected.test) {
             let file = trace_file(lab.folder(), row.number);
             if file.is_file() {
                 runs.push(trace::signals(&file, plan, &wires)?);
             }
         }
         if !runs.is_empty() {
-            found.push(LabTraces { number: it.number, test: it.test.clone(), runs });
+            found.push(LabTraces { number: selected.number, test: selected.test.clone(), runs });
         }
     }
     Ok(found)

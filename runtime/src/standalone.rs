@@ -112,8 +112,12 @@ fn options(plan: &CampaignPlan, monitor: &Monitor) -> Options {
     if !monitor.doc.is_empty() {
         about = format!("{about}\n\n{}", monitor.doc);
     }
-    let relied_on: Vec<String> =
-        plan.monitors.iter().filter(|it| it.name != monitor.name).map(|it| format!("`{}`", it.name)).collect();
+    let relied_on: Vec<String> = plan
+        .monitors
+        .iter()
+        .filter(|other| other.name != monitor.name)
+        .map(|other| format!("`{}`", other.name))
+        .collect();
     if !relied_on.is_empty() {
         about = format!("{about}\n\nIt relies on {}, which it evaluates, too.", relied_on.join(", "));
     }

@@ -78,7 +78,7 @@ fn of_35_000_changes_to_results_none_is_too_much() {
     let number = |name| std::env::var(name).ok().and_then(|text| text.parse().ok());
     let first = number("SESAME_TAMPERING_FROM").unwrap_or(1_000);
     let last = first + number("SESAME_TAMPERING_COUNT").unwrap_or(35_000);
-    let parts = std::thread::available_parallelism().map_or(1, |it| it.get() as u64);
+    let parts = std::thread::available_parallelism().map_or(1, |processors| processors.get() as u64);
     let edge = |part: u64| first + (last - first) * part / parts;
     std::thread::scope(|scope| {
         for part in 0..parts {

@@ -152,7 +152,7 @@ impl<'a> Evaluator<'a> {
             self.record(&test.observed(observation), each)?;
             // Only there it is asked for: a campaign has too many tests.
             if self.recorder.repository().task().undisturbed().is_some() {
-                let wires = added.iter().map(|it| (it.path.as_str(), &it.latencies));
+                let wires = added.iter().map(|wire| (wire.path.as_str(), &wire.latencies));
                 self.recorder.put_relay_latencies(number, wires)?;
             }
             for text in notes {

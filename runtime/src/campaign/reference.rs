@@ -48,11 +48,11 @@ impl Ineffective {
 
     /// What to do about these, in one sentence without its full stop.
     pub(super) fn remedies(found: &[Ineffective]) -> String {
-        let received = found.iter().any(|it| matches!(it, Ineffective::NoReceiver { .. })).then_some(
+        let received = found.iter().any(|reason| matches!(reason, Ineffective::NoReceiver { .. })).then_some(
             "Disturb what the simulator subscribes to, let it subscribe to this topic, or read the topic by a metric with \
              `outbound`",
         );
-        let reached = found.iter().any(|it| matches!(it, Ineffective::NoMessage { .. })).then_some(
+        let reached = found.iter().any(|reason| matches!(reason, Ineffective::NoMessage { .. })).then_some(
             "Let `within` include a message of the reference run, where its start counts and its end does not",
         );
         received.into_iter().chain(reached).collect::<Vec<_>>().join(". ")
@@ -103,14 +103,16 @@ pub(super) fn ineffective(plan: &CampaignPlan, task: &Task, reference: &Observat
         (Task::Shrink(shrinking), _) => of_test(&shrinking.test).into_iter().collect(),
         (Task::Variations(variations), _) => variations.tests.iter().flat_map(of_test).collect(),
         (Task::Undisturbed(_), _) => BTreeSet::new(),
-        (Task::Lab(lab) | Task::Compensated(lab), _) => lab.tests.iter().flat_map(|it| of_test(&it.test)).collect(),
+        (Task::Lab(lab) | Task::Compensated(lab), _) => {
+            lab.tests.iter().flat_map(|selected| of_test(&selected.test)).collect()
+        }
         (Task::Campaign | Task::Repeat { .. }, _) => plan.campaign.operations.iter().copied().collect(),
     };
     let wires = WireTable::new(plan);
     let found = operations.into_iter().filter_map(|id| {
         let operation = plan.operation(id);
         let topic = plan.topic(operation.topic?);
-        if let Some(unreached) = reference.unreached.iter().find(|it| it.operation == id) {
+        if let Some(unreached) = reference.unreached.iter().find(|unreached| unreached.operation == id) {
             return Some(Ineffective::NoMessage {
                 operation: operation.name.clone(),
                 topic: topic.name.clone(),

@@ -169,12 +169,9 @@ fn insufficient(summary: &Summary, plan: &CampaignPlan, task: &Task) -> Vec<Stri
         objections.push(format!("no operation had an effect in any of {}", tests(ran)));
     }
     if counts.no_effect < counts.evaluations {
-        objections.extend(
-            summary
-                .without_effect
-                .iter()
-                .map(|it| format!("operation `{}` had no effect in any of its {} uses", it.operation, it.uses)),
-        );
+        objections.extend(summary.without_effect.iter().map(|operation| {
+            format!("operation `{}` had no effect in any of its {} uses", operation.operation, operation.uses)
+        }));
     }
     let judged = summary.requirements.iter().any(|requirement| requirement.satisfied + requirement.violated > 0);
     if !summary.requirements.is_empty() && !judged {

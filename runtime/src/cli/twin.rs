@@ -41,7 +41,7 @@ pub(super) fn twin(session: &Session, options: &Options) -> Result<ExitCode, Fai
     let withheld = chosen(plan, &options.without, |monitor| {
         monitor.otherwise.mitigation.is_some() || options.without.contains(&monitor.name)
     })?;
-    let sends_none = withheld.iter().map(|&id| plan.monitor(id)).find(|it| it.otherwise.mitigation.is_none());
+    let sends_none = withheld.iter().map(|&id| plan.monitor(id)).find(|monitor| monitor.otherwise.mitigation.is_none());
     if let Some(monitor) = sends_none {
         return Err(Failure(format!("monitor `{}` has no mitigation that could be withheld", monitor.name)));
     }

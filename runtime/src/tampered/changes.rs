@@ -233,7 +233,7 @@ fn change_bytes(bytes: &mut Vec<u8>, stream: &mut Stream) {
         if stream.chance(0.5) {
             bytes[from..to].fill(byte);
         } else {
-            bytes[from..to].iter_mut().for_each(|it| *it ^= byte);
+            bytes[from..to].iter_mut().for_each(|changed| *changed ^= byte);
         }
     }
     if stream.chance(0.1) {

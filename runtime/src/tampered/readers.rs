@@ -61,7 +61,7 @@ pub(super) fn read_all(folder: &Path) -> Read {
     ask!(tests_of(&repository, &all), shown);
     ask!(front(&repository, &all), shown);
     ask!(sspr(&repository, &all, &Dimension::ALL, Convention::Ours), shown);
-    ask!(indicators(&repository, None), |it: analysis::IndicatorAnalysis| shown(it.dataset()));
+    ask!(indicators(&repository, None), |analysis: analysis::IndicatorAnalysis| shown(analysis.dataset()));
     ask!(regions::regions(&repository, &all, None, 3), |found: Vec<regions::Regions>| {
         shown(regions::table(&found));
         for of in &found {
@@ -72,7 +72,7 @@ pub(super) fn read_all(folder: &Path) -> Read {
         match Grid::new(goal.axes.clone()) {
             Ok(grid) => ask!(
                 coverage(&repository, &all, grid, goal.hits, Convention::Paper),
-                |it: analysis::CoverageAnalysis| (shown(it.curve()), shown(it.cells()))
+                |analysis: analysis::CoverageAnalysis| (shown(analysis.curve()), shown(analysis.cells()))
             ),
             Err(error) => said(Err(error.to_string())),
         }
@@ -92,10 +92,10 @@ pub(super) fn read_all(folder: &Path) -> Read {
     let runs = [0, 1].map(|_| Repository::open(folder));
     if let [Ok(one), Ok(other)] = runs {
         let runs = [("a", one), ("b", other)].map(|(group, repository)| Run { group: group.to_owned(), repository });
-        ask!(compare(&runs, None, None), |it: analysis::Comparison| (
-            shown(it.runs()),
-            shown(it.groups()),
-            shown(it.pairs())
+        ask!(compare(&runs, None, None), |comparison: analysis::Comparison| (
+            shown(comparison.runs()),
+            shown(comparison.groups()),
+            shown(comparison.pairs())
         ));
     }
     // What a run that goes on asks first; tests without number would take their time.

@@ -216,8 +216,9 @@ fn moments_of_time(case: &Case, activation: &Activation, metrics: &[MetricId], l
         }
         if grows(case, id) {
             for number in numbers(activation) {
-                let reached = |time| value_at(case, id, ledger, time, &ledger.order).is_some_and(|it| it >= number);
-                let passed = |time| value_at(case, id, ledger, time, &ledger.order).is_some_and(|it| it > number);
+                let reached =
+                    |time| value_at(case, id, ledger, time, &ledger.order).is_some_and(|value| value >= number);
+                let passed = |time| value_at(case, id, ledger, time, &ledger.order).is_some_and(|value| value > number);
                 moments.extend(first(ledger.end, reached));
                 moments.extend(first(ledger.end, passed));
             }

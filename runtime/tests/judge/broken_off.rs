@@ -42,9 +42,12 @@ pub(crate) fn is_over(plan: &CampaignPlan, metric: &Metric, ledger: &Ledger) -> 
 /// Whether every wire spoke at an instant that had spoken at each earlier instant at which any of them did.
 fn is_complete(plan: &CampaignPlan, inputs: &[Input], messages: &[Message], instant: i64) -> bool {
     let wires: BTreeSet<&String> = inputs.iter().flat_map(|input| &plan.topic(input.field.topic).paths).collect();
-    let spoken: BTreeSet<(i64, &String)> =
-        messages.iter().filter(|message| wires.contains(&message.path)).map(|it| (it.time, &it.path)).collect();
-    let earlier: BTreeSet<i64> = spoken.iter().map(|it| it.0).filter(|&time| time < instant).collect();
+    let spoken: BTreeSet<(i64, &String)> = messages
+        .iter()
+        .filter(|message| wires.contains(&message.path))
+        .map(|message| (message.time, &message.path))
+        .collect();
+    let earlier: BTreeSet<i64> = spoken.iter().map(|message| message.0).filter(|&time| time < instant).collect();
     wires
         .iter()
         .all(|&wire| spoken.contains(&(instant, wire)) || earlier.iter().any(|&time| !spoken.contains(&(time, wire))))

@@ -45,7 +45,8 @@ impl Case {
     pub(crate) fn is_heard(&self, path: &str) -> bool {
         let subscribed = self.script.lines.iter().any(|line| line.path == path && line.subscribed);
         let measured = |metric: &Metric| {
-            let of = |inputs: &[Input], side| side == Side::Outbound && inputs.iter().any(|it| self.is_on(it, path));
+            let of =
+                |inputs: &[Input], side| side == Side::Outbound && inputs.iter().any(|input| self.is_on(input, path));
             match &metric.source {
                 MetricSource::Formula { formula } => of(&formula.inputs, formula.side),
                 MetricSource::Robustness { robustness } => of(&robustness.inputs, robustness.side),
@@ -95,7 +96,7 @@ pub(crate) fn topics_of(metric: &Metric) -> Vec<TopicId> {
         MetricSource::Hook { topics } => topics.clone(),
         MetricSource::FuzzingTime | MetricSource::Monitor { .. } => Vec::new(),
         MetricSource::Last { input } => vec![input.topic],
-        MetricSource::Robustness { robustness } => robustness.inputs.iter().map(|it| it.field.topic).collect(),
-        MetricSource::Formula { formula } => formula.inputs.iter().map(|it| it.field.topic).collect(),
+        MetricSource::Robustness { robustness } => robustness.inputs.iter().map(|input| input.field.topic).collect(),
+        MetricSource::Formula { formula } => formula.inputs.iter().map(|input| input.field.topic).collect(),
     }
 }

@@ -179,7 +179,7 @@ fn of_robustness(plan: &CampaignPlan, of: &Robustness, messages: &[Message], led
 }
 
 fn value(of: &Expression, at: &Computed) -> f64 {
-    let all = |of: &[Expression]| of.iter().map(|it| value(it, at)).collect::<Vec<f64>>().into_iter();
+    let all = |of: &[Expression]| of.iter().map(|part| value(part, at)).collect::<Vec<f64>>().into_iter();
     match of {
         Expression::Constant(value) => *value,
         Expression::Input(input) => at.values[*input as usize],

@@ -53,7 +53,7 @@ mod runner {
 
     pub(super) fn main() -> ExitCode {
         let words: Vec<String> = env::args().skip(1).collect();
-        let has = |word: &str| words.iter().any(|it| it == word);
+        let has = |word: &str| words.iter().any(|other| other == word);
         if has("--list") {
             println!("{}: test", if has("--ignored") { LONG_TEST } else { TEST });
             if !has("--ignored") {

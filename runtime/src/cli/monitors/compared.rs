@@ -97,8 +97,8 @@ impl Words<'_> {
         let decided = self.sides.map(|side| steps(&side.course.decisions, monitor));
         let compared = compare(&decided[0], &decided[1]);
         let mut found = disagreements(self.network, monitor, &first.course, &second.course);
-        let difference = compared.difference.as_ref().filter(|it| !self.is_beyond_the_end(it));
-        let difference = difference.map(|it| self.difference(monitor, it, &found));
+        let difference = compared.difference.as_ref().filter(|difference| !self.is_beyond_the_end(difference));
+        let difference = difference.map(|difference| self.difference(monitor, difference, &found));
         let omitted = found.len().saturating_sub(KEPT);
         found.truncate(KEPT);
         ComparedMonitor {
@@ -107,7 +107,7 @@ impl Words<'_> {
             second: decided[1].len(),
             difference,
             furthest: self.furthest(monitor, &compared, &decided[0]),
-            disagreements: found.iter().map(|it| self.disagreement(monitor, it)).collect(),
+            disagreements: found.iter().map(|disagreement| self.disagreement(monitor, disagreement)).collect(),
             omitted,
         }
     }
@@ -130,12 +130,13 @@ impl Words<'_> {
     ) -> DecisionDifference {
         let Difference { position, first, second } = difference;
         let at = [first, second].into_iter().flatten().map(|step| step.at).min();
-        let covering = found.iter().find(|it| at.is_some_and(|at| it.from <= at && at < it.to));
+        let covering =
+            found.iter().find(|disagreement| at.is_some_and(|at| disagreement.from <= at && at < disagreement.to));
         DecisionDifference {
             decision: *position,
             first: first.map(|step| self.step(monitor, step)),
             second: second.map(|step| self.step(monitor, step)),
-            because: covering.map_or_else(Vec::new, |it| self.because(it)),
+            because: covering.map_or_else(Vec::new, |disagreement| self.because(disagreement)),
         }
     }
 
@@ -150,18 +151,18 @@ impl Words<'_> {
         Some(ShiftedDecision { decision, state, at, late: late.seconds() })
     }
 
-    fn disagreement(&self, monitor: MonitorId, it: &Disagreement) -> MonitorDisagreement {
+    fn disagreement(&self, monitor: MonitorId, disagreement: &Disagreement) -> MonitorDisagreement {
         MonitorDisagreement {
-            from: it.from.seconds(),
-            to: it.to.seconds(),
-            first: self.state(monitor, it.first),
-            second: self.state(monitor, it.second),
-            because: self.because(it),
+            from: disagreement.from.seconds(),
+            to: disagreement.to.seconds(),
+            first: self.state(monitor, disagreement.first),
+            second: self.state(monitor, disagreement.second),
+            because: self.because(disagreement),
         }
     }
 
-    fn because(&self, it: &Disagreement) -> Vec<EvidenceDeviation> {
-        it.because.iter().map(|deviation| self.deviation(deviation)).collect()
+    fn because(&self, disagreement: &Disagreement) -> Vec<EvidenceDeviation> {
+        disagreement.because.iter().map(|deviation| self.deviation(deviation)).collect()
     }
 
     fn deviation(&self, deviation: &Deviation) -> EvidenceDeviation {

@@ -139,6 +139,6 @@ impl Places {
 /// Things at their new places.
 pub(crate) fn put<T>(places: impl IntoIterator<Item = usize>, things: impl IntoIterator<Item = T>) -> Vec<T> {
     let mut all: Vec<(usize, T)> = places.into_iter().zip(things).collect();
-    all.sort_by_key(|it| it.0);
-    all.into_iter().map(|it| it.1).collect()
+    all.sort_by_key(|timed| timed.0);
+    all.into_iter().map(|timed| timed.1).collect()
 }

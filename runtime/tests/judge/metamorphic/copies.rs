@@ -54,8 +54,8 @@ fn multiplied(case: &Case) -> Option<Multiplied> {
             MetricSource::Robustness { robustness } => &mut robustness.inputs,
             _ => &mut [],
         };
-        for it in inputs.iter_mut().filter(|input| input.field.topic == topic) {
-            it.members = Members::Each;
+        for input in inputs.iter_mut().filter(|input| input.field.topic == topic) {
+            input.members = Members::Each;
         }
     }
     Some(Multiplied { case, topic, members })

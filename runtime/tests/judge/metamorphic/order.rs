@@ -81,14 +81,14 @@ fn rename(case: &mut Case) {
         });
         metric.name = other.map_or_else(|| renamed(at), str::to_owned);
     }
-    for (it, at) in case.plan.requirements.iter_mut().zip(0..) {
-        it.name = renamed(at);
+    for (requirement, at) in case.plan.requirements.iter_mut().zip(0..) {
+        requirement.name = renamed(at);
     }
-    for (it, at) in case.plan.operations.iter_mut().zip(0..) {
-        it.name = renamed(at);
+    for (operation, at) in case.plan.operations.iter_mut().zip(0..) {
+        operation.name = renamed(at);
     }
-    for (it, at) in case.plan.monitors.iter_mut().zip(0..) {
-        it.name = renamed(at);
+    for (monitor, at) in case.plan.monitors.iter_mut().zip(0..) {
+        monitor.name = renamed(at);
     }
     for (topic, at) in case.plan.topics.iter_mut().zip(0..) {
         topic.name = renamed(at);

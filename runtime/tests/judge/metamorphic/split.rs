@@ -45,7 +45,7 @@ fn switched_between(case: &Case, topics: &[TopicId], observed: &Observation, tol
             told.published.iter().any(|message| message.time == time && own.contains(&message.path))
         };
         if !matches!(used.activation, Activation::Time { .. })
-            && effect.intervals.iter().any(|it| at(it.start) || at(it.end))
+            && effect.intervals.iter().any(|interval| at(interval.start) || at(interval.end))
         {
             switched.push(topic);
         }

@@ -29,8 +29,8 @@ impl Maker {
             let id = OperationId(u32::try_from(at).unwrap());
             // By time, copies that stay apart are given disjoint windows by whoever makes a test.
             let instance = self.instance(id, &operations[at], end, by_condition, metrics);
-            let timed = |it: &TestOperation| matches!(it.activation, Activation::Time { .. });
-            let stacked = timed(&instance) && instances.iter().any(|it| it.operation == id);
+            let timed = |operation: &TestOperation| matches!(operation.activation, Activation::Time { .. });
+            let stacked = timed(&instance) && instances.iter().any(|other| other.operation == id);
             if copies == Copies::MayOverlap || !stacked {
                 instances.push(instance);
             }
@@ -177,8 +177,13 @@ impl Maker {
             .collect();
         // The robustness of a formula is not a condition variable: it is known only when the run is over.
         let readable = |metric: &&(u32, &Metric)| !matches!(metric.1.source, MetricSource::Robustness { .. });
-        let variables: Vec<MetricId> =
-            (0u32..).zip(metrics).collect::<Vec<_>>().iter().filter(readable).map(|it| MetricId(it.0)).collect();
+        let variables: Vec<MetricId> = (0u32..)
+            .zip(metrics)
+            .collect::<Vec<_>>()
+            .iter()
+            .filter(readable)
+            .map(|metric| MetricId(metric.0))
+            .collect();
         let activation = if by_condition && !variables.is_empty() {
             let start = self.switch(&variables, 2);
             let times = self.between(1, 3).unsigned_abs();
