@@ -38,7 +38,7 @@ fn words(ty: &WireType) -> String {
 }
 
 fn shown(definition: &Definition) -> String {
-    let constants = definition.constants.iter().map(|it| format!("  {} = {}\n", it.name, it.value));
+    let constants = definition.constants.iter().map(|constant| format!("  {} = {}\n", constant.name, constant.value));
     let fields = definition.fields.iter().map(|field| format!("  {}: {}\n", field.name, words(&field.ty)));
     std::iter::once(format!("{}\n", definition.name)).chain(constants).chain(fields).collect()
 }
@@ -129,7 +129,7 @@ fn a_layout_has_what_it_contains_before_it_and_says_what_is_missing() {
         "in `a/msg/Outer`: there is no interface `b/msg/Other`"
     );
     catalogue.add(msg("b", "Other", "a/Inner inner").unwrap());
-    let names: Vec<String> = catalogue.layout("a/msg/Outer").unwrap().into_iter().map(|it| it.name).collect();
+    let names: Vec<String> = catalogue.layout("a/msg/Outer").unwrap().into_iter().map(|field| field.name).collect();
     assert_eq!(names, ["a/msg/Inner", "b/msg/Other", "a/msg/Outer"]);
     catalogue.add(msg("c", "Snake", "Tail tail").unwrap());
     catalogue.add(msg("c", "Tail", "Snake snake").unwrap());
@@ -172,14 +172,15 @@ fn all(share: &Path, ending: &str) -> Catalogue {
                 let path = file.unwrap().path();
                 let name = path.file_stem().unwrap().to_str().unwrap();
                 let is = |wanted: &str| {
-                    path.extension().is_some_and(|it| it == wanted) && (ending == "idl") == (wanted == "idl")
+                    path.extension().is_some_and(|extension| extension == wanted)
+                        && (ending == "idl") == (wanted == "idl")
                 };
                 let text = || std::fs::read_to_string(&path).unwrap();
                 if is("idl") {
                     idl(&text())
                         .unwrap_or_else(|error| panic!("{}: {error}", path.display()))
                         .into_iter()
-                        .for_each(|it| catalogue.add(it));
+                        .for_each(|definition| catalogue.add(definition));
                 } else if is("msg") {
                     catalogue.add(
                         msg(&package_name, name, &text()).unwrap_or_else(|error| panic!("{}: {error}", path.display())),
@@ -188,7 +189,7 @@ fn all(share: &Path, ending: &str) -> Catalogue {
                     let both = srv(&package_name, name, &text());
                     both.unwrap_or_else(|error| panic!("{}: {error}", path.display()))
                         .into_iter()
-                        .for_each(|it| catalogue.add(it));
+                        .for_each(|definition| catalogue.add(definition));
                 }
             }
         }

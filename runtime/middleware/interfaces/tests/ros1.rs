@@ -22,7 +22,8 @@ Inner inner
 fn types_of_ros_1_are_those_of_the_wire() {
     let status = ros1::msg("cell", "Status", STATUS).unwrap();
     assert_eq!(status.name, "cell/msg/Status");
-    let constants: Vec<_> = status.constants.iter().map(|it| (it.name.as_str(), it.value.as_str())).collect();
+    let constants: Vec<_> =
+        status.constants.iter().map(|constant| (constant.name.as_str(), constant.value.as_str())).collect();
     assert_eq!(constants, [("OK", "0"), ("ROOM", "room #1, \"left\" = right"), ("PI", "3.14")]);
     let message = |name: &str| WireType::Interface { name: name.to_owned() };
     let primitive = |primitive| WireType::Primitive { primitive };
