@@ -377,7 +377,7 @@ impl Network {
     /// ground station are all nodes without a proxy.
     fn is_at(&self, link: LinkAt, end: End, node: NodeId) -> bool {
         match end {
-            End::Vehicle => self.links.get(usize::from(link)).is_some_and(|it| self.proxies[it.proxy].node == node),
+            End::Vehicle => self.links.get(usize::from(link)).is_some_and(|link| self.proxies[link.proxy].node == node),
             End::Ground => self.proxies.iter().all(|proxy| proxy.node != node),
         }
     }

@@ -88,8 +88,8 @@ mod real {
 import os, sys
 os.environ['MAVLINK20'] = '1'
 from importlib import import_module
-for it in import_module('pymavlink.dialects.v20.' + sys.argv[1]).mavlink_map.values():
-    print(it.msgname, it.id, it.crc_extra, it.unpacker.size)
+for message in import_module('pymavlink.dialects.v20.' + sys.argv[1]).mavlink_map.values():
+    print(message.msgname, message.id, message.crc_extra, message.unpacker.size)
 ";
 
     #[test]
@@ -104,7 +104,9 @@ for it in import_module('pymavlink.dialects.v20.' + sys.argv[1]).mavlink_map.val
         let folder = PathBuf::from(said(&["-c", place]).trim());
         for dialect in ["common", "ardupilotmega"] {
             let definitions = Definitions::read(&[format!("{dialect}.xml")], &folder).unwrap();
-            let own = definitions.iter().map(|it| format!("{} {} {} {}", it.name, it.id, it.crc_extra, it.whole));
+            let own = definitions.iter().map(|definition| {
+                format!("{} {} {} {}", definition.name, definition.id, definition.crc_extra, definition.whole)
+            });
             let mut own: Vec<String> = own.collect();
             let mut known: Vec<String> = said(&["-c", KNOWN, dialect]).lines().map(str::to_owned).collect();
             own.sort();

@@ -266,7 +266,7 @@ proptest! {
         let bytes = naive_frame(id, "ANY", &base, &extensions, header);
         let [sequence, system, component] = header;
         let record = read(&layout, &bytes).unwrap();
-        prop_assert_eq!(record.unchanged().map(|it| it.to_vec()), Some(bytes.clone()));
+        prop_assert_eq!(record.unchanged().map(|unchanged| unchanged.to_vec()), Some(bytes.clone()));
         let frame = Frame::first(&bytes).unwrap();
         prop_assert_eq!((frame.system, frame.component, frame.id), (system, component, id));
         // Every NaN in a single precision number is written as the nearest one, so those are left out here.
