@@ -20,7 +20,7 @@ impl Address {
             _ => return Err(format!("`{url}` is not the address of a broker; write `mqtt://HOST:PORT`")),
         };
         let rest = rest.trim_end_matches('/');
-        let (host, port) = match rest.strip_prefix('[').and_then(|it| it.split_once(']')) {
+        let (host, port) = match rest.strip_prefix('[').and_then(|bracketed| bracketed.split_once(']')) {
             Some((host, port)) => (host, port.strip_prefix(':')),
             None => rest.split_once(':').map_or((rest, None), |(host, port)| (host, Some(port))),
         };
@@ -41,7 +41,7 @@ mod tests {
 
     #[test]
     fn addresses_have_a_host_and_perhaps_a_port() {
-        let read = |url: &str| Address::read(url).map(|it| (it.host, it.port, it.tls));
+        let read = |url: &str| Address::read(url).map(|address| (address.host, address.port, address.tls));
         assert_eq!(read("mqtt://127.0.0.1:4000"), Ok(("127.0.0.1".to_owned(), 4000, false)));
         assert_eq!(read("mqtt://fleet"), Ok(("fleet".to_owned(), 1883, false)));
         assert_eq!(read("mqtts://[::1]:9000/"), Ok(("::1".to_owned(), 9000, true)));

@@ -113,7 +113,7 @@ impl Session {
             }
             code => return Err(End::Refused(format!("it answers {code:?}"))),
         }
-        if let Some(permitted) = answer.properties.and_then(|it| it.receive_max) {
+        if let Some(permitted) = answer.properties.and_then(|properties| properties.receive_max) {
             self.limit = self.limit.min(permitted.max(1));
             self.state = MqttState::new(self.limit, false);
         }

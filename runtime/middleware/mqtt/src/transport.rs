@@ -189,7 +189,8 @@ impl Brokers {
         let (line, source, on_to) = match self.routes.heard.get(&(broker, topic.to_owned())) {
             None => return Ok(None),
             Some(&Role::Sink { line, sink }) => {
-                let back = self.echoes.as_mut().and_then(|it| it.heard(line, sink, hash(&publish.payload), arrived));
+                let back =
+                    self.echoes.as_mut().and_then(|echoes| echoes.heard(line, sink, hash(&publish.payload), arrived));
                 return Ok(back.map(|added| Event::Returned { line, added }));
             }
             Some(Role::Source { line, source, on_to }) => (*line, *source, on_to.clone()),
