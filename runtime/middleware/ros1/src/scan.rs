@@ -229,7 +229,8 @@ fn learn(topic: &mut FoundTopic, header: &Header, layouts: &mut BTreeMap<String,
     let (name, md5) = (header.get("type"), header.get("md5sum"));
     let ty = interface(name);
     topic.latching = Some(header.is("latching"));
-    topic.hash = Some(md5.to_owned()).filter(|md5| md5.len() == 32 && md5.bytes().all(|it| it.is_ascii_hexdigit()));
+    topic.hash =
+        Some(md5.to_owned()).filter(|md5| md5.len() == 32 && md5.bytes().all(|digit| digit.is_ascii_hexdigit()));
     topic.ty = Some(ty.clone());
     if layouts.contains_key(&ty) {
         return;
@@ -261,7 +262,7 @@ mod tests {
     #[test]
     fn what_every_node_has_is_left_out() {
         let side = |pairs: &[(&str, &[&str])]| -> Vec<(String, Vec<String>)> {
-            let texts = |nodes: &[&str]| nodes.iter().map(|&it| it.to_owned()).collect();
+            let texts = |nodes: &[&str]| nodes.iter().map(|&node| node.to_owned()).collect();
             pairs.iter().map(|(name, nodes)| ((*name).to_owned(), texts(nodes))).collect()
         };
         let state = State {
@@ -276,7 +277,7 @@ mod tests {
         assert_eq!(nodes[0].serves, ["/grip"]);
         let topics = topics(&state, &[("/joints".to_owned(), "sensor_msgs/JointState".to_owned())].into());
         let shown: Vec<_> =
-            topics.iter().map(|it| (it.path.as_str(), it.ty.as_deref(), it.subscribers.len())).collect();
+            topics.iter().map(|topic| (topic.path.as_str(), topic.ty.as_deref(), topic.subscribers.len())).collect();
         assert_eq!(shown, [("/a", None, 1), ("/joints", Some("sensor_msgs/msg/JointState"), 2)]);
         assert_eq!(services(&state).len(), 1);
     }

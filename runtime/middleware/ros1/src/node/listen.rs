@@ -82,9 +82,13 @@ impl Shared {
                 success(Value::Int(0))
             }
             ("requestTopic", [_, Value::Text(topic), protocols]) => {
-                let spoken =
-                    protocols.items().iter().any(|it| it.items().first().and_then(Value::text) == Some("TCPROS"));
-                let offered = lock(&self.publications).iter().any(|it| it.topic == *topic && it.offer.is_some());
+                let spoken = protocols
+                    .items()
+                    .iter()
+                    .any(|protocol| protocol.items().first().and_then(Value::text) == Some("TCPROS"));
+                let offered = lock(&self.publications)
+                    .iter()
+                    .any(|publication| publication.topic == *topic && publication.offer.is_some());
                 match (spoken, offered) {
                     (true, true) => success(Value::List(vec![
                         "TCPROS".into(),
@@ -100,12 +104,17 @@ impl Shared {
             ("getBusInfo", _) => success(Value::List(Vec::new())),
             ("getBusStats", _) => success(Value::List(vec![Value::List(Vec::new()); 3])),
             ("getSubscriptions", _) => {
-                let pairs = lock(&self.subscriptions).iter().map(|it| pair(&it.topic, &it.ty)).collect();
+                let pairs = lock(&self.subscriptions)
+                    .iter()
+                    .map(|subscription| pair(&subscription.topic, &subscription.ty))
+                    .collect();
                 success(Value::List(pairs))
             }
             ("getPublications", _) => {
                 let publications = lock(&self.publications);
-                let offered = publications.iter().filter_map(|it| Some(pair(&it.topic, &it.offer.as_ref()?.ty)));
+                let offered = publications
+                    .iter()
+                    .filter_map(|publication| Some(pair(&publication.topic, &publication.offer.as_ref()?.ty)));
                 success(Value::List(offered.collect()))
             }
             ("paramUpdate", _) => success(Value::Int(0)),

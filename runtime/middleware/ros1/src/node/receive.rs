@@ -42,8 +42,10 @@ impl Shared {
 
     /// Registers all subscriptions again, at a master that has forgotten them. Connections stay.
     pub(super) fn subscribe_again(self: &Arc<Self>) -> Result<(), AskError> {
-        let all: Vec<(String, String)> =
-            lock(&self.subscriptions).iter().map(|it| (it.topic.clone(), it.ty.clone())).collect();
+        let all: Vec<(String, String)> = lock(&self.subscriptions)
+            .iter()
+            .map(|subscription| (subscription.topic.clone(), subscription.ty.clone()))
+            .collect();
         for (at, (topic, ty)) in all.into_iter().enumerate() {
             let publishers = self.master.subscribe(&topic, &ty)?;
             self.add_publishers(at, &publishers);
@@ -55,7 +57,7 @@ impl Shared {
     pub(super) fn update_publishers(self: &Arc<Self>, topic: &str, uris: &[String]) {
         let all: Vec<usize> = {
             let mut subscriptions = lock(&self.subscriptions);
-            let of_topic = subscriptions.iter_mut().enumerate().filter(|(_, it)| it.topic == topic);
+            let of_topic = subscriptions.iter_mut().enumerate().filter(|(_, subscription)| subscription.topic == topic);
             of_topic
                 .map(|(at, subscription)| {
                     for (uri, publisher) in &mut subscription.publishers {
@@ -118,8 +120,13 @@ impl Shared {
     fn meet_publisher(self: &Arc<Self>, at: usize, uri: &str) -> Result<Connection, Problem> {
         let (topic, ty, codec, feeds) = {
             let subscriptions = lock(&self.subscriptions);
-            let it = &subscriptions[at];
-            (it.topic.clone(), it.ty.clone(), it.codec.clone(), it.feeds.clone())
+            let subscription = &subscriptions[at];
+            (
+                subscription.topic.clone(),
+                subscription.ty.clone(),
+                subscription.codec.clone(),
+                subscription.feeds.clone(),
+            )
         };
         let asked = Address::read(uri).ok_or(Problem::Unreachable)?;
         let met = contact::subscribe(&asked, [&self.name, &topic, &ty], &self.stop);

@@ -60,7 +60,7 @@ impl Shared {
     pub(super) fn offer_again(&self) -> Result<(), AskError> {
         let all: Vec<(String, String)> = lock(&self.publications)
             .iter()
-            .filter_map(|it| Some((it.topic.clone(), it.offer.as_ref()?.ty.clone())))
+            .filter_map(|publication| Some((publication.topic.clone(), publication.offer.as_ref()?.ty.clone())))
             .collect();
         all.iter().try_for_each(|(topic, ty)| self.master.publish(topic, ty))
     }
@@ -103,7 +103,7 @@ impl Shared {
     fn link(&self, link: &Arc<Link>, header: &Header) -> Result<Header, String> {
         let (topic, md5) = (header.get("topic"), header.get("md5sum"));
         let mut publications = lock(&self.publications);
-        let found = publications.iter_mut().find(|it| it.topic == topic);
+        let found = publications.iter_mut().find(|publication| publication.topic == topic);
         let known = found.and_then(|publication| Some((publication.offer.clone()?, publication)));
         let Some((mut offer, publication)) = known else { return Err(format!("`{topic}` is not published here")) };
         if publication.by_space && header.get("type") == offer.ty && md5 != "*" {

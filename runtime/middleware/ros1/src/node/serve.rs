@@ -60,8 +60,8 @@ impl Shared {
         let waiting: Vec<(usize, String, String)> = lock(&self.services)
             .iter()
             .enumerate()
-            .filter(|(_, it)| it.offer.is_none() && is_served(&it.server))
-            .map(|(at, it)| (at, it.path.clone(), it.server.clone()))
+            .filter(|(_, service)| service.offer.is_none() && is_served(&service.server))
+            .map(|(at, service)| (at, service.path.clone(), service.server.clone()))
             .collect();
         for (at, path, server) in waiting {
             // A server that has ended without a word is still known; one that comes is asked the next time.
@@ -74,8 +74,11 @@ impl Shared {
 
     /// Registers all services again, at a master that has forgotten them.
     pub(super) fn serve_again(&self) -> Result<(), AskError> {
-        let all: Vec<String> =
-            lock(&self.services).iter().filter(|it| it.offer.is_some()).map(|it| it.path.clone()).collect();
+        let all: Vec<String> = lock(&self.services)
+            .iter()
+            .filter(|service| service.offer.is_some())
+            .map(|service| service.path.clone())
+            .collect();
         all.iter().try_for_each(|path| self.master.serve(path, &self.served_at()))
     }
 

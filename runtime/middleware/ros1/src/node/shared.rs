@@ -103,11 +103,18 @@ impl Shared {
     /// Takes the node out of the graph. A master that is gone has forgotten it anyway.
     pub(super) fn unregister(&self) {
         let ask = |method: &str, parameters: &[&str]| self.master.ask(method, parameters).is_ok();
-        let topics: Vec<String> = lock(&self.subscriptions).iter().map(|it| it.topic.clone()).collect();
-        let offered: Vec<String> =
-            lock(&self.publications).iter().filter(|it| it.offer.is_some()).map(|it| it.topic.clone()).collect();
-        let served: Vec<String> =
-            lock(&self.services).iter().filter(|it| it.offer.is_some()).map(|it| it.path.clone()).collect();
+        let topics: Vec<String> =
+            lock(&self.subscriptions).iter().map(|subscription| subscription.topic.clone()).collect();
+        let offered: Vec<String> = lock(&self.publications)
+            .iter()
+            .filter(|publication| publication.offer.is_some())
+            .map(|publication| publication.topic.clone())
+            .collect();
+        let served: Vec<String> = lock(&self.services)
+            .iter()
+            .filter(|service| service.offer.is_some())
+            .map(|service| service.path.clone())
+            .collect();
         let uri = self.master.uri.as_str();
         let at = self.served_at();
         // The first question without an answer is the last one.

@@ -44,9 +44,11 @@ impl Shared {
         let is_forgotten = {
             let (subscriptions, publications, services) =
                 (lock(&self.subscriptions), lock(&self.publications), lock(&self.services));
-            !subscriptions.iter().all(|it| is_known(&state.subscribers, &it.topic))
-                || !publications.iter().all(|it| it.offer.is_none() || is_known(&state.publishers, &it.topic))
-                || !services.iter().all(|it| it.offer.is_none() || is_known(&state.servers, &it.path))
+            !subscriptions.iter().all(|subscription| is_known(&state.subscribers, &subscription.topic))
+                || !publications
+                    .iter()
+                    .all(|publication| publication.offer.is_none() || is_known(&state.publishers, &publication.topic))
+                || !services.iter().all(|service| service.offer.is_none() || is_known(&state.servers, &service.path))
         };
         if is_forgotten {
             self.subscribe_again()?;

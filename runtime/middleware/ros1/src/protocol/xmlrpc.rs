@@ -92,7 +92,7 @@ pub(crate) fn read_answer(text: &str) -> Result<Value, String> {
     let document = document(text)?;
     let root = document.root_element();
     if let Some(fault) = child(root, "fault") {
-        let said: Vec<&str> = fault.descendants().filter(Node::is_text).filter_map(|it| it.text()).collect();
+        let said: Vec<&str> = fault.descendants().filter(Node::is_text).filter_map(|node| node.text()).collect();
         return Err(format!("it reports: {}", said.join(" ").split_whitespace().collect::<Vec<_>>().join(" ")));
     }
     let values = child(root, "params").map_or(Ok(Vec::new()), parameters)?;

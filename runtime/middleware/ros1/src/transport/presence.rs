@@ -27,7 +27,7 @@ pub(super) fn missing(bus: &Ros1Bus) -> Vec<String> {
         }
     }
     if let Some(clock) = &bus.clock
-        && node.with_subscription(clock.subscription, |it| it.connected().next().is_none())
+        && node.with_subscription(clock.subscription, |subscription| subscription.connected().next().is_none())
     {
         missing.push(format!("nobody publishes the clock `{}`", clock.path));
     }
@@ -41,7 +41,7 @@ pub(super) fn missing(bus: &Ros1Bus) -> Vec<String> {
 
 fn sources(bus: &Ros1Bus, node: &Node, wired: &Wired, missing: &mut Vec<String>) {
     for (source, &at) in wired.line.sources.iter().zip(&wired.sources) {
-        if node.with_subscription(at, |it| it.connected().next().is_none()) {
+        if node.with_subscription(at, |subscription| subscription.connected().next().is_none()) {
             let who = source.publisher.map_or("nobody publishes on".to_owned(), |publisher| {
                 format!("node `{}` does not publish on", bus.plan.node(publisher).name)
             });
@@ -62,7 +62,7 @@ fn sinks(bus: &Ros1Bus, node: &Node, wired: &Wired, missing: &mut Vec<String>) {
             })
             .map(|(_, node)| node.name.as_str())
             .collect();
-        let there = node.with_publication(at, |it| it.connected().count());
+        let there = node.with_publication(at, |publication| publication.connected().count());
         if there < expected.len() {
             let all = expected.join(", ");
             missing.push(format!("{there} of {} subscribe to `{}`: {all}", expected.len(), sink.path));
@@ -96,7 +96,10 @@ pub(super) fn is_heard(bus: &Ros1Bus, line: usize) -> bool {
         return true;
     }
     if wired.line.cut {
-        return wired.sinks.iter().any(|&at| node.with_publication(at, |it| it.connected().next().is_some()));
+        return wired
+            .sinks
+            .iter()
+            .any(|&at| node.with_publication(at, |publication| publication.connected().next().is_some()));
     }
     let state = node.state().unwrap_or_default();
     nodes(&state.subscribers, &wired.line.path).iter().any(|other| *other != node.name)

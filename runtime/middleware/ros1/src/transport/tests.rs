@@ -63,7 +63,7 @@ mod real {
         let launch = |program: &str, arguments: &[&str], when: ReadyWhen| Launch {
             command: Command {
                 program: program.to_owned(),
-                arguments: arguments.iter().map(|&it| it.to_owned()).collect(),
+                arguments: arguments.iter().map(|&argument| argument.to_owned()).collect(),
             },
             ready: Some(Ready { when, within: 120.0 }),
         };

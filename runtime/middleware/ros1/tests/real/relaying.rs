@@ -249,7 +249,7 @@ fn a_header_is_changed_in_its_place() {
     finished.unwrap();
     let (names, values) = (echo.line(), echo.line());
     let value = |name: &str| {
-        let at = names.split(',').position(|it| it == name).unwrap();
+        let at = names.split(',').position(|listed| listed == name).unwrap();
         values.split(',').nth(at).unwrap().to_owned()
     };
     let (received, stamp) = (value("%time"), value("field.header.stamp"));
@@ -280,7 +280,7 @@ fn latched_messages_are_there_for_those_who_come_later() {
     assert_eq!(publisher.said()["sent"], 3);
     let mut system = System::new(plan);
     let listen = || core.peer("subscriber.py", &["/peer", "std_msgs/String", "1", "120"]);
-    let said_by = |peer: &mut Program| peer.said_already().filter(|it| it["received"].is_u64());
+    let said_by = |peer: &mut Program| peer.said_already().filter(|line| line["received"].is_u64());
     // What one has heard has passed, and the other comes after that.
     let (mut early, mut late, mut heard, mut said) = (listen(), None, None, None);
     let finished = system.run(
