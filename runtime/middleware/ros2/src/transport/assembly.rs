@@ -34,7 +34,7 @@ impl Session {
             for (source, reader) in line.sources.iter().zip(readers.iter_mut()) {
                 let topic = names::topic(&source.path);
                 let of_topic = publishers.iter().filter(|endpoint| endpoint.topic == topic);
-                let fitting: Vec<&Endpoint> = of_topic.filter(|it| it.type_name == *type_name).collect();
+                let fitting: Vec<&Endpoint> = of_topic.filter(|endpoint| endpoint.type_name == *type_name).collect();
                 if reader.is_none() && !fitting.is_empty() {
                     *qos = mirrored(fitting.iter().map(|endpoint| &endpoint.qos));
                     *reader = Some(self.dds.read(&topic, type_name, qos)?);

@@ -36,7 +36,8 @@ impl System {
         self.now = self.zero.wall_clock(self.now).min(until);
         if let Zero::Clock(zero) = self.zero {
             // A simulator that is paused may go on to publish the time at which it was.
-            let is_tick = |it: &Incoming| matches!(it, Incoming::Clock(nanos) if nanos - zero > self.now.nanos());
+            let is_tick =
+                |incoming: &Incoming| matches!(incoming, Incoming::Clock(nanos) if nanos - zero > self.now.nanos());
             if incoming.iter().any(is_tick) {
                 self.ticked = now();
             } else if self.ticked.elapsed() >= SILENCE {

@@ -243,7 +243,7 @@ impl Session {
                 let there: Vec<&Endpoint> = publishers.iter().filter(|endpoint| endpoint.topic == topic).collect();
                 let most = if source.publisher.is_some() { 1 } else { declared };
                 if there.len() > most {
-                    let mut names: Vec<String> = there.iter().map(|it| name(it.guid)).collect();
+                    let mut names: Vec<String> = there.iter().map(|present| name(present.guid)).collect();
                     names.sort_unstable();
                     let names: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
                     crowded.push(format!("{} publish on `{}`: {}", names.len(), source.path, names.join(", ")));
@@ -261,7 +261,8 @@ impl Session {
         for Connected { line, interface, type_name, readers, .. } in &self.lines {
             for (source, _) in line.sources.iter().zip(readers).filter(|(_, reader)| !alone || reader.is_none()) {
                 let topic = names::topic(&source.path);
-                let others = publishers.iter().filter(|it| it.topic == topic && it.type_name != *type_name);
+                let others =
+                    publishers.iter().filter(|publisher| publisher.topic == topic && publisher.type_name != *type_name);
                 wrong.extend(others.map(|other| {
                     let found = names::interface(&other.type_name).unwrap_or_else(|| other.type_name.clone());
                     format!("`{}` publishes `{found}` on `{}`; expected `{}`", name(other.guid), source.path, interface)

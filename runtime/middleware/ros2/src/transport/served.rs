@@ -85,7 +85,8 @@ pub(super) fn services(
     for wire in of(Channel::Request) {
         let Some(reply) = of(Channel::Reply).find(|&reply| wires.path(reply) == wires.path(wire)) else { continue };
         let wiring = &plan.simulator.wiring;
-        let cut = [wire, reply].iter().any(|&wire| wiring.get(wires.topic(wire).index()).is_some_and(|it| it.cut));
+        let cut =
+            [wire, reply].iter().any(|&wire| wiring.get(wires.topic(wire).index()).is_some_and(|wiring| wiring.cut));
         let path = absolute(wires.path(wire));
         let server = if cut { format!("{path}/undisturbed") } else { path.clone() };
         let (asked, forwarded) = (names::request(&path), names::request(&server));

@@ -254,7 +254,8 @@ fn parameters(plan: &CampaignPlan, dds: &mut Participant) -> Result<BTreeMap<Nod
         _ => None,
     });
     let fitted = plan.labs.iter().flat_map(|lab| &lab.fits).map(|fit| &fit.what);
-    let adjusted = plan.compensation.iter().flat_map(|compensation| &compensation.adjustments).map(|it| &it.what);
+    let adjusted =
+        plan.compensation.iter().flat_map(|compensation| &compensation.adjustments).map(|adjustment| &adjustment.what);
     let named = fitted.chain(adjusted).filter_map(|what| {
         let Fitted::Parameter { name } = what else { return None };
         let (node, _) = name.split_once('/')?;

@@ -68,7 +68,7 @@ impl Watch {
     pub(super) fn begin(&mut self, present: impl FnOnce() -> Vec<Present>) {
         self.said.clear();
         if self.looked.is_none() {
-            self.there = present().into_iter().map(|it| (it.guid, it)).collect();
+            self.there = present().into_iter().map(|present| (present.guid, present)).collect();
         }
     }
 
@@ -91,37 +91,38 @@ impl Watch {
     /// operations have stopped or killed it is not said that they have gone.
     pub(super) fn look(&mut self, now: Instant, present: Vec<Present>, absent: &BTreeSet<String>) -> Vec<String> {
         self.looked = Some(now);
-        let present: BTreeMap<GUID, Present> = present.into_iter().map(|it| (it.guid, it)).collect();
+        let present: BTreeMap<GUID, Present> = present.into_iter().map(|present| (present.guid, present)).collect();
         let mut notes = Vec::new();
-        for it in std::mem::take(&mut self.there).into_values() {
-            if let Some(now) = present.get(&it.guid) {
+        for earlier in std::mem::take(&mut self.there).into_values() {
+            if let Some(now) = present.get(&earlier.guid) {
                 // A node that ends takes its name back before its publishers.
-                self.there.insert(it.guid, Present { name: it.name.or_else(|| now.name.clone()), ..now.clone() });
+                self.there
+                    .insert(earlier.guid, Present { name: earlier.name.or_else(|| now.name.clone()), ..now.clone() });
                 continue;
             }
-            let stays = present.values().any(|other| known(other) == known(&it));
-            if !stays && it.name.as_ref().is_none_or(|name| !absent.contains(name)) {
-                self.gone.insert(known(&it));
+            let stays = present.values().any(|other| known(other) == known(&earlier));
+            if !stays && earlier.name.as_ref().is_none_or(|name| !absent.contains(name)) {
+                self.gone.insert(known(&earlier));
             }
         }
         self.fresh.retain(|guid, _| present.contains_key(guid));
         self.beyond.retain(|guid, _| present.contains_key(guid));
-        for (&guid, it) in &present {
+        for (&guid, newcomer) in &present {
             if self.there.contains_key(&guid) {
                 continue;
             }
             let since = *self.fresh.entry(guid).or_insert(now);
-            if it.will_be_named && now.duration_since(since) < NAME {
+            if newcomer.will_be_named && now.duration_since(since) < NAME {
                 continue;
             }
             self.fresh.remove(&guid);
-            let there = present.values().filter(|other| other.place == it.place).count();
-            if self.gone.remove(&known(it)) {
-                notes.push(came_back(&known(it)));
-            } else if let Some(most) = it.place.most.filter(|&most| there > most) {
-                self.beyond.insert(guid, too_many(it, there, most));
+            let there = present.values().filter(|other| other.place == newcomer.place).count();
+            if self.gone.remove(&known(newcomer)) {
+                notes.push(came_back(&known(newcomer)));
+            } else if let Some(most) = newcomer.place.most.filter(|&most| there > most) {
+                self.beyond.insert(guid, too_many(newcomer, there, most));
             }
-            self.there.insert(guid, it.clone());
+            self.there.insert(guid, newcomer.clone());
         }
         notes.extend(self.gone.iter().map(has_gone));
         notes.extend(self.beyond.values().cloned());
@@ -150,9 +151,9 @@ fn has_gone((role, path, name): &Known) -> String {
     }
 }
 
-fn too_many(it: &Present, there: usize, most: usize) -> String {
-    let (_, _, name) = known(it);
-    let path = it.place.topic.strip_prefix("rt").unwrap_or(&it.place.topic);
+fn too_many(present: &Present, there: usize, most: usize) -> String {
+    let (_, _, name) = known(present);
+    let path = present.place.topic.strip_prefix("rt").unwrap_or(&present.place.topic);
     match most {
         0 => format!("`{name}` publishes on `{path}` past the relay since the run began"),
         1 => format!("`{name}` publishes on `{path}` since the run began: {there} publish there, and 1 is declared"),
