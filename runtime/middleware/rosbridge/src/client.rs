@@ -343,7 +343,7 @@ mod tests {
 
     impl Callback for WantsSecret {
         fn on_request(self, request: &Request, response: Response) -> Result<Response, ErrorResponse> {
-            let shown = request.headers().get(AUTHORIZATION).and_then(|it| it.to_str().ok());
+            let shown = request.headers().get(AUTHORIZATION).and_then(|value| value.to_str().ok());
             if shown == Some(&format!("Bearer {SECRET}")) {
                 return Ok(response);
             }

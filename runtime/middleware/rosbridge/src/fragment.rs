@@ -167,7 +167,7 @@ mod tests {
             for (id, data, num, total) in pieces {
                 let _ = waiting.take(&id, &data, (num, total), most);
                 prop_assert!(waiting.bytes <= most);
-                let kept: usize = waiting.waiting.values().flat_map(|it| it.pieces.values()).map(|it| it.len() + PER_PIECE).sum();
+                let kept: usize = waiting.waiting.values().flat_map(|message| message.pieces.values()).map(|piece| piece.len() + PER_PIECE).sum();
                 prop_assert_eq!(kept, waiting.bytes);
             }
         }

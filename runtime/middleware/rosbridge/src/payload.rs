@@ -97,7 +97,7 @@ impl Payloads {
             }
             Type::List { of } => match (json, &**of) {
                 (Json::Array(items), of) => {
-                    let item = |(at, item)| self.value(of, item).map_err(|it| it.inside(&format!("[{at}]")));
+                    let item = |(at, item)| self.value(of, item).map_err(|error| error.inside(&format!("[{at}]")));
                     Value::List(items.iter().enumerate().map(item).collect::<Result<_, _>>()?)
                 }
                 (Json::String(text), Type::Int { .. }) => {
@@ -113,7 +113,7 @@ impl Payloads {
                 for (name, value) in entries {
                     let name = in_ros2(name, entries);
                     values.push(match declared.iter().find(|field| field.name == name) {
-                        Some(field) => self.value(&field.ty, value).map_err(|it| it.inside(name))?,
+                        Some(field) => self.value(&field.ty, value).map_err(|error| error.inside(name))?,
                         None => Value::Undeclared(value.to_string().into()),
                     });
                 }

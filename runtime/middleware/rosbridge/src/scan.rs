@@ -125,24 +125,24 @@ impl Scanner {
             if graph.topics[at].1.is_empty() && now() < until {
                 let path = graph.topics[at].0.clone();
                 let answer = self.call("topic_type", &[("topic", &path)])?;
-                graph.topics[at].1 = answer.and_then(|it| rosapi::text(&it, "type")).unwrap_or_default();
+                graph.topics[at].1 = answer.and_then(|answer| rosapi::text(&answer, "type")).unwrap_or_default();
             }
         }
         let services = self.call("services", &[])?;
-        for path in services.map(|it| rosapi::texts(&it, "services")).unwrap_or_default() {
+        for path in services.map(|answer| rosapi::texts(&answer, "services")).unwrap_or_default() {
             let mut ty = None;
             if assemble::is_of_the_system(&path) && now() < until {
-                ty = self.call("service_type", &[("service", &path)])?.and_then(|it| rosapi::text(&it, "type"));
+                ty = self.call("service_type", &[("service", &path)])?.and_then(|answer| rosapi::text(&answer, "type"));
             }
             graph.services.push((path, ty.unwrap_or_default()));
         }
-        match self.call("nodes", &[])?.map(|it| rosapi::texts(&it, "nodes")) {
+        match self.call("nodes", &[])?.map(|answer| rosapi::texts(&answer, "nodes")) {
             Some(nodes) if !nodes.is_empty() => {
                 for name in nodes {
                     let mut details = rosapi::Details::default();
                     if assemble::is_node_of_the_system(&name) && now() < until {
                         let answer = self.call("node_details", &[("node", &name)])?;
-                        details = answer.map(|it| rosapi::details(&it)).unwrap_or_default();
+                        details = answer.map(|answer| rosapi::details(&answer)).unwrap_or_default();
                     }
                     graph.nodes.push((name, details));
                 }
@@ -155,7 +155,7 @@ impl Scanner {
                             break;
                         }
                         let names = self.call(service, &[("topic", &path)])?;
-                        let names = names.map(|it| rosapi::texts(&it, field)).unwrap_or_default();
+                        let names = names.map(|answer| rosapi::texts(&answer, field)).unwrap_or_default();
                         graph.add(&path, names, service == "publishers");
                     }
                 }
@@ -230,7 +230,7 @@ impl Scanner {
                 break;
             }
             let answer = self.call("message_details", &[("type", &type_name(ty, dialect))])?;
-            if let Some(layouts) = answer.and_then(|it| rosapi::layouts(&it)) {
+            if let Some(layouts) = answer.and_then(|answer| rosapi::layouts(&answer)) {
                 described.insert(ty.clone(), layouts);
             }
         }

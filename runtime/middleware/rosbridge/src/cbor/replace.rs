@@ -135,7 +135,7 @@ mod tests {
     fn values() -> impl Strategy<Value = Cbor> {
         let leaf = prop_oneof![
             any::<i64>().prop_map(Cbor::from),
-            any::<f64>().prop_filter("comparable", |it| !it.is_nan()).prop_map(Cbor::from),
+            any::<f64>().prop_filter("comparable", |number| !number.is_nan()).prop_map(Cbor::from),
             any::<bool>().prop_map(Cbor::from),
             Just(Cbor::Null),
             ".{0,30}".prop_map(Cbor::Text),

@@ -68,7 +68,9 @@ struct Heard {
 
 impl Names {
     pub(super) fn new(renamed: &Renamed) -> Names {
-        let names = |remappings: &[Remapping]| remappings.iter().map(|it| (it.from.clone(), it.to.clone())).collect();
+        let names = |remappings: &[Remapping]| {
+            remappings.iter().map(|remapping| (remapping.from.clone(), remapping.to.clone())).collect()
+        };
         Names {
             published: names(&renamed.publishes),
             subscribed: names(&renamed.subscribes),

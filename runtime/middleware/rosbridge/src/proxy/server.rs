@@ -284,7 +284,7 @@ impl Callback for Check<'_> {
 /// Why a client that shows this is not let in. Browsers cannot send headers with a WebSocket: they show a token in the
 /// address.
 fn objection(request: &Request, token: &Token) -> Option<&'static str> {
-    let in_header = request.headers().get(AUTHORIZATION).and_then(|it| it.to_str().ok()?.strip_prefix("Bearer "));
+    let in_header = request.headers().get(AUTHORIZATION).and_then(|value| value.to_str().ok()?.strip_prefix("Bearer "));
     let in_address = || request.uri().query()?.split('&').find_map(|part| part.strip_prefix("token="));
     match in_header.or_else(in_address) {
         None => Some("it showed no token"),

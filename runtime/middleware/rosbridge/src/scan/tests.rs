@@ -49,7 +49,7 @@ fn serve(answers: Answers) -> SocketAddr {
         while let Some(Ok(Frame::Text(text))) = socket.next().await {
             let said: Json = serde_json::from_str(&text).unwrap();
             let answers = if said["op"] == "call_service" {
-                let argument = said["args"].as_object().and_then(|it| it.values().next()?.as_str());
+                let argument = said["args"].as_object().and_then(|arguments| arguments.values().next()?.as_str());
                 let service = said["service"].as_str().unwrap();
                 let values = answers(service.strip_prefix("/rosapi/").unwrap(), argument.unwrap_or_default());
                 let result = values.is_some();
@@ -131,7 +131,15 @@ fn rosapi_of_ros_2_says_who_is_there() {
     let topics: Vec<_> = facts
         .topics
         .iter()
-        .map(|it| (it.path.as_str(), it.ty.as_deref(), it.publishers.join(","), it.subscribers.join(","), it.messages))
+        .map(|topic| {
+            (
+                topic.path.as_str(),
+                topic.ty.as_deref(),
+                topic.publishers.join(","),
+                topic.subscribers.join(","),
+                topic.messages,
+            )
+        })
         .collect();
     assert_eq!(
         topics,
