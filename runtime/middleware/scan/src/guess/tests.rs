@@ -27,7 +27,7 @@ fn in_words(guess: &Guess) -> String {
         Guess::List(of) => format!("list of {}", in_words(of)),
         Guess::Message { fields, left_out } => {
             let fields = fields.iter().map(|(name, of)| format!("{name}: {}", in_words(of)));
-            let left_out = left_out.iter().map(|it| format!("not {}: {}", it.name, it.why));
+            let left_out = left_out.iter().map(|omitted| format!("not {}: {}", omitted.name, omitted.why));
             format!("{{ {} }}", fields.chain(left_out).collect::<Vec<_>>().join("  "))
         }
     }
@@ -135,7 +135,7 @@ fn payload() -> impl Strategy<Value = Json> {
         prop_oneof![
             prop::collection::vec(inner.clone(), 0..4).prop_map(Json::from),
             prop::collection::vec((name, inner), 0..4).prop_map(|fields| Json::Object(
-                fields.into_iter().map(|(name, it)| (name.to_owned(), it)).collect::<Map<_, _>>()
+                fields.into_iter().map(|(name, value)| (name.to_owned(), value)).collect::<Map<_, _>>()
             )),
         ]
     })
