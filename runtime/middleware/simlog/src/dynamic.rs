@@ -79,7 +79,7 @@ fn dynamic(tree: &Tree) -> Result<Dynamic, Mismatch> {
         Tree::Text(text) => Kind::StringValue(text.clone()),
         Tree::List(items) => {
             let items = items.iter().enumerate();
-            let values = items.map(|(at, item)| dynamic(item).map_err(|it| it.inside(&format!("[{at}]"))));
+            let values = items.map(|(at, item)| dynamic(item).map_err(|error| error.inside(&format!("[{at}]"))));
             Kind::ListValue(ListValue { values: values.collect::<Result<_, _>>()? })
         }
         Tree::Fields(fields) => {

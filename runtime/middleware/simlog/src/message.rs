@@ -40,8 +40,8 @@ impl Message {
     /// which field the wire cannot hold. Reals that have 32 bits on the wire are rounded to the nearest.
     pub fn with(&self, value: &Value) -> Result<Message, Mismatch> {
         match self {
-            Message::V2(message) => ros::write(value, message).map(|it| Message::V2(Box::new(it))),
-            Message::V3(message) => dynamic::write(value, message).map(|it| Message::V3(Box::new(it))),
+            Message::V2(message) => ros::write(value, message).map(|written| Message::V2(Box::new(written))),
+            Message::V3(message) => dynamic::write(value, message).map(|written| Message::V3(Box::new(written))),
         }
     }
 

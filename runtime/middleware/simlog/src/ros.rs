@@ -250,7 +250,7 @@ impl<T: Part> Part for Vec<T> {
     fn of(tree: &Tree) -> Result<Self, Mismatch> {
         let Tree::List(items) = tree else { return Err(tree.mismatch("list")) };
         let items = items.iter().enumerate();
-        items.map(|(at, item)| T::of(item).map_err(|it| it.inside(&format!("[{at}]")))).collect()
+        items.map(|(at, item)| T::of(item).map_err(|error| error.inside(&format!("[{at}]")))).collect()
     }
 }
 
@@ -308,10 +308,10 @@ fn each(
 ) -> Result<(), Mismatch> {
     match tree {
         Tree::Fields(fields) => {
-            fields.iter().try_for_each(|(name, tree)| take(name, tree).map_err(|it| it.inside(name)))
+            fields.iter().try_for_each(|(name, tree)| take(name, tree).map_err(|error| error.inside(name)))
         }
         Tree::List(items) if names == ["x", "y", "z"] && items.len() == 3 => {
-            names.iter().zip(items).try_for_each(|(name, item)| take(name, item).map_err(|it| it.inside(name)))
+            names.iter().zip(items).try_for_each(|(name, item)| take(name, item).map_err(|error| error.inside(name)))
         }
         _ => Err(tree.mismatch("message")),
     }

@@ -92,7 +92,7 @@ impl Tree {
             Shape::List(of) => {
                 let Tree::List(items) = self else { return Err(self.mismatch("list")) };
                 let items = items.iter().enumerate();
-                let items = items.map(|(at, item)| item.read(of).map_err(|it| it.inside(&format!("[{at}]"))));
+                let items = items.map(|(at, item)| item.read(of).map_err(|error| error.inside(&format!("[{at}]"))));
                 items.collect::<Result<_, _>>().map(Value::List)
             }
             Shape::Record(fields) => {
@@ -111,7 +111,7 @@ impl Tree {
                 Tree::Fields(_) => self.field(axis).ok_or_else(|| Mismatch::missing(axis))?,
                 _ => return Err(self.mismatch("point")),
             };
-            point[at] = coordinate.real().map_err(|it| it.inside(axis))?;
+            point[at] = coordinate.real().map_err(|error| error.inside(axis))?;
         }
         Ok(point)
     }

@@ -12,7 +12,7 @@ fn values() -> impl Strategy<Value = Value> {
         (-(1i64 << 53)..=1 << 53).prop_map(Value::Int),
         any::<f64>().prop_filter("NaN is not equal to itself", |x| !x.is_nan()).prop_map(Value::Real),
         "\\PC{0,6}".prop_map(|text| Value::from(text.as_str())),
-        any::<[f64; 3]>().prop_filter("as above", |it| it.iter().all(|x| !x.is_nan())).prop_map(Value::Point),
+        any::<[f64; 3]>().prop_filter("as above", |point| point.iter().all(|x| !x.is_nan())).prop_map(Value::Point),
     ];
     leaf.prop_recursive(2, 8, 3, |inner| {
         vec(inner, 1..4).prop_map(|values| {

@@ -102,7 +102,7 @@ proptest! {
         let value = read(&shape, &message).unwrap();
         prop_assert_eq!(&write(&value, &message).unwrap(), &message);
         let other = holding(other);
-        let kinds = [&message, &other].map(|it| it.content.as_ref().map(std::mem::discriminant));
+        let kinds = [&message, &other].map(|message| message.content.as_ref().map(std::mem::discriminant));
         if kinds[0] == kinds[1] {
             prop_assert_eq!(write(&value, &other).unwrap().content, message.content);
         }

@@ -105,8 +105,12 @@ impl<S: Simulator, F: FnMut(&Setup, &mut Bus<'_>) -> Result<S, SimulatorError>> 
             return Ok(-1);
         }
         self.subscribers.retain(|subscriber| !subscriber.messages.is_closed());
-        let cut: Vec<String> =
-            self.subscribers.iter().filter(|it| it.injected.is_some()).map(|it| it.topic.clone()).collect();
+        let cut: Vec<String> = self
+            .subscribers
+            .iter()
+            .filter(|subscriber| subscriber.injected.is_some())
+            .map(|subscriber| subscriber.topic.clone())
+            .collect();
         let run = self.running()?;
         let topics: Vec<String> = run.topics().map(str::to_owned).collect();
         for topic in &topics {
@@ -124,7 +128,7 @@ impl<S: Simulator, F: FnMut(&Setup, &mut Bus<'_>) -> Result<S, SimulatorError>> 
 
     /// Sends a message to all who hear its topic. The stream of whoever does not keep up ends.
     fn send(&mut self, topic: &str, value: &Value, now: SimTime) -> Result<(), Status> {
-        if self.subscribers.iter().all(|it| it.topic != topic) {
+        if self.subscribers.iter().all(|subscriber| subscriber.topic != topic) {
             return Ok(());
         }
         let message = written(topic, value, now)?;
@@ -149,8 +153,9 @@ impl<S: Simulator, F: FnMut(&Setup, &mut Bus<'_>) -> Result<S, SimulatorError>> 
             return Err(Status::resource_exhausted(format!("there are {SUBSCRIBERS} subscribers already")));
         }
         if let Some(injected) = &injected {
-            let taken = |it: &Subscriber| {
-                it.injected.is_some() && (it.topic == topic || it.injected.as_ref() == Some(injected))
+            let taken = |subscriber: &Subscriber| {
+                subscriber.injected.is_some()
+                    && (subscriber.topic == topic || subscriber.injected.as_ref() == Some(injected))
             };
             if self.subscribers.iter().any(taken) {
                 return Err(Status::already_exists(format!("`{name}` is cut already, or `{injected}` is in use")));
@@ -166,7 +171,11 @@ impl<S: Simulator, F: FnMut(&Setup, &mut Bus<'_>) -> Result<S, SimulatorError>> 
 
     /// Delivers a message to a topic that is cut, or publishes one where nothing is cut.
     fn publish(&mut self, name: &str, data: &RosMessage) -> Result<(), Status> {
-        let cut = self.subscribers.iter().find(|it| it.injected.as_deref() == Some(name)).map(|it| it.topic.clone());
+        let cut = self
+            .subscribers
+            .iter()
+            .find(|subscriber| subscriber.injected.as_deref() == Some(name))
+            .map(|subscriber| subscriber.topic.clone());
         let topic = match cut {
             Some(topic) => topic,
             None => self.find(name)?,

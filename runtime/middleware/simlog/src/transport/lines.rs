@@ -45,7 +45,7 @@ impl Lines {
         wires: &WireTable,
         client: &mut Client,
     ) -> Result<Self, ClientError> {
-        let mut cut: BTreeSet<Wire> = plan.operations.iter().flat_map(|it| wires.acted_on(it)).collect();
+        let mut cut: BTreeSet<Wire> = plan.operations.iter().flat_map(|operation| wires.acted_on(operation)).collect();
         cut.extend(wires.iter().filter(|&wire| settings.cut.contains(&wires.topic(wire))));
         let mut lines = Vec::new();
         for wire in wires.iter() {
