@@ -111,7 +111,7 @@ mod tests {
 
     fn of(milliseconds: impl IntoIterator<Item = f64>) -> Latencies {
         let mut latencies = Latencies::default();
-        milliseconds.into_iter().for_each(|it| latencies.record(Duration::from_secs_f64(it / 1000.0)));
+        milliseconds.into_iter().for_each(|latency| latencies.record(Duration::from_secs_f64(latency / 1000.0)));
         latencies
     }
 
