@@ -57,7 +57,7 @@ fn unit_of_field<'a>(plan: &'a CampaignPlan, field: &FieldRef) -> Option<Unit<'a
     let mut ty = &plan.topic(field.topic).ty;
     for name in &field.path {
         ty = match ty {
-            Type::Message { id } => &plan.message(*id).fields.iter().find(|it| it.name == *name)?.ty,
+            Type::Message { id } => &plan.message(*id).fields.iter().find(|field| field.name == *name)?.ty,
             // A coordinate of a point.
             other => other,
         };

@@ -36,7 +36,7 @@ pub fn operation(plan: &CampaignPlan, operation: &Operation) -> String {
         priority: Some(operation.priority),
         inclusion: Some(operation.inclusion),
         untimed: !operation.timed,
-        start_contains: operation.constraints.iter().map(|it| constraint(it, &plan.metrics)).collect(),
+        start_contains: operation.constraints.iter().map(|comparison| constraint(comparison, &plan.metrics)).collect(),
     };
     format!("{line} = {}{}", disturbance(operation), clauses.write())
 }
@@ -100,20 +100,26 @@ fn disturbance(operation: &Operation) -> String {
     let words = operation.kind.words();
     let permitted: Vec<String> = match (&operation.kind, axes(&operation.parameters)) {
         (OperationKind::RandomValue { .. }, Some((unit, low, high))) => vec![unit.corners(low, high)],
-        _ => operation.parameters.iter().map(|it| permitted(&operation.kind, it)).collect(),
+        _ => operation.parameters.iter().map(|parameter| permitted(&operation.kind, parameter)).collect(),
     };
     match &operation.kind {
         OperationKind::Custom { .. } => {
-            let parameters = operation
-                .parameters
-                .iter()
-                .map(|it| format!("{}: {}  ", it.name, custom_domain(&it.domain, Unit::named(it.unit.as_deref()))));
+            let parameters = operation.parameters.iter().map(|parameter| {
+                format!(
+                    "{}: {}  ",
+                    parameter.name,
+                    custom_domain(&parameter.domain, Unit::named(parameter.unit.as_deref()))
+                )
+            });
             format!("{words} {{ {}}}", parameters.collect::<String>())
         }
         OperationKind::RandomText { texts } => format!("{words} {}", list(texts)),
         OperationKind::BurstLoss => {
-            let clauses =
-                operation.parameters.iter().zip(&permitted).map(|(it, range)| format!("{} {range}  ", it.name));
+            let clauses = operation
+                .parameters
+                .iter()
+                .zip(&permitted)
+                .map(|(parameter, range)| format!("{} {range}  ", parameter.name));
             format!("{words} {{ {}}}", clauses.collect::<String>())
         }
         OperationKind::Latency { distribution, drain } => {
