@@ -86,8 +86,10 @@ impl CampaignPlan {
         if pairs.is_empty() {
             let is_of_system = |metric: &MetricSource| !matches!(metric, MetricSource::Monitor { .. });
             let requirements = (0..).map(RequirementId).zip(&self.requirements);
-            let requirements: Vec<RequirementId> =
-                requirements.filter(|(_, it)| is_of_system(&self.metric(it.metric).source)).map(|(id, _)| id).collect();
+            let requirements: Vec<RequirementId> = requirements
+                .filter(|(_, requirement)| is_of_system(&self.metric(requirement.metric).source))
+                .map(|(id, _)| id)
+                .collect();
             let monitors = (0..).map(MonitorId).take(self.monitors.len());
             pairs = monitors.flat_map(|monitor| requirements.iter().map(move |&id| (monitor, id))).collect();
         }

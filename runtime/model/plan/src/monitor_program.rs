@@ -124,7 +124,7 @@ impl CampaignPlan {
                 monitor.otherwise.mitigation = None;
             }
         }
-        plan.keep_topics(|it, topic| it.is_read_by_monitor(topic) || it.is_published_by_monitor(topic));
+        plan.keep_topics(|plan, topic| plan.is_read_by_monitor(topic) || plan.is_published_by_monitor(topic));
         plan.keep_messages();
         plan.join();
         Ok(plan)
@@ -282,15 +282,15 @@ mod tests {
             ..Ros::default()
         });
         let mut alone = whole.of_monitor_alone(MonitorId(0)).unwrap();
-        let names = |plan: &CampaignPlan| plan.topics.iter().map(|it| it.name.clone()).collect::<Vec<_>>();
+        let names = |plan: &CampaignPlan| plan.topics.iter().map(|topic| topic.name.clone()).collect::<Vec<_>>();
         assert_eq!(names(&alone), ["light", "gap", "drive", "state"], "nobody publishes what `seen` is");
-        assert_eq!(alone.messages.iter().map(|it| it.name.as_str()).collect::<Vec<_>>(), ["Inner", "Drive"]);
+        assert_eq!(alone.messages.iter().map(|message| message.name.as_str()).collect::<Vec<_>>(), ["Inner", "Drive"]);
         assert_eq!(alone.topics[2].ty, Type::Message { id: MessageId(1) });
         let [fast, seen] = alone.monitors.as_slice() else { panic!("{:?}", alone.monitors) };
         assert_eq!((fast.publishes, fast.demands[0].monitor), (Some(TopicId(3)), MonitorId(1)));
         assert_eq!(fast.otherwise.mitigation.as_ref().unwrap().field.topic, TopicId(2));
         assert_eq!((seen.publishes, seen.evidence[0].inputs[0].field.topic), (None, TopicId(0)));
-        let joined: Vec<bool> = alone.simulator.wiring.iter().map(|it| it.joined).collect();
+        let joined: Vec<bool> = alone.simulator.wiring.iter().map(|wiring| wiring.joined).collect();
         assert_eq!((joined, alone.is_guest(), whole.is_guest()), (vec![false, false, true, true], true, false));
         assert_eq!(alone.simulator.ros, Some(Ros::default()), "a guest neither steps nor resets");
         assert_eq!(alone.simulator.endpoint(), Some(Endpoint::Domain(&mut 3)));

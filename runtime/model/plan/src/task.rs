@@ -93,7 +93,7 @@ pub struct LabTest {
 impl LabTask {
     /// The number in the campaign's results of a test that was run in the lab; `None` of another test.
     pub fn of(&self, test: &Test) -> Option<u32> {
-        self.tests.iter().find(|it| it.test == *test).map(|it| it.number)
+        self.tests.iter().find(|known| known.test == *test).map(|known| known.number)
     }
 }
 

@@ -127,10 +127,10 @@ impl CampaignPlan {
                 || self.is_published_by_monitor(topic);
             // The server may be known by the other direction of its service.
             let served = declared.channel != Channel::Topic
-                && (0..).map(TopicId).zip(&self.topics).any(|(other, it)| {
-                    it.channel != Channel::Topic
-                        && it.paths == declared.paths
-                        && self.nodes.iter().any(|node| is_source(node, other, it.channel))
+                && (0..).map(TopicId).zip(&self.topics).any(|(other, topic)| {
+                    topic.channel != Channel::Topic
+                        && topic.paths == declared.paths
+                        && self.nodes.iter().any(|node| is_source(node, other, topic.channel))
                 });
             if claimed || served || !self.shares_broker(0, topic) {
                 continue;
@@ -371,7 +371,8 @@ mod tests {
         let mut plan = plan();
         assert_eq!(plan.unclaimed(), []);
         plan.nodes.truncate(1);
-        let said: Vec<(Channel, String)> = plan.unclaimed().into_iter().map(|(kind, it)| (kind, it.rule())).collect();
+        let said: Vec<(Channel, String)> =
+            plan.unclaimed().into_iter().map(|(kind, remapping)| (kind, remapping.rule())).collect();
         let said: Vec<(Channel, &str)> = said.iter().map(|(kind, rule)| (*kind, rule.as_str())).collect();
         assert_eq!(
             said,

@@ -70,11 +70,11 @@ impl CampaignPlan {
 
     pub(super) fn sound_compensation(&self, compensation: &Compensation) -> Checked {
         at("lab", name(&compensation.lab))?;
-        at("adjustments", distinct(compensation.adjustments.iter().map(|it| &it.what)))?;
-        each("adjustments", &compensation.adjustments, |it| {
-            at("what", self.sound_fitted(&it.what))?;
-            at("levels", filled(&it.levels))?;
-            each("levels", &it.levels, |&value| level(&it.what, value))
+        at("adjustments", distinct(compensation.adjustments.iter().map(|adjustment| &adjustment.what)))?;
+        each("adjustments", &compensation.adjustments, |adjustment| {
+            at("what", self.sound_fitted(&adjustment.what))?;
+            at("levels", filled(&adjustment.levels))?;
+            each("levels", &adjustment.levels, |&value| level(&adjustment.what, value))
         })
     }
 

@@ -222,35 +222,35 @@ mod tests {
 
     #[test]
     fn ids_names_and_counts_of_monitors_are_checked() {
-        assert_eq!(said(|it| it.monitors[1].name = "transport".into()), "monitors: \"transport\" is there twice");
+        assert_eq!(said(|plan| plan.monitors[1].name = "transport".into()), "monitors: \"transport\" is there twice");
         let group = "monitors[0].publishes: `belt` is not one topic of a bool, an int or a text";
-        assert_eq!(said(|it| it.monitors[0].publishes = Some(TopicId(3))), group);
+        assert_eq!(said(|plan| plan.monitors[0].publishes = Some(TopicId(3))), group);
         let gone = "monitors[0].demands[0].guarantee: there is no guarantee 1, there are 1";
-        assert_eq!(said(|it| it.monitors[0].demands[0].guarantee = 1), gone);
+        assert_eq!(said(|plan| plan.monitors[0].demands[0].guarantee = 1), gone);
         let empty = "monitors[1].evidence: there is none";
-        assert_eq!(said(|it| it.monitors[1].evidence.clear()), empty);
+        assert_eq!(said(|plan| plan.monitors[1].evidence.clear()), empty);
         let late = "monitors[0].evidence[1].held: -1 is below 0";
-        assert_eq!(said(|it| it.monitors[0].evidence[1].held = -1.0), late);
+        assert_eq!(said(|plan| plan.monitors[0].evidence[1].held = -1.0), late);
         let twice = "monitors[0].evidence: \"still\" is there twice";
-        assert_eq!(said(|it| it.monitors[0].evidence[1].name = "still".into()), twice);
+        assert_eq!(said(|plan| plan.monitors[0].evidence[1].name = "still".into()), twice);
         let equal = "monitors[0].guarantees: their integrity does not fall from one to the next";
-        assert_eq!(said(|it| it.monitors[0].guarantees[1].integrity = 3), equal);
+        assert_eq!(said(|plan| plan.monitors[0].guarantees[1].integrity = 3), equal);
         let none = "monitors[0].guarantees[1].integrity: must be at least 1";
-        assert_eq!(said(|it| it.monitors[0].guarantees[1].integrity = 0), none);
+        assert_eq!(said(|plan| plan.monitors[0].guarantees[1].integrity = 0), none);
         let state = "monitors[1].guarantees: \"still\" is there twice";
-        assert_eq!(said(|it| it.monitors[1].otherwise.name = "still".into()), state);
+        assert_eq!(said(|plan| plan.monitors[1].otherwise.name = "still".into()), state);
         let condition = "monitors[0].evidence[0].condition: there is no input 0, there are 1";
-        let time = said(|it| it.monitors[0].evidence[0].condition = crate::Condition::Input(1));
+        let time = said(|plan| plan.monitors[0].evidence[0].condition = crate::Condition::Input(1));
         assert_eq!(time, condition.replace("input 0", "input 1"));
         let field = crate::FieldRef { topic: TopicId(0), path: Vec::new() };
         let mitigation = Some(Mitigation { field, value: MitigationValue::Real(0.0) });
         let external = "monitors[1].otherwise.mitigation: is there, but nothing is sent for an external monitor";
-        assert_eq!(said(|it| it.monitors[1].otherwise.mitigation = mitigation), external);
+        assert_eq!(said(|plan| plan.monitors[1].otherwise.mitigation = mitigation), external);
     }
 
     #[test]
     fn gates_fit_and_are_neither_deep_nor_many() {
-        let with = |gate: Gate| said(|it| it.monitors[0].guarantees[0].gate = gate);
+        let with = |gate: Gate| said(|plan| plan.monitors[0].guarantees[0].gate = gate);
         let place = "monitors[0].guarantees[0].gate: ";
         assert_eq!(with(Gate::Evidence(2)), format!("{place}there is no evidence 2, there are 2"));
         assert_eq!(with(Gate::Demand(1)), format!("{place}there is no demand 1, there are 1"));
@@ -272,9 +272,12 @@ mod tests {
 
     #[test]
     fn a_cycle_of_demands_is_refused_and_a_long_chain_is_not() {
-        let cycle = said(|it| it.monitors[1].demands = vec![demand("fast", 0, 0)]);
+        let cycle = said(|plan| plan.monitors[1].demands = vec![demand("fast", 0, 0)]);
         assert_eq!(cycle, "monitors[0].demands: form a cycle");
-        assert_eq!(said(|it| it.monitors[0].demands[0].monitor = MonitorId(0)), "monitors[0].demands: form a cycle");
+        assert_eq!(
+            said(|plan| plan.monitors[0].demands[0].monitor = MonitorId(0)),
+            "monitors[0].demands: form a cycle"
+        );
         let mut plan = watched();
         let link = plan.monitors[0].clone();
         plan.monitors = (0..1000u32)
@@ -292,7 +295,7 @@ mod tests {
 
     #[test]
     fn a_score_is_of_something_and_never_of_itself() {
-        let with = |of: Score| said(|it| it.metrics[3] = score("relies", 0, of));
+        let with = |of: Score| said(|plan| plan.metrics[3] = score("relies", 0, of));
         let place = "metrics[3].source.score: ";
         let own = Score::MissedHazards { requirement: RequirementId(1) };
         assert_eq!(with(own), format!("{place}requirement `R2` bounds a score of hazards"));
@@ -305,9 +308,9 @@ mod tests {
         assert_eq!(with(state), format!("{place}there is no guarantee 2, there are 2"));
         let part = Score::Holds { part: MonitorPart::Evidence(2) };
         assert_eq!(with(part), format!("{place}there is no evidence 2, there are 2"));
-        let monitor = said(|it| it.metrics[3] = score("relies", 2, Score::Integrity));
+        let monitor = said(|plan| plan.metrics[3] = score("relies", 2, Score::Integrity));
         assert_eq!(monitor, "metrics[3].source.monitor: there is no monitor 2, there are 2");
         // A requirement that bounds no metric of the plan is told of as such.
-        assert!(said(|it| it.requirements[0].metric = crate::MetricId(9)).contains("there is no metric 9"));
+        assert!(said(|plan| plan.requirements[0].metric = crate::MetricId(9)).contains("there is no metric 9"));
     }
 }

@@ -80,8 +80,8 @@ impl CampaignPlan {
         let apart = names.cut != names.injected && !names.injected.is_empty();
         at("names.injected", require(apart, || "names the same topic as what it replaces".to_owned()))?;
         each("names.bare", &names.bare, |part| require(!part.is_empty(), || "is in every name".to_owned()))?;
-        let of_3 = |it: &Option<String>| {
-            let known = *protocol == SimlogVersion::V3 || it.is_none();
+        let of_3 = |named: &Option<String>| {
+            let known = *protocol == SimlogVersion::V3 || named.is_none();
             require(known, || "is there, but version 2 of the protocol has none".to_owned())
         };
         at("topics_url", of_3(topics_url))?;
@@ -98,7 +98,7 @@ impl CampaignPlan {
         at("name", name(&node.name))?;
         each("publishes", &node.publishes, |&id| self.has_topic(id))?;
         each("subscribes", &node.subscribes, |&id| self.has_topic(id))?;
-        at("named", node.named.as_ref().map_or(Ok(()), |it| name(it)))?;
+        at("named", node.named.as_ref().map_or(Ok(()), |named| name(named)))?;
         at("launch", node.launch.as_ref().map_or(Ok(()), |launch| self.sound_launch(launch)))?;
         each("every_step", &node.every_step, |&id| self.has_topic(id))?;
         each("answers", &node.answers, |answer| {

@@ -165,7 +165,7 @@ fn a_struct_of_ordinary_fields_is_left_out_only_where_no_other_could_be() {
 fn a_new_field_changes_only_the_base_and_what_says_something_about_it() {
     let with = |text: &str, probe: &str| Tree::read(&text.replace("note:", &format!("probe: {probe}, note:")));
     let [base_before, model_before] =
-        [plant(vec![part("a", 1.0), part("b", 2.0)]), unusual()].map(|it| format!("{it:?}"));
+        [plant(vec![part("a", 1.0), part("b", 2.0)]), unusual()].map(|plan| format!("{plan:?}"));
     let before = base().compact(&Tree::read(&model_before));
     for probe in ["None", "7"] {
         let base = Base::of(&[with(&base_before, probe)]);
