@@ -186,7 +186,7 @@ impl<'a> Choosing<'a> {
         columns.push("quality".to_owned());
         columns.extend(terms.over.iter().map(|dimension: &Dimension| dimension.name().to_owned()));
         let mut table = Table::new(columns);
-        for candidate in self.candidates.tests.iter().filter(|it| choice.tests.contains(&it.number)) {
+        for candidate in self.candidates.tests.iter().filter(|candidate| choice.tests.contains(&candidate.number)) {
             let head = [
                 Datum::test(candidate.number),
                 Datum::Real(candidate.cost),

@@ -137,7 +137,7 @@ pub fn compare(runs: &[Run], reference: Option<&[f64]>, grid: Option<Grid>) -> R
         runs.iter().map(|run| measure(run, cells.as_ref())).collect::<Result<Vec<Measured>, RecordError>>()?;
 
     let reference: Vec<f64> = match reference {
-        Some(given) => plan.objectives().zip(given).map(|(it, &x)| it.oriented(x)).collect(),
+        Some(given) => plan.objectives().zip(given).map(|(objective, &x)| objective.oriented(x)).collect(),
         None => (0..needed)
             .map(|at| measured.iter().filter_map(|run| run.worst.get(at).copied()).fold(f64::NEG_INFINITY, f64::max))
             .collect(),
@@ -167,7 +167,9 @@ pub fn compare(runs: &[Run], reference: Option<&[f64]>, grid: Option<Grid>) -> R
         run.joint_share = (!joint.members().is_empty()).then(|| had as f64 / joint.members().len() as f64);
     }
     let named = plan.objectives().zip(&reference).filter(|_| finite);
-    let reference = named.map(|(it, &value)| (plan.metric(it.metric).name.clone(), it.in_unit(value))).collect();
+    let reference = named
+        .map(|(objective, &value)| (plan.metric(objective.metric).name.clone(), objective.in_unit(value)))
+        .collect();
     Ok(Comparison { runs: measured, reference, covers: cells.is_some() })
 }
 

@@ -57,8 +57,11 @@ pub fn levels(plan: &CampaignPlan, what: &Fitted, levels: &[f64]) -> String {
 /// All that a compensation sets, in one line.
 pub fn in_words(plan: &CampaignPlan, compensation: &Compensation) -> String {
     let adjustments = compensation.adjustments.iter();
-    let all: Vec<String> =
-        adjustments.map(|it| format!("{} {}", fitted(plan, &it.what), levels(plan, &it.what, &it.levels))).collect();
+    let all: Vec<String> = adjustments
+        .map(|adjustment| {
+            format!("{} {}", fitted(plan, &adjustment.what), levels(plan, &adjustment.what, &adjustment.levels))
+        })
+        .collect();
     format!("for lab {}: {}", compensation.lab, all.join(", "))
 }
 
@@ -66,7 +69,9 @@ pub fn in_words(plan: &CampaignPlan, compensation: &Compensation) -> String {
 pub fn values(plan: &CampaignPlan, fits: &[Fit], compensation: &Compensation) -> Table {
     let mut table = Table::new(["fitted", "permitted", "value", "remark"].map(str::to_owned));
     for fit in fits {
-        let Some(adjustment) = compensation.adjustments.iter().find(|it| it.what == fit.what) else { continue };
+        let Some(adjustment) = compensation.adjustments.iter().find(|adjustment| adjustment.what == fit.what) else {
+            continue;
+        };
         let width = fit.high - fit.low;
         let near = |end: f64| width > 0.0 && adjustment.levels.iter().any(|level| (level - end).abs() <= width / 100.0);
         // Without delay and without noise the simulation is as it was, and less is not possible.
@@ -96,7 +101,7 @@ pub fn before_and_after(plan: &CampaignPlan, before: &Gap, after: &Gap) -> Table
         let Some(is) = after.metrics.iter().find(|is| is.metric == was.metric) else { continue };
         let shared = |gap: &MetricGap| -> (Vec<f64>, usize) {
             let other = if std::ptr::eq(gap, was) { is } else { was };
-            let tests = gap.tests.iter().filter(|test| other.tests.iter().any(|it| it.test == test.test));
+            let tests = gap.tests.iter().filter(|test| other.tests.iter().any(|compared| compared.test == test.test));
             let (mut sizes, mut different) = (Vec::new(), 0);
             for test in tests {
                 if let Ok([simulation, lab]) = moments(Samples::new(&test.simulation, &test.lab)) {

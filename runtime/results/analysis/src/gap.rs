@@ -111,10 +111,10 @@ fn runs_of(campaign: &Repository, lab: &Repository, task: &LabTask) -> Result<Ve
         return Err(GapError::OtherModel { lab: paths().0, difference });
     }
     let known: BTreeSet<u32> = campaign.numbers()?.into_iter().collect();
-    for it in &task.tests {
-        if !known.contains(&it.number) || campaign.row(it.number)?.test != it.test {
+    for selected in &task.tests {
+        if !known.contains(&selected.number) || campaign.row(selected.number)?.test != selected.test {
             let (lab, campaign) = paths();
-            return Err(GapError::OtherTests { lab, campaign, test: TestNumber(it.number) });
+            return Err(GapError::OtherTests { lab, campaign, test: TestNumber(selected.number) });
         }
     }
     let rows = lab.tests()?.into_iter().filter(|row| row.origin != Origin::Reference);
@@ -252,7 +252,8 @@ fn compare(
             || tolerances.iter().any(|tolerance| tolerance.metric == *metric)
     };
     for metric in ids.filter(|metric| matters(metric) && !interlocked.contains(metric)) {
-        let tolerance = tolerances.iter().find(|it| it.metric == metric).map_or(0.0, |it| it.value);
+        let tolerance =
+            tolerances.iter().find(|tolerance| tolerance.metric == metric).map_or(0.0, |tolerance| tolerance.value);
         let tests: Vec<Compared> = sides.iter().filter_map(|sides| sides.compared(metric, tolerance)).collect();
         if !tests.is_empty() {
             metrics.push(MetricGap { metric, tolerance, tests, extent: Extent::None, located: Vec::new() });
@@ -279,7 +280,8 @@ fn compare(
             (simulation, lab)
         })
     });
-    let is_bounded = |metric: MetricId| plan.requirements.iter().any(|it: &Requirement| it.metric == metric);
+    let is_bounded =
+        |metric: MetricId| plan.requirements.iter().any(|requirement: &Requirement| requirement.metric == metric);
     let interlocks = interlocked.iter().filter(|&&metric| !is_bounded(metric)).map(|&metric| {
         let usual = reference.as_ref().and_then(|values| values.get(metric.index())).and_then(|value| value.value);
         // Without a requirement, an interlock has acted where the metric is not as it is without disturbance.
@@ -666,8 +668,9 @@ impl Gap {
     /// A test has a gap if one of its metrics differs, and none if all that is decided agrees.
     pub fn next_test(&self, campaign: &Repository) -> Result<Option<(u32, String)>, RecordError> {
         let verdict = |test: u32| {
-            let of_metrics = self.metrics.iter().flat_map(|gap| gap.tests.iter().filter(move |it| it.test == test));
-            let verdicts: Vec<Equal> = of_metrics.map(|it| it.equivalence.verdict).collect();
+            let of_metrics =
+                self.metrics.iter().flat_map(|gap| gap.tests.iter().filter(move |compared| compared.test == test));
+            let verdicts: Vec<Equal> = of_metrics.map(|compared| compared.equivalence.verdict).collect();
             match () {
                 () if verdicts.contains(&Equal::Different) => Some(true),
                 () if verdicts.contains(&Equal::Equivalent) => Some(false),
@@ -689,7 +692,7 @@ impl Gap {
             Extent::Range { split, .. } => Some(split.range.dimension),
             _ => None,
         });
-        let known: Vec<Tried> = tried.iter().map(|(_, it)| it.clone()).collect();
+        let known: Vec<Tried> = tried.iter().map(|(_, tried)| tried.clone()).collect();
         let places: Vec<Vec<Option<f64>>> = candidates.iter().map(|(_, at)| at.clone()).collect();
         let Some(Next { candidate, why }) = next(&known, &places, along) else { return Ok(None) };
         let test = candidates[candidate].0;

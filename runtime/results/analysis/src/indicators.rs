@@ -146,7 +146,9 @@ pub fn indicators(repository: &Repository, reference: Option<&[f64]>) -> Result<
 
 fn named(plan: &CampaignPlan, reference: &[f64]) -> Vec<(String, f64)> {
     let objectives = plan.objectives().zip(reference);
-    objectives.map(|(it, &value)| (plan.metric(it.metric).name.clone(), it.in_unit(value))).collect()
+    objectives
+        .map(|(objective, &value)| (plan.metric(objective.metric).name.clone(), objective.in_unit(value)))
+        .collect()
 }
 
 /// Fills in what was not recorded while the campaign ran: distances, coverage, and hypervolumes from another point.
@@ -257,18 +259,29 @@ impl IndicatorAnalysis {
         let columns = head.into_iter().chain(counts).chain(measures).chain(cells.iter().copied());
         let mut dataset = Table::new(columns.map(str::to_owned));
         let whole = |count: Option<u32>| count.map_or(Datum::Missing, |count| Datum::Whole(i64::from(count)));
-        for it in &self.generations {
-            let head = imported.then(|| it.set.clone().map_or(Datum::Missing, Datum::Text));
-            let counts =
-                [it.generation, it.evaluations, it.unique, it.no_effect, it.crashes, it.timeouts, Some(it.front)];
+        for generation in &self.generations {
+            let head = imported.then(|| generation.set.clone().map_or(Datum::Missing, Datum::Text));
+            let counts = [
+                generation.generation,
+                generation.evaluations,
+                generation.unique,
+                generation.no_effect,
+                generation.crashes,
+                generation.timeouts,
+                Some(generation.front),
+            ];
             let cells = self.cells.map(|cells| {
-                let share = it.covered.map(|covered| covered as f64 / cells as f64);
-                [it.covered.map_or(Datum::Missing, Datum::count), Datum::count(cells), Datum::real(share)]
+                let share = generation.covered.map(|covered| covered as f64 / cells as f64);
+                [generation.covered.map_or(Datum::Missing, Datum::count), Datum::count(cells), Datum::real(share)]
             });
             let row = head
                 .into_iter()
                 .chain(counts.map(whole))
-                .chain([Datum::real(it.hypervolume), Datum::real(it.standard_error), Datum::real(it.igd_plus)])
+                .chain([
+                    Datum::real(generation.hypervolume),
+                    Datum::real(generation.standard_error),
+                    Datum::real(generation.igd_plus),
+                ])
                 .chain(cells.into_iter().flatten());
             dataset.row(row);
         }

@@ -128,7 +128,8 @@ pub fn tests(repository: &Repository, selection: &Selection) -> Result<Table, Re
     let original = (!originals.is_empty()).then(|| "original_name".to_owned());
     let run_of = runs_in_a_lab(repository)?;
     let lab = (!run_of.is_empty()).then(|| "run_of".to_owned());
-    let entered: BTreeMap<u32, EnteredRun> = repository.entered_runs()?.into_iter().map(|it| (it.test, it)).collect();
+    let entered: BTreeMap<u32, EnteredRun> =
+        repository.entered_runs()?.into_iter().map(|entered| (entered.test, entered)).collect();
     let run = (!entered.is_empty()).then(|| "run".to_owned());
     let said: Vec<usize> = (0..Provenance::NAMES.len())
         .filter(|&at| entered.values().any(|run| run.provenance.texts()[at].is_some()))
@@ -146,7 +147,8 @@ pub fn tests(repository: &Repository, selection: &Selection) -> Result<Table, Re
             original.is_some().then(|| originals.get(&test.number).cloned().map_or(Datum::Missing, Datum::Text));
         let of = lab.is_some().then(|| run_of.get(&test.number).copied().map_or(Datum::Missing, Datum::test));
         let entered = entered.get(&test.number);
-        let of_run = run.is_some().then(|| entered.map_or(Datum::Missing, |it| Datum::Whole(i64::from(it.run))));
+        let of_run =
+            run.is_some().then(|| entered.map_or(Datum::Missing, |entered| Datum::Whole(i64::from(entered.run))));
         let head = [
             Datum::Text(test.origin.word().to_owned()),
             test.generation.map_or(Datum::Missing, |generation| Datum::Whole(i64::from(generation))),
@@ -156,7 +158,7 @@ pub fn tests(repository: &Repository, selection: &Selection) -> Result<Table, Re
         ];
         let values = (0u32..).map(MetricId).take(plan.metrics.len()).map(|id| Datum::real(test.value(id).value));
         let said = said.iter().map(|&at| {
-            let text = entered.and_then(|it| it.provenance.texts()[at]);
+            let text = entered.and_then(|entered| entered.provenance.texts()[at]);
             text.map_or(Datum::Missing, Datum::text)
         });
         let first = std::iter::once(Datum::test(test.number)).chain(called).chain(of).chain(of_run);
@@ -249,7 +251,8 @@ pub fn front(repository: &Repository, selection: &Selection) -> Result<Table, Re
     for (number, fitness) in &judged {
         let Some(oriented) = fitness.objectives() else { continue };
         let Ok(at) = members.binary_search_by(|member| lexicographic(&member.objectives, oriented)) else { continue };
-        let values = plan.objectives().zip(oriented).map(|(it, &value)| Datum::real(Some(it.in_unit(value))));
+        let values =
+            plan.objectives().zip(oriented).map(|(objective, &value)| Datum::real(Some(objective.in_unit(value))));
         let same = if members[at].number == *number { Datum::Missing } else { Datum::test(members[at].number) };
         let of = confirmed.iter().find(|test| test.number == *number);
         let surest = of.and_then(|test| test.surest());

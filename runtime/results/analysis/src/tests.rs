@@ -254,7 +254,8 @@ fn a_front_is_at_no_distance_from_itself_however_it_is_given() {
     for given in given {
         for scaling in [Scaling::ByRange, Scaling::Unscaled] {
             let found = distances(&repository, &given, scaling).unwrap();
-            let own: Vec<Option<u32>> = repository.indicators().unwrap().iter().map(|it| Some(it.generation)).collect();
+            let own: Vec<Option<u32>> =
+                repository.indicators().unwrap().iter().map(|indicator| Some(indicator.generation)).collect();
             assert_eq!(found.iter().map(|distance| distance.generation).collect::<Vec<_>>(), own);
             let last = found.last().unwrap();
             assert_eq!((last.igd, last.igd_plus), (Some(0.0), Some(0.0)), "{given:?}");

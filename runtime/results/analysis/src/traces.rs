@@ -116,14 +116,14 @@ pub fn compare(tests: &[TracedTest], dimensions: &[Dimension]) -> TraceGap {
             }
         }
     }
-    let moving = comparisons.iter().filter(|it| it.runs.iter().any(|run| run.lag.is_ok()));
-    let names: BTreeSet<&str> = moving.map(|it| it.signal.as_str()).collect();
+    let moving = comparisons.iter().filter(|compared| compared.runs.iter().any(|run| run.lag.is_ok()));
+    let names: BTreeSet<&str> = moving.map(|compared| compared.signal.as_str()).collect();
     let questions = (2 * names.len()).max(1) as f64;
     let signals = names.into_iter().map(|name| {
         let over = |tolerance: f64, value: &dyn Fn(&Comparison) -> Option<f64>| {
             let mut located = Vec::new();
             let mut numbers = Vec::new();
-            for compared in comparisons.iter().filter(|it| it.signal == name) {
+            for compared in comparisons.iter().filter(|compared| compared.signal == name) {
                 let values: Vec<f64> = compared.runs.iter().filter_map(value).collect();
                 let test = tests.iter().find(|test| test.test == compared.test);
                 let (Some(difference), Some(test)) = (of_one_simulation(&values), test) else { continue };
@@ -134,9 +134,9 @@ pub fn compare(tests: &[TracedTest], dimensions: &[Dimension]) -> TraceGap {
                 localise::Settings { tolerance, alpha: ALPHA / questions, permutations: PERMUTATIONS, seed: 0 };
             Over { extent: localise(&located, settings), tests: numbers }
         };
-        let spread = comparisons.iter().filter(|it| it.signal == name).filter_map(Compared::spread);
+        let spread = comparisons.iter().filter(|compared| compared.signal == name).filter_map(Compared::spread);
         let spread = spread.fold(0.0, f64::max);
-        let steps = comparisons.iter().filter(|it| it.signal == name).map(|it| it.runs[0].step);
+        let steps = comparisons.iter().filter(|compared| compared.signal == name).map(|compared| compared.runs[0].step);
         let step = steps.fold(f64::INFINITY, f64::min);
         SignalGap {
             signal: name.to_owned(),
