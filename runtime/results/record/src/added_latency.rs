@@ -96,7 +96,7 @@ mod tests {
         let measured = recorded(&folder, &[(0, "a", 1), (0, "b", 2), (1, "a", 3)]);
         let all = measured.relay_latencies().unwrap();
         let seen: Vec<(&str, u64, Option<f64>)> =
-            all.iter().map(|(path, it)| (path.as_str(), it.messages(), it.longest())).collect();
+            all.iter().map(|(path, latencies)| (path.as_str(), latencies.messages(), latencies.longest())).collect();
         assert_eq!(seen, [("a", 2, Some(0.003)), ("b", 1, Some(0.002))]);
         assert_eq!(measured.digest().unwrap(), plain.digest().unwrap());
         drop(measured);

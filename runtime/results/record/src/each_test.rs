@@ -268,8 +268,9 @@ impl Repository {
                     test.operations[at].part_of = Some(first);
                 }
             }
-            for it in &test.operations {
-                let (needed, chosen) = (self.plan().operation(it.operation).parameters.len(), it.choices.len());
+            for operation in &test.operations {
+                let (needed, chosen) =
+                    (self.plan().operation(operation.operation).parameters.len(), operation.choices.len());
                 if needed != chosen {
                     return Err(damaged(format!("{this} has {chosen} choices for {needed} parameters")));
                 }
@@ -312,13 +313,13 @@ mod tests {
                 .operations
                 .iter()
                 .enumerate()
-                .map(|(at, it)| ScannedOperation {
-                    operation: it.operation,
-                    planned: match it.activation {
+                .map(|(at, operation)| ScannedOperation {
+                    operation: operation.operation,
+                    planned: match operation.activation {
                         sesame_plan::Activation::Time { start, end } => Some(Span { start, end }),
                         _ => None,
                     },
-                    choices: it.parameters.clone(),
+                    choices: operation.parameters.clone(),
                     intervals: record
                         .observation
                         .operations

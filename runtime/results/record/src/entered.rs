@@ -145,7 +145,7 @@ impl Recorder {
         let path = self.repository().path().to_owned();
         let plan = self.repository().plan().clone();
         let first = self.repository().numbers()?.last().map_or(1, |last| last + 1);
-        let tests: BTreeMap<u32, &Test> = task.tests.iter().map(|it| (it.number, &it.test)).collect();
+        let tests: BTreeMap<u32, &Test> = task.tests.iter().map(|selected| (selected.number, &selected.test)).collect();
         let mut records = Vec::with_capacity(runs.len());
         for (number, entered) in (first..).zip(runs) {
             let test = tests.get(&entered.of).expect("a task has the tests of its runs");
@@ -272,7 +272,10 @@ mod tests {
             }
         }
         let read = apart.entered_runs().unwrap();
-        let read: Vec<_> = read.iter().map(|it| (it.test, it.of, it.run, it.provenance.operator.as_deref())).collect();
+        let read: Vec<_> = read
+            .iter()
+            .map(|entered| (entered.test, entered.of, entered.run, entered.provenance.operator.as_deref()))
+            .collect();
         assert_eq!(read, [(1, 1, 1, None), (2, 2, 1, Some("Ada")), (3, 1, 2, None)]);
         assert_eq!(apart.digest().unwrap(), together.digest().unwrap(), "who made the runs is not part of it");
     }
@@ -316,7 +319,7 @@ mod tests {
             let connection = Connection::open(folder.path().join(DATABASE)).unwrap();
             connection.execute_batch(&format!("PRAGMA foreign_keys = OFF; {sql}")).unwrap();
             drop(connection);
-            Repository::open(folder.path()).and_then(|it| it.entered_runs()).unwrap_err().to_string()
+            Repository::open(folder.path()).and_then(|repository| repository.entered_runs()).unwrap_err().to_string()
         };
         assert!(said("UPDATE lab_runs SET test = 9 WHERE test = 2").contains("T9 is a run of a lab, but of no test"));
         assert!(

@@ -69,14 +69,14 @@ pub(super) fn install(connection: &Connection, plan: &CampaignPlan) -> rusqlite:
         let topic = monitor.publishes.map(|topic| &plan.topic(topic).name);
         let monitors = "INSERT INTO monitors (id, name, topic) VALUES (?1, ?2, ?3)";
         connection.execute(monitors, params![index(id), monitor.name, topic])?;
-        let guarantees = monitor.guarantees.iter().map(|it| (&it.name, it.integrity));
+        let guarantees = monitor.guarantees.iter().map(|guarantee| (&guarantee.name, guarantee.integrity));
         for (at, (name, integrity)) in guarantees.chain([(&monitor.otherwise.name, 0)]).enumerate() {
             let states = "INSERT INTO monitor_states (monitor, position, name, integrity) VALUES (?1, ?2, ?3, ?4)";
             connection.execute(states, params![index(id), index(at), name, integrity])?;
         }
-        for (at, it) in monitor.evidence.iter().enumerate() {
+        for (at, declared) in monitor.evidence.iter().enumerate() {
             let evidence = "INSERT INTO monitor_evidence (monitor, position, name) VALUES (?1, ?2, ?3)";
-            connection.execute(evidence, params![index(id), index(at), it.name])?;
+            connection.execute(evidence, params![index(id), index(at), declared.name])?;
         }
     }
     Ok(())

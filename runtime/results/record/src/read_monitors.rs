@@ -48,7 +48,7 @@ impl Repository {
         )?;
         for (test, monitor, time, state) in rows {
             let unknown = || self.odd(test, "a decision for a state that no monitor has");
-            let guarantees = plan.monitors.get(monitor).map(|it| it.guarantees.len()).ok_or_else(unknown)?;
+            let guarantees = plan.monitors.get(monitor).map(|monitor| monitor.guarantees.len()).ok_or_else(unknown)?;
             let state = match u32::try_from(state) {
                 _ if state == guarantees => MonitorState::Otherwise,
                 Ok(at) if state < guarantees => MonitorState::Guarantee(at),
@@ -105,7 +105,7 @@ impl Repository {
         )?;
         for ((test, monitor), time, evidence, holds, cause, message) in rows {
             let unknown = || self.odd(test, "a change of evidence that cannot be read");
-            let known = plan.monitors.get(monitor).is_some_and(|it| evidence < it.evidence.len());
+            let known = plan.monitors.get(monitor).is_some_and(|monitor| evidence < monitor.evidence.len());
             let cause = match (cause.as_str(), message) {
                 ("message", (Some(topic), Some(index))) => {
                     ChangeCause::Message { topic, index: u64::try_from(index).map_err(|_| unknown())? }

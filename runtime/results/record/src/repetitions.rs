@@ -45,8 +45,8 @@ fn own<'a>(plan: &CampaignPlan, repetitions: &'a [Repetition]) -> Option<&'a [Re
 impl Repetition {
     /// What is recorded of the run, in the form that a run reports. Series, operations and warnings are not kept.
     fn observation(&self) -> Observation {
-        let shown = |it: &MetricValue| {
-            let MetricValue { value, set, reach, not_finite } = *it;
+        let shown = |recorded: &MetricValue| {
+            let MetricValue { value, set, reach, not_finite } = *recorded;
             MetricObservation { value, set, reach, not_finite, ..MetricObservation::default() }
         };
         Observation {

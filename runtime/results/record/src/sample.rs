@@ -373,7 +373,9 @@ pub fn front(plan: &CampaignPlan, records: &[TestRecord]) -> Vec<u32> {
             return None;
         }
         plan.objectives()
-            .map(|it| record.observation.metrics.get(it.metric.index())?.value.map(|value| it.oriented(value)))
+            .map(|objective| {
+                record.observation.metrics.get(objective.metric.index())?.value.map(|value| objective.oriented(value))
+            })
             .collect()
     };
     let points: Vec<(u32, Vec<f64>)> =
@@ -414,7 +416,7 @@ fn recorded(folder: &Path, plan: &CampaignPlan, searched: u32, fronts: bool) -> 
         indicators.add(&record.observation.outcome, record.duplicate_of.is_some(), &fitness);
         front_so_far.add(record.number, &fitness);
         let next = records.get(at + 1).map(|next| next.generation);
-        if let Some(generation) = record.generation.filter(|&it| next != Some(Some(it))) {
+        if let Some(generation) = record.generation.filter(|&generation| next != Some(Some(generation))) {
             recorder
                 .put_indicators(&indicators.after(generation, &front_so_far), indicators.reference())
                 .expect("what is made up here can be recorded");

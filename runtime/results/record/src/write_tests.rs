@@ -75,13 +75,15 @@ pub(super) fn unrecordable(record: &TestRecord) -> Option<String> {
     }
     for monitor in monitors {
         let decisions = monitor.decisions.iter().map(|decision| ("the time of a decision", decision.time));
-        numbers
-            .extend(decisions.chain(monitor.evidence.iter().map(|it| ("the time of a change of evidence", it.time))));
-        let hazards = monitor.hazards.iter().flat_map(|it| [Some(it.time), it.lead]).flatten();
+        numbers.extend(
+            decisions.chain(monitor.evidence.iter().map(|change| ("the time of a change of evidence", change.time))),
+        );
+        let hazards = monitor.hazards.iter().flat_map(|hazard| [Some(hazard.time), hazard.lead]).flatten();
         numbers.extend(hazards.map(|time| ("the time of a hazard", time)));
     }
-    let traffic = traffic.iter().flat_map(|it| [it.first, it.last, it.gap.start, it.gap.end, it.median_gap]);
-    let nearest = unreached.iter().filter_map(|it| it.nearest);
+    let traffic =
+        traffic.iter().flat_map(|heard| [heard.first, heard.last, heard.gap.start, heard.gap.end, heard.median_gap]);
+    let nearest = unreached.iter().filter_map(|unreached| unreached.nearest);
     numbers.extend(traffic.chain(nearest).map(|time| ("the time of a message", time)));
     if let Some((what, number)) = numbers.into_iter().find(|(_, number)| !number.is_finite()) {
         return Some(format!("{what} is {number}"));

@@ -92,7 +92,7 @@ pub(super) fn watch(plan: &CampaignPlan, test: &Test, observation: &mut Observat
         let steps: Vec<Step<State>> = shown
             .decisions
             .iter()
-            .map(|it| Step { at: SimTime::from_seconds(it.time), state: it.state.into() })
+            .map(|decision| Step { at: SimTime::from_seconds(decision.time), state: decision.state.into() })
             .collect();
         let judged = scorer(9, None, &steps, &hazards).end(SimTime::from_seconds(observation.end));
         shown.hazards.extend(judged.hazards.iter().map(|hazard| MonitorHazard {
@@ -120,7 +120,7 @@ fn run(plan: &CampaignPlan, test: &Test, network: &Arc<Network>, end: f64) -> Ve
         test.operations.iter().any(|used| {
             let (start, end) = window(used);
             let operation = plan.operation(used.operation);
-            let of_topic = operation.topic.is_some_and(|it| it.index() == topic);
+            let of_topic = operation.topic.is_some_and(|own| own.index() == topic);
             of_topic && kind(&operation.kind) && start + lag <= time && time < end + lag
         })
     };

@@ -31,7 +31,13 @@ fn results_of_schema_7_are_read_with_the_digest_they_were_given_and_nothing_is_a
         let record = repository.test(1).unwrap();
         assert!(record.observation.traffic.is_empty(), "nobody wrote down what was heard");
         assert_eq!(
-            repository.decisions(0..=20).unwrap().values().flatten().map(|it| it.hazards.len()).sum::<usize>(),
+            repository
+                .decisions(0..=20)
+                .unwrap()
+                .values()
+                .flatten()
+                .map(|decisions| decisions.hazards.len())
+                .sum::<usize>(),
             8
         );
         drop(repository);
