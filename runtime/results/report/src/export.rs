@@ -175,13 +175,13 @@ fn value(record: &TestRecord, metric: MetricId) -> Option<f64> {
 fn free_name(plan: &CampaignPlan, name: &str) -> String {
     let names = [&plan.space, &plan.simulator.name, &plan.campaign.name];
     let mut taken: Vec<&str> = names.into_iter().map(String::as_str).collect();
-    taken.extend(plan.messages.iter().map(|it| it.name.as_str()));
-    taken.extend(plan.topics.iter().map(|it| it.name.as_str()));
-    taken.extend(plan.nodes.iter().map(|it| it.name.as_str()));
-    taken.extend(plan.metrics.iter().map(|it| it.name.as_str()));
-    taken.extend(plan.requirements.iter().map(|it| it.name.as_str()));
-    taken.extend(plan.operations.iter().map(|it| it.name.as_str()));
-    taken.extend(plan.tests.iter().map(|it| it.name.as_str()));
+    taken.extend(plan.messages.iter().map(|message| message.name.as_str()));
+    taken.extend(plan.topics.iter().map(|topic| topic.name.as_str()));
+    taken.extend(plan.nodes.iter().map(|node| node.name.as_str()));
+    taken.extend(plan.metrics.iter().map(|metric| metric.name.as_str()));
+    taken.extend(plan.requirements.iter().map(|requirement| requirement.name.as_str()));
+    taken.extend(plan.operations.iter().map(|operation| operation.name.as_str()));
+    taken.extend(plan.tests.iter().map(|test| test.name.as_str()));
     let more = (2u32..).map(|n| format!("{name}_{n}"));
     let names = std::iter::once(name.to_owned()).chain(more);
     names.into_iter().find(|name| !taken.contains(&name.as_str())).unwrap_or_else(|| name.to_owned())

@@ -59,11 +59,12 @@ pub(super) fn decisions(compared: &MonitorsCompared) -> Table {
     let mut table = Table::with(columns.chain([Column::line("decisions"), Column::line("furthest apart")]));
     for monitor in &compared.monitors {
         let differs = monitor.difference.is_some();
-        let apart = monitor.furthest.as_ref().map(|it| {
-            let (late, direction) = (seconds(it.late.abs()), if it.late < 0.0 { "earlier" } else { "later" });
-            format!("{late} {direction} (decision {}, `{}`)", it.decision, it.state)
+        let apart = monitor.furthest.as_ref().map(|shifted| {
+            let (late, direction) = (seconds(shifted.late.abs()), if shifted.late < 0.0 { "earlier" } else { "later" });
+            format!("{late} {direction} (decision {}, `{}`)", shifted.decision, shifted.state)
         });
-        let too_far = monitor.furthest.as_ref().zip(compared.within).is_some_and(|(it, within)| it.late.abs() > within);
+        let too_far =
+            monitor.furthest.as_ref().zip(compared.within).is_some_and(|(shifted, within)| shifted.late.abs() > within);
         table.row([
             Datum::text(&monitor.monitor).into(),
             Datum::count(monitor.first).into(),
@@ -82,14 +83,14 @@ pub(super) fn disagreements(compared: &MonitorsCompared) -> Table {
     let states = ["first", "second"].map(Column::line);
     let mut table = Table::with(columns.chain(states).chain([Column::sentence("because")]));
     for monitor in &compared.monitors {
-        for it in monitor.disagreements.iter().take(SHOWN) {
-            let because: Vec<String> = it.because.iter().map(EvidenceDeviation::sentence).collect();
+        for disagreement in monitor.disagreements.iter().take(SHOWN) {
+            let because: Vec<String> = disagreement.because.iter().map(EvidenceDeviation::sentence).collect();
             table.row([
                 Datum::text(&monitor.monitor),
-                Datum::text(seconds(it.from)),
-                Datum::text(seconds(it.to)),
-                Datum::text(&it.first),
-                Datum::text(&it.second),
+                Datum::text(seconds(disagreement.from)),
+                Datum::text(seconds(disagreement.to)),
+                Datum::text(&disagreement.first),
+                Datum::text(&disagreement.second),
                 Datum::text(because.join("; and ")),
             ]);
         }
@@ -122,20 +123,20 @@ pub(super) fn tolerances(compared: &MonitorsCompared) -> Table {
     table
 }
 
-fn tolerated(it: &Tolerated) -> String {
-    match it.delay {
-        Some(delay) if it.given_up => format!("at least {}", seconds(delay)),
+fn tolerated(tolerated: &Tolerated) -> String {
+    match tolerated.delay {
+        Some(delay) if tolerated.given_up => format!("at least {}", seconds(delay)),
         Some(delay) => seconds(delay),
         None => "any".to_owned(),
     }
 }
 
-fn broken(it: &BrokenDecision) -> String {
+fn broken(broken: &BrokenDecision) -> String {
     let said = |state: &Option<TimedState>| match state {
         Some(TimedState { state, at }) => format!("`{state}` at {}", seconds(*at)),
         None => "none".to_owned(),
     };
-    let BrokenDecision { monitor, decision, recorded, delayed } = it;
+    let BrokenDecision { monitor, decision, recorded, delayed } = broken;
     format!("decision {decision} of `{monitor}`: {}, not {}", said(delayed), said(recorded))
 }
 
@@ -146,7 +147,7 @@ pub(super) fn conclusion(compared: &MonitorsCompared) -> String {
     } else {
         "Monitors decide differently."
     };
-    let least = [("first", compared.least(|it| &it.first)), ("second", compared.least(|it| &it.second))];
+    let least = [("first", compared.least(|topic| &topic.first)), ("second", compared.least(|topic| &topic.second))];
     let tolerance = least.map(|(side, least)| match least {
         Some((topic, delay)) => format!("on the {side} up to {} (`{topic}`)", seconds(delay)),
         None => format!("on the {side} up to any delay"),

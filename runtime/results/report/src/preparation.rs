@@ -48,10 +48,10 @@ pub struct Preparation {
 impl Preparation {
     /// All that is not as required, a sentence each.
     pub fn objections(&self) -> Vec<&str> {
-        let null = self.null.iter().flat_map(|it| &it.objections);
-        let mitm = self.mitm.iter().flat_map(|it| &it.objections);
-        let known = self.known.iter().flat_map(|it| &it.objections);
-        let monitors = self.monitors.iter().flat_map(|it| &it.objections);
+        let null = self.null.iter().flat_map(|null| &null.objections);
+        let mitm = self.mitm.iter().flat_map(|mitm| &mitm.objections);
+        let known = self.known.iter().flat_map(|known| &known.objections);
+        let monitors = self.monitors.iter().flat_map(|monitors| &monitors.objections);
         null.chain(mitm).chain(known).chain(monitors).map(String::as_str).collect()
     }
 
@@ -62,10 +62,10 @@ impl Preparation {
 
     /// The steps that were carried out, and whether each passed.
     pub fn steps(&self) -> Vec<(&'static str, bool)> {
-        let null = self.null.as_ref().map(|it| ("null", it.objections.is_empty()));
-        let mitm = self.mitm.as_ref().map(|it| ("mitm", it.objections.is_empty()));
-        let known = self.known.as_ref().map(|it| ("known", it.objections.is_empty()));
-        let monitors = self.monitors.as_ref().map(|it| ("monitors", it.objections.is_empty()));
+        let null = self.null.as_ref().map(|null| ("null", null.objections.is_empty()));
+        let mitm = self.mitm.as_ref().map(|mitm| ("mitm", mitm.objections.is_empty()));
+        let known = self.known.as_ref().map(|known| ("known", known.objections.is_empty()));
+        let monitors = self.monitors.as_ref().map(|monitors| ("monitors", monitors.objections.is_empty()));
         [null, mitm, known, monitors].into_iter().flatten().collect()
     }
 }

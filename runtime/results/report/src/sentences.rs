@@ -166,8 +166,11 @@ pub(crate) fn counts_sentence(summary: &Summary) -> String {
 
 /// Which operations did nothing, in a sentence; `None` if there is none.
 pub(crate) fn without_effect_sentence(summary: &Summary) -> Option<String> {
-    let operations: Vec<String> =
-        summary.without_effect.iter().map(|it| format!("`{}` in none of its {} uses", it.operation, it.uses)).collect();
+    let operations: Vec<String> = summary
+        .without_effect
+        .iter()
+        .map(|operation| format!("`{}` in none of its {} uses", operation.operation, operation.uses))
+        .collect();
     (!operations.is_empty())
         .then(|| format!("without effect: {}; these tests say nothing about what it would do", join_words(&operations)))
 }

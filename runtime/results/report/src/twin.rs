@@ -39,13 +39,13 @@ fn requirements(twin: &Twin) -> Table {
     let columns = [Column::heading("requirement")].into_iter().chain(numbers);
     let mut table = Table::with(columns.chain([Column::line("verdict")]));
     let time = |at: Option<f64>| at.map_or(Datum::Missing, |at| Datum::text(seconds(at)));
-    for it in &twin.requirements {
+    for requirement in &twin.requirements {
         table.row([
-            Datum::text(&it.requirement).into(),
-            time(it.hazard).into(),
-            time(it.hazard_of_twin).into(),
-            time(it.lead).into(),
-            Datum::text(it.verdict.words()).bad_if(!it.verdict.is_as_required()),
+            Datum::text(&requirement.requirement).into(),
+            time(requirement.hazard).into(),
+            time(requirement.hazard_of_twin).into(),
+            time(requirement.lead).into(),
+            Datum::text(requirement.verdict.words()).bad_if(!requirement.verdict.is_as_required()),
         ]);
     }
     table

@@ -15,7 +15,11 @@ pub fn sentence(plan: &CampaignPlan, text: &str) -> String {
     let mut said = String::with_capacity(text.len());
     let mut rest = text;
     while let Some((begin, length, metric)) = first_value(plan, rest) {
-        let bounds = plan.requirements.iter().filter(|requirement| requirement.metric == metric).map(|it| it.bound);
+        let bounds = plan
+            .requirements
+            .iter()
+            .filter(|requirement| requirement.metric == metric)
+            .map(|requirement| requirement.bound);
         let bounds: Vec<Bound> = bounds.collect();
         let value: f64 = rest[begin..begin + length].parse().expect("its length is that of a number");
         said.push_str(&short_numbers(&rest[..begin]));

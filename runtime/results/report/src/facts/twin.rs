@@ -127,13 +127,13 @@ pub fn twin(
     let mut mitigations: Vec<SentMitigation> = Vec::new();
     for &id in withheld {
         let monitor = plan.monitor(id);
-        let decisions = test.monitors.get(id.index()).map_or(&[][..], |it| &it.decisions);
+        let decisions = test.monitors.get(id.index()).map_or(&[][..], |monitor| &monitor.decisions);
         // The first decision is that of time zero, with which nothing is lost.
-        let lost = decisions.iter().skip(1).filter(|it| it.state == MonitorState::Otherwise);
-        mitigations.extend(lost.map(|it| SentMitigation { monitor: monitor.name.clone(), at: it.time }));
+        let lost = decisions.iter().skip(1).filter(|decision| decision.state == MonitorState::Otherwise);
+        mitigations.extend(lost.map(|decision| SentMitigation { monitor: monitor.name.clone(), at: decision.time }));
     }
     mitigations.sort_by(|a, b| a.at.total_cmp(&b.at));
-    let first = mitigations.first().map(|it| it.at);
+    let first = mitigations.first().map(|mitigation| mitigation.at);
     let side = |run: &Observation, hazard: Option<f64>| match hazard {
         Some(_) => Side::Hazard,
         None if run.outcome.is_whole() => Side::Safe,
@@ -166,7 +166,7 @@ pub fn twin(
         outcome: test.outcome.word().to_owned(),
         outcome_of_twin: twin.outcome.word().to_owned(),
         mitigations,
-        passed: requirements.iter().all(|it| it.verdict.is_as_required()),
+        passed: requirements.iter().all(|requirement| requirement.verdict.is_as_required()),
         requirements,
     }
 }

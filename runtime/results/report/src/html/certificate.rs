@@ -168,7 +168,7 @@ fn evidence(
     markup.open("svg", &[("class", "plot"), ("height", &tall), ("role", "img"), ("aria-label", &said)]);
     backdrop(markup, time, broke_off);
     let unknown = (0.0, ("unknown", "nothing heard yet".to_owned()));
-    let changes = shown.changes.iter().map(|it| (it.at, (it.is.as_str(), cause_text(&it.cause))));
+    let changes = shown.changes.iter().map(|change| (change.at, (change.is.as_str(), cause_text(&change.cause))));
     for Stretch { start, end, what } in stretches(std::iter::once(unknown).chain(changes).collect(), time, end) {
         let (is, title) = match what {
             Ok((is, cause)) => {

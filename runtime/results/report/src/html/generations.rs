@@ -45,10 +45,10 @@ pub(crate) fn generations(
     let mut analysis = indicators(repository, None)?;
     // Of an imported campaign two sets tell of the same evaluations: all survivors, and the front among them.
     let imported: Vec<Indicator> = std::mem::take(&mut analysis.generations);
-    for it in imported {
+    for generation in imported {
         match analysis.generations.last_mut() {
-            Some(last) if last.evaluations == it.evaluations => *last = it,
-            _ => analysis.generations.push(it),
+            Some(last) if last.evaluations == generation.evaluations => *last = generation,
+            _ => analysis.generations.push(generation),
         }
     }
     analysis.generations.retain(|generation| generation.evaluations.is_some());
@@ -74,7 +74,9 @@ fn caption(analysis: &IndicatorAnalysis) -> String {
         let _ = write!(text, "Hypervolumes are measured from {}; more is better. ", number::join_words(&point));
     }
     if analysis.generations.iter().any(|generation| generation.standard_error.is_some()) {
-        let share = |it: &Indicator| it.hypervolume.zip(it.standard_error).map(|(volume, error)| error / volume);
+        let share = |generation: &Indicator| {
+            generation.hypervolume.zip(generation.standard_error).map(|(volume, error)| error / volume)
+        };
         let worst = analysis.generations.iter().filter_map(share).fold(0.0, f64::max);
         let _ = write!(
             text,
@@ -106,13 +108,16 @@ fn charts(markup: &mut Markup, analysis: &IndicatorAnalysis) {
         "tests on the front",
         &[("line", "on the front", &|generation| Some(f64::from(generation.front)))],
     );
-    let share = |count: Option<u32>, it: &Indicator| {
-        let all = it.evaluations.filter(|&all| all > 0)?;
+    let share = |count: Option<u32>, generation: &Indicator| {
+        let all = generation.evaluations.filter(|&all| all > 0)?;
         Some(100.0 * f64::from(count?) / f64::from(all))
     };
-    let no_effect = |it: &Indicator| share(it.no_effect, it);
-    let duplicates = |it: &Indicator| share(it.evaluations?.checked_sub(it.unique?), it);
-    let failed = |it: &Indicator| share(it.crashes.zip(it.timeouts).map(|(crashes, timeouts)| crashes + timeouts), it);
+    let no_effect = |generation: &Indicator| share(generation.no_effect, generation);
+    let duplicates =
+        |generation: &Indicator| share(generation.evaluations?.checked_sub(generation.unique?), generation);
+    let failed = |generation: &Indicator| {
+        share(generation.crashes.zip(generation.timeouts).map(|(crashes, timeouts)| crashes + timeouts), generation)
+    };
     chart(
         markup,
         analysis,
@@ -127,7 +132,7 @@ fn charts(markup: &mut Markup, analysis: &IndicatorAnalysis) {
 
 /// Draws a chart over evaluations; nothing where there are no values, or nothing but zeros.
 fn chart(markup: &mut Markup, analysis: &IndicatorAnalysis, title: &str, lines: &[Line<'_>]) {
-    let place = |it: &Indicator| f64::from(it.evaluations.unwrap_or_default());
+    let place = |generation: &Indicator| f64::from(generation.evaluations.unwrap_or_default());
     let mut drawn: Vec<DrawnLine> = Vec::new();
     for &(class, name, value) in lines {
         let points: Vec<(f64, f64)> = analysis
@@ -167,14 +172,14 @@ fn chart(markup: &mut Markup, analysis: &IndicatorAnalysis, title: &str, lines: 
         drawn.iter().map(|(class, _, points)| (*class, points.as_slice())).collect();
     chart::steps(markup, &across, &up, &paths);
     let mut left = 0.0;
-    for it in evenly(&analysis.generations, HINTS) {
-        let right = across.share(place(&it));
+    for indicator in evenly(&analysis.generations, HINTS) {
+        let right = across.share(place(&indicator));
         let values: Vec<String> = lines
             .iter()
-            .filter_map(|(_, name, value)| Some(format!("{name} {}", number::number(value(&it)?))))
+            .filter_map(|(_, name, value)| Some(format!("{name} {}", number::number(value(&indicator)?))))
             .collect();
-        let named = it.generation.map_or(String::new(), |generation| format!("generation {generation}, "));
-        let tests = plural(it.evaluations.unwrap_or_default() as usize, "test", "tests");
+        let named = indicator.generation.map_or(String::new(), |generation| format!("generation {generation}, "));
+        let tests = plural(indicator.evaluations.unwrap_or_default() as usize, "test", "tests");
         let (x, width) = (percent(left), percent((right - left).max(0.0)));
         markup.open("rect", &[("class", "hint"), ("x", &x), ("y", "0"), ("width", &width), ("height", "100%")]);
         markup.element("title", &[], &format!("{named}{tests}: {}", values.join(", ")));

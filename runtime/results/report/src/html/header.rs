@@ -74,7 +74,9 @@ pub(super) fn header(
     rows.extend(entered(repository)?);
     rows.push(("Digest", digest.to_owned()));
     let compensation = plan.compensation.as_ref();
-    rows.extend(compensation.map(|it| ("Compensated", sesame_analysis::compensation::in_words(plan, it))));
+    rows.extend(
+        compensation.map(|compensation| ("Compensated", sesame_analysis::compensation::in_words(plan, compensation))),
+    );
     body.open("dl", &[]);
     for (name, value) in &rows {
         body.open("div", &[("class", if *name == "Digest" { "digest" } else { "fact" })]);

@@ -156,7 +156,8 @@ fn chosen(summary: &Summary, rows: &[TestRow]) -> Vec<Group> {
     };
     let shrunk = summary.shrinking.as_ref().map_or_else(Vec::new, Shrinking::ends);
     more.retain(|number| !shrunk.contains(number));
-    let missed: Vec<u32> = missed.into_iter().filter(|it| !shrunk.contains(it) && !reference.contains(it)).collect();
+    let missed: Vec<u32> =
+        missed.into_iter().filter(|number| !shrunk.contains(number) && !reference.contains(number)).collect();
     let shrunk_caption = "The test before and after it was shrunk.".to_owned();
     vec![
         Group { title: "Before and after", caption: shrunk_caption, tests: shrunk },

@@ -86,7 +86,7 @@ impl Node {
                 vec![gate(plan, monitor, &guarantee.gate)],
             ));
         }
-        let sent = monitor.otherwise.mitigation.as_ref().map(|it| notation::mitigation(plan, it));
+        let sent = monitor.otherwise.mitigation.as_ref().map(|mitigation| notation::mitigation(plan, mitigation));
         let sent = sent.map_or("otherwise".to_owned(), |sent| format!("otherwise, with {sent}"));
         parts.push(Node::new("otherwise", &[&monitor.otherwise.name, &sent], Vec::new()));
         let external = if monitor.publishes.is_none() { "external monitor" } else { "monitor" };
@@ -116,8 +116,8 @@ impl Node {
     }
 }
 
-fn gate(plan: &CampaignPlan, monitor: &Monitor, it: &Gate) -> Node {
-    match it {
+fn gate(plan: &CampaignPlan, monitor: &Monitor, formula: &Gate) -> Node {
+    match formula {
         Gate::Evidence(at) => {
             let evidence = &monitor.evidence[*at as usize];
             Node::new("evidence", &[&evidence.name, &notation::evidence(plan, evidence)], Vec::new())
@@ -128,13 +128,13 @@ fn gate(plan: &CampaignPlan, monitor: &Monitor, it: &Gate) -> Node {
             Node { leads_to: Some(demand.monitor), ..Node::new("demand", &[&demand.name, &from], Vec::new()) }
         }
         Gate::All(_) | Gate::Any(_) | Gate::AtLeast { .. } => {
-            let (needed, of) = (it.needed().unwrap_or_default(), it.parts().len());
-            let name = match it {
+            let (needed, of) = (formula.needed().unwrap_or_default(), formula.parts().len());
+            let name = match formula {
                 Gate::All(_) => "and".to_owned(),
                 Gate::Any(_) => "or".to_owned(),
                 _ => format!("{needed} of {of}"),
             };
-            Node::new("gate", &[&name], it.parts().iter().map(|part| gate(plan, monitor, part)).collect())
+            Node::new("gate", &[&name], formula.parts().iter().map(|part| gate(plan, monitor, part)).collect())
         }
     }
 }

@@ -108,7 +108,8 @@ pub struct Drift {
 /// one.
 pub fn mitm(stages: &[Repository]) -> Result<MitmTesting, RecordError> {
     let plan = stages[0].plan();
-    let budget = plan.simulator.lifecycle.relay_budget.map(|it| Budget { latency: it.latency, jitter: it.jitter });
+    let budget =
+        plan.simulator.lifecycle.relay_budget.map(|budget| Budget { latency: budget.latency, jitter: budget.jitter });
     // Then time stands still while the relay works.
     let lock_stepped = plan.simulator.step_ns().is_some();
     let lab = stages[0].task().lab().map(str::to_owned);
@@ -157,7 +158,7 @@ fn added_to(
     paths.sort_unstable();
     paths.dedup();
     let mut all = Latencies::default();
-    paths.iter().filter_map(|&path| measured.get(path)).for_each(|it| all.add(it));
+    paths.iter().filter_map(|&path| measured.get(path)).for_each(|latencies| all.add(latencies));
     let p50 = all.percentile(50);
     let p99 = all.percentile(99).filter(|_| all.messages() >= FEWEST);
     let jitter = p99.zip(p50).map(|(p99, p50)| p99 - p50);
@@ -177,7 +178,7 @@ fn stage(
     lab: Option<&str>,
 ) -> Stage {
     let place = format!("{} with {} relayed", place(lab), plural(relayed, "topic", "topics"));
-    let exceeded = budget.iter().flat_map(|&budget| added.iter().flat_map(move |it| over(it, budget, relayed)));
+    let exceeded = budget.iter().flat_map(|&budget| added.iter().flat_map(move |topic| over(topic, budget, relayed)));
     let mut objections: Vec<String> = exceeded.collect();
     objections.extend(broken_off(records, &place));
     let mut violated = BTreeMap::new();
@@ -209,7 +210,9 @@ fn stage(
     let difference = records.split_first().and_then(|(first, others)| {
         let differing = |other: &TestRecord| {
             let found = differences(plan, &Test::default(), &first.observation, &other.observation);
-            found.first().map(|it| format!("{} was {} in one run and {} in another", it.what, it.before, it.after))
+            found.first().map(|difference| {
+                format!("{} was {} in one run and {} in another", difference.what, difference.before, difference.after)
+            })
         };
         others.iter().find_map(differing)
     });
@@ -217,7 +220,7 @@ fn stage(
         relayed,
         topic,
         runs: records.len(),
-        over_budget: added.iter().any(|it| it.over_budget),
+        over_budget: added.iter().any(|topic| topic.over_budget),
         added,
         metrics: metrics.collect(),
         violated,

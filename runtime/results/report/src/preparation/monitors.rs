@@ -27,9 +27,9 @@ pub struct MonitorTest {
 
 /// Judges what monitors decide in these tests.
 pub fn monitors(lab: &str, tests: Vec<MonitorTest>) -> MonitorTesting {
-    let in_test = |it: &MonitorTest| {
-        let test = it.test.clone();
-        it.compared.objections().into_iter().map(move |objection| format!("in `{test}` {objection}"))
+    let in_test = |of_test: &MonitorTest| {
+        let test = of_test.test.clone();
+        of_test.compared.objections().into_iter().map(move |objection| format!("in `{test}` {objection}"))
     };
     let objections = tests.iter().flat_map(in_test).collect();
     MonitorTesting { lab: lab.to_owned(), tests, objections }

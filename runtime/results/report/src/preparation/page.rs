@@ -25,17 +25,17 @@ pub fn page(plan: &CampaignPlan, preparation: &Preparation, files: &Files<'_>) -
     let mut body = Markup::default();
     header(&mut body, plan, preparation);
     body.open("main", &[]);
-    if let Some(it) = &preparation.null {
-        null(&mut body, it);
+    if let Some(testing) = &preparation.null {
+        null(&mut body, testing);
     }
-    if let Some(it) = &preparation.mitm {
-        mitm(&mut body, it);
+    if let Some(testing) = &preparation.mitm {
+        mitm(&mut body, testing);
     }
-    if let Some(it) = &preparation.known {
-        known(&mut body, it);
+    if let Some(testing) = &preparation.known {
+        known(&mut body, testing);
     }
-    if let Some(it) = &preparation.monitors {
-        monitors(&mut body, it);
+    if let Some(testing) = &preparation.monitors {
+        monitors(&mut body, testing);
     }
     body.open("section", &[("id", "provenance")]);
     body.element("h2", &[], "Where this comes from");
@@ -77,25 +77,25 @@ fn header(body: &mut Markup, plan: &CampaignPlan, preparation: &Preparation) {
     body.close();
 }
 
-fn null(body: &mut Markup, it: &NullTesting) {
-    let lab = it.lab.as_deref();
-    section(body, "null", "Without disturbance", &it.objections);
+fn null(body: &mut Markup, testing: &NullTesting) {
+    let lab = testing.lab.as_deref();
+    section(body, "null", "Without disturbance", &testing.objections);
     let sides = match lab {
-        Some(lab) => format!("{} in simulation and as many in lab {lab}", plural(it.runs, "run", "runs")),
-        None => format!("{} in simulation; no lab", plural(it.runs, "run", "runs")),
+        Some(lab) => format!("{} in simulation and as many in lab {lab}", plural(testing.runs, "run", "runs")),
+        None => format!("{} in simulation; no lab", plural(testing.runs, "run", "runs")),
     };
     said(body, &format!("{sides}. Nothing is disturbed, and no topic is relayed."));
-    part(body, "Requirements", &tables::requirements(lab, &it.requirements));
-    part(body, "Metrics", &tables::metrics(lab, &it.metrics));
+    part(body, "Requirements", &tables::requirements(lab, &testing.requirements));
+    part(body, "Metrics", &tables::metrics(lab, &testing.metrics));
     if lab.is_some() {
         said(body, "Differences are the lab's mean minus the simulation's.");
     }
-    details(body, "Runs and ranges", &tables::ranges(lab, &it.metrics));
-    if !it.figures.is_empty() {
+    details(body, "Runs and ranges", &tables::ranges(lab, &testing.metrics));
+    if !testing.figures.is_empty() {
         body.element("h3", &[], "In the course of the runs");
         said(body, if lab.is_some() { "Black: simulation; orange: lab." } else { "Runs of the simulation." });
         body.open("div", &[("class", "drawings")]);
-        for figure in &it.figures {
+        for figure in &testing.figures {
             figure.show(body);
         }
         body.close();
@@ -103,21 +103,21 @@ fn null(body: &mut Markup, it: &NullTesting) {
     body.close();
 }
 
-fn mitm(body: &mut Markup, it: &MitmTesting) {
-    section(body, "mitm", "Topics through the relay", &it.objections);
-    said(body, &about_latency(it));
-    if let Some(sentence) = about_stages(it) {
+fn mitm(body: &mut Markup, testing: &MitmTesting) {
+    section(body, "mitm", "Topics through the relay", &testing.objections);
+    said(body, &about_latency(testing));
+    if let Some(sentence) = about_stages(testing) {
         said(body, sentence);
     }
-    part(body, "Stages", &tables::stages(it));
-    for stage in &it.stages {
+    part(body, "Stages", &tables::stages(testing));
+    for stage in &testing.stages {
         if let Some(difference) = &stage.difference {
             let relayed = plural(stage.relayed, "topic", "topics");
             said(body, &format!("With {relayed} relayed, runs differ: {difference}."));
         }
     }
-    part(body, "Added by the relay", &tables::added(it));
-    part(body, "Drift of metrics", &tables::drifts(it));
+    part(body, "Added by the relay", &tables::added(testing));
+    part(body, "Drift of metrics", &tables::drifts(testing));
     said(
         body,
         "Drift is the mean minus that of the runs in which nothing was relayed; beside it is how far these are apart.",
@@ -125,23 +125,23 @@ fn mitm(body: &mut Markup, it: &MitmTesting) {
     body.close();
 }
 
-fn known(body: &mut Markup, it: &KnownTesting) {
-    section(body, "known", "Regression tests", &it.objections);
-    part(body, "Expectations", &tables::expectations(it));
-    if it.lab.is_some() {
-        part(body, "Requirements", &tables::known_requirements(it));
+fn known(body: &mut Markup, testing: &KnownTesting) {
+    section(body, "known", "Regression tests", &testing.objections);
+    part(body, "Expectations", &tables::expectations(testing));
+    if testing.lab.is_some() {
+        part(body, "Requirements", &tables::known_requirements(testing));
     }
-    details(body, "Metrics", &tables::known_metrics(it));
+    details(body, "Metrics", &tables::known_metrics(testing));
     body.close();
 }
 
-fn monitors(body: &mut Markup, it: &MonitorTesting) {
-    section(body, "monitors", "Decisions of monitors", &it.objections);
+fn monitors(body: &mut Markup, testing: &MonitorTesting) {
+    section(body, "monitors", "Decisions of monitors", &testing.objections);
     said(
         body,
-        &format!("The first recording of each test is that of the simulation, the second that of lab {}.", it.lab),
+        &format!("The first recording of each test is that of the simulation, the second that of lab {}.", testing.lab),
     );
-    for MonitorTest { test, compared } in &it.tests {
+    for MonitorTest { test, compared } in &testing.tests {
         part(body, test, &decisions(compared));
         said(body, &conclusion(compared));
         details(body, "Different states", &disagreements(compared));

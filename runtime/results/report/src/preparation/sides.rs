@@ -45,7 +45,7 @@ impl Values {
         match self.deviation.filter(|deviation| *deviation > 0.0) {
             Some(deviation) => {
                 let decimals = number::decimals([self.mean, deviation]);
-                let [mean, deviation] = [self.mean, deviation].map(|it| number::fixed(it, decimals));
+                let [mean, deviation] = [self.mean, deviation].map(|value| number::fixed(value, decimals));
                 number::with_unit(format!("{mean} ± {deviation}"), unit)
             }
             None => quantity(self.mean, unit),
@@ -84,7 +84,7 @@ pub(super) fn metrics<'a>(
         let in_lab = lab.and_then(|(_, runs)| values(runs));
         let tolerated = |lab: &Lab| {
             let ends_by = lab.interlock.contains(&id);
-            lab.tolerances.iter().find(|it| it.metric == id && !ends_by).map(|it| it.value)
+            lab.tolerances.iter().find(|tolerance| tolerance.metric == id && !ends_by).map(|tolerance| tolerance.value)
         };
         let tolerance = lab.and_then(|(lab, _)| tolerated(lab));
         let difference = simulated.zip(in_lab).map(|(simulated, in_lab)| in_lab.mean - simulated.mean);

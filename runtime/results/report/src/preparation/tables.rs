@@ -35,16 +35,16 @@ fn metric_columns(lab: Option<&str>, named: bool) -> Table {
 }
 
 fn add_metrics(table: &mut Table, lab: Option<&str>, of: Option<&str>, metrics: &[MetricSides]) {
-    for it in metrics {
-        let unit = it.unit.as_deref();
+    for metric in metrics {
+        let unit = metric.unit.as_deref();
         let mut row = vec![];
         row.extend(of.map(|of| Datum::text(of).into()));
-        row.push(Datum::text(&it.metric).into());
-        row.push(values(it.simulation.as_ref(), unit).into());
+        row.push(Datum::text(&metric.metric).into());
+        row.push(values(metric.simulation.as_ref(), unit).into());
         if lab.is_some() {
-            row.push(values(it.lab.as_ref(), unit).bad_if(it.beyond));
-            row.push(amount(it.difference, unit).bad_if(it.beyond));
-            row.push(amount(it.tolerance, unit).into());
+            row.push(values(metric.lab.as_ref(), unit).bad_if(metric.beyond));
+            row.push(amount(metric.difference, unit).bad_if(metric.beyond));
+            row.push(amount(metric.tolerance, unit).into());
         }
         table.row(row);
     }
@@ -63,10 +63,10 @@ pub(super) fn ranges(lab: Option<&str>, metrics: &[MetricSides]) -> Table {
     let columns =
         sides.flat_map(|side| ["runs", "least", "greatest"].map(|what| Column::number(&format!("{what}, {side}"))));
     let mut table = Table::with(std::iter::once(Column::heading("metric")).chain(columns));
-    for it in metrics {
-        let unit = it.unit.as_deref();
-        let mut row = vec![Datum::text(&it.metric)];
-        let sides = std::iter::once(it.simulation.as_ref()).chain(lab.map(|_| it.lab.as_ref()));
+    for metric in metrics {
+        let unit = metric.unit.as_deref();
+        let mut row = vec![Datum::text(&metric.metric)];
+        let sides = std::iter::once(metric.simulation.as_ref()).chain(lab.map(|_| metric.lab.as_ref()));
         for side in sides {
             row.push(Datum::count(side.map_or(0, |values| values.runs)));
             row.push(amount(side.map(|values| values.min), unit));
@@ -82,14 +82,16 @@ pub(super) fn requirements(lab: Option<&str>, requirements: &[RequirementSides])
     let columns = [Column::heading("requirement"), Column::words("metric"), Column::line("bound")];
     let sides = std::iter::once("simulation").chain(lab).map(Column::line);
     let mut table = Table::with(columns.into_iter().chain(sides));
-    for it in requirements {
+    for requirement in requirements {
         let mut row = vec![
-            Datum::text(&it.requirement).into(),
-            Datum::text(&it.metric).into(),
-            Datum::text(&it.bound).into(),
-            Datum::text(it.simulation.words()).bad_if(it.simulation.violated > 0),
+            Datum::text(&requirement.requirement).into(),
+            Datum::text(&requirement.metric).into(),
+            Datum::text(&requirement.bound).into(),
+            Datum::text(requirement.simulation.words()).bad_if(requirement.simulation.violated > 0),
         ];
-        row.extend(it.lab.filter(|_| lab.is_some()).map(|it| Datum::text(it.words()).bad_if(it.violated > 0)));
+        row.extend(
+            requirement.lab.filter(|_| lab.is_some()).map(|lab| Datum::text(lab.words()).bad_if(lab.violated > 0)),
+        );
         table.row(row);
     }
     table
@@ -101,15 +103,15 @@ pub(super) fn added(mitm: &MitmTesting) -> Table {
     let columns = [Column::heading("relayed"), Column::words("topic")].into_iter().chain(numbers);
     let mut table = Table::with(columns);
     for stage in &mitm.stages {
-        for it in &stage.added {
+        for added in &stage.added {
             table.row([
                 Datum::count(stage.relayed).into(),
-                Datum::text(&it.topic).into(),
-                i64::try_from(it.messages).map_or(Datum::Missing, Datum::Whole).into(),
-                time(it.p50).bad_if(it.over_budget && it.p99.is_none()),
-                time(it.p99).bad_if(it.over_budget),
-                time(it.max).into(),
-                time(it.jitter).bad_if(it.over_budget),
+                Datum::text(&added.topic).into(),
+                i64::try_from(added.messages).map_or(Datum::Missing, Datum::Whole).into(),
+                time(added.p50).bad_if(added.over_budget && added.p99.is_none()),
+                time(added.p99).bad_if(added.over_budget),
+                time(added.max).into(),
+                time(added.jitter).bad_if(added.over_budget),
             ]);
         }
     }
@@ -154,15 +156,15 @@ pub(super) fn drifts(mitm: &MitmTesting) -> Table {
     let metrics = mitm.stages.first().map_or(0, |stage| stage.metrics.len());
     for at in 0..metrics {
         for stage in &mitm.stages {
-            let Some(it) = stage.metrics.get(at) else { continue };
-            let unit = it.unit.as_deref();
+            let Some(drift) = stage.metrics.get(at) else { continue };
+            let unit = drift.unit.as_deref();
             let first = stage.relayed == 0;
             table.row([
-                Datum::text(&it.metric),
+                Datum::text(&drift.metric),
                 Datum::count(stage.relayed),
-                values(it.values.as_ref(), unit),
-                if first { Datum::Missing } else { amount(it.drift, unit) },
-                amount(it.spread_before, unit),
+                values(drift.values.as_ref(), unit),
+                if first { Datum::Missing } else { amount(drift.drift, unit) },
+                amount(drift.spread_before, unit),
             ]);
         }
     }
@@ -177,9 +179,10 @@ pub(super) fn expectations(known: &KnownTesting) -> Table {
         std::iter::once("simulation").chain(lab).flat_map(|side| [Column::number(side), Column::line("verdict")]);
     let mut table = Table::with(columns.into_iter().chain(sides));
     for test in &known.tests {
-        for it in &test.expectations {
-            let ExpectationSides { metric, bound, simulation_value, simulation, lab_value, lab: in_lab } = it;
-            let unit = test.metrics.iter().find(|known| known.metric == *metric).and_then(|it| it.unit.as_deref());
+        for expectation in &test.expectations {
+            let ExpectationSides { metric, bound, simulation_value, simulation, lab_value, lab: in_lab } = expectation;
+            let unit =
+                test.metrics.iter().find(|known| known.metric == *metric).and_then(|metric| metric.unit.as_deref());
             let mut row = vec![
                 Datum::text(&test.test).into(),
                 Datum::text(metric).into(),
@@ -224,15 +227,15 @@ pub(super) fn known_requirements(known: &KnownTesting) -> Table {
     let sides = std::iter::once("simulation").chain(lab).map(Column::line);
     let mut table = Table::with(columns.into_iter().chain(sides));
     for test in &known.tests {
-        for it in &test.requirements {
-            let differs = lab.is_some() && it.lab != Some(it.simulation);
+        for requirement in &test.requirements {
+            let differs = lab.is_some() && requirement.lab != Some(requirement.simulation);
             let mut row = vec![
                 Datum::text(&test.test).into(),
-                Datum::text(&it.requirement).into(),
-                Datum::text(it.simulation.words()).into(),
+                Datum::text(&requirement.requirement).into(),
+                Datum::text(requirement.simulation.words()).into(),
             ];
             if lab.is_some() {
-                let words = it.lab.map_or_else(|| "–".to_owned(), VerdictCounts::words);
+                let words = requirement.lab.map_or_else(|| "–".to_owned(), VerdictCounts::words);
                 row.push(Datum::text(words).bad_if(differs));
             }
             table.row(row);

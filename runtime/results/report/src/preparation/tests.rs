@@ -22,7 +22,7 @@ const OPTIONS: TextOptions = TextOptions { width: Some(100), colour: false };
 fn plan(latency: Option<f64>) -> CampaignPlan {
     let mut plan = sample::plan();
     plan.simulator.transport = Transport::Process { program: "sim".to_owned(), arguments: Vec::new(), step_ns: None };
-    plan.simulator.lifecycle.relay_budget = latency.map(|it| RelayBudget { latency: Some(it), jitter: None });
+    plan.simulator.lifecycle.relay_budget = latency.map(|latency| RelayBudget { latency: Some(latency), jitter: None });
     plan
 }
 
@@ -50,7 +50,7 @@ fn recorded(
     }
     for (path, milliseconds) in added {
         let mut latencies = Latencies::default();
-        milliseconds.iter().for_each(|&it| latencies.record(Duration::from_millis(it)));
+        milliseconds.iter().for_each(|&latency| latencies.record(Duration::from_millis(latency)));
         recorder.put_relay_latencies(0, [(*path, &latencies)]).unwrap();
     }
     recorder.finish("all tests were evaluated").unwrap()

@@ -48,10 +48,10 @@ pub fn text(preparation: &Preparation, options: TextOptions) -> String {
     }
     if let Some(monitors) = monitors {
         heading(&mut text, "Decisions of monitors", options);
-        for it in &monitors.tests {
-            section(&mut text, &visible(&it.test), &decisions(&it.compared), options);
-            section(&mut text, "Delay tolerance", &tolerances(&it.compared), options);
-            sentence(&mut text, &conclusion(&it.compared), options);
+        for test in &monitors.tests {
+            section(&mut text, &visible(&test.test), &decisions(&test.compared), options);
+            section(&mut text, "Delay tolerance", &tolerances(&test.compared), options);
+            sentence(&mut text, &conclusion(&test.compared), options);
         }
     }
     text.push('\n');

@@ -28,7 +28,7 @@ fn figure(plan: &CampaignPlan, old: &MetricGap, new: &MetricGap) -> Option<Figur
     let rows = old.tests.iter().filter_map(|before| {
         let after = new.tests.iter().find(|after| after.test == before.test)?;
         let [before_it, after_it] =
-            [before, after].map(|it: &Compared| difference(it).map(|(difference, _)| difference));
+            [before, after].map(|compared: &Compared| difference(compared).map(|(difference, _)| difference));
         Some((before.test, before_it?, after_it?))
     });
     let rows: Vec<(u32, f64, f64)> = rows.collect();

@@ -135,7 +135,9 @@ pub(super) fn map(body: &mut Markup, plan: &CampaignPlan, gap: &Gap) {
         body.element("td", &[("class", "number")], &quantity(metric.tolerance, unit));
         for test in &gap.tests {
             let compared = metric.tests.iter().find(|compared| compared.test == *test);
-            let Some((compared, (difference, _))) = compared.and_then(|it| Some((it, difference(it)?))) else {
+            let Some((compared, (difference, _))) =
+                compared.and_then(|compared| Some((compared, difference(compared)?)))
+            else {
                 body.element("td", &[("class", "number")], "–");
                 continue;
             };

@@ -83,7 +83,9 @@ impl Study<'_> {
                 .gap
                 .zip(self.after)
                 .map_or_else(Vec::new, |(before, after)| before_after::figures(plan, before, after)),
-            traces: self.traces.map_or_else(Vec::new, |it| signals::figures(&it.tests, self.simulated_after, &it.gap)),
+            traces: self
+                .traces
+                .map_or_else(Vec::new, |traces| signals::figures(&traces.tests, self.simulated_after, &traces.gap)),
         }
     }
 

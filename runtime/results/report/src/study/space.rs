@@ -65,7 +65,7 @@ impl Space {
     ) -> Space {
         let candidates = &choosing.candidates().tests;
         let count = terms.over.len().min(3);
-        let points = || candidates.iter().map(|it| &it.point).chain(others);
+        let points = || candidates.iter().map(|candidate| &candidate.point).chain(others);
         let dimensions: Vec<Axis> =
             (0..count).map(|at| Axis::round(points().filter_map(|point| point.get(at).copied()), 2)).collect();
         let place = |point: &[f64]| {
@@ -115,7 +115,10 @@ impl Space {
                 "tip": test.tip,
             })
         });
-        let stretches = self.stretches.iter().map(|it| json!({ "from": it.from, "to": it.to, "chosen": it.chosen }));
+        let stretches = self
+            .stretches
+            .iter()
+            .map(|stretch| json!({ "from": stretch.from, "to": stretch.to, "chosen": stretch.chosen }));
         json!({
             "axes": axes.collect::<Vec<_>>(),
             "tests": tests.collect::<Vec<_>>(),
@@ -219,7 +222,7 @@ fn corner(bits: usize) -> [f64; 3] {
 
 /// How interesting a candidate is by one key of the rank: 1 for the first, 0 for the last.
 fn interest(terms: &Terms, all: &[Candidate], candidate: &Candidate, key: usize) -> f64 {
-    let place = |it: &Candidate| terms.rank[key].order.place(it.values[key]);
+    let place = |candidate: &Candidate| terms.rank[key].order.place(candidate.values[key]);
     let (least, most) = all
         .iter()
         .map(place)

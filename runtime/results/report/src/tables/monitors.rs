@@ -102,7 +102,7 @@ pub(crate) fn monitors(summary: &MonitorsSummary) -> Table {
     ]);
     let whole = |count: u64| i64::try_from(count).map_or(Datum::Missing, Datum::Whole);
     for monitor in &summary.monitors {
-        let states = monitor.states.iter().map(|it| format!("{} {:.1} %", it.state, 100.0 * it.share));
+        let states = monitor.states.iter().map(|state| format!("{} {:.1} %", state.state, 100.0 * state.share));
         table.row([
             Datum::text(&monitor.monitor),
             Datum::Lone(monitor.median_changes),

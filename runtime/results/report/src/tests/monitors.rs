@@ -34,7 +34,7 @@ fn found(repository: &Repository) -> [u32; 2] {
     let rows = repository.tests().unwrap();
     let hazard = |number: u32, missed: bool| {
         let monitors = show(repository, &number.to_string()).unwrap().monitors;
-        monitors.iter().flat_map(|it| &it.hazards).any(|hazard| hazard.foreseen != missed)
+        monitors.iter().flat_map(|monitor| &monitor.hazards).any(|hazard| hazard.foreseen != missed)
     };
     [true, false].map(|missed| rows.iter().find(|row| hazard(row.number, missed)).unwrap().number)
 }
@@ -67,7 +67,7 @@ fn the_hazards_of_a_test_that_was_run_again_are_those_of_its_fresh_runs() {
     let [missed, foreseen] = found(&repository);
     let before = summary(&repository).unwrap().monitors.unwrap();
     let satisfied = repository.row(0).unwrap().values;
-    let values: Vec<MetricValue> = satisfied.iter().map(|it| MetricValue::whole(it.value, it.set)).collect();
+    let values: Vec<MetricValue> = satisfied.iter().map(|value| MetricValue::whole(value.value, value.set)).collect();
     drop(repository);
     let mut recorder = Recorder::reopen(folder.path(), 1).unwrap();
     let hazard = MonitorHazard { requirement: RequirementId(0), time: 5.0, lead: None };
@@ -95,8 +95,8 @@ fn the_hazards_of_a_test_that_was_run_again_are_those_of_its_fresh_runs() {
     let monitors = summary.monitors.as_ref().unwrap();
     assert_eq!(monitors.run_again, 2);
     assert_eq!(monitors.missed.len(), before.missed.len(), "one is none, and one is new");
-    assert!(monitors.missed.iter().all(|it| it.test.0 != missed));
-    let new = monitors.missed.iter().find(|it| it.test.0 == foreseen).unwrap();
+    assert!(monitors.missed.iter().all(|hazard| hazard.test.0 != missed));
+    let new = monitors.missed.iter().find(|hazard| hazard.test.0 == foreseen).unwrap();
     let again = new.again.as_ref().unwrap();
     assert_eq!((new.at, &new.state, again.again, again.conclusive, again.first), (5.0, &None, 1, 2, false));
     let [now, then] = [&monitors.hazards[0], &before.hazards[0]];
@@ -158,7 +158,7 @@ fn each_decision_has_a_reason_that_decides_it() {
         {
             for decision in &monitor.decisions {
                 decisions += 1;
-                let held = declared.guarantees.iter().position(|it| it.name == decision.state);
+                let held = declared.guarantees.iter().position(|guarantee| guarantee.name == decision.state);
                 let expected = held.map_or(declared.guarantees.len(), |at| at + 1);
                 assert_eq!(decision.why.len(), expected, "{}: {decision:#?}", row.number);
                 let last = decision.why.last().unwrap();
@@ -177,7 +177,7 @@ fn a_moment_shows_the_values_of_a_certificate_and_what_decided() {
     let [missed, _] = found(&repository);
     let name = missed.to_string();
     let monitors = show(&repository, &name).unwrap().monitors;
-    let hazard = monitors.iter().flat_map(|it| &it.hazards).find(|hazard| !hazard.foreseen).unwrap();
+    let hazard = monitors.iter().flat_map(|monitor| &monitor.hazards).find(|hazard| !hazard.foreseen).unwrap();
     let moment = show_at(&repository, &name, hazard.at).unwrap();
     insta::assert_snapshot!("moment", moment_text(&moment, WIDE));
     insta::assert_snapshot!("moment_json", serde_json::to_string_pretty(&moment.monitors[0]).unwrap());
@@ -204,7 +204,7 @@ fn the_page_shows_certificates_over_time_and_marks_missed_hazards_in_words() {
     let document = parsed(&html);
     let section = |id: &str| document.descendants().find(|node| node.attribute("id") == Some(id)).unwrap();
     let text = |node: roxmltree::Node<'_, '_>| -> String {
-        node.descendants().filter(roxmltree::Node::is_text).filter_map(|it| it.text()).collect::<Vec<_>>().join(" ")
+        node.descendants().filter(roxmltree::Node::is_text).filter_map(|node| node.text()).collect::<Vec<_>>().join(" ")
     };
     let front = text(section("monitors"));
     assert!(front.contains("Missed hazards") && front.contains("transport"), "{front}");
@@ -256,11 +256,12 @@ fn a_mend_is_shown_in_the_same_tests_before_and_after() {
     assert!(0 < mend.missed_after && mend.missed_after < mend.missed_before, "{mend:#?}");
     assert!(mend.changed.iter().all(|test| test.test == test.before && test.same_seed));
     let of = |side: fn(&MendedTest) -> &Vec<String>| {
-        let mut tests: Vec<_> = mend.changed.iter().filter(|it| !side(it).is_empty()).map(|it| it.test).collect();
+        let mut tests: Vec<_> =
+            mend.changed.iter().filter(|test| !side(test).is_empty()).map(|test| test.test).collect();
         tests.sort();
         tests
     };
-    assert_eq!((of(|it| &it.missed_before), of(|it| &it.missed_after)), (tests_of(&old), tests_of(&new)));
+    assert_eq!((of(|test| &test.missed_before), of(|test| &test.missed_after)), (tests_of(&old), tests_of(&new)));
     // In text, in JSON, and on the page.
     let mut summary = summary(&after).unwrap();
     assert_eq!(serde_json::to_value(&summary).unwrap()["mend"], serde_json::Value::Null);

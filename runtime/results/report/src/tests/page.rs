@@ -236,7 +236,7 @@ fn the_page_permits_its_own_style_and_script_and_nothing_else() {
     let meta = document.descendants().find(|node| node.has_attribute("http-equiv")).unwrap();
     assert_eq!(meta.attribute("http-equiv"), Some("Content-Security-Policy"));
     assert_eq!(meta.attribute("content"), Some(expected.as_str()));
-    let before = |it: &&roxmltree::Node<'_, '_>| matches!(it.tag_name().name(), "style" | "script" | "title");
+    let before = |node: &&roxmltree::Node<'_, '_>| matches!(node.tag_name().name(), "style" | "script" | "title");
     let first = document.descendants().find(|node| before(&node)).unwrap();
     assert!(meta.range().end < first.range().start, "a policy holds for what follows it");
     // What the policy would keep from working.

@@ -82,12 +82,12 @@ fn the_views_of_findings_agree_with_the_report() {
     let is_failure = |finding: &str| ["crash", "timeout"].contains(&finding);
     let mut told = Vec::new();
     for test in &summary.confirmed {
-        for it in test.findings.iter().filter(|finding| !is_failure(&finding.finding)) {
+        for finding in test.findings.iter().filter(|finding| !is_failure(&finding.finding)) {
             told.push((
                 test.number,
-                it.finding.clone(),
-                count(it.again),
-                count(it.conclusive),
+                finding.finding.clone(),
+                count(finding.again),
+                count(finding.conclusive),
                 count(test.repetitions),
             ));
         }

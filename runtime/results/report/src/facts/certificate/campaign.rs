@@ -147,7 +147,7 @@ pub(crate) fn missed_by_test(
     let judge = repository.judge()?;
     each_test(repository, rows, |row, shown| {
         let missed = missed_in(plan, &judge, row, shown);
-        let words = missed.iter().map(|it| format!("{} by {}", it.requirement, it.monitor));
+        let words = missed.iter().map(|hazard| format!("{} by {}", hazard.requirement, hazard.monitor));
         found.insert(row.number, words.collect());
     })?;
     Ok(found)
@@ -187,7 +187,7 @@ fn missed_in(plan: &CampaignPlan, judge: &Judge<'_>, row: &TestRow, shown: &[Mon
             if tally.verdict(verdict) != Verdict::Violated {
                 continue;
             }
-            let again = runs.iter().filter_map(|run| run.hazard(id, requirement)).find(|it| it.lead.is_none());
+            let again = runs.iter().filter_map(|run| run.hazard(id, requirement)).find(|hazard| hazard.lead.is_none());
             let Some(hazard) = again.or(first) else { continue };
             let is_of_first = again.is_none();
             missed.push(MissedHazard {
@@ -294,7 +294,7 @@ impl Collected {
                 None => {}
             }
             let hazards: Vec<(u32, SimTime)> =
-                hazards.map(|it| (it.requirement.0, SimTime::from_seconds(it.time))).collect();
+                hazards.map(|hazard| (hazard.requirement.0, SimTime::from_seconds(hazard.time))).collect();
             let scorer = scorer(guarantees(pair.monitor), pair.horizon, steps, &hazards);
             // Which of its last alarms were false is not known of a run that broke off.
             let score = if row.outcome.is_whole() { scorer.end(end) } else { scorer.so_far(end) };
@@ -363,7 +363,9 @@ impl Collected {
 
 fn steps(shown: &MonitorObservation) -> Vec<Step<State>> {
     let steps = shown.decisions.iter();
-    steps.map(|it| Step { at: SimTime::from_seconds(it.time), state: State::from(it.state) }).collect()
+    steps
+        .map(|decision| Step { at: SimTime::from_seconds(decision.time), state: State::from(decision.state) })
+        .collect()
 }
 
 /// The name of the state of a monitor at the end of an instant.

@@ -188,7 +188,7 @@ mod tests {
         let found = events(&shown);
         let found: Vec<(f64, Vec<(u32, usize)>)> = found
             .iter()
-            .map(|it| (it.time.seconds(), it.changes.iter().map(|(monitor, at)| (monitor.0, *at)).collect()))
+            .map(|group| (group.time.seconds(), group.changes.iter().map(|(monitor, at)| (monitor.0, *at)).collect()))
             .collect();
         let expected = vec![
             (0.5, vec![(1, 0)]),

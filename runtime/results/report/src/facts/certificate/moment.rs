@@ -121,11 +121,11 @@ pub(crate) fn moment(plan: &CampaignPlan, record: &TestRecord, at: f64) -> Resul
     if !(0.0..=end).contains(&at) {
         return Err(MomentError::Outside { test, at, end });
     }
-    let times = shown.iter().flat_map(|it| {
-        it.decisions.iter().map(|decision| decision.time).chain(it.evidence.iter().map(|change| change.time))
+    let times = shown.iter().flat_map(|monitor| {
+        monitor.decisions.iter().map(|decision| decision.time).chain(monitor.evidence.iter().map(|change| change.time))
     });
     let last = times.fold(0.0, f64::max);
-    if at > last && shown.iter().any(|it| it.omitted > 0) {
+    if at > last && shown.iter().any(|monitor| monitor.omitted > 0) {
         return Err(MomentError::NotKept { test, last });
     }
     let instant = SimTime::from_seconds(at);
@@ -134,7 +134,7 @@ pub(crate) fn moment(plan: &CampaignPlan, record: &TestRecord, at: f64) -> Resul
     let monitors = (0..).map(MonitorId).zip(plan.monitors.iter().zip(shown)).map(|(id, (monitor, shown))| {
         let tree = certificate(&now, &plan.monitors, id);
         let (state, integrity) = named(monitor, now.state(id));
-        let past = shown.decisions.iter().take_while(|it| SimTime::from_seconds(it.time) <= instant);
+        let past = shown.decisions.iter().take_while(|decision| SimTime::from_seconds(decision.time) <= instant);
         let guarantees = 0..history.network().guarantees(id);
         MonitorMoment {
             monitor: monitor.name.clone(),

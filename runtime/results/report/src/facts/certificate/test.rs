@@ -161,7 +161,7 @@ pub(crate) fn monitors(plan: &CampaignPlan, observation: &Observation) -> Vec<Mo
         let end = observation.end;
         let steps: Vec<Step<State>> = decisions
             .iter()
-            .map(|it| Step { at: SimTime::from_seconds(it.time), state: State::from(it.state) })
+            .map(|decision| Step { at: SimTime::from_seconds(decision.time), state: State::from(decision.state) })
             .collect();
         let guarantees = u32::try_from(monitor.guarantees.len()).unwrap_or(u32::MAX);
         let score = scorer(guarantees, None, &steps, &[]).so_far(SimTime::from_seconds(end));
@@ -204,7 +204,11 @@ pub(crate) fn monitors(plan: &CampaignPlan, observation: &Observation) -> Vec<Mo
                     changes: evidence
                         .iter()
                         .filter(|change| change.evidence == at)
-                        .map(|it| ChangeReport { at: it.time, is: word(it.holds), cause: it.cause.clone() })
+                        .map(|change| ChangeReport {
+                            at: change.time,
+                            is: word(change.holds),
+                            cause: change.cause.clone(),
+                        })
                         .collect(),
                 })
                 .collect(),
