@@ -108,7 +108,7 @@ pub fn disagreements(network: &Network, monitor: MonitorId, first: &Course, seco
             side.advance(at);
         }
         let [a, b] = &sides;
-        if let Some(last) = found.last_mut().filter(|it| open && (it.first, it.second) != (a.state, b.state)) {
+        if let Some(last) = found.last_mut().filter(|last| open && (last.first, last.second) != (a.state, b.state)) {
             last.to = at;
             open = false;
         }
@@ -183,7 +183,7 @@ impl<'a> Walk<'a> {
             self.values[change.evidence.index()] = Value { truth: change.truth, since: Some(self.changes) };
             self.changes += 1;
         }
-        while let Some(decision) = self.course.decisions.get(self.decisions).filter(|it| it.at <= to) {
+        while let Some(decision) = self.course.decisions.get(self.decisions).filter(|decision| decision.at <= to) {
             if decision.monitor == self.monitor {
                 self.state = decision.state;
             }

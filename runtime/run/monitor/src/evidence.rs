@@ -127,7 +127,7 @@ impl Automaton {
         if self.last == i64::MAX {
             return i64::MAX;
         }
-        let stale = rule.stale.map_or(i64::MAX, |it| self.last.saturating_add(it.after).saturating_add(1));
+        let stale = rule.stale.map_or(i64::MAX, |stale| self.last.saturating_add(stale.after).saturating_add(1));
         if self.raw == Truth::True && self.value != Truth::True {
             stale.min(self.since.saturating_add(rule.held))
         } else {

@@ -51,12 +51,12 @@ pub(super) fn heard(recording: &Recording) -> Vec<Vec<Heard>> {
     let streams = recording.streams.iter().flatten().max().map_or(0, |&last| last as usize + 1);
     let mut messages = vec![Vec::new(); streams];
     let mut event = 0;
-    for (message, it) in recording.messages.iter().enumerate() {
-        if !it.joined {
+    for (message, recorded) in recording.messages.iter().enumerate() {
+        if !recorded.joined {
             event = message;
         }
-        if let Some(messages) = messages.get_mut(it.stream as usize) {
-            messages.push((message, event, it.at));
+        if let Some(messages) = messages.get_mut(recorded.stream as usize) {
+            messages.push((message, event, recorded.at));
         }
     }
     let of_evidence = recording.streams.iter().map(|streams| {

@@ -351,7 +351,7 @@ fn without_witnesses(monitors: &[Monitor], report: &Report) -> Vec<Finding> {
                 (X, Value::Number(x)) => sample.x = *x,
                 (Y, Value::Number(y)) => sample.y = *y,
                 (FLAG, Value::Flag(flag)) => sample.flag = *flag,
-                (3, Value::Text(text)) => sample.text = TEXTS.into_iter().find(|it| it == text).unwrap_or("c"),
+                (3, Value::Text(text)) => sample.text = TEXTS.into_iter().find(|known| known == text).unwrap_or("c"),
                 other => panic!("{other:?}"),
             }
         }

@@ -26,12 +26,12 @@ fn course(network: &Arc<Network>, messages: &[Message]) -> Course {
 }
 
 fn state(course: &Course, monitor: MonitorId, at: i64) -> State {
-    let mut decided = course.decisions.iter().filter(|it| it.monitor == monitor && it.at <= T(at));
+    let mut decided = course.decisions.iter().filter(|decision| decision.monitor == monitor && decision.at <= T(at));
     decided.next_back().map_or(State::Safe, |decision| decision.state)
 }
 
 fn truth(course: &Course, evidence: EvidenceId, at: SimTime) -> Truth {
-    let mut changes = course.evidence.iter().filter(|it| it.evidence == evidence && it.at <= at);
+    let mut changes = course.evidence.iter().filter(|change| change.evidence == evidence && change.at <= at);
     changes.next_back().map_or(Truth::Unknown, |change| change.truth)
 }
 
@@ -70,24 +70,24 @@ proptest! {
             let found = disagreements(&network, monitor, &a, &b);
             for at in 0..END {
                 let states = (state(&a, monitor, at), state(&b, monitor, at));
-                let covering = found.iter().filter(|it: &&Disagreement| it.from <= T(at) && T(at) < it.to);
-                let covered: Vec<_> = covering.map(|it| (it.first, it.second)).collect();
+                let covering = found.iter().filter(|disagreement: &&Disagreement| disagreement.from <= T(at) && T(at) < disagreement.to);
+                let covered: Vec<_> = covering.map(|disagreement| (disagreement.first, disagreement.second)).collect();
                 prop_assert_eq!(covered, if states.0 == states.1 { vec![] } else { vec![states] });
             }
-            for it in &found {
-                let set: Vec<EvidenceId> = it.because.iter().map(|deviation| deviation.evidence).collect();
-                prop_assert_eq!(with(&network, monitor, it.from, [&a, &b], &set), it.first);
+            for disagreement in &found {
+                let set: Vec<EvidenceId> = disagreement.because.iter().map(|deviation| deviation.evidence).collect();
+                prop_assert_eq!(with(&network, monitor, disagreement.from, [&a, &b], &set), disagreement.first);
                 for at in 0..set.len() {
                     let mut less = set.clone();
                     less.remove(at);
-                    prop_assert_ne!(with(&network, monitor, it.from, [&a, &b], &less), it.first);
+                    prop_assert_ne!(with(&network, monitor, disagreement.from, [&a, &b], &less), disagreement.first);
                 }
-                for Deviation { evidence, first, second, leads, follows } in &it.because {
-                    prop_assert_eq!(first.truth, truth(&a, *evidence, it.from));
-                    prop_assert_eq!(second.truth, truth(&b, *evidence, it.from));
+                for Deviation { evidence, first, second, leads, follows } in &disagreement.because {
+                    prop_assert_eq!(first.truth, truth(&a, *evidence, disagreement.from));
+                    prop_assert_eq!(second.truth, truth(&b, *evidence, disagreement.from));
                     let (led, other) = if *leads == Leads::First { (first, &b) } else { (second, &a) };
                     let next = other.evidence.iter().position(|change| {
-                        change.evidence == *evidence && change.at > it.from && change.truth == led.truth
+                        change.evidence == *evidence && change.at > disagreement.from && change.truth == led.truth
                     });
                     prop_assert_eq!(next, *follows);
                 }

@@ -15,7 +15,11 @@ const T: fn(i64) -> SimTime = SimTime::from_nanos;
 pub(crate) fn heard(network: &Network, message: &Message) -> Vec<Reading> {
     let heard = message.heard.iter();
     heard
-        .map(|it| Reading { evidence: network.evidence(it.monitor, it.at), truth: it.truth, oldest: T(it.oldest) })
+        .map(|heard| Reading {
+            evidence: network.evidence(heard.monitor, heard.at),
+            truth: heard.truth,
+            oldest: T(heard.oldest),
+        })
         .collect()
 }
 

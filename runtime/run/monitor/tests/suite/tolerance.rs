@@ -61,8 +61,8 @@ fn delayed(
                 for (evidence, streams) in (0..).map(EvidenceId).zip(&recording.streams) {
                     let latest: Option<Vec<_>> = streams.iter().map(|&stream| latest[stream as usize]).collect();
                     let Some(latest) = latest.filter(|_| streams.contains(&stream)) else { continue };
-                    let oldest = T(latest.iter().map(|it| it.1).min().unwrap());
-                    let latest: Vec<usize> = latest.iter().map(|it| it.0).collect();
+                    let oldest = T(latest.iter().map(|read| read.1).min().unwrap());
+                    let latest: Vec<usize> = latest.iter().map(|read| read.0).collect();
                     let reading = Reading { evidence, truth: truth(values, evidence, message, &latest), oldest };
                     if streams.len() > 1 {
                         settled.insert(evidence, reading);
