@@ -58,7 +58,7 @@ impl WireTable {
         let wiring = &plan.simulator.wiring;
         let mut links = Vec::new();
         for of in table.iter() {
-            let distinguished = wiring.get(table.topic(of).index()).into_iter().flat_map(|it| &it.subscribers);
+            let distinguished = wiring.get(table.topic(of).index()).into_iter().flat_map(|wiring| &wiring.subscribers);
             for &to in distinguished {
                 let wire = Wire(u32::try_from(table.len() + links.len()).unwrap_or(u32::MAX));
                 let path = format!("{}/to/{}", table.path(of), plan.node(to).name);

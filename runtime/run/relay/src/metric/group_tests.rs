@@ -231,7 +231,7 @@ fn looked_at(source: MetricSource, steps: bool, sent: &[Sent], moments: &[i64]) 
     metrics.begin();
     let messages = sent.iter().map(|message| (message.0 * 1_000_000, Some(message)));
     let mut all: Vec<(i64, Option<&Sent>)> = moments.iter().map(|&moment| (moment, None)).chain(messages).collect();
-    all.sort_by_key(|it| it.0);
+    all.sort_by_key(|timed| timed.0);
     for (time, message) in all {
         let now = SimTime::from_nanos(time);
         metrics.advance_to(now);

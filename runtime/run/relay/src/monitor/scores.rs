@@ -107,7 +107,7 @@ impl<'p> Scores<'p> {
             Judged { monitor, requirement, scorer: Scorer::new(guarantees(plan, monitor), None), late }
         });
         let judged: Vec<Judged> = judged.collect();
-        let mut requirements: Vec<RequirementId> = judged.iter().map(|it| it.requirement).collect();
+        let mut requirements: Vec<RequirementId> = judged.iter().map(|judged| judged.requirement).collect();
         requirements.sort_unstable();
         requirements.dedup();
         let watched = requirements.into_iter().filter(|&requirement| !is_late(requirement)).map(|requirement| {
@@ -121,22 +121,22 @@ impl<'p> Scores<'p> {
 
     /// A monitor decided.
     pub(super) fn decided(&mut self, decision: &Decision) {
-        for it in self.metrics.iter_mut().filter(|it| it.monitor == decision.monitor) {
-            it.scorer.decide(decision.at, decision.state);
-            it.state = decision.state;
-            if let Some(late) = &mut it.late {
+        for scored in self.metrics.iter_mut().filter(|scored| scored.monitor == decision.monitor) {
+            scored.scorer.decide(decision.at, decision.state);
+            scored.state = decision.state;
+            if let Some(late) = &mut scored.late {
                 late.push(Step { at: decision.at, state: decision.state });
             }
-            if let Score::FalseAlarms { within: Some(within), .. } = it.score
+            if let Score::FalseAlarms { within: Some(within), .. } = scored.score
                 && decision.mitigate
             {
                 self.deadlines.push(decision.at + SimTime::from_seconds(within) + SimTime::from_nanos(1));
             }
         }
-        for it in self.judged.iter_mut().filter(|it| it.monitor == decision.monitor) {
-            match &mut it.late {
+        for judged in self.judged.iter_mut().filter(|judged| judged.monitor == decision.monitor) {
+            match &mut judged.late {
                 Some(late) => late.push(Step { at: decision.at, state: decision.state }),
-                None => it.scorer.decide(decision.at, decision.state),
+                None => judged.scorer.decide(decision.at, decision.state),
             }
         }
         self.changed = true;
@@ -160,21 +160,21 @@ impl<'p> Scores<'p> {
     }
 
     fn set(&mut self, now: SimTime, run: &Run, metrics: &mut Metrics<'_>, at: impl Fn(&Scorer, SimTime) -> Scored) {
-        for it in &self.metrics {
-            let shown = match it.score {
-                Score::Holds { part } => holds(part, it.monitor, run),
-                Score::Integrity => Shown::Value(f64::from(integrity(self.plan.monitor(it.monitor), it.state))),
-                _ => value(it.score, &at(&it.scorer, now)).map_or(Shown::Nothing, Shown::Value),
+        for scored in &self.metrics {
+            let shown = match scored.score {
+                Score::Holds { part } => holds(part, scored.monitor, run),
+                Score::Integrity => Shown::Value(f64::from(integrity(self.plan.monitor(scored.monitor), scored.state))),
+                _ => value(scored.score, &at(&scored.scorer, now)).map_or(Shown::Nothing, Shown::Value),
             };
-            metrics.score(it.metric, now, shown);
+            metrics.score(scored.metric, now, shown);
         }
     }
 
     /// Time has passed: sets what grows with it, and shows what has become due.
     pub(super) fn tick(&mut self, now: SimTime, metrics: &mut Metrics<'_>) {
-        for it in self.metrics.iter().filter(|it| it.grows() && !self.ended) {
-            if let Some(value) = value(it.score, &it.scorer.so_far(now)) {
-                metrics.score(it.metric, now, Shown::Growing(value));
+        for scored in self.metrics.iter().filter(|scored| scored.grows() && !self.ended) {
+            if let Some(value) = value(scored.score, &scored.scorer.so_far(now)) {
+                metrics.score(scored.metric, now, Shown::Growing(value));
             }
         }
         if self.deadlines.iter().any(|&due| due <= now) {
@@ -185,7 +185,7 @@ impl<'p> Scores<'p> {
 
     /// Whether a metric is the time in a state in which its monitor is now.
     pub(super) fn grows(&self, metric: MetricId) -> bool {
-        self.metrics.iter().any(|it| it.metric == metric && it.grows())
+        self.metrics.iter().any(|scored| scored.metric == metric && scored.grows())
     }
 
     /// Whether a requirement is violated at this moment and was not before.
@@ -215,11 +215,13 @@ impl<'p> Scores<'p> {
             if is_violated(watched) {
                 watched.found = true;
                 let RequirementId(number) = watched.requirement;
-                for it in self.metrics.iter_mut().filter(|it| it.score.requirement() == Some(watched.requirement)) {
-                    it.scorer.hazard(now, number);
+                for scored in
+                    self.metrics.iter_mut().filter(|scored| scored.score.requirement() == Some(watched.requirement))
+                {
+                    scored.scorer.hazard(now, number);
                 }
-                for it in self.judged.iter_mut().filter(|it| it.requirement == watched.requirement) {
-                    it.scorer.hazard(now, number);
+                for judged in self.judged.iter_mut().filter(|judged| judged.requirement == watched.requirement) {
+                    judged.scorer.hazard(now, number);
                 }
                 self.changed = true;
             }
@@ -288,30 +290,30 @@ impl<'p> Scores<'p> {
 
     /// The scores of hazards of which nobody can tell whether there were any.
     fn undecided(&self, metrics: &[MetricObservation], outcome: &Outcome) -> Vec<MetricId> {
-        let scores = self.metrics.iter().filter(|it| {
-            it.score.requirement().is_some_and(|requirement| {
+        let scores = self.metrics.iter().filter(|scored| {
+            scored.score.requirement().is_some_and(|requirement| {
                 let declared = self.plan.requirement(requirement);
                 let observed = &metrics[declared.metric.index()];
                 verdict(declared.bound, outcome, MetricValue::from(observed)) == Verdict::Inconclusive
             })
         });
-        scores.map(|it| it.metric).collect()
+        scores.map(|scored| scored.metric).collect()
     }
 
     /// Per monitor the hazards that it was to foresee, in the order of time.
     fn hazards(&self, end: SimTime, metrics: &[MetricObservation], outcome: &Outcome) -> Vec<Vec<MonitorHazard>> {
         let mut found = vec![Vec::new(); self.plan.monitors.len()];
-        for it in &self.judged {
-            let scored = match &it.late {
-                None => it.scorer.end(end),
+        for judged in &self.judged {
+            let scored = match &judged.late {
+                None => judged.scorer.end(end),
                 Some(steps) => {
-                    let hazard = hazard_at(self.plan, it.requirement, outcome, metrics, end);
-                    let hazards: Vec<_> = hazard.map(|at| (it.requirement.0, at)).into_iter().collect();
-                    score(guarantees(self.plan, it.monitor), None, steps, &hazards, end)
+                    let hazard = hazard_at(self.plan, judged.requirement, outcome, metrics, end);
+                    let hazards: Vec<_> = hazard.map(|at| (judged.requirement.0, at)).into_iter().collect();
+                    score(guarantees(self.plan, judged.monitor), None, steps, &hazards, end)
                 }
             };
-            found[it.monitor.index()].extend(scored.hazards.iter().map(|hazard| MonitorHazard {
-                requirement: it.requirement,
+            found[judged.monitor.index()].extend(scored.hazards.iter().map(|hazard| MonitorHazard {
+                requirement: judged.requirement,
                 time: hazard.at.seconds(),
                 lead: hazard.lead.map(SimTime::seconds),
             }));

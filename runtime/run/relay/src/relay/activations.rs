@@ -217,8 +217,8 @@ fn plainly(plan: &CampaignPlan, test: &[TestOperation], events: &[Event]) -> Vec
                 .sum();
             values.insert(MetricId(0), nanos(active));
             let true_now = |condition: &Condition| holds(condition, &|metric| values.get(&metric).copied());
-            for (it, used) in plain.iter_mut().zip(test) {
-                let Some(since) = it.on else { continue };
+            for (operation, used) in plain.iter_mut().zip(test) {
+                let Some(since) = operation.on else { continue };
                 let within = in_nanos(&[plan.operation(used.operation).within])[0];
                 let over = t >= within.1
                     || match &used.activation {
@@ -226,10 +226,10 @@ fn plainly(plan: &CampaignPlan, test: &[TestOperation], events: &[Event]) -> Vec
                         Activation::ConditionFor { length, .. } => t >= since + SimTime::from_seconds(*length).nanos(),
                         other => panic!("{other:?} is not by condition"),
                     };
-                if over && it.switched != Some(t) {
-                    it.intervals.push((since, t));
-                    (it.on, it.switched) = (None, Some(t));
-                    it.history.drain(..it.history.len() - 1);
+                if over && operation.switched != Some(t) {
+                    operation.intervals.push((since, t));
+                    (operation.on, operation.switched) = (None, Some(t));
+                    operation.history.drain(..operation.history.len() - 1);
                 }
             }
             for at in 0..test.len() {
@@ -246,13 +246,14 @@ fn plainly(plan: &CampaignPlan, test: &[TestOperation], events: &[Event]) -> Vec
                     && (0..test.len()).any(|other| {
                         other != at && test[other].operation == test[at].operation && plain[other].on.is_some()
                     });
-                let it = &mut plain[at];
-                it.history.push(begins);
-                let stretch = it.history.iter().rev().take_while(|begins| **begins).count();
-                let became = stretch > 0 && stretch < it.history.len();
-                let left = u32::try_from(it.intervals.len()).unwrap() < times;
-                if became && it.on.is_none() && it.switched != Some(t) && left && t < within.1 && !blocked {
-                    (it.on, it.switched) = (Some(t), Some(t));
+                let operation = &mut plain[at];
+                operation.history.push(begins);
+                let stretch = operation.history.iter().rev().take_while(|begins| **begins).count();
+                let became = stretch > 0 && stretch < operation.history.len();
+                let left = u32::try_from(operation.intervals.len()).unwrap() < times;
+                if became && operation.on.is_none() && operation.switched != Some(t) && left && t < within.1 && !blocked
+                {
+                    (operation.on, operation.switched) = (Some(t), Some(t));
                 }
             }
         }

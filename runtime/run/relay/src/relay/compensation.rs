@@ -166,7 +166,7 @@ mod tests {
             if tick < 10 {
                 relay.message(now, wires.find("arm/command").unwrap(), Value::Real(1.0), &mut out);
             }
-            let number = |it: Delivery| (tick, it.value.number_at::<&str>(&[]).unwrap());
+            let number = |delivery: Delivery| (tick, delivery.value.number_at::<&str>(&[]).unwrap());
             delivered.extend(out.into_iter().map(number));
         }
         let finished = relay.finish(SimTime::from_seconds(10.0));

@@ -114,7 +114,7 @@ impl Ran {
             MonitorState::Otherwise => None,
         };
         let decisions = &self.finished.monitors[monitor].decisions;
-        decisions.iter().map(|it| (SimTime::from_seconds(it.time).nanos(), state(it.state))).collect()
+        decisions.iter().map(|decision| (SimTime::from_seconds(decision.time).nanos(), state(decision.state))).collect()
     }
 }
 
@@ -162,7 +162,8 @@ fn a_monitor_publishes_its_state_at_time_zero_and_at_each_change() {
     assert_eq!(ran.states("state"), [(0, 0.0), (0, 2.0), (20, 0.0), (40, 2.0)]);
     assert_eq!(ran.decisions(0), [(0, None), (0, Some(0)), (20, None), (40, Some(0))]);
     let of = |index| ChangeCause::Message { topic: "a".to_owned(), index };
-    let changes: Vec<_> = ran.finished.monitors[0].evidence.iter().map(|it| (it.holds, it.cause.clone())).collect();
+    let changes: Vec<_> =
+        ran.finished.monitors[0].evidence.iter().map(|change| (change.holds, change.cause.clone())).collect();
     assert_eq!(changes, [(Some(true), of(0)), (Some(false), of(2)), (Some(true), of(4))]);
     assert_eq!(ran.finished.messages, 5 + 4 + 1, "with the states and one mitigation");
 }
@@ -178,7 +179,7 @@ fn timers_are_exact_between_two_steps_and_come_before_messages_of_the_same_insta
     let expected = [(0, None), (400 * ms, Some(0)), (400 * ms, None), (1400 * ms, Some(0)), (1700 * ms + 1, None)];
     assert_eq!(ran.decisions(0), expected);
     assert_eq!(ran.states("state")[1..], [(400 * ms, 2.0), (400 * ms, 0.0), (1400 * ms, 2.0), (1700 * ms + 1, 0.0)]);
-    let causes: Vec<_> = ran.finished.monitors[0].evidence.iter().map(|it| it.cause.word()).collect();
+    let causes: Vec<_> = ran.finished.monitors[0].evidence.iter().map(|change| change.cause.word()).collect();
     assert_eq!(causes, ["message", "held", "message", "held", "stale"]);
 }
 
@@ -214,7 +215,8 @@ fn evidence_over_several_topics_sees_no_state_that_never_was() {
     assert_eq!(ran.states("state"), [(0, 0.0), (10, 2.0), (20, 0.0), (30, 2.0)]);
     assert_eq!(ran.delivered("drive"), [(20, drive(0.0, 0))]);
     let of = |index| ChangeCause::Message { topic: "b".to_owned(), index };
-    let changes: Vec<_> = ran.finished.monitors[0].evidence.iter().map(|it| (it.holds, it.cause.clone())).collect();
+    let changes: Vec<_> =
+        ran.finished.monitors[0].evidence.iter().map(|change| (change.holds, change.cause.clone())).collect();
     assert_eq!(changes, [(Some(true), of(0)), (Some(false), of(1)), (Some(true), of(2))]);
 }
 
@@ -355,7 +357,7 @@ fn monitors_that_cause_each_others_messages_without_end_are_stopped() {
 /// The scores of a monitor beside the gap, in this order.
 fn scored(evidence: Evidence, scores: &[Score]) -> CampaignPlan {
     let mut plan = watched(vec![cell(evidence)]);
-    plan.metrics.extend(scores.iter().map(|&it| score(it.name(), 0, it)));
+    plan.metrics.extend(scores.iter().map(|&scored| score(scored.name(), 0, scored)));
     plan
 }
 
@@ -396,7 +398,11 @@ fn scores_are_metrics_during_the_run_and_at_its_end() {
 /// The hazards that are recorded: monitor, requirement, time, lead.
 fn hazards(ran: &Ran) -> Vec<(usize, u32, f64, Option<f64>)> {
     let monitors = ran.finished.monitors.iter().enumerate();
-    monitors.flat_map(|(at, it)| it.hazards.iter().map(move |it| (at, it.requirement.0, it.time, it.lead))).collect()
+    monitors
+        .flat_map(|(at, monitor)| {
+            monitor.hazards.iter().map(move |hazard| (at, hazard.requirement.0, hazard.time, hazard.lead))
+        })
+        .collect()
 }
 
 #[test]

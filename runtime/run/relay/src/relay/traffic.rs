@@ -59,7 +59,7 @@ impl Recorder {
             })
         });
         let unreached: Vec<Reached> = unreached.collect();
-        let waits = |wire: Wire| unreached.iter().any(|it| it.topic == wires.topic(wire));
+        let waits = |wire: Wire| unreached.iter().any(|reached| reached.topic == wires.topic(wire));
         Recorder { wires: wires.iter().map(|_| None).collect(), awaited: wires.iter().map(waits).collect(), unreached }
     }
 
@@ -73,8 +73,8 @@ impl Recorder {
     #[inline(never)]
     pub(super) fn meets(&mut self, now: SimTime, wires: &WireTable, wire: Wire, publisher: Option<NodeId>) {
         let topic = wires.topic(wire);
-        self.unreached.retain_mut(|it| it.topic != topic || !it.is_met(now, publisher));
-        self.awaited[wire.index()] = self.unreached.iter().any(|it| it.topic == topic);
+        self.unreached.retain_mut(|reached| reached.topic != topic || !reached.is_met(now, publisher));
+        self.awaited[wire.index()] = self.unreached.iter().any(|reached| reached.topic == topic);
     }
 
     /// The system said something. What monitors of the runner publish is no sign of life.
@@ -102,8 +102,11 @@ impl Recorder {
 
     /// The operations of the campaign that would have met no message.
     pub(super) fn unreached(&self) -> Vec<Unreached> {
-        let nearest = |it: &Reached| it.nearest.map(|(_, time)| time.seconds());
-        self.unreached.iter().map(|it| Unreached { operation: it.operation, nearest: nearest(it) }).collect()
+        let nearest = |reached: &Reached| reached.nearest.map(|(_, time)| time.seconds());
+        self.unreached
+            .iter()
+            .map(|reached| Unreached { operation: reached.operation, nearest: nearest(reached) })
+            .collect()
     }
 }
 

@@ -13,7 +13,7 @@ pub(super) fn scored_bounds(plan: &CampaignPlan) -> Vec<Bound> {
         _ => None,
     };
     let scored = plan.metrics.iter().filter_map(|metric| of_metric(&metric.source));
-    let on_it = scored.filter(|it| matches!(plan.metric(it.metric).source, MetricSource::FuzzingTime));
+    let on_it = scored.filter(|objective| matches!(plan.metric(objective.metric).source, MetricSource::FuzzingTime));
     on_it.map(|requirement| requirement.bound).collect()
 }
 

@@ -271,7 +271,8 @@ mod tests {
         let mut transport = in_process::<Robot>().transport(&plan);
         let run = || evaluate(&plan, &wires, &metrics, &mut *transport, &test_of(vec![]), 1, &mut Custom::none());
         let observed = std::iter::repeat_with(run).take(2).collect::<Result<Vec<_>, _>>().unwrap();
-        let decisions: Vec<_> = observed[0].monitors[0].decisions.iter().map(|it| (it.time, it.state)).collect();
+        let decisions: Vec<_> =
+            observed[0].monitors[0].decisions.iter().map(|decision| (decision.time, decision.state)).collect();
         let moves = MonitorState::Guarantee(0);
         assert_eq!(decisions, [(0.0, MonitorState::Otherwise), (0.1, moves), (0.5, MonitorState::Otherwise)]);
         assert_eq!(observed[0].metrics[0].value, Some(5.0), "it stops in the step after it is told to");

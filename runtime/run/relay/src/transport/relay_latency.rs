@@ -50,10 +50,10 @@ impl Added {
 
 /// Takes what was measured together with what was measured before, each wire once.
 pub fn join(all: &mut Vec<AddedOnWire>, new: Vec<AddedOnWire>) {
-    for it in new {
-        match all.iter_mut().find(|known| known.path == it.path) {
-            Some(known) => known.latencies.add(&it.latencies),
-            None => all.push(it),
+    for added in new {
+        match all.iter_mut().find(|known| known.path == added.path) {
+            Some(known) => known.latencies.add(&added.latencies),
+            None => all.push(added),
         }
     }
 }
@@ -61,7 +61,7 @@ pub fn join(all: &mut Vec<AddedOnWire>, new: Vec<AddedOnWire>) {
 /// Where a budget was exceeded over all wires together, each in a sentence; nothing below a hundred messages.
 pub fn objections<'a>(budget: RelayBudget, added: impl IntoIterator<Item = &'a AddedOnWire>) -> Vec<String> {
     let mut all = Latencies::default();
-    added.into_iter().for_each(|it| all.add(&it.latencies));
+    added.into_iter().for_each(|path| all.add(&path.latencies));
     let (Some(half), Some(most)) = (all.percentile(50), all.percentile(99)) else { return Vec::new() };
     if all.messages() < FEWEST {
         return Vec::new();
@@ -139,8 +139,10 @@ mod tests {
             measured.record(wire, Duration::from_millis(milliseconds));
         }
         let taken = measured.take(&wires);
-        let seen: Vec<(&str, u64, Option<f64>)> =
-            taken.iter().map(|it| (it.path.as_str(), it.latencies.messages(), it.latencies.longest())).collect();
+        let seen: Vec<(&str, u64, Option<f64>)> = taken
+            .iter()
+            .map(|added| (added.path.as_str(), added.latencies.messages(), added.latencies.longest()))
+            .collect();
         assert_eq!(seen, [(wires.path(first), 1, Some(0.001)), (wires.path(second), 2, Some(0.03))]);
     }
 

@@ -40,7 +40,7 @@ impl Promises {
             answers: all.map(|wire| answers_to(plan, wires, wire)).collect(),
             answered: topics().map(|topic| answers().any(|answer| answer.to == topic)).collect(),
             counted: topics()
-                .map(|topic| published().any(|it| it == topic) || answers().any(|answer| answer.with == topic))
+                .map(|topic| published().any(|other| other == topic) || answers().any(|answer| answer.with == topic))
                 .collect(),
         }
     }

@@ -38,7 +38,7 @@ proptest! {
     ) {
         let named = evidence.into_iter().enumerate();
         let evidence: Vec<Evidence> =
-            named.map(|(at, it)| Evidence { name: format!("e{at}"), ..it }).collect();
+            named.map(|(at, evidence)| Evidence { name: format!("e{at}"), ..evidence }).collect();
         let gate = |(one, other, all): (u32, u32, bool)| {
             let parts = vec![Gate::Evidence(one), Gate::Evidence(other)];
             if all { Gate::All(parts) } else { Gate::Any(parts) }
@@ -103,8 +103,9 @@ fn fed(plan: &CampaignPlan, ran: &Ran, end: i64) -> [Vec<(i64, Option<u32>)>; 2]
                     else {
                         panic!("evidence is a comparison")
                     };
-                    let holds = last[evidence.inputs[0].field.topic.index()].is_some_and(|it| by.holds(it.0, *limit));
-                    let oldest = SimTime::from_nanos(read.iter().map(|it| it.1).min().unwrap());
+                    let holds =
+                        last[evidence.inputs[0].field.topic.index()].is_some_and(|message| by.holds(message.0, *limit));
+                    let oldest = SimTime::from_nanos(read.iter().map(|message| message.1).min().unwrap());
                     let reading = Reading { evidence: id, truth: Truth::from(holds), oldest };
                     if read.len() > 1 {
                         settled.insert(id, reading);
@@ -122,12 +123,12 @@ fn fed(plan: &CampaignPlan, ran: &Ran, end: i64) -> [Vec<(i64, Option<u32>)>; 2]
     }
     run.advance(SimTime::from_nanos(end), &mut changes);
     let of = |monitor: u32| {
-        let own = changes.decisions.iter().filter(|it| it.monitor == sesame_plan::MonitorId(monitor));
+        let own = changes.decisions.iter().filter(|decision| decision.monitor == sesame_plan::MonitorId(monitor));
         let state = |state| match state {
             State::Guarantee(at) => Some(at),
             State::Safe => None,
         };
-        own.map(|it| (it.at.nanos(), state(it.state))).collect()
+        own.map(|decision| (decision.at.nanos(), state(decision.state))).collect()
     };
     [of(0), of(1)]
 }

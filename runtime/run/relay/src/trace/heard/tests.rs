@@ -53,7 +53,9 @@ impl Transport for Script {
         let at = self.messages.get(self.next).map(|message| SimTime::from_nanos(message.0 * MS));
         self.now = at.map_or(until, |at| at.min(until));
         relay.advance(self.now, &mut Vec::new());
-        while let Some(&(at, path, value)) = self.messages.get(self.next).filter(|it| it.0 * MS <= self.now.nanos()) {
+        while let Some(&(at, path, value)) =
+            self.messages.get(self.next).filter(|message| message.0 * MS <= self.now.nanos())
+        {
             assert_eq!(at * MS, self.now.nanos());
             self.next += 1;
             let wire = relay.wires().find(path).unwrap();
@@ -131,7 +133,7 @@ fn decided(heard: &RecordedMonitors<'_>) -> Decisions {
         State::Guarantee(at) => Some(at),
         State::Safe => None,
     };
-    heard.decide().course.decisions.iter().map(|it| (it.at.nanos(), state(it.state))).collect()
+    heard.decide().course.decisions.iter().map(|decision| (decision.at.nanos(), state(decision.state))).collect()
 }
 
 fn of_run(observed: &MonitorObservation) -> Decisions {
@@ -139,7 +141,11 @@ fn of_run(observed: &MonitorObservation) -> Decisions {
         MonitorState::Guarantee(at) => Some(at),
         MonitorState::Otherwise => None,
     };
-    observed.decisions.iter().map(|it| (SimTime::from_seconds(it.time).nanos(), state(it.state))).collect()
+    observed
+        .decisions
+        .iter()
+        .map(|decision| (SimTime::from_seconds(decision.time).nanos(), state(decision.state)))
+        .collect()
 }
 
 /// The decisions on a copy of a recording in which what is on a topic comes so much later: fed to the monitors of the
@@ -237,7 +243,7 @@ fn fifty_milliseconds_are_found_with_the_evidence_that_is_late_and_what_could_ha
     assert_eq!(compared.shifts, [ms(0), ms(50)]);
 
     let found = disagreements(&network, cell, &a.course, &b.course);
-    let at: Vec<_> = found.iter().map(|it| (it.from, it.to)).collect();
+    let at: Vec<_> = found.iter().map(|disagreement| (disagreement.from, disagreement.to)).collect();
     assert_eq!(at, [(ms(1060), ms(1080)), (ms(1080), ms(1100)), (ms(1100), ms(1110)), (ms(1400), ms(1450))]);
     let [lit] = found[1].because[..] else { panic!("{found:?}") };
     assert_eq!((lit.evidence, lit.late(&a.course, &b.course)), (network.evidence(cell, 1), Some(ms(50))));

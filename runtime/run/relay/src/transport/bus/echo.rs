@@ -35,7 +35,7 @@ impl Echoes {
 
     /// What was published last on this sink had come to the runner at this moment.
     pub fn came(&mut self, line: usize, sink: usize, arrived: Instant) {
-        if let Some(last) = self.awaited.iter_mut().rev().find(|it| (it.line, it.sink) == (line, sink)) {
+        if let Some(last) = self.awaited.iter_mut().rev().find(|last| (last.line, last.sink) == (line, sink)) {
             last.arrived = Some(arrived);
         }
     }
@@ -43,13 +43,13 @@ impl Echoes {
     /// A message was heard on a sink: how long ago it had come to the runner, if it is one of the runner's that no
     /// operation delayed. Those published on this sink before it were lost, since servers keep their order.
     pub fn heard(&mut self, line: usize, sink: usize, content: u64, at: Instant) -> Option<Duration> {
-        let of_sink = |it: &Published| (it.line, it.sink) == (line, sink);
-        let found = self.awaited.iter().position(|it| of_sink(it) && it.content == content)?;
+        let of_sink = |published: &Published| (published.line, published.sink) == (line, sink);
+        let found = self.awaited.iter().position(|published| of_sink(published) && published.content == content)?;
         let arrived = self.awaited[found].arrived;
         let mut position = 0;
-        self.awaited.retain(|it| {
+        self.awaited.retain(|published| {
             position += 1;
-            !of_sink(it) || position > found + 1
+            !of_sink(published) || position > found + 1
         });
         arrived.map(|arrived| at.saturating_duration_since(arrived))
     }

@@ -236,7 +236,8 @@ impl System {
     }
 
     fn addresses(&self) -> String {
-        let addresses: Vec<String> = self.settings.addresses.iter().map(|it| self.launched.fill(it)).collect();
+        let addresses: Vec<String> =
+            self.settings.addresses.iter().map(|address| self.launched.fill(address)).collect();
         format!("`{}`", addresses.join("`, `"))
     }
 
@@ -405,7 +406,7 @@ impl System {
         let mut added = self.added.take(&self.wires);
         let returned = self.returned.take(&self.wires);
         for kept in &mut added {
-            if let Some(whole) = returned.iter().find(|it| it.path == kept.path) {
+            if let Some(whole) = returned.iter().find(|whole| whole.path == kept.path) {
                 kept.latencies.clone_from(&whole.latencies);
             } else if self.bus.hears_itself() && self.is_topic(&kept.path) && kept.latencies.messages() >= FEWEST {
                 self.note(format!(

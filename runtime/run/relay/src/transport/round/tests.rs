@@ -89,13 +89,13 @@ fn naive(plan: &CampaignPlan, links: &[Vec<NodeId>], events: &[Event], (topic, m
         for (at, node) in (0u32..).map(NodeId).zip(&plan.nodes) {
             match event {
                 Event::Begins => {
-                    owed += node.every_step.iter().map(|it| u32::from(it.index() == topic)).sum::<u32>();
+                    owed += node.every_step.iter().map(|expected| u32::from(expected.index() == topic)).sum::<u32>();
                 }
                 Event::Delivered(to, only) if only == Some(at) || only.is_none() && !links[to.0].contains(&at) => {
                     let sizes = [topic, to.0].map(|topic| plan.topics[topic].paths.len());
                     let is_its = sizes[0] != sizes[1] || member == to.1;
-                    let answer = |it: &Answer| it.to.index() == to.0 && it.with.index() == topic && is_its;
-                    owed += node.answers.iter().map(|it| u32::from(answer(it))).sum::<u32>();
+                    let answer = |answer: &Answer| answer.to.index() == to.0 && answer.with.index() == topic && is_its;
+                    owed += node.answers.iter().map(|expected| u32::from(answer(expected))).sum::<u32>();
                 }
                 Event::Delivered(..) | Event::Comes(_) => {}
             }
@@ -122,7 +122,7 @@ proptest! {
             ..node("one")
         }).collect();
         let links: Vec<Vec<NodeId>> = told_apart[..sizes.len()].iter().map(|told_apart| {
-            (0u32..).map(NodeId).zip(told_apart).take(nodes.len()).filter(|(_, it)| **it).map(|(id, _)| id).collect()
+            (0u32..).map(NodeId).zip(told_apart).take(nodes.len()).filter(|(_, told)| **told).map(|(id, _)| id).collect()
         }).collect();
         let plan = plan(&sizes, nodes, &links);
         let wires = WireTable::new(&plan);

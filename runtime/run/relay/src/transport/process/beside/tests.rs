@@ -125,9 +125,9 @@ fn decided(beside_the_cell: bool, test: &Test) -> (Vec<String>, Vec<Json>) {
         let monitor = thread::spawn(move || {
             let mut said = Vec::new();
             let sides = Beside { from_runner, to_runner, from_simulator: from_cell, to_simulator: to_cell };
-            let mut tell = |run: u32, it: &Decided| {
+            let mut tell = |run: u32, decided: &Decided| {
                 assert_eq!(run, 1);
-                said.push(format!("{} {:?}", it.at.nanos(), it.state));
+                said.push(format!("{} {:?}", decided.at.nanos(), decided.state));
             };
             beside(&alone, sides, &mut tell).unwrap();
             said
@@ -148,7 +148,7 @@ fn a_monitor_beside_the_cell_decides_what_one_in_the_runner_decides_to_the_nanos
     let late = late();
     let disturbed = decided(false, &late);
     assert_ne!(undisturbed.0, disturbed.0);
-    let between_steps = |decisions: &[String]| decisions.iter().any(|it| !it.contains("00000000 "));
+    let between_steps = |decisions: &[String]| decisions.iter().any(|decision| !decision.contains("00000000 "));
     assert!(between_steps(&disturbed.0) && disturbed.0.len() > 20, "{:#?}", disturbed.0);
     assert!(disturbed.1.iter().any(|step| !step[1].as_array().unwrap().is_empty()), "mitigation is sent");
     assert_eq!(decided(true, &Test { operations: Vec::new() }), undisturbed);
