@@ -132,7 +132,7 @@ pub(crate) fn aggregate_margin(runs: &[Margin], by: Statistic) -> Margin {
     let values: Vec<Fitness> = runs.iter().map(value).collect();
     let value = aggregate(&values, by).objectives().map(|values| values[0]);
     // On the edge itself a bound decides, and so the runs that are there know.
-    let on_edge = |it: f64| it == 0.0 && runs.iter().any(|run| run.value == Some(0.0) && run.violated);
+    let on_edge = |value: f64| value == 0.0 && runs.iter().any(|run| run.value == Some(0.0) && run.violated);
     Margin { value, violated: value.is_some_and(|margin| margin < 0.0 || on_edge(margin)) }
 }
 

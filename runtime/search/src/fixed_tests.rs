@@ -65,8 +65,8 @@ impl FixedTests {
     /// Tests in a lab, each as often as the task says, round by round. A stand-in for the lab has another seed in each
     /// run.
     pub(crate) fn in_lab(task: &LabTask, seed: u64) -> Self {
-        let tests = (1..=task.repeats).flat_map(|_| &task.tests).zip(1u64..).map(|(it, run)| Candidate {
-            test: it.test.clone(),
+        let tests = (1..=task.repeats).flat_map(|_| &task.tests).zip(1u64..).map(|(known, run)| Candidate {
+            test: known.test.clone(),
             parents: Vec::new(),
             generation: 0,
             known: None,

@@ -128,7 +128,10 @@ mod tests {
                 let counts = [Dimension::O1, Dimension::O2, Dimension::O3].map(|dimension| apart(dimension) / most);
                 let [t1, t2, t3, p1, p2] =
                     [Dimension::T1, Dimension::T2, Dimension::T3, Dimension::P1, Dimension::P2].map(apart);
-                let far = [t1, t2, t3, p1, p2].iter().chain(&counts).fold(0.0, |sum, it| sum + it * it);
+                let far = [t1, t2, t3, p1, p2]
+                    .iter()
+                    .chain(&counts)
+                    .fold(0.0, |sum, coordinate| sum + coordinate * coordinate);
                 let far = libm::sqrt(far);
                 Some((far, other.number, other.fitness.objectives()?))
             })

@@ -61,7 +61,11 @@ pub fn coordinate(plan: &CampaignPlan, test: &Test, dimension: Dimension) -> Opt
         (dimension == Dimension::P1).then(|| {
             let always = |id| plan.operation(id).within;
             let operations = test.operations.iter();
-            operations.map(|it| disturbance(plan, it.operation, &it.parameters, vec![always(it.operation)])).collect()
+            operations
+                .map(|operation| {
+                    disturbance(plan, operation.operation, &operation.parameters, vec![always(operation.operation)])
+                })
+                .collect()
         })
     })?;
     Point::from_disturbances(&disturbances, Convention::Ours)?.get(dimension)
@@ -81,8 +85,10 @@ impl<'a> Family<'a> {
         let windows: Vec<(Span, Span)> = test
             .operations
             .iter()
-            .filter_map(|it| match it.activation {
-                Activation::Time { start, end } => Some((Span { start, end }, plan.operation(it.operation).within)),
+            .filter_map(|operation| match operation.activation {
+                Activation::Time { start, end } => {
+                    Some((Span { start, end }, plan.operation(operation.operation).within))
+                }
                 _ => None,
             })
             .collect();
@@ -139,8 +145,8 @@ impl<'a> Family<'a> {
 /// operation permits, and copies of an operation stay apart where they must not overlap.
 fn longest(plan: &CampaignPlan, test: &Test) -> f64 {
     let windows = || {
-        test.operations.iter().filter_map(|it| match it.activation {
-            Activation::Time { start, end } => Some((it.operation, Span { start, end })),
+        test.operations.iter().filter_map(|operation| match operation.activation {
+            Activation::Time { start, end } => Some((operation.operation, Span { start, end })),
             _ => None,
         })
     };
@@ -212,7 +218,7 @@ mod tests {
     fn windows(test: &Test) -> Vec<(f64, f64)> {
         test.operations
             .iter()
-            .map(|it| match it.activation {
+            .map(|operation| match operation.activation {
                 Activation::Time { start, end } => (start, end),
                 _ => panic!("the test is by time"),
             })
@@ -253,9 +259,9 @@ mod tests {
             let found = coordinate(&plan, &varied, dimension).unwrap();
             prop_assert!((found - wanted.clamp(low, high)).abs() < 1e-9, "{found} instead of {wanted}");
             plan.validate_test(&varied).unwrap();
-            let choices = |test: &Test| test.operations.iter().map(|it| it.parameters.clone()).collect::<Vec<_>>();
+            let choices = |test: &Test| test.operations.iter().map(|operation| operation.parameters.clone()).collect::<Vec<_>>();
             prop_assert_eq!(choices(&varied) == choices(&test), dimension != Dimension::P1 || varied == test);
-            let seeds = |test: &Test| test.operations.iter().map(|it| it.operation_seed).collect::<Vec<_>>();
+            let seeds = |test: &Test| test.operations.iter().map(|operation| operation.operation_seed).collect::<Vec<_>>();
             prop_assert_eq!(seeds(&varied), seeds(&test));
             let (before, after) = (windows(&test), windows(&varied));
             for (was, is) in before.iter().zip(&after) {

@@ -300,11 +300,11 @@ impl Sectors {
         let classed = self.has(&[Dimension::O1, Dimension::O2, Dimension::O3]);
         let mut kinds: Vec<KindOfOperation> = Vec::new();
         let mut operations: Vec<Vec<OperationId>> = Vec::new();
-        for it in test_space.operations() {
-            let operation = plan.operation(it.operation);
-            let Some(window) = Window::of(plan, it) else { continue };
+        for used in test_space.operations() {
+            let operation = plan.operation(used.operation);
+            let Some(window) = Window::of(plan, used) else { continue };
             let window = if self.one_interval_each { window } else { Window::anywhere(window.start, window.end) };
-            let parameters = operation.parameters.iter().zip(&it.parameters);
+            let parameters = operation.parameters.iter().zip(&used.parameters);
             let kind = KindOfOperation {
                 window: if timed { window } else { Window::anywhere(0.0, 1.0) },
                 parameters: parameters
@@ -314,10 +314,10 @@ impl Sectors {
                 class: if classed { operation.kind.class() } else { Class::Other },
             };
             if let Some(at) = kinds.iter().position(|other| *other == kind) {
-                operations[at].push(it.operation);
+                operations[at].push(used.operation);
             } else {
                 kinds.push(kind);
-                operations.push(vec![it.operation]);
+                operations.push(vec![used.operation]);
             }
         }
         (kinds, operations)
@@ -380,21 +380,22 @@ impl Sectors {
     fn timing(&self, windows: &[(Window, usize)], longest: f64) -> Reached {
         let count: usize = windows.iter().map(|(_, count)| count).sum();
         let n = count as f64;
-        let mean = |value: fn(&Window) -> f64| windows.iter().map(|(it, n)| value(it) * *n as f64).sum::<f64>() / n;
+        let mean =
+            |value: fn(&Window) -> f64| windows.iter().map(|(window, n)| value(window) * *n as f64).sum::<f64>() / n;
         let centre = mean(|window| f64::midpoint(window.start, window.end));
         let (width, shortest) = (mean(|window| window.end - window.start), mean(|window| window.shortest));
         let greatest = mean(Window::greatest_length);
         // With conditions, intervals can be anywhere in the windows, so the means can be those of any part of them.
         let reached_by_any = (
-            windows.iter().map(|(it, _)| it.start).fold(f64::INFINITY, f64::min),
-            windows.iter().map(|(it, _)| it.end).fold(f64::NEG_INFINITY, f64::max),
+            windows.iter().map(|(window, _)| window.start).fold(f64::INFINITY, f64::min),
+            windows.iter().map(|(window, _)| window.end).fold(f64::NEG_INFINITY, f64::max),
         );
         let members: Vec<(Member, usize)> = windows
             .iter()
-            .map(|(it, n)| {
-                let reach = (it.end - it.start - it.shortest) / 2.0;
-                let free = (it.end - it.start - it.longest).max(0.0) / 2.0;
-                (Member { centre: f64::midpoint(it.start, it.end), reach, free }, *n)
+            .map(|(window, n)| {
+                let reach = (window.end - window.start - window.shortest) / 2.0;
+                let free = (window.end - window.start - window.longest).max(0.0) / 2.0;
+                (Member { centre: f64::midpoint(window.start, window.end), reach, free }, *n)
             })
             .collect();
         let free: f64 = members.iter().map(|(member, n)| member.free * *n as f64).sum();

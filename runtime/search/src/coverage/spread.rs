@@ -40,22 +40,24 @@ const MOST_VERTICES: usize = 3_000;
 pub(super) fn midpoints(groups: &[(Member, usize)], budget: f64, low: f64, high: f64) -> Spread {
     let count: usize = groups.iter().map(|(_, count)| count).sum();
     let n = count as f64;
-    let meeting = groups
-        .iter()
-        .fold((low, high), |(low, high), (it, _)| (low.max(it.centre - it.reach), high.min(it.centre + it.reach)));
-    let distance = |t: f64| groups.iter().map(|(it, count)| *count as f64 * it.cost(t - it.centre)).sum::<f64>();
+    let meeting = groups.iter().fold((low, high), |(low, high), (member, _)| {
+        (low.max(member.centre - member.reach), high.min(member.centre + member.reach))
+    });
+    let distance =
+        |t: f64| groups.iter().map(|(member, count)| *count as f64 * member.cost(t - member.centre)).sum::<f64>();
     // The sum of costs is convex, and least where a distance begins to cost, or at an end of what is left.
-    let kinks = groups.iter().flat_map(|(it, _)| [it.centre - it.free, it.centre + it.free]);
+    let kinks = groups.iter().flat_map(|(member, _)| [member.centre - member.free, member.centre + member.free]);
     let places = kinks.map(|kink| kink.clamp(meeting.0, meeting.1.max(meeting.0)));
     let nearest = places.map(distance).fold(f64::INFINITY, f64::min);
     let meet = meeting.0 <= meeting.1 + 1e-12 && nearest <= budget + 1e-9;
     // A group of n in one of three places has (n + 1)(n + 2) / 2 ways, in one of four (n + 3) / 3 times as many.
-    let mut ways = groups.iter().map(|(it, n)| (n + 1) * (n + 2) / 2 * if it.free > 0.0 { n + 3 } else { 3 } / 3);
+    let mut ways =
+        groups.iter().map(|(member, n)| (n + 1) * (n + 2) / 2 * if member.free > 0.0 { n + 3 } else { 3 } / 3);
     let ways = ways.try_fold(1usize, usize::checked_mul);
     let pairs = groups.len() * groups.len() + groups.len() + 1;
     if ways.and_then(|ways| ways.checked_mul(pairs)).is_none_or(|all| all > MOST_VERTICES) {
-        let ends = groups.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (it, _)| {
-            (low.min(it.centre - it.reach), high.max(it.centre + it.reach))
+        let ends = groups.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (member, _)| {
+            (low.min(member.centre - member.reach), high.max(member.centre + member.reach))
         });
         return Spread { least: 0.0, greatest: (ends.1 - ends.0) / 2.0, exact: false };
     }
@@ -195,13 +197,13 @@ mod tests {
 
     /// Random climbing over midpoints that keep to the rules: what the greatest spread is at least.
     fn climbed(groups: &[(Member, usize)], budget: f64, low: f64, high: f64, seed: u64) -> f64 {
-        let members: Vec<Member> = groups.iter().flat_map(|&(it, count)| vec![it; count]).collect();
+        let members: Vec<Member> = groups.iter().flat_map(|&(member, count)| vec![member; count]).collect();
         let n = members.len() as f64;
         let spread = |x: &[f64]| {
-            let midpoints: Vec<f64> = members.iter().zip(x).map(|(it, x)| it.centre + x).collect();
+            let midpoints: Vec<f64> = members.iter().zip(x).map(|(member, x)| member.centre + x).collect();
             let mean = midpoints.iter().sum::<f64>() / n;
-            let kept = members.iter().zip(x).all(|(it, x)| x.abs() <= it.reach)
-                && members.iter().zip(x).map(|(it, x)| it.cost(*x)).sum::<f64>() <= budget
+            let kept = members.iter().zip(x).all(|(member, x)| x.abs() <= member.reach)
+                && members.iter().zip(x).map(|(member, x)| member.cost(*x)).sum::<f64>() <= budget
                 && (low..=high).contains(&mean);
             kept.then(|| (midpoints.iter().map(|m| (m - mean) * (m - mean)).sum::<f64>() / n).sqrt())
         };
@@ -209,7 +211,7 @@ mod tests {
         let mut best: f64 = 0.0;
         for _ in 0..12 {
             let mut x: Vec<f64> = members.iter().map(|member| stream.uniform(-member.reach, member.reach)).collect();
-            let used: f64 = members.iter().zip(&x).map(|(it, x)| it.cost(*x)).sum();
+            let used: f64 = members.iter().zip(&x).map(|(member, x)| member.cost(*x)).sum();
             for (x, member) in x.iter_mut().zip(&members) {
                 let within = x.abs().min(member.free) + member.cost(*x) * (budget / used).min(1.0);
                 *x = x.signum() * within;
@@ -256,10 +258,10 @@ mod tests {
         ) {
             let count: usize = groups.iter().map(|(_, count)| count).sum();
             prop_assume!(count > 1);
-            let budget = share * groups.iter().map(|(it, n)| it.cost(it.reach) * *n as f64).sum::<f64>();
-            let mean = groups.iter().map(|(it, n)| it.centre * *n as f64).sum::<f64>() / count as f64;
+            let budget = share * groups.iter().map(|(member, n)| member.cost(member.reach) * *n as f64).sum::<f64>();
+            let mean = groups.iter().map(|(member, n)| member.centre * *n as f64).sum::<f64>() / count as f64;
             // Means that can be reached, somewhere around the mean of the centres; enough for a climber to find some.
-            let costless = groups.iter().map(|(it, n)| it.free * *n as f64).sum::<f64>();
+            let costless = groups.iter().map(|(member, n)| member.free * *n as f64).sum::<f64>();
             let half = (budget + costless) / count as f64;
             let (low, high) = (mean - half * ends.0, mean + half * ends.1);
             let spread = midpoints(&groups, budget, low, high);

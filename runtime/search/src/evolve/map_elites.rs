@@ -156,15 +156,15 @@ mod tests {
                }
                for (&cell, elites) in &search.elites {
                    prop_assert!(elites.len() <= ELITES);
-                   let here = || all.iter().filter(|(early, _)| *early == (cell == 0)).map(|(_, it)| it);
+                   let here = || all.iter().filter(|(early, _)| *early == (cell == 0)).map(|(_, evaluated)| evaluated);
                    for elite in elites {
                        prop_assert!(!here().any(|other| dominates(&other.fitness, &elite.fitness)));
                    }
                    let best = here().filter(|elite| !here().any(|other| dominates(&other.fitness, &elite.fitness)));
                    let mut distinct: Vec<&Fitness> = Vec::new();
-                   for it in best.filter(|_| true) {
-                       if !distinct.contains(&&it.fitness) {
-                           distinct.push(&it.fitness);
+                   for elite in best.filter(|_| true) {
+                       if !distinct.contains(&&elite.fitness) {
+                           distinct.push(&elite.fitness);
                        }
                    }
                    prop_assert_eq!(elites.len(), distinct.len().min(ELITES));

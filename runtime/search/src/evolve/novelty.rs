@@ -174,14 +174,14 @@ mod tests {
             for (number, point) in (1..).zip(&points) {
                 archive.add(number, *point);
             }
-            for (number, it) in (1..).zip(&points) {
+            for (number, point) in (1..).zip(&points) {
                 let others = (1..).zip(&points).filter(|(other, _)| *other != number);
                 let mut distances: Vec<f64> =
-                    others.map(|(_, other)| distance(it, other, &archive.measure.over, 5.0).unwrap()).collect();
+                    others.map(|(_, other)| distance(point, other, &archive.measure.over, 5.0).unwrap()).collect();
                 distances.sort_by(f64::total_cmp);
                 let nearest = &distances[..neighbours.min(distances.len())];
                 let expected = nearest.iter().sum::<f64>() / nearest.len() as f64;
-                prop_assert!((archive.novelty(number, it) - expected).abs() < 1e-12);
+                prop_assert!((archive.novelty(number, point) - expected).abs() < 1e-12);
             }
         }
     }

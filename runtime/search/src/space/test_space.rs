@@ -456,7 +456,8 @@ pub(crate) mod tests {
                     let within = operation.within;
                     let room = within.end.min(plan.campaign.end_after) - within.start;
                     let longest = operation.lengths.map_or(room, |lengths| lengths.high.min(room));
-                    if end - start < longest * 0.000_999 || operation.lengths.is_some_and(|it| !it.contain(end - start))
+                    if end - start < longest * 0.000_999
+                        || operation.lengths.is_some_and(|lengths| !lengths.contain(end - start))
                     {
                         return Some(format!("window {start} to {end}"));
                     }

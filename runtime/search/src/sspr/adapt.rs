@@ -59,10 +59,10 @@ pub fn planned(plan: &CampaignPlan, test: &Test) -> Option<Vec<Disturbance>> {
 /// imported run nobody knows the effects, and what was active counts.
 pub fn observed(plan: &CampaignPlan, test: &Test, observation: &Observation) -> Vec<Disturbance> {
     let operations = test.operations.iter().zip(&observation.operations);
-    let disturbances = operations.map(|(it, effect)| {
+    let disturbances = operations.map(|(operation, effect)| {
         let acted = effect.counters.any_effect() || observation.outcome == Outcome::Unknown;
         let intervals = if acted { effect.intervals.clone() } else { Vec::new() };
-        disturbance(plan, it.operation, &it.parameters, intervals)
+        disturbance(plan, operation.operation, &operation.parameters, intervals)
     });
     disturbances.collect()
 }

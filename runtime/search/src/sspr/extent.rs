@@ -58,10 +58,10 @@ struct Timing {
 }
 
 impl Timing {
-    fn of(plan: &CampaignPlan, it: &OperationSpace) -> Option<Timing> {
-        let window = Window::of(plan, it)?;
-        let numbers = it.parameters.iter().map(|parameter| shares_of(parameter).len()).sum();
-        Some(Timing { window, class: plan.operation(it.operation).kind.class(), numbers })
+    fn of(plan: &CampaignPlan, operation: &OperationSpace) -> Option<Timing> {
+        let window = Window::of(plan, operation)?;
+        let numbers = operation.parameters.iter().map(|parameter| shares_of(parameter).len()).sum();
+        Some(Timing { window, class: plan.operation(operation.operation).kind.class(), numbers })
     }
 }
 

@@ -152,9 +152,9 @@ fn a_planned_window_is_cut_at_the_end_of_the_campaign() {
 /// The reduction again, straight from its definition: sums over all intervals and parameters, one dimension at a time.
 fn naive(plan: &CampaignPlan, test: &Test, dimension: Dimension) -> Option<f64> {
     let (mut midpoints, mut lengths, mut parameters, mut counts) = (vec![], vec![], vec![], [0.0; 4]);
-    for it in &test.operations {
-        let operation: &Operation = plan.operation(it.operation);
-        let Activation::Time { start, end } = it.activation else { panic!("by time") };
+    for used in &test.operations {
+        let operation: &Operation = plan.operation(used.operation);
+        let Activation::Time { start, end } = used.activation else { panic!("by time") };
         let end = end.min(plan.campaign.end_after);
         let (s, e) = (operation.within.start, operation.within.end);
         midpoints.push((start + end - 2.0 * s) / (e - s) / 2.0);
@@ -166,7 +166,7 @@ fn naive(plan: &CampaignPlan, test: &Test, dimension: Dimension) -> Option<f64> 
             OperationKind::Latency { .. } => 3,
             _ => panic!("none here"),
         }] += 1.0;
-        for (choice, parameter) in it.parameters.iter().zip(&operation.parameters) {
+        for (choice, parameter) in used.parameters.iter().zip(&operation.parameters) {
             let mut part = |low: f64, high: f64, part: f64| {
                 if low != high {
                     parameters.push(part / (high - low));

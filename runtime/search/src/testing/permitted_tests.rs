@@ -43,7 +43,7 @@ fn by_time(copies: Copies, evaluations: u32) -> Vec<CampaignPlan> {
 
 fn tests_of(plan: &CampaignPlan, seed: u64) -> Vec<Test> {
     let mut strategy = strategy(plan, seed).unwrap();
-    SYNTHETIC_ROBOTS[0].campaign_of(plan, strategy.as_mut()).tests.into_iter().map(|it| it.test).collect()
+    SYNTHETIC_ROBOTS[0].campaign_of(plan, strategy.as_mut()).tests.into_iter().map(|test| test.test).collect()
 }
 
 /// All tests of a campaign are permitted, as the plan itself has it and as the search does.
@@ -57,7 +57,8 @@ fn assert_permitted(plan: &CampaignPlan, tests: &[Test]) {
 
 fn has_copies(test: &Test) -> bool {
     let operations = &test.operations;
-    (0..operations.len()).any(|i| operations[..i].iter().any(|it| it.operation == operations[i].operation))
+    (0..operations.len())
+        .any(|i| operations[..i].iter().any(|operation| operation.operation == operations[i].operation))
 }
 
 #[test]
@@ -128,10 +129,10 @@ fn fresh_tests_contain_copies_equally_often_with_each_strategy() {
             let mut tests = Vec::new();
             while tests.len() < 2_000 {
                 let asked = strategy.ask();
-                tests.extend(asked.iter().map(|it| it.test.clone()));
-                let results = asked.into_iter().zip(0..).map(|(it, number)| crate::Evaluated {
+                tests.extend(asked.iter().map(|candidate| candidate.test.clone()));
+                let results = asked.into_iter().zip(0..).map(|(candidate, number)| crate::Evaluated {
                     number,
-                    test: it.test,
+                    test: candidate.test,
                     fitness: sesame_optimise::dominance::Fitness::Unfit(sesame_optimise::dominance::Unfit::Void),
                     point: None,
                     run: crate::testing::no_run(),

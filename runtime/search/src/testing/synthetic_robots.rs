@@ -194,9 +194,9 @@ impl SyntheticRobot {
 
     /// Where a test lies when it is run.
     pub fn point(plan: &CampaignPlan, test: &Test) -> Option<Point> {
-        let disturbances = test.operations.iter().map(|it| {
-            let intervals = Self::active(it).into_iter().map(|(start, end)| Span { start, end }).collect();
-            sspr::disturbance(plan, it.operation, &it.parameters, intervals)
+        let disturbances = test.operations.iter().map(|operation| {
+            let intervals = Self::active(operation).into_iter().map(|(start, end)| Span { start, end }).collect();
+            sspr::disturbance(plan, operation.operation, &operation.parameters, intervals)
         });
         Point::from_disturbances(&disturbances.collect::<Vec<_>>(), Convention::Ours)
     }

@@ -33,17 +33,17 @@ fn found(plan: &CampaignPlan, grid: &Grid, tests: u64) -> BTreeSet<usize> {
         let mut stream = Stream::derive(n, "sample", &[]);
         let mut test = fresh_test(&test_space, &mut stream);
         let same = stream.chance(0.5).then(|| stream.unit());
-        for it in &mut test.operations {
-            let kind = test_space.find(it.operation).unwrap();
+        for operation in &mut test.operations {
+            let kind = test_space.find(operation.operation).unwrap();
             if stream.chance(0.7) {
                 let window = window_of(kind);
                 let whole = window.high - window.low;
                 let share = same.unwrap_or_else(|| stream.unit());
                 let length = (whole * share * share).max(window.shortest).min(window.longest);
                 let start = window.low + (whole - length) * [0.0, 1.0, stream.unit()][stream.below(3)];
-                it.activation = sesame_plan::Activation::Time { start, end: (start + length).min(window.high) };
+                operation.activation = sesame_plan::Activation::Time { start, end: (start + length).min(window.high) };
             }
-            for (choice, parameter_space) in it.parameters.iter_mut().zip(&kind.parameters) {
+            for (choice, parameter_space) in operation.parameters.iter_mut().zip(&kind.parameters) {
                 *choice = match (stream.below(4), parameter_space) {
                     (0, ParameterSpace::Number(range, Shape::Value)) => Choice::Value { value: range.low },
                     (0, ParameterSpace::Number(range, Shape::Range)) => {
@@ -94,15 +94,16 @@ fn climbs_into(plan: &CampaignPlan, grid: &Grid, cell: usize) -> bool {
             let moved = 1 + stream.below(2);
             for _ in 0..moved {
                 let at = stream.below(other.operations.len());
-                let it = &mut other.operations[at];
-                let kind = test_space.find(it.operation).unwrap();
+                let operation = &mut other.operations[at];
+                let kind = test_space.find(operation.operation).unwrap();
                 if stream.chance(0.5) || kind.parameters.is_empty() {
-                    let sesame_plan::Activation::Time { start, end } = it.activation else { panic!("by time") };
+                    let sesame_plan::Activation::Time { start, end } = operation.activation else { panic!("by time") };
                     let (start, end) = window_of(kind).interval_near((start, end), steps, &mut stream);
-                    it.activation = sesame_plan::Activation::Time { start, end };
+                    operation.activation = sesame_plan::Activation::Time { start, end };
                 } else {
                     let which = stream.below(kind.parameters.len());
-                    it.parameters[which] = kind.parameters[which].near(&it.parameters[which], steps, &mut stream);
+                    operation.parameters[which] =
+                        kind.parameters[which].near(&operation.parameters[which], steps, &mut stream);
                 }
             }
             test_space.settle(&mut other, &mut stream);

@@ -22,7 +22,7 @@ pub(crate) fn mutate(test: &mut Test, test_space: &TestSpace, rates: &Rates, str
         operations.remove(stream.below(operations.len()));
     }
     if duplicate && operations.len() < test_space.most() {
-        let has_room = |it: &&TestOperation| test_space.has_room(operations, kind_of(it, test_space));
+        let has_room = |operation: &&TestOperation| test_space.has_room(operations, kind_of(operation, test_space));
         let originals: Vec<&TestOperation> = operations.iter().filter(has_room).collect();
         if !originals.is_empty() {
             let mut copy = originals[stream.below(originals.len())].clone();

@@ -30,12 +30,12 @@ fn numbers(choice: &Choice) -> Vec<i64> {
 }
 
 fn shown(test: &Test) -> Vec<Operation> {
-    let operation = |it: &TestOperation| {
-        let window = match it.activation {
+    let operation = |operation: &TestOperation| {
+        let window = match operation.activation {
             Activation::Time { start, end } => vec![rounded(start), rounded(end)],
             _ => Vec::new(),
         };
-        (it.operation.0, window.into_iter().chain(it.parameters.iter().flat_map(numbers)).collect())
+        (operation.operation.0, window.into_iter().chain(operation.parameters.iter().flat_map(numbers)).collect())
     };
     let mut operations: Vec<Operation> = test.operations.iter().map(operation).collect();
     operations.sort();
@@ -109,7 +109,7 @@ fn instances(kind: &OperationSpace, levels: u32) -> Vec<(Option<[i64; 2]>, Vec<i
                 }
                 points
             }
-            ParameterSpace::Items(items) => items.iter().map(|it| it.bytes().map(i64::from).collect()).collect(),
+            ParameterSpace::Items(items) => items.iter().map(|item| item.bytes().map(i64::from).collect()).collect(),
         };
         found = found
             .iter()
@@ -306,14 +306,14 @@ fn windows_and_sub_ranges_begin_and_end_at_levels() {
         windows.insert([*start, *end].map(rounded));
         ranges.insert([*low, *high].map(rounded));
     }
-    assert_eq!(windows, [[start, middle], [start, end], [middle, end]].map(|it| it.map(rounded)).into());
+    assert_eq!(windows, [[start, middle], [start, end], [middle, end]].map(|window| window.map(rounded)).into());
     // The example of the reference.
     let domains = [number(-0.3, 0.3, Shape::Range, false)];
     let counts =
         [1, 3].map(|max| grid(&one_operation(&domains, Copies::Apart, Count { min: 1, max }), 4, 1).unwrap().tests);
     assert_eq!(counts, [60, 1_560]);
     let pairs = [[-1.0, -1.0], [-1.0, 0.0], [-1.0, 1.0], [0.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
-    assert_eq!(ranges, pairs.map(|it| it.map(rounded)).into());
+    assert_eq!(ranges, pairs.map(|range| range.map(rounded)).into());
 }
 
 #[test]
@@ -397,7 +397,7 @@ fn a_search_ends_when_the_grid_does_and_is_brought_back_by_its_results() {
     let tests = |plan: &CampaignPlan| {
         let mut search = crate::strategy(plan, 3).unwrap();
         let tests = SYNTHETIC_ROBOTS[0].campaign_of(plan, search.as_mut()).tests;
-        (tests.into_iter().map(|it| it.test).collect::<Vec<_>>(), search.ended())
+        (tests.into_iter().map(|candidate| candidate.test).collect::<Vec<_>>(), search.ended())
     };
     plan.campaign.search = Search::new(Strategy::Grid { levels: 6 }, 1_000);
     let (all, ended) = tests(&plan);

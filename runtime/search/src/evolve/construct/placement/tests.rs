@@ -92,16 +92,16 @@ fn witnessed(plan: &CampaignPlan, grid: &Grid, tests: u64) -> std::collections::
         let mut stream = Stream::derive(n, "witness", &[]);
         let mut test = fresh_test(&test_space, &mut stream);
         let [like, place] = [0, 1].map(|_| stream.chance(0.6).then(|| stream.unit()));
-        for it in &mut test.operations {
-            let kind = test_space.find(it.operation).unwrap();
+        for operation in &mut test.operations {
+            let kind = test_space.find(operation.operation).unwrap();
             let ActivationSpace::Time(window) = kind.activation else { panic!("by time") };
             let whole = window.high - window.low;
             let share = like.unwrap_or_else(|| stream.unit());
             let length = (whole * share * share).max(window.shortest).min(window.longest);
             let at = place.unwrap_or_else(|| [0.0, 1.0, stream.unit()][stream.below(3)]);
             let start = window.low + (whole - length) * (at + 0.05 * stream.normal()).clamp(0.0, 1.0);
-            it.activation = Activation::Time { start, end: (start + length).min(window.high) };
-            for (choice, parameter_space) in it.parameters.iter_mut().zip(&kind.parameters) {
+            operation.activation = Activation::Time { start, end: (start + length).min(window.high) };
+            for (choice, parameter_space) in operation.parameters.iter_mut().zip(&kind.parameters) {
                 if let (true, ParameterSpace::Number(range, shape)) = (stream.chance(0.4), parameter_space) {
                     let high = stream.chance(0.5);
                     *choice = match shape {
