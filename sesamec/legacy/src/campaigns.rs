@@ -24,7 +24,11 @@ pub(crate) fn end_of(original: &Original, campaign: &Campaign) -> f64 {
     if let Some(limit) = campaign.limit.filter(|&limit| limit > 0.0) {
         return limit;
     }
-    let included = campaign.included.iter().filter_map(|&it| original.operation(it)).map(|at| &original.operations[at]);
+    let included = campaign
+        .included
+        .iter()
+        .filter_map(|&reference| original.operation(reference))
+        .map(|at| &original.operations[at]);
     let performed = campaign.tests.iter().flat_map(|test| &test.operations);
     let last = included.chain(performed).map(|operation| match operation.activation {
         Activation::Time(start, end) => start.max(end),
@@ -39,7 +43,7 @@ fn repeated(original: &Original, at: usize) -> Option<((usize, usize), bool)> {
     let Approach::Repeat { test, .. } = campaign.approach else { return None };
     // What it performed are copies of the test it repeated.
     let first = || (!campaign.tests.is_empty()).then_some(((at, 0), false));
-    test.and_then(|it| original.test(it)).map(|place| (place, true)).or_else(first)
+    test.and_then(|reference| original.test(reference)).map(|place| (place, true)).or_else(first)
 }
 
 /// When a test is over in the first of the campaigns that repeat it, in seconds.
@@ -244,7 +248,8 @@ fn search(
     observed: &mut Vec<String>,
 ) -> Result<Vec<Clause>, String> {
     let original = writer.original;
-    let mut held: Vec<usize> = campaign.included.iter().filter_map(|&it| original.operation(it)).collect();
+    let mut held: Vec<usize> =
+        campaign.included.iter().filter_map(|&reference| original.operation(reference)).collect();
     held.extend(writer.mapped.holders.used_by(original, &campaign.tests));
     held.sort_unstable();
     held.dedup();
@@ -292,7 +297,7 @@ fn activation(writer: &mut Writer<'_>, campaign: &Campaign, shown: &str, observe
         writer.notes.say(Kind::Changed, text);
     }
     let mut over: Vec<&str> = Vec::new();
-    for name in campaign.condition_metrics.iter().filter_map(|&it| writer.metric(it)) {
+    for name in campaign.condition_metrics.iter().filter_map(|&reference| writer.metric(reference)) {
         if !over.contains(&name) {
             over.push(name);
         }

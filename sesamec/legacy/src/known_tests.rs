@@ -237,7 +237,7 @@ fn choices<'e>(
                     }
                     Domain::Texts(texts) => {
                         let offered = |text: &str| match permitted.get(*at).map(|set| &set.domain) {
-                            Some(Domain::Texts(offered)) => offered.iter().any(|it| **it == *text),
+                            Some(Domain::Texts(offered)) => offered.iter().any(|other| **other == *text),
                             _ => true,
                         };
                         match texts.first().filter(|text| offered(text)) {
@@ -297,24 +297,26 @@ fn window(writer: &Writer<'_>, operation: &Operation, at: usize, over: f64) -> R
             }
         }
         Activation::Condition(start, end) => {
-            let start = match start.as_ref().map(|it| settled(writer, it)).transpose()? {
+            let start = match start.as_ref().map(|condition| settled(writer, condition)).transpose()? {
                 Some(Truth::Sometimes(start)) => start,
                 Some(Truth::Always) => return Err("its start condition always holds".to_owned()),
                 Some(Truth::Never) | None => return never(),
             };
-            match end.as_ref().map(|it| settled(writer, it)).transpose()? {
+            match end.as_ref().map(|condition| settled(writer, condition)).transpose()? {
                 Some(Truth::Sometimes(end)) => exact(plan::Activation::Condition { start, end, times }),
                 Some(Truth::Always) => Err("its end condition always holds".to_owned()),
                 Some(Truth::Never) | None => exact(plan::Activation::ConditionFor { start, length: forever, times }),
             }
         }
-        Activation::ConditionFor(start, length) => match start.as_ref().map(|it| settled(writer, it)).transpose()? {
-            Some(Truth::Sometimes(start)) if *length > 0.0 => {
-                exact(plan::Activation::ConditionFor { start, length: *length, times })
+        Activation::ConditionFor(start, length) => {
+            match start.as_ref().map(|condition| settled(writer, condition)).transpose()? {
+                Some(Truth::Sometimes(start)) if *length > 0.0 => {
+                    exact(plan::Activation::ConditionFor { start, length: *length, times })
+                }
+                Some(Truth::Always) => Err("its start condition always holds".to_owned()),
+                _ => never(),
             }
-            Some(Truth::Always) => Err("its start condition always holds".to_owned()),
-            _ => never(),
-        },
+        }
         Activation::Missing => Err("it does not say when it is active".to_owned()),
     }
 }

@@ -196,8 +196,8 @@ impl Writer<'_> {
                 text.push_str(&doc_comment(&called_before(&metric.name)));
             }
             let direction = if metric.highest { "maximise" } else { "minimise" };
-            let value = |word: &str, it: Option<f64>| {
-                it.map_or(String::new(), |it| format!(" {word} {}", Unit::SECONDS.number(it)))
+            let value = |word: &str, seconds: Option<f64>| {
+                seconds.map_or(String::new(), |seconds| format!(" {word} {}", Unit::SECONDS.number(seconds)))
             };
             let (default, initial) = (value("default", metric.default), value("initial", metric.initial));
             let _ = writeln!(text, "metric {name} {direction}{default}{initial} = lead_time({monitor}, {requirement})");
@@ -217,22 +217,26 @@ impl Writer<'_> {
     }
 
     fn hears(&self, metric: &Metric, consert: &Consert) -> bool {
-        let heard = metric.related.iter().filter_map(|&it| self.topic(it));
+        let heard = metric.related.iter().filter_map(|&reference| self.topic(reference));
         heard.into_iter().any(|(topic, _)| consert.guarantees.iter().any(|guarantee| guarantee.topic == *topic))
     }
 
     /// The metric of the hazards that a metric of warnings is about: it hears something of what that one hears, and no
     /// guarantee. Those that are optimised come first, since violations are what a search looks for.
     fn hazard_of(&self, warning: &Metric) -> Option<usize> {
-        let heard: Vec<&str> =
-            warning.related.iter().filter_map(|&it| self.topic(it)).map(|(topic, _)| topic.as_str()).collect();
+        let heard: Vec<&str> = warning
+            .related
+            .iter()
+            .filter_map(|&reference| self.topic(reference))
+            .map(|(topic, _)| topic.as_str())
+            .collect();
         let fits = |metric: &Metric| {
             metric.source == MetricSource::Code
                 && !self.conserts.iter().any(|consert| self.hears(metric, consert))
                 && metric
                     .related
                     .iter()
-                    .filter_map(|&it| self.topic(it))
+                    .filter_map(|&reference| self.topic(reference))
                     .any(|(topic, _)| heard.contains(&topic.as_str()))
         };
         let metrics = self.original.metrics.iter().enumerate().filter(|(_, metric)| fits(metric));

@@ -99,7 +99,7 @@ mod tests {
         #[test]
         fn whatever_is_wanted_names_are_names_and_differ(wanted in prop::collection::vec(any::<String>(), 1..8)) {
             let mut names = Names::default();
-            let given: Vec<String> = wanted.iter().map(|it| names.take(it, "thing")).collect();
+            let given: Vec<String> = wanted.iter().map(|name| names.take(name, "thing")).collect();
             for (at, name) in given.iter().enumerate() {
                 prop_assert!(is_identifier(name) && !is_reserved(name), "{name}");
                 prop_assert!(given[..at].iter().all(|other| key(other) != key(name)), "{given:?}");

@@ -83,7 +83,7 @@ fn template(original: &Original, operation: &Operation) -> Option<usize> {
 }
 
 fn stray(original: &Original, operation: &Operation) -> Stray {
-    let variable = operation.variable.and_then(|it| original.variable(it));
+    let variable = operation.variable.and_then(|reference| original.variable(reference));
     (word(&operation.kind), variable, operation.name.to_string())
 }
 

@@ -314,8 +314,9 @@ fn operation(original: &mut Original, element: &Element) -> Result<Operation, St
         },
     };
     let recorded = element.children.iter().find(|child| child.tag == "recordedTimings");
-    let recorded =
-        recorded.map(|it| Ok::<_, String>((number(it, "startTime", 0.0)?, number(it, "endTime", 0.0)?))).transpose()?;
+    let recorded = recorded
+        .map(|timings| Ok::<_, String>((number(timings, "startTime", 0.0)?, number(timings, "endTime", 0.0)?)))
+        .transpose()?;
     let mut constraints = Vec::new();
     for child in element.children.iter().filter(|child| child.tag == "conditionConstraints") {
         match child.kind.as_deref() {

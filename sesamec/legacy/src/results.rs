@@ -340,10 +340,11 @@ impl Importer<'_> {
                     _ => notes.say(Kind::LeftOut, "members of result sets that are not tests of the same campaign"),
                 }
             }
-            let generation = evaluations(&set.name).and_then(|it| generations.binary_search(&it).ok());
+            let generation =
+                evaluations(&set.name).and_then(|evaluations| generations.binary_search(&evaluations).ok());
             sets.push(ResultSet {
                 name,
-                generation: generation.and_then(|it| u32::try_from(it).ok()),
+                generation: generation.and_then(|generation| u32::try_from(generation).ok()),
                 status: if set.last { Status::Final } else { Status::Intermediate },
                 members,
             });

@@ -65,7 +65,7 @@ fn first_ends(original: &Original, holders: &Holders) -> Vec<f64> {
     let mut ends = vec![f64::INFINITY; holders.operations.len()];
     for campaign in &original.campaigns {
         let end = campaigns::end_of(original, campaign);
-        let included = campaign.included.iter().filter_map(|&it| original.operation(it));
+        let included = campaign.included.iter().filter_map(|&reference| original.operation(reference));
         for at in included.chain(holders.used_by(original, &campaign.tests)) {
             ends[at] = ends[at].min(end);
         }
@@ -151,7 +151,7 @@ impl Writer<'_> {
         for node in &self.original.system.nodes {
             let list = |word: &str, references: &[Reference]| -> Option<String> {
                 let mut names: Vec<&str> = Vec::new();
-                for (name, _) in references.iter().filter_map(|&it| self.topic(it)) {
+                for (name, _) in references.iter().filter_map(|&reference| self.topic(reference)) {
                     if !names.contains(&name.as_str()) {
                         names.push(name);
                     }
@@ -200,7 +200,7 @@ impl Writer<'_> {
             } else {
                 let mut topics: Vec<&str> = Vec::new();
                 let heard = if metric.related.is_empty() { &published } else { &metric.related };
-                for (topic, _) in heard.iter().filter_map(|&it| self.topic(it)) {
+                for (topic, _) in heard.iter().filter_map(|&reference| self.topic(reference)) {
                     if !topics.contains(&topic.as_str()) {
                         topics.push(topic);
                     }
@@ -213,8 +213,10 @@ impl Writer<'_> {
                 if metric.related.is_empty() {
                     let _ = writeln!(text, "// It heard everything: keep the topics that it needs.");
                 }
-                let default = metric.default.map_or(String::new(), |it| format!(" default {}", Unit::None.number(it)));
-                let initial = metric.initial.map_or(String::new(), |it| format!(" initial {}", Unit::None.number(it)));
+                let default =
+                    metric.default.map_or(String::new(), |default| format!(" default {}", Unit::None.number(default)));
+                let initial =
+                    metric.initial.map_or(String::new(), |initial| format!(" initial {}", Unit::None.number(initial)));
                 let _ =
                     writeln!(text, "metric {name} {direction}{default}{initial} {{ hook on {} }}", topics.join(", "));
                 self.notes
@@ -252,7 +254,7 @@ impl Writer<'_> {
 
     /// The operations that one of the original becomes, with these clauses.
     fn parts(&mut self, operation: &Operation, called: &str, clauses: &str, text: &mut String) -> Vec<Part> {
-        let topic = operation.variable.and_then(|it| self.topic(it)).cloned();
+        let topic = operation.variable.and_then(|reference| self.topic(reference)).cloned();
         let wanted = if operation.name.is_empty() {
             let topic = topic.as_ref().map_or("", |(name, _)| name);
             format!("{}_{topic}", kind_word(&operation.kind))
@@ -495,13 +497,13 @@ impl Writer<'_> {
         let mut using = self.original.campaigns.iter().filter(|campaign| {
             matches!(campaign.activation, Some(ActivationMode::Condition { .. }))
                 && !matches!(campaign.approach, Approach::Repeat { .. })
-                && campaign.included.iter().any(|&it| self.original.operation(it) == Some(at))
+                && campaign.included.iter().any(|&reference| self.original.operation(reference) == Some(at))
         });
         match *constraint {
             Constraint::Metric(metric) => {
                 let name = self.metric(metric)?;
                 let offers = |campaign: &crate::original::Campaign| {
-                    campaign.condition_metrics.iter().any(|&it| self.metric(it) == Some(name))
+                    campaign.condition_metrics.iter().any(|&reference| self.metric(reference) == Some(name))
                 };
                 using.all(offers).then(|| name.to_owned())
             }
