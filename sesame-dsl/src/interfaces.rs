@@ -105,7 +105,8 @@ pub fn wire_type(written: &str) -> Option<WireType> {
         Some((base, rest)) => (base, Some(rest.strip_suffix(']')?)),
         None => (written, None),
     };
-    let number = |digits: &str| digits.parse::<u32>().ok().filter(|_| digits.bytes().all(|it| it.is_ascii_digit()));
+    let number =
+        |digits: &str| digits.parse::<u32>().ok().filter(|_| digits.bytes().all(|digit| digit.is_ascii_digit()));
     let of = match base.split_once("<=") {
         Some(("string", bound)) if number(bound).is_some() => WireType::String,
         Some(("wstring", bound)) if number(bound).is_some() => WireType::WString,

@@ -59,7 +59,8 @@ pub(crate) fn keep_what_mends(
     let mut trials = Trials { sources, before: &before, again, read: 0 };
     for found in diagnostics {
         let suggested = std::mem::take(&mut found.suggestions);
-        found.suggestions = kept(suggested.into_iter().map(|it| trials.settled(found, it, MOST_STEPS)).collect());
+        found.suggestions =
+            kept(suggested.into_iter().map(|suggestion| trials.settled(found, suggestion, MOST_STEPS)).collect());
     }
 }
 
@@ -106,10 +107,12 @@ impl<A: Fn(&SourceMap) -> Vec<Diagnostic>> Trials<'_, A> {
 
     /// What applied edits lead to, and the worst diagnostic among what is new at their place.
     fn tried(&self, found: &Diagnostic, applied: &Applied) -> (Outcome, Option<Diagnostic>) {
-        let mistake = |it: &Diagnostic| (it.code, it.span, it.title.clone());
+        let mistake = |diagnostic: &Diagnostic| (diagnostic.code, diagnostic.span, diagnostic.title.clone());
         let others = self.before.iter().filter(|other| mistake(other) != mistake(found));
-        let known: Vec<(Code, Range<usize>)> =
-            others.filter(|it| it.span.file == applied.file).map(|it| (it.code, applied.moved(it.span))).collect();
+        let known: Vec<(Code, Range<usize>)> = others
+            .filter(|other| other.span.file == applied.file)
+            .map(|other| (other.code, applied.moved(other.span)))
+            .collect();
         let is_known = |code, at: &Range<usize>| {
             known.iter().any(|(known, place)| *known == code && (place.start == at.start || place.end == at.end))
         };
@@ -238,7 +241,7 @@ impl Applied {
         let message = if short { format!("write `{written}`") } else { first.message.clone() };
         let [lo, hi] = [lo, hi].map(|at| u32::try_from(at).expect("files are small"));
         let mut both = Suggestion::possible(message, vec![(Span { file: self.file, lo, hi }, written.to_owned())]);
-        if [first, then].iter().all(|it| it.applicability == Applicability::MachineApplicable) {
+        if [first, then].iter().all(|suggestion| suggestion.applicability == Applicability::MachineApplicable) {
             both.applicability = Applicability::MachineApplicable;
         }
         Some(both)

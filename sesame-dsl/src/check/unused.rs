@@ -146,8 +146,8 @@ pub(super) fn evidence(space: &Space, diagnostics: &mut Vec<Diagnostic>) {
                 Gate::All(_) | Gate::Any(_) | Gate::AtLeast { .. } => gates.extend(gate.parts()),
             }
         }
-        let evidence = (0u32..).zip(&eddi.evidence).map(|(at, it)| ((false, at), &it.declaration));
-        let demands = (0u32..).zip(&eddi.demands).map(|(at, it)| ((true, at), &it.declaration));
+        let evidence = (0u32..).zip(&eddi.evidence).map(|(at, evidence)| ((false, at), &evidence.declaration));
+        let demands = (0u32..).zip(&eddi.demands).map(|(at, demand)| ((true, at), &demand.declaration));
         for (key, declaration) in evidence.chain(demands).filter(|(key, _)| !needed.contains(key)) {
             let what = if key.0 { "demand" } else { "evidence" };
             let title = format!("no guarantee of `{}` uses {what} `{}`", eddi.declaration.name, declaration.name);

@@ -190,7 +190,7 @@ impl<'a> Indexer<'a> {
         let demands = demands.iter().map(|demand| (Kind::Demand, &demand.head));
         let evidence = evidence.iter().map(|item| (Kind::Evidence, &item.head));
         let guarantees = guarantees.iter().map(|guarantee| (Kind::Guarantee, &guarantee.head));
-        let otherwise = otherwise.iter().map(|(_, it)| (Kind::Guarantee, &it.head));
+        let otherwise = otherwise.iter().map(|(_, otherwise)| (Kind::Guarantee, &otherwise.head));
         for (kind, head) in demands.chain(evidence).chain(guarantees).chain(otherwise) {
             self.declare_member(kind, head, id);
         }
@@ -548,12 +548,14 @@ impl<'a> Indexer<'a> {
                 self.refer(demand.head.name.span, guarantee, id);
             }
         }
-        for expression in
-            evidence.iter().map(|item| &item.condition).chain(guarantees.iter().filter_map(|it| it.gate.as_ref()))
+        for expression in evidence
+            .iter()
+            .map(|item| &item.condition)
+            .chain(guarantees.iter().filter_map(|guarantee| guarantee.gate.as_ref()))
         {
             self.expression(expression, id);
         }
-        for (path, _) in otherwise.iter().filter_map(|(_, it)| it.mitigation.as_ref()) {
+        for (path, _) in otherwise.iter().filter_map(|(_, otherwise)| otherwise.mitigation.as_ref()) {
             self.path(path, id);
         }
     }

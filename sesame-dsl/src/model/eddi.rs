@@ -31,12 +31,16 @@ pub struct Eddi {
 impl Eddi {
     /// What can be true, false or unknown of it, each name once: evidence, demands, guarantees, and whether none holds.
     pub fn parts(&self) -> impl Iterator<Item = (MonitorPart, &Declaration)> {
-        let own = |declaration: &Declaration| self.guarantees.iter().any(|it| it.declaration.name == declaration.name);
-        let evidence = (0..).zip(&self.evidence).map(|(at, it)| (MonitorPart::Evidence(at), &it.declaration));
+        let own = |declaration: &Declaration| {
+            self.guarantees.iter().any(|guarantee| guarantee.declaration.name == declaration.name)
+        };
+        let evidence =
+            (0..).zip(&self.evidence).map(|(at, evidence)| (MonitorPart::Evidence(at), &evidence.declaration));
         // What a topic says of a guarantee is not named besides it.
         let evidence = evidence.filter(move |(_, declaration)| !own(declaration));
-        let demands = (0..).zip(&self.demands).map(|(at, it)| (MonitorPart::Demand(at), &it.declaration));
-        let guarantees = (0..).zip(&self.guarantees).map(|(at, it)| (MonitorPart::Guarantee(at), &it.declaration));
+        let demands = (0..).zip(&self.demands).map(|(at, demand)| (MonitorPart::Demand(at), &demand.declaration));
+        let guarantees =
+            (0..).zip(&self.guarantees).map(|(at, guarantee)| (MonitorPart::Guarantee(at), &guarantee.declaration));
         let otherwise = std::iter::once((MonitorPart::Otherwise, &self.otherwise.declaration));
         evidence.chain(demands).chain(guarantees).chain(otherwise)
     }

@@ -229,7 +229,8 @@ fn malformed(rest: &str) -> Option<String> {
         return Some("expected a host after the scheme".to_owned());
     }
     let authority = rest.split('/').next().unwrap_or_default();
-    let port = authority.strip_prefix('[').and_then(|it| it.split_once(']')).map_or(authority, |(_, port)| port);
+    let port =
+        authority.strip_prefix('[').and_then(|bracketed| bracketed.split_once(']')).map_or(authority, |(_, port)| port);
     match port.rsplit_once(':').map(|(_, port)| port) {
         Some(port) if !port.contains('{') && !port.parse::<u16>().is_ok_and(|port| port > 0) => {
             Some(format!("`{port}` is not a port; expected a number from 1 to 65535"))

@@ -354,7 +354,7 @@ impl<'a> Resolver<'a> {
     /// Whether a search has a setting that its strategy does not have, which is reported.
     fn foreign_setting(&mut self, search: &'a ast::Search, kind: StrategyKind) -> bool {
         let StrategyProperties { own, averaging, noun, .. } = kind.properties();
-        let foreign = |it: &&(Span, (Setting, Count))| own.is_none_or(|own| own.setting != it.1.0);
+        let foreign = |setting: &&(Span, (Setting, Count))| own.is_none_or(|own| own.setting != setting.1.0);
         let Some((span, (setting, _))) = search.own.iter().find(foreign) else { return false };
         let neighbours = (averaging == Averaging::Possible).then_some("neighbours");
         let known: Vec<&str> =

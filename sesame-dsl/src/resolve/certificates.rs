@@ -23,8 +23,9 @@ impl Resolver<'_> {
         let mut work = MOST_WORK;
         let constant = self.diagnostics.iter().filter(|found| found.code == Code::ONE_OUTCOME);
         let constant: Vec<Span> = constant.map(|found| found.span).collect();
-        let is_constant =
-            |within: Span| constant.iter().any(|it| it.file == within.file && within.lo <= it.lo && it.hi <= within.hi);
+        let is_constant = |within: Span| {
+            constant.iter().any(|known| known.file == within.file && within.lo <= known.lo && known.hi <= within.hi)
+        };
         for members in group::groups(&self.eddis) {
             let mut evidence = members.iter().flat_map(|&at| &self.file.eddis[at].evidence);
             if evidence.any(|evidence| is_constant(evidence.condition.span)) {

@@ -155,10 +155,10 @@ impl<'a> Resolver<'a> {
 
     fn members_of_eddi(&mut self, eddi: &'a written::Eddi) -> Members<'a> {
         let mut members: Members<'a> = BTreeMap::new();
-        let demands = (0..).zip(&eddi.demands).map(|(at, it)| (&it.head.name, Member::Demand(at)));
-        let evidence = (0..).zip(&eddi.evidence).map(|(at, it)| (&it.head.name, Member::Evidence(at)));
+        let demands = (0..).zip(&eddi.demands).map(|(at, demand)| (&demand.head.name, Member::Demand(at)));
+        let evidence = (0..).zip(&eddi.evidence).map(|(at, evidence)| (&evidence.head.name, Member::Evidence(at)));
         let states = eddi.guarantees.iter().map(|guarantee| &guarantee.head.name);
-        let states = states.chain(eddi.otherwise.iter().map(|(_, it)| &it.head.name));
+        let states = states.chain(eddi.otherwise.iter().map(|(_, otherwise)| &otherwise.head.name));
         let mut all: Vec<_> = demands.chain(evidence).chain(states.map(|name| (name, Member::State))).collect();
         all.sort_by_key(|(name, _)| name.span);
         for (name, member) in all {

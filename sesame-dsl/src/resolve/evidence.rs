@@ -102,7 +102,8 @@ impl<'a> Resolver<'a> {
 
     /// The evidence of a monitor whose state a field says: for each of its guarantees whether the field says that one.
     pub(super) fn evidence_of_states(&mut self, eddi: &'a written::Eddi, path: &'a Path) -> Option<Vec<Evidence>> {
-        let declared = eddi.demands.iter().map(|demand| &demand.head).chain(eddi.evidence.iter().map(|it| &it.head));
+        let declared =
+            eddi.demands.iter().map(|demand| &demand.head).chain(eddi.evidence.iter().map(|evidence| &evidence.head));
         for head in declared {
             let title = format!("the state of `{}` is what `{}` says", eddi.head.name.text, self.text(path.span));
             let diagnostic = Diagnostic::new(Code::BAD_MONITOR, head.full_span, title)

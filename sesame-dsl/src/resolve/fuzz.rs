@@ -86,7 +86,7 @@ impl<'a> Resolver<'a> {
                 continue;
             };
             // The axes of a box may be fixed, as long as one is not.
-            let of_box = |it: &Parameter| matches!(&it.domain, Domain::Number { range, .. } if range.low < range.high);
+            let of_box = |parameter: &Parameter| matches!(&parameter.domain, Domain::Number { range, .. } if range.low < range.high);
             if !said.contains(&span) && (parameter.name != "x" || !parameters.iter().any(of_box)) {
                 self.one_value(*range, span);
             }
@@ -494,5 +494,5 @@ fn is_constant(kind: &OperationKind) -> bool {
 fn copies_may_overlap(file: &ast::File) -> bool {
     let mut searching = file.campaigns.iter().filter_map(|campaign| campaign.operations.first()).peekable();
     searching.peek().is_some()
-        && searching.all(|operations| operations.copies.is_some_and(|(_, it)| it == model::Copies::MayOverlap))
+        && searching.all(|operations| operations.copies.is_some_and(|(_, copies)| copies == model::Copies::MayOverlap))
 }

@@ -172,7 +172,7 @@ impl<'a> Resolver<'a> {
 
     /// The clock of the simulator, which only some have.
     fn clock(&mut self, span: Span) -> Option<ReadyWhen> {
-        if self.has_a_clock() || self.simulators().next().is_none_or(|it| it.transport.is_none()) {
+        if self.has_a_clock() || self.simulators().next().is_none_or(|simulator| simulator.transport.is_none()) {
             return Some(ReadyWhen::Clock);
         }
         let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, span, "the simulator has no clock that could advance")

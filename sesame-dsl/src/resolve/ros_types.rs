@@ -191,7 +191,7 @@ impl<'a> Resolver<'a> {
         for (field, ty) in listed {
             let name = &field.head.name;
             let mut of_layout = last.fields.iter().filter(|field| field.name != interfaces::NO_FIELDS).enumerate();
-            let Some((position, of_wire)) = of_layout.find(|(_, it)| it.name == name.text) else {
+            let Some((position, of_wire)) = of_layout.find(|(_, field)| field.name == name.text) else {
                 self.unknown_field(message, name, last);
                 complete = false;
                 continue;
@@ -305,7 +305,8 @@ impl<'a> Resolver<'a> {
         };
         if let WireType::Interface { name } = interfaces::innermost(&wire) {
             let declared = self.system.ros.declared.get(name).map(|&index| self.system.message_ids[index]);
-            let known = declared.is_some() || self.system.ros.interfaces.iter().any(|it| it.name == *name);
+            let known =
+                declared.is_some() || self.system.ros.interfaces.iter().any(|interface| interface.name == *name);
             if !known {
                 match self.layout(name, written.span) {
                     Ok(Some(found)) => self.keep(&found),

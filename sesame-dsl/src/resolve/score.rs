@@ -216,7 +216,8 @@ impl<'a> Resolver<'a> {
 
     fn not_a_state(&mut self, eddi: usize, span: Span) {
         let Some(monitor) = &self.eddis[eddi] else { return };
-        let mut states: Vec<&str> = monitor.guarantees.iter().map(|it| it.declaration.name.as_str()).collect();
+        let mut states: Vec<&str> =
+            monitor.guarantees.iter().map(|guarantee| guarantee.declaration.name.as_str()).collect();
         states.push(&monitor.otherwise.declaration.name);
         let note = format!("the states of `{}` are {}", monitor.declaration.name, list(&states));
         let title = format!("`{}` is not a state of the monitor", self.text(span));

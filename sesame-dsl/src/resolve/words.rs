@@ -21,15 +21,15 @@ pub(super) fn list(names: &[&str]) -> String {
 /// A type with its article.
 pub(super) fn type_in_words(ty: &Type) -> String {
     let unit = |unit: &Option<Unit>| match unit {
-        Some(it) if dimension(Some(it)) != Dimension::NONE => format!(" in `{}`", it.text()),
+        Some(unit) if dimension(Some(unit)) != Dimension::NONE => format!(" in `{}`", unit.text()),
         _ => String::new(),
     };
     match ty {
         Type::Bool => "a `bool`".to_owned(),
-        Type::Int(it) => format!("an integer{}", unit(it)),
-        Type::Real(it) => format!("a number{}", unit(it)),
+        Type::Int(of) => format!("an integer{}", unit(of)),
+        Type::Real(of) => format!("a number{}", unit(of)),
         Type::Text => "a `text`".to_owned(),
-        Type::Point(it) => format!("a point{}", unit(it)),
+        Type::Point(of) => format!("a point{}", unit(of)),
         Type::List(_) => "a list".to_owned(),
         Type::Message(_) => "a message".to_owned(),
     }

@@ -437,7 +437,7 @@ mod tests {
                     // One word, or several in parentheses of which it is one.
                     let group = first.strip_prefix('(').and_then(|rest| rest.split_once(')'));
                     let words = group.map_or(first.split(['~', '}']).next().unwrap(), |(words, _)| words);
-                    let listed = words.split('|').any(|it| it.trim() == format!("k_{word}"));
+                    let listed = words.split('|').any(|listed| listed.trim() == format!("k_{word}"));
                     assert!(listed, "{rule} begins with `{word}` in the table, and with {first} in the grammar");
                 }
                 None => assert!(!first.starts_with("k_"), "{rule} begins with a word in the grammar: {first}"),

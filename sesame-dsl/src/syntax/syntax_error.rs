@@ -253,8 +253,9 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
         let phrase = placed(file, found.lo..phrase);
         // What may stand only once would stand there twice.
         let direction = |word: &str| matches!(word, "maximise" | "minimise");
-        let said_already =
-            |word: &str| tokens(text, from, hi).any(|it| it.text == word || direction(word) && direction(it.text));
+        let said_already = |word: &str| {
+            tokens(text, from, hi).any(|token| token.text == word || direction(word) && direction(token.text))
+        };
         for synonym in &meanings {
             let message = format!("did you mean `{}`?", synonym.meant);
             diagnostic = if synonym.same && !said_already(synonym.meant) {

@@ -83,8 +83,9 @@ fn new_at_its_place(
 /// All suggestions for a text that lead to the next mistake, and how many there are.
 fn next_mistakes(text: &str, counts: fn(&str, &Range<i64>, &Range<i64>) -> bool) -> (Vec<String>, usize) {
     let before = diagnostics(text);
-    let suggested = || before.iter().flat_map(|found| found.suggestions.iter().map(move |it| (found, it)));
-    let next = suggested().filter_map(|(found, it)| new_at_its_place(text, found, it, &before, counts));
+    let suggested =
+        || before.iter().flat_map(|found| found.suggestions.iter().map(move |suggestion| (found, suggestion)));
+    let next = suggested().filter_map(|(found, suggestion)| new_at_its_place(text, found, suggestion, &before, counts));
     (next.collect(), suggested().count())
 }
 
@@ -180,7 +181,7 @@ fn words_of_other_tools_are_mended_in_one_step() {
         let (text, mended) = (with_operation(written), with_operation(meant));
         let found = diagnostics(&text);
         let [found] = &found[..] else { panic!("{written}: {found:#?}") };
-        let suggested: Vec<String> = found.suggestions.iter().map(|it| applied(&text, it)).collect();
+        let suggested: Vec<String> = found.suggestions.iter().map(|suggestion| applied(&text, suggestion)).collect();
         assert!(suggested.contains(&mended), "{written}: {found:#?}");
         assert_eq!(diagnostics(&mended), [], "{meant}");
     }

@@ -65,14 +65,20 @@ impl<'a> Group<'a> {
         let own: Vec<&Eddi> = members.iter().map(|&at| eddis[at].as_ref()).collect::<Option<_>>()?;
         let monitors = own.iter().map(|eddi| planned(eddi, &own, &members)).collect::<Option<_>>()?;
         let group = Group { members, eddis: own, monitors, system };
-        let mut inputs = group.monitors.iter().flat_map(|it| &it.evidence).flat_map(|it| &it.inputs);
+        let mut inputs =
+            group.monitors.iter().flat_map(|monitor| &monitor.evidence).flat_map(|evidence| &evidence.inputs);
         inputs.all(|input| group.value(&input.field).is_some()).then_some(group)
     }
 
     /// How much work a check may be: pieces of evidence times gates.
     pub(super) fn size(&self) -> usize {
-        let gates = self.monitors.iter().flat_map(|it| &it.guarantees).map(|it| it.gate.size()).sum::<usize>();
-        self.monitors.iter().map(|it| it.evidence.len()).sum::<usize>().saturating_mul(gates)
+        let gates = self
+            .monitors
+            .iter()
+            .flat_map(|monitor| &monitor.guarantees)
+            .map(|guarantee| guarantee.gate.size())
+            .sum::<usize>();
+        self.monitors.iter().map(|monitor| monitor.evidence.len()).sum::<usize>().saturating_mul(gates)
     }
 
     fn topic(&self, field: &plan::FieldRef) -> Option<&'a Topic> {
@@ -166,7 +172,7 @@ impl<'a> Group<'a> {
             let Leaf::Demand(at) = leaf else { return free };
             let demand = &declared.demands[at as usize];
             let mut content = (0..=demand.guarantee).map(|strong| known.contains(&(demand.monitor, strong)));
-            let has = if value == Truth::True { content.any(|it| it) } else { content.all(|it| it) };
+            let has = if value == Truth::True { content.any(|holds| holds) } else { content.all(|holds| holds) };
             if has { value } else { free }
         });
         computed == value
@@ -197,7 +203,7 @@ fn planned(eddi: &Eddi, all: &[&Eddi], members: &[usize]) -> Option<plan::Monito
     let demands = eddi.demands.iter().map(|demand| {
         let name = &demand.declaration.name;
         let at = members.iter().position(|&member| member == demand.eddi.index())?;
-        let guarantee = all[at].guarantees.iter().position(|it| it.declaration.name == *name)?;
+        let guarantee = all[at].guarantees.iter().position(|guarantee| guarantee.declaration.name == *name)?;
         let monitor = MonitorId(u32::try_from(at).ok()?);
         Some(plan::Demand { name: name.clone(), monitor, guarantee: u32::try_from(guarantee).ok()? })
     });

@@ -97,7 +97,8 @@ impl<'a> Reporter<'a> {
             }
             Finding::Redundant { monitor, evidence, as_if } => {
                 let guarantees = (0..).zip(&self.group.monitors[monitor.index()].guarantees);
-                let mut reading = guarantees.filter(|(_, it)| leaves(&it.gate).contains(&Leaf::Evidence(evidence)));
+                let mut reading =
+                    guarantees.filter(|(_, guarantee)| leaves(&guarantee.gate).contains(&Leaf::Evidence(evidence)));
                 // If nothing was found of a guarantee that needs it; that none does is W0015.
                 let own = reading.any(|(at, _)| !self.found.contains(&(monitor, at)));
                 own.then(|| self.redundant(monitor, evidence, as_if))
@@ -123,7 +124,7 @@ impl<'a> Reporter<'a> {
                 continue;
             }
             let others: Vec<&str> =
-                excluding.iter().filter(|&&other| other != (of, at)).map(|&it| self.named(it)).collect();
+                excluding.iter().filter(|&&other| other != (of, at)).map(|&other| self.named(other)).collect();
             diagnostic = diagnostic.secondary(
                 span,
                 match others.as_slice() {
@@ -221,9 +222,9 @@ impl<'a> Reporter<'a> {
     /// The suggestion to let the weaker guarantee hold whenever the stronger one does.
     fn weaker_as_well(&self, monitor: MonitorId, stronger: &str, weaker: &str) -> Option<Suggestion> {
         let written = &self.file.eddis[self.group.members[monitor.index()]];
-        let below = written.guarantees.iter().find(|it| it.head.name.text == weaker)?.gate.as_ref()?;
+        let below = written.guarantees.iter().find(|guarantee| guarantee.head.name.text == weaker)?.gate.as_ref()?;
         let declared = &self.group.eddis[monitor.index()].guarantees;
-        let position = |name: &str| declared.iter().find(|it| it.declaration.name == name);
+        let position = |name: &str| declared.iter().find(|guarantee| guarantee.declaration.name == name);
         let (above, own) = (position(stronger)?, position(weaker)?);
         // A plan limits how deeply gates are nested.
         if above.gate.depth().max(own.gate.depth()) >= Gate::MOST_DEPTH {
@@ -280,7 +281,7 @@ impl<'a> Reporter<'a> {
         }
         let note = |(monitor, [of_one, of_many], declarations): (MonitorId, [&str; 2], Vec<&Declaration>)| {
             let (shown, others) = declarations.split_at(declarations.len().min(MOST_SHOWN));
-            let names: Vec<&str> = shown.iter().map(|it| it.name.as_str()).collect();
+            let names: Vec<&str> = shown.iter().map(|declaration| declaration.name.as_str()).collect();
             let more = if others.is_empty() { String::new() } else { format!(" and {} others", others.len()) };
             let names = if more.is_empty() { list(&names) } else { quoted(&names).join(", ") };
             let what = if declarations.len() == 1 { of_one } else { of_many };

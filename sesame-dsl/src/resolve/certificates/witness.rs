@@ -22,7 +22,7 @@ pub(super) fn in_words(group: &Group<'_>, monitor: MonitorId, guarantees: [u32; 
     let evidence = |&(of, at): &(MonitorId, u32)| &group.monitors[of.index()].evidence[at as usize];
     let inputs = witness.inputs.iter().filter(|(side, input, _)| {
         let same = |read: &sesame_plan::Input| read.field == input.field && read.members == input.members;
-        read.iter().map(evidence).any(|it| it.side == *side && it.inputs.iter().any(same))
+        read.iter().map(evidence).any(|evidence| evidence.side == *side && evidence.inputs.iter().any(same))
     });
     let inputs: Vec<String> = inputs
         .map(|(side, input, value)| {
