@@ -14,7 +14,7 @@ use crate::peers::{Broker, packages};
 fn vehicles_finish_their_orders_and_under_disturbances_they_are_late_or_never_heard_of_again() {
     let Some(packages) = packages() else { return };
     let folder = fresh_folder("mqtt_fleet");
-    let [vehicles, control] = [Broker::start(&folder), Broker::start(&folder)].map(|it| (it.port, it));
+    let [vehicles, control] = [Broker::start(&folder), Broker::start(&folder)].map(|broker| (broker.port, broker));
     let program = workspace().join("tests/mqtt/fleet.js").display().to_string();
     let text = format!(
         "space fleet\n\
@@ -67,7 +67,8 @@ fn vehicles_finish_their_orders_and_under_disturbances_they_are_late_or_never_he
     let tests = found["known"]["tests"].as_array().expect("both are run");
     let slowest = |test: &Value| {
         let metrics = test["metrics"].as_array().expect("metrics are measured");
-        metrics.iter().find(|it| it["metric"] == "slowest").expect("it is among them")["simulation"]["mean"].as_f64()
+        metrics.iter().find(|metric| metric["metric"] == "slowest").expect("it is among them")["simulation"]["mean"]
+            .as_f64()
     };
     assert!(slowest(&tests[0]).is_some_and(|seconds| (5.0..10.0).contains(&seconds)), "late: {found:#}");
     assert_eq!(slowest(&tests[1]), Some(60.0), "never: {found:#}");

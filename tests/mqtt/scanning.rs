@@ -59,7 +59,7 @@ fn the_space_of_a_fleet_passes_its_check() {
             scan.join().expect("it scans")
         });
         let all = ["/order\"", "{agv0,agv1,agv2}/state\"", "/connection\"", "    agvPosition: StateAgvPosition"];
-        if all.iter().all(|it| space.contains(it)) {
+        if all.iter().all(|part| space.contains(part)) {
             break space;
         }
         println!("in {seconds} s not all was heard:\n{space}");

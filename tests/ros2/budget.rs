@@ -19,7 +19,7 @@ const COUNT: u64 = 3 * FEWEST;
 fn ran(python: &Path, domain: &Domain, plan: CampaignPlan) -> (System, u64) {
     let count = COUNT.to_string();
     let arguments = ["--type", KIND, "--count", &count];
-    let remapped = plan.unclaimed().into_iter().map(|(_, it)| it.to).next();
+    let remapped = plan.unclaimed().into_iter().map(|(_, remapping)| remapping.to).next();
     let topic = remapped.unwrap_or_else(|| "/peer".to_owned());
     let speaking = ["--topic", &topic, "--hold"];
     let publisher = Peer::start(python, domain, "publisher.py", &[&arguments[..], &speaking].concat());
@@ -37,7 +37,7 @@ fn relayed(python: &Path, first: u32) -> (u64, Vec<(String, u64)>) {
     let domain = Domain::free();
     let plan = plan(&space(&domain, KIND, "node hearing { subscribes peer }", "", 1000)).relaying(first);
     let (mut system, observed) = ran(python, &domain, plan);
-    (observed, system.added().into_iter().map(|it| (it.path, it.latencies.messages())).collect())
+    (observed, system.added().into_iter().map(|wire| (wire.path, wire.latencies.messages())).collect())
 }
 
 #[test]

@@ -95,9 +95,10 @@ fn compared(name: &str) -> Option<[f64; 2]> {
         let external = &repository.plan().monitors[0];
         // The state at time zero is nobody's: the runner has not heard of any yet.
         let decisions = record.observation.monitors[0].decisions.iter().skip(1);
-        let heard: Vec<(f64, &str)> = decisions.map(|it| (it.time, external.state_name(it.state))).collect();
+        let heard: Vec<(f64, &str)> =
+            decisions.map(|decision| (decision.time, external.state_name(decision.state))).collect();
         let mut decided: Vec<(f64, &str)> = Vec::new();
-        let mut tell = |it: &Decided| decided.push((it.at.seconds(), inside.monitors[0].state_name(it.state)));
+        let mut tell = |told: &Decided| decided.push((told.at.seconds(), inside.monitors[0].state_name(told.state)));
         let trace = results.join(format!("traces/T{number}.mcap"));
         feed_telling(&trace, &inside, &wires, &table, Some(&mut tell)).expect("a trace can be read");
         // Monitor and runner meet the nodes at different moments: what is heard first is what holds then, or what the

@@ -113,7 +113,7 @@ impl Peer {
 
     /// The latest number that it has said under a name, and zero before.
     pub(crate) fn told(&self, key: &str) -> u64 {
-        lock(&self.said.lines).latest(key).and_then(|it| it.as_u64()).unwrap_or_default()
+        lock(&self.said.lines).latest(key).and_then(|value| value.as_u64()).unwrap_or_default()
     }
 
     /// Waits until it has said something under this name.

@@ -27,7 +27,7 @@ fn in_folder(folder: &Path, arguments: &[&str]) -> Done {
 
 /// Whether a scan has found all of these.
 fn all_of(all: &[&str]) -> impl Fn(&str) -> bool {
-    move |found| all.iter().all(|it| found.contains(it))
+    move |found| all.iter().all(|part| found.contains(part))
 }
 
 /// What a scan says when it has found enough. It listens longer each time but the first, for nodes may take
@@ -41,7 +41,7 @@ fn looked(folder: &Path, arguments: &[&str], is_enough: impl Fn(&str) -> bool) -
             return found;
         }
         assert!(begun.elapsed() < LIMIT, "more is awaited:\n{found}");
-        let at = arguments.iter().position(|it| *it == "--seconds").expect("it says how long it listens");
+        let at = arguments.iter().position(|argument| *argument == "--seconds").expect("it says how long it listens");
         arguments[at + 1] = "8";
     }
 }

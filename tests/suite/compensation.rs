@@ -85,7 +85,7 @@ fn a_lag_shows_in_traces_and_a_fitted_delay_closes_the_gap() {
     assert!((0.04..0.08).contains(&level(1)), "{adjustments:?}");
     for judged in ["fitted", "held_out"] {
         let [before, after] =
-            ["discrepancy_before", "discrepancy_after"].map(|it| compensated[judged][it].as_f64().unwrap());
+            ["discrepancy_before", "discrepancy_after"].map(|name| compensated[judged][name].as_f64().unwrap());
         assert!(after < before / 2.0, "{judged}: {before} and then {after}");
     }
 

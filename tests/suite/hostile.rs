@@ -342,7 +342,7 @@ fn each_kind_of_misbehaviour_is_the_outcome_of_its_own_test_and_leaves_no_proces
     if !shown_here() {
         return;
     }
-    let (stuck, small): (Vec<_>, Vec<_>) = SMALL.iter().copied().partition(|(_, it)| matches!(it, Timeout));
+    let (stuck, small): (Vec<_>, Vec<_>) = SMALL.iter().copied().partition(|(_, answer)| matches!(answer, Timeout));
     let of_small = run("small", &names(&small), "2", ENOUGH);
     came_out_as_expected(&of_small, &small, FEW);
     let of_stuck = run("stuck", &names(&stuck), "2", LITTLE);

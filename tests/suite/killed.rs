@@ -75,7 +75,7 @@ fn processes(runner: &Runner) -> Vec<(Role, Pid)> {
 }
 
 fn with_role(runner: &Runner, role: Role) -> Vec<Pid> {
-    processes(runner).into_iter().filter(|&(it, _)| it == role).map(|(_, pid)| pid).collect()
+    processes(runner).into_iter().filter(|&(found, _)| found == role).map(|(_, pid)| pid).collect()
 }
 
 /// Insists that nothing of a project's lives, after what workers and simulators are given to end.

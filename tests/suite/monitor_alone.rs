@@ -165,7 +165,7 @@ fn beside_a_cell_that_runs_freely_it_decides_what_the_recording_shows() {
     // The simulator cannot be reset, so each test has a process of its own, and the last one has written the file.
     // The monitor goes on until it is ended, a moment after the test.
     let within = |mut all: Vec<String>| {
-        all.retain(|it| it.split(' ').next().unwrap().parse::<f64>().unwrap() < 5.9);
+        all.retain(|line| line.split(' ').next().unwrap().parse::<f64>().unwrap() < 5.9);
         all
     };
     let decided = within(decisions(&lines, Some(1)));
@@ -174,7 +174,7 @@ fn beside_a_cell_that_runs_freely_it_decides_what_the_recording_shows() {
         within(decisions(&on(&program, &trace).expect(0).out, None))
     };
     assert!([on_recording("T0"), on_recording("T1"), on_recording("T2")].contains(&decided), "{decided:#?}");
-    let silent = decided.iter().any(|it| it.ends_with("camera blind") && !it.starts_with("0.0"));
+    let silent = decided.iter().any(|line| line.ends_with("camera blind") && !line.starts_with("0.0"));
     assert!(decided.len() > 6 && silent, "{decided:#?}");
 }
 

@@ -48,8 +48,10 @@ fn a_camera_that_is_late_in_the_lab_is_found_with_the_decision_that_it_costs() {
     );
     // The dark may come 40 ms later, when the robot is far again, and the robot 80 ms, when it is light again.
     let tolerances = found["topics"].as_array().unwrap();
-    let tolerances: Vec<(&str, f64)> =
-        tolerances.iter().map(|it| (it["topic"].as_str().unwrap(), it["first"]["delay"].as_f64().unwrap())).collect();
+    let tolerances: Vec<(&str, f64)> = tolerances
+        .iter()
+        .map(|tolerance| (tolerance["topic"].as_str().unwrap(), tolerance["first"]["delay"].as_f64().unwrap()))
+        .collect();
     assert_eq!(tolerances, [("camera/light", 0.04), ("cell/gap", 0.08)]);
     let same = project.sesamec("monitors", &[sides[0], sides[0]]).expect(0);
     assert!(same.out.contains("All monitors decide the same in the same order."), "{}", same.out);

@@ -149,7 +149,9 @@ fn no_crate_links_what_is_for_tests() {
     for folder in members() {
         let manifest = manifest(&folder);
         let dependencies = manifest.get("dependencies").and_then(toml::Value::as_table).into_iter().flatten();
-        linked.extend(dependencies.filter(|(_, it)| for_tests(it)).map(|(name, _)| format!("{folder}: {name}")));
+        linked.extend(
+            dependencies.filter(|(_, dependency)| for_tests(dependency)).map(|(name, _)| format!("{folder}: {name}")),
+        );
     }
     assert!(linked.is_empty(), "{linked:?}");
 }
