@@ -92,8 +92,8 @@ fn monitors(criterion: &mut Criterion) {
     };
     let is_own = |path: &str| path.starts_with('s') && path.contains('_');
     let five = sesame_bench::plan_of(&space(5, Topics::Own));
-    assert_eq!(five.monitors.iter().map(|it| it.evidence.len()).sum::<usize>(), 50);
-    assert_eq!(five.monitors.iter().map(|it| it.guarantees.len()).sum::<usize>(), 20);
+    assert_eq!(five.monitors.iter().map(|monitor| monitor.evidence.len()).sum::<usize>(), 50);
+    assert_eq!(five.monitors.iter().map(|monitor| monitor.guarantees.len()).sum::<usize>(), 20);
     measure(BenchmarkId::new("50 evidence, 20 guarantees", "one of them hears each message"), &five, &is_own);
     let mut none = five.clone();
     none.monitors.clear();
