@@ -1,4 +1,4 @@
-//! In what a real cell differs from the model: what a stand-in for a lab does otherwise.
+//! How a real cell differs from the model: what a stand-in for a lab does otherwise.
 
 use sesame_runtime::time::SimTime;
 
