@@ -166,8 +166,8 @@ fn dispatch(session: &Session, arguments: impl Iterator<Item = std::ffi::OsStrin
     }
 }
 
-/// What commands ask of recorded results beside what reports do: whether a gate closes, how a test is shrunk, and
-/// how long it may take when it is run again.
+/// What commands ask of recorded results in addition to what reports do: whether a gate closes, how a test is shrunk,
+/// and how long it may take when it is run again.
 #[cfg(test)]
 pub(crate) fn asked_beside_reports(repository: &sesame_record::Repository, test: &str) -> Result<(), String> {
     let words = |error: sesame_record::RecordError| error.to_string();

@@ -1,5 +1,5 @@
-//! Campaigns on a simulator beside which programs are launched, by a runner with real workers: this program is the
-//! runner, and starts itself as its worker and keeper, so it has no test harness.
+//! Campaigns on a simulator in addition to which programs are launched, by a runner with real workers: this program is
+//! the runner, and starts itself as its worker and keeper, so it has no test harness.
 
 #![cfg_attr(
     unix,

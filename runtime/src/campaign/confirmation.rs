@@ -20,7 +20,7 @@ use crate::campaign::numbering::Numbering;
 use crate::campaign::pool::Pool;
 use crate::campaign::settings::{Settings, default_timeout};
 
-/// What is said when no confirmation could have shown anything.
+/// The message if no confirmation could have shown anything.
 const DETERMINISTIC_SIMULATOR: &str = "each run that confirms a test had exactly the results of the run it repeats: the simulator \
      does not vary with its seed, so `confirm` costs simulations and shows nothing";
 
@@ -114,9 +114,10 @@ pub struct Confirmations {
     pub times: u32,
 }
 
-/// Runs tests of finished results again, and records the runs beside those that are recorded already: the repetitions
-/// by which the campaign itself confirms are never among them, so its front stays what it is. `each` is told how many
-/// runs there are by now, and how many there will be. False if the user stopped it; what had ended by then is recorded.
+/// Runs tests of finished results again, and records the runs in addition to those that are recorded already: the
+/// repetitions by which the campaign itself confirms are never among them, so its front stays what it is. `each` is
+/// told how many runs there are by now, and how many there will be. False if the user stopped it; what had ended by
+/// then is recorded.
 pub fn confirm_recorded(
     recorder: &mut Recorder,
     confirmations: &Confirmations,

@@ -51,8 +51,8 @@ pub(super) struct Numbering {
 }
 
 impl Numbering {
-    /// That of a campaign with this seed. The first number is 0. Equal tests are only recognised if the simulator is
-    /// stepped.
+    /// The numbering of a campaign with this seed. The first number is 0. Equal tests are only recognised if the
+    /// simulator is stepped.
     pub(super) fn new(seed: u64, lock_stepped: bool) -> Self {
         Numbering {
             simulator_seed: derive_seed(seed, "simulator", &[0]),

@@ -23,7 +23,7 @@ const GREETING_LIMIT: usize = 1 << 10;
 pub(super) struct Hello {
     /// Whether its simulator is stepped, so that equal tests give equal results.
     pub(super) lock_stepped: bool,
-    /// How long it may take to end what the plan launches, beside the simulator, when the connection is closed.
+    /// How long it may take to end what the plan launches, in addition to the simulator, when the connection is closed.
     pub(super) end_limit: Duration,
     /// Proves that the worker is the one that the supervisor started, where other programs could connect.
     pub(super) token: Option<String>,

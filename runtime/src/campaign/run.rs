@@ -103,7 +103,7 @@ struct Campaign<'a, 'l> {
     front: Front,
     /// Tests evaluated.
     done: u32,
-    /// Those of them that were recorded before this session.
+    /// How many of them were recorded before this session.
     earlier: u32,
     /// Tests to evaluate in total, at most.
     total: u32,

@@ -61,7 +61,7 @@ pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: &Address) -> io::
     unreachable!("jobs come until the process is ended")
 }
 
-/// How long it may take to end what the plan launches, beside its simulator.
+/// How long it may take to end what the plan launches in addition to its simulator.
 fn end_limit(plan: &CampaignPlan) -> Duration {
     #[cfg(feature = "process")]
     return sesame_lifecycle::launch::end_limit(plan);
@@ -92,7 +92,7 @@ fn read_jobs(mut stream: Stream) -> mpsc::Receiver<Job> {
 /// Ends simulators, after the time that they are given to end by themselves, and then everything else that is below
 /// this process.
 fn end_what_was_started() {
-    // Of the two threads that may get here, the later one waits until the earlier one is done.
+    // The later one of the two threads that may get here waits until the earlier one is done.
     static TURN: Mutex<()> = Mutex::new(());
     let _turn = TURN.lock();
     #[cfg(feature = "process")]

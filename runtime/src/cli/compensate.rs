@@ -32,13 +32,13 @@ use crate::cli::terminal::{Format, print, print_json, say, text_options};
 use crate::fitting::{self, Journal, Judged, LabTraces, Progress, Settings, Simulations};
 use crate::lab::find;
 
-/// How often it is said how far the fit is.
+/// How often a line says how far the fit is.
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
 /// What a fit has tried, in the folder of the lab's results, until it is complete.
 const TRIED: &str = "fit.jsonl";
 
-/// Of so many tests one is kept aside to judge by.
+/// One of this many tests is kept aside to judge by.
 const ONE_IN: usize = 3;
 
 /// To what the simulation is fitted, and how.

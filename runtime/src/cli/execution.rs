@@ -269,7 +269,7 @@ pub(super) fn execute(
     Ok(code)
 }
 
-/// Runs a campaign to its end; `None` if the user stopped it, which is said. `again` gives the command that goes on
+/// Runs a campaign to its end; `None` if the user stopped it, which it prints. `again` gives the command that goes on
 /// with it, with these options more.
 pub(super) fn perform(
     session: &Session,

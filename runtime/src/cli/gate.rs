@@ -127,7 +127,7 @@ fn not_as_expected(summary: &Summary) -> Vec<String> {
     objections
 }
 
-/// With which seed regression tests ran that name none and are not as expected: with another seed, they may be.
+/// The seed of regression tests that name none and are not as expected: with another seed, they may be.
 fn seed_note(summary: &Summary, plan: &CampaignPlan, task: &Task, seed: u64) -> Option<String> {
     let Task::Known { .. } = task else { return None };
     let names_no_seed = |name: &str| plan.tests.iter().any(|test| test.name == name && test.simulator_seed.is_none());

@@ -107,7 +107,7 @@ pub(super) fn sides(
         if recorded {
             plan.campaign.record = Some(Recorded::All);
         }
-        // Of its own: equal seeds would make a stand-in for the lab repeat the runs of the simulation.
+        // The lab has seeds of its own: equal ones would make a stand-in for the lab repeat the runs of the simulation.
         let run = seed.unwrap_or(plan.campaign.seed);
         let run = lab.map_or(run, |lab| derive_seed(run, &format!("lab {}", lab.name), &[]));
         work.runs(session, lab.map_or("simulation", |_| "lab"), &task, &plan, run, lab.is_some())
@@ -128,7 +128,7 @@ pub(super) fn sides(
     Ok(true)
 }
 
-/// The plan of a task; with a seed for all tests, none of them has one of its own, which is said.
+/// The plan of a task; with a seed for all tests, none of them has one of its own, which it prints.
 fn plan_of(plan: &CampaignPlan, task: &Task, seed: Option<u64>) -> CampaignPlan {
     let mut plan = task.plan(plan);
     if seed.is_some() {

@@ -88,7 +88,7 @@ pub(super) fn stages(
         let task = Task::Undisturbed(Undisturbed { runs, relayed, equal_seeds: true, lab });
         let session = session.relaying(relayed);
         let plan = task.plan(&session.plan);
-        // One at a time: runs beside each other would take the time that is measured from each other.
+        // One at a time: runs at the same time would take the time that is measured from each other.
         let Some(stage) = work.runs(&session, &relayed.to_string(), &task, &plan, seed, true)? else {
             return Ok(false);
         };

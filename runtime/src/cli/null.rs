@@ -57,7 +57,7 @@ pub(super) fn observe(
     found: &mut Found,
 ) -> Result<bool, Failure> {
     let side = |session: &Session, lab: Option<&Lab>| -> Result<Option<Repository>, Failure> {
-        // Of its own: equal seeds would make a stand-in for the lab repeat the runs of the simulation.
+        // The lab has seeds of its own: equal ones would make a stand-in for the lab repeat the runs of the simulation.
         let seed = lab.map_or(seed, |lab| derive_seed(seed, &format!("lab {}", lab.name), &[]));
         let name = lab.map(|lab| lab.name.clone());
         let task = Task::Undisturbed(Undisturbed { runs, relayed: 0, equal_seeds: false, lab: name });

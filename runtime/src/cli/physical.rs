@@ -87,7 +87,7 @@ pub(super) fn physical(session: &Session, options: &Options) -> Result<ExitCode,
         tests,
         repeats: options.times.unwrap_or(lab.repeats),
     };
-    // Of its own: equal seeds would make a stand-in for the lab repeat the runs of the simulation.
+    // The lab has seeds of its own: equal ones would make a stand-in for the lab repeat the runs of the simulation.
     let seed = derive_seed(repository.campaign().seed, &format!("lab {}", lab.name), &[]);
     let name = format!("{}-{}", repository.folder().file_name().unwrap_or_default().display(), lab.name);
     let results = match &options.into {
@@ -107,7 +107,7 @@ pub(super) fn physical(session: &Session, options: &Options) -> Result<ExitCode,
     execute(&session, recorder, &folder, &execution, &options.output, files)
 }
 
-/// The names of the tests that a lab's budget chooses, which is said.
+/// The names of the tests that a lab's budget chooses; it prints them.
 fn chosen(repository: &Repository, lab: &Lab) -> Result<Vec<String>, Failure> {
     let until = Instant::now() + CHOICE_LIMIT;
     let Some(choice) = choice_for(repository, lab, &mut || Instant::now() >= until)? else {

@@ -38,7 +38,7 @@ pub(super) struct PreparationArgs {
 }
 
 impl PreparationArgs {
-    /// Of a command that has options of its own for them.
+    /// The arguments of a command that has options of its own for them.
     pub(super) fn of(resume: Option<PathBuf>, results: Option<PathBuf>, format: Format) -> Self {
         PreparationArgs { resume, results, format }
     }

@@ -75,8 +75,8 @@ pub(super) fn countdown(name: &str, waited: Duration, limit: Duration, columns: 
     if console::measure_text_width(&long) <= columns { long } else { short }
 }
 
-/// What a log is told while the first reference run is awaited: after ten seconds, then once a minute. `due` is when
-/// it is told next.
+/// What a log gets while the first reference run is awaited: after ten seconds, then once a minute. `due` is when it
+/// gets the next line.
 pub(super) fn awaited(name: &str, waited: Duration, limit: Duration, due: &mut Duration) -> Option<String> {
     if waited < (*due).max(FIRST_AWAITED) {
         return None;

@@ -47,7 +47,7 @@ struct Repeated {
     /// What the campaign is made of, and its seed.
     plan: CampaignPlan,
     seed: u64,
-    /// Where its results go, if nothing else is said.
+    /// Where its results go by default.
     results: PathBuf,
 }
 

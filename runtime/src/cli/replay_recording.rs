@@ -65,7 +65,7 @@ pub(super) fn replay_recording(session: &Session, options: &Options) -> Result<E
     Ok(ExitCode::from(if replay.same { 0 } else { NOT_AS_REQUIRED }))
 }
 
-/// What metrics are now beside what was recorded.
+/// What metrics are now, compared with what was recorded.
 #[cfg(feature = "mcap")]
 fn compared(plan: &CampaignPlan, options: &Options, fed: sesame_relay::trace::Fed) -> sesame_report::RecordingReplay {
     use sesame_base::visible::visible;

@@ -44,7 +44,7 @@ pub(super) struct Again {
     _folder: Scratch,
 }
 
-/// Runs a recorded test once more and says what happened to its worker. `None` if it was interrupted, which is said;
+/// Runs a recorded test once more and says what happened to its worker. `None` if it was interrupted, which it prints;
 /// then nothing is left behind.
 pub(super) fn run_again(session: &Session, asked: Asked<'_>) -> Result<Option<Again>, Failure> {
     let Session { plan, results, .. } = session;

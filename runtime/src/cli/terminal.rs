@@ -1,4 +1,4 @@
-//! Standard output for what was asked for, standard error for everything else that is said.
+//! Standard output for what was asked for, standard error for all other messages.
 
 use std::process::ExitCode;
 

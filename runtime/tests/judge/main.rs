@@ -1,4 +1,4 @@
-//! What a run says, beside a judge who knows everything.
+//! What a run says, compared with a judge who knows everything.
 //!
 //! Random spaces, tests and simulators, the simulators of which crash, hang, publish what is not a number, and do not
 //! subscribe to some of their topics. The **judge** sees the same run of the same simulator without its faults, and

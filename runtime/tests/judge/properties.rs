@@ -199,7 +199,7 @@ pub(crate) fn contradictions(case: &Case) -> Vec<String> {
     wrong
 }
 
-/// What is wrong with the run of a robot with faults, beside the true one.
+/// What is wrong with the run of a robot with faults, compared with the true one.
 fn faulty(
     case: &Case,
     truth: &Observation,

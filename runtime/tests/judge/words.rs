@@ -44,7 +44,7 @@ pub(crate) fn metric(metric: &Metric) -> String {
     format!("{} default {default:?} initial {initial:?} = {}", metric.name, json(&metric.source))
 }
 
-/// The messages of a run, one to a line, those published beside those delivered.
+/// The messages of a run, one to a line, those published next to those delivered.
 pub(crate) fn ledger(ledger: &Ledger) -> String {
     let mut text = String::new();
     let list = |text: &mut String, messages: &[Message]| {

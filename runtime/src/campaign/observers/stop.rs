@@ -17,7 +17,7 @@ pub(super) struct Rules {
 }
 
 impl Rules {
-    /// Those of a plan, from now on.
+    /// The rules of a plan, from now on.
     pub(super) fn new(plan: &CampaignPlan) -> Self {
         Rules { rules: StopRules::from_plan(plan), begun: Instant::now() }
     }

@@ -63,7 +63,7 @@ proptest! {
         prop_assert_eq!(stream.given, whole);
     }
 
-    /// Of other bytes, no more are read than the longest greeting has, and only a greeting is accepted.
+    /// If other bytes come, no more are read than the longest greeting has, and only a greeting is accepted.
     #[test]
     fn no_more_is_read_than_the_longest_greeting(
         length in prop_oneof![any::<u32>(), 0u32..1100],

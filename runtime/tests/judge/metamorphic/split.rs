@@ -31,7 +31,7 @@ fn topic_id(position: usize) -> TopicId {
     TopicId(u32::try_from(position).unwrap())
 }
 
-/// Those of these topics on which an operation is switched by a condition at an instant in which they have messages:
+/// The topics among these on which an operation is switched by a condition at an instant in which they have messages:
 /// the first of two equal ones may be what switches it, and then only the second is disturbed.
 fn switched_between(case: &Case, topics: &[TopicId], observed: &Observation, told: &Ledger) -> Vec<TopicId> {
     let mut switched = Vec::new();

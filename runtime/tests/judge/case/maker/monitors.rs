@@ -11,7 +11,7 @@ use super::Maker;
 /// What monitors hear, and what they send.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::case) struct Watching {
-    /// On which side they hear; each piece of evidence on one of its own, if this is not said.
+    /// The side on which they hear; without it, each piece of evidence has a side of its own.
     pub(in crate::case) side: Option<Side>,
     /// Whether each piece of evidence reads one topic with one member.
     pub(in crate::case) one_wire: bool,
