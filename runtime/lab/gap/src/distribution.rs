@@ -14,7 +14,7 @@ pub fn normal_quantile(p: f64) -> f64 {
     if p == 0.0 || p == 1.0 {
         return if p == 0.0 { f64::NEG_INFINITY } else { f64::INFINITY };
     }
-    // Of the lower half, where the tail keeps its digits.
+    // The quantile in the lower half, where the tail keeps its digits.
     let tail = p.min(1.0 - p);
     let z = inverse(|z| normal_cdf(-z), tail);
     if p < 0.5 { -z } else { z }

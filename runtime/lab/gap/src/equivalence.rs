@@ -129,7 +129,7 @@ pub fn verdict(tests: &Tests, p_equivalent: f64, p_different: f64, tolerance: f6
     }
 }
 
-/// Of samples without spread on either side: by the share of all divisions of the runs into two sides that separate the
+/// For samples without spread on either side: the share of all divisions of the runs into two sides that separate the
 /// values as the observed one does (a permutation test).
 fn without_spread(samples: Samples<'_>, tolerance: f64, alpha: f64) -> Verdict {
     let (m, n) = (samples.simulation().len() as f64, samples.lab().len() as f64);

@@ -30,7 +30,7 @@ pub fn lag(simulation: &Series<'_>, lab: &Series<'_>, step: f64, greatest: f64) 
         let b = lab.resampled(start + shift / 2.0, step, count);
         pearson(&a, &b)
     };
-    // Of lags there are at most twice as many as steps in the greatest, which is less than the series have in common.
+    // There are at most twice as many lags as steps in the greatest, which is less than the series have in common.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the common grid is bounded")]
     let steps = libm::floor(greatest / step + 1e-9) as usize;
     let both_ways = |at: usize| if at == 0 { vec![0.0] } else { vec![at as f64, -(at as f64)] };

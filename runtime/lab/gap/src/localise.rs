@@ -32,7 +32,7 @@ pub enum Extent {
     },
     /// The differences in one range of a coordinate are unlike the others.
     Range {
-        /// The range. Of the two sides of a threshold, that with the greater difference.
+        /// The range. It is the side of a threshold with the greater difference.
         split: Split,
         /// The common value inside it.
         inside: Pooled,
@@ -125,7 +125,7 @@ fn few_tests(tests: &[Located], alpha: f64) -> Option<Extent> {
     let mut rest: Vec<usize> = (0..tests.len()).collect();
     let mut left_out = Vec::new();
     while left_out.len() < tests.len() / 3 {
-        // Of the tests without each in turn, those that agree best.
+        // Each test is left out in turn; the others should agree as well as possible.
         let without = |at: usize| rest.iter().filter(move |&&other| other != at).map(|&other| &tests[other].difference);
         let q = |at: usize| Some(Heterogeneity::of(without(at))?.q);
         let (worst, _) = rest.iter().filter_map(|&at| Some((at, q(at)?))).min_by(|a, b| a.1.total_cmp(&b.1))?;

@@ -17,7 +17,7 @@ pub struct Pooled {
 }
 
 impl Pooled {
-    /// Of differences with their standard errors, which are above 0; `None` without one.
+    /// Pools differences by their standard errors, which are above 0; `None` without a difference.
     pub fn of<'a>(differences: impl IntoIterator<Item = &'a Welch>) -> Option<Pooled> {
         let differences: Vec<&Welch> = differences.into_iter().collect();
         let weights = Weights::of(&differences)?;
@@ -50,7 +50,7 @@ impl Pooled {
 /// Inverse squared standard errors.
 struct Weights {
     total: f64,
-    /// Of the total; they sum to 1.
+    /// The share of each weight in the total; they sum to 1.
     shares: Vec<f64>,
 }
 
@@ -66,7 +66,7 @@ impl Weights {
     }
 }
 
-/// How much several differences differ from each other beside their standard errors.
+/// How much several differences differ from each other compared with their standard errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Heterogeneity {
     /// Cochran's Q: the sum of squared deviations from the pooled value, in standard errors [Cochran 1954].
@@ -79,7 +79,7 @@ pub struct Heterogeneity {
 }
 
 impl Heterogeneity {
-    /// Of two differences or more; `None` of fewer.
+    /// The heterogeneity of two or more differences; `None` for fewer.
     pub fn of<'a>(differences: impl IntoIterator<Item = &'a Welch>) -> Option<Heterogeneity> {
         let differences: Vec<&Welch> = differences.into_iter().collect();
         let count = differences.len() as f64;

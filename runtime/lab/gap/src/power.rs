@@ -1,4 +1,4 @@
-//! How likely an equivalence test shows what is true: before runs are made, and beside a comparison that stayed
+//! How likely an equivalence test shows what is true: before runs are made, and together with a comparison that stayed
 //! undecided.
 
 use crate::distribution::{deviation_density, normal_cdf, student_quantile};

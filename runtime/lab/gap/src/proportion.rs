@@ -31,7 +31,7 @@ pub struct Share {
 }
 
 impl Share {
-    /// Of so many trials; `None` without one.
+    /// The share in this many trials; `None` without a trial.
     pub fn new(count: usize, of: usize) -> Option<Share> {
         assert!(count <= of, "a share is at most the whole");
         Some(Share { count, of, interval: wilson(count, of)? })

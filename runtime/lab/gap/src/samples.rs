@@ -1,5 +1,5 @@
 //! Two independent samples of one metric of one test, from a simulation and from a lab: the difference of their means,
-//! and how great it is beside their spread.
+//! and how great it is compared with their spread.
 //!
 //! Differences are the lab's value minus the simulation's. A simulator that always gives the same value is a sample
 //! without spread: whoever knows that of a simulator that ran once passes its value twice, and then only the lab's
@@ -60,7 +60,7 @@ pub struct Samples<'a> {
 }
 
 impl<'a> Samples<'a> {
-    /// Of finite values, in any order; a side may be empty.
+    /// Takes finite values, in any order; a side may be empty.
     pub fn new(simulation: &'a [f64], lab: &'a [f64]) -> Self {
         let finite = simulation.iter().chain(lab).all(|value| value.is_finite());
         assert!(finite, "samples are finite: what was not measured is left out");
@@ -90,7 +90,7 @@ pub struct Moments {
 }
 
 impl Moments {
-    /// Of finite values; `None` without one.
+    /// Summarises finite values; `None` without a value.
     pub fn of(values: &[f64]) -> Option<Moments> {
         let first = *values.first()?;
         let n = values.len() as f64;
@@ -128,7 +128,7 @@ pub struct Welch {
 }
 
 impl Welch {
-    /// Of two samples with two values or more each, of which at least one has spread.
+    /// Compares two samples with two values or more each, at least one of which has spread.
     pub fn of(samples: Samples<'_>) -> Result<Welch, Undefined> {
         let [simulation, lab] = moments(samples)?;
         Welch::from_moments(simulation, lab)
@@ -244,7 +244,7 @@ mod tests {
         assert!(near(cohen_d(samples).unwrap(), 3.0 / libm::sqrt(2.5)));
         // The exact factor of four degrees of freedom is √(2/π)·Γ(2)... = 0.797885.
         assert!(near(hedges_g(samples).unwrap(), 3.0 / libm::sqrt(2.5) * 0.797_884_560_802_865_4));
-        // Of nine pairs, 2-4, 2-6 and so on, eight are greater and one, 4-4, is a tie.
+        // There are nine pairs, 2-4, 2-6 and so on: eight are greater and one, 4-4, is a tie.
         assert!(near(cliff_delta(samples).unwrap(), 8.0 / 9.0));
         assert!(near(welch.p(), welch.p_above(0.0) * 2.0));
     }

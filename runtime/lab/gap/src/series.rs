@@ -56,7 +56,7 @@ impl fmt::Display for NotASeries {
 impl std::error::Error for NotASeries {}
 
 impl<'a> Series<'a> {
-    /// Of times in seconds, ascending, with a value each. Of samples of one time the last one counts.
+    /// Takes times in seconds, ascending, with a value each. If samples have the same time, the last one counts.
     pub fn new(times: &'a [f64], values: &'a [f64], between: Between) -> Result<Self, NotASeries> {
         if times.len() != values.len() {
             return Err(NotASeries::Lengths { times: times.len(), values: values.len() });
@@ -129,7 +129,7 @@ impl<'a> Series<'a> {
 /// In seconds.
 const NANOSECOND: f64 = 1e-9;
 
-/// The least number of common samples with which anything is said.
+/// The least number of common samples that any statement needs.
 const LEAST: usize = 4;
 /// The greatest number of samples on a common grid: some hours at a thousand samples per second.
 const MOST: f64 = 2e7;

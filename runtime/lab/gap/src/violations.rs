@@ -42,8 +42,8 @@ impl Occurrences {
         counts
     }
 
-    /// Of the test: the event occurs if it was seen in any run, and does not if some run was without it and none with
-    /// it. That is the rule for verdicts of tests that were run again.
+    /// What is known of the test: the event occurs if it was seen in any run, and does not if some run was without it
+    /// and none with it. That is the rule for verdicts of tests that were run again.
     pub fn occurrence(self) -> Occurrence {
         match self {
             Occurrences { seen: 1.., .. } => Occurrence::Seen,
@@ -61,9 +61,9 @@ impl Occurrences {
 /// How often an event of one test occurs in the simulation and in the lab.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frequencies {
-    /// Of the simulation's conclusive runs.
+    /// In the simulation's conclusive runs.
     pub simulation: Option<Share>,
-    /// Of the lab's conclusive runs.
+    /// In the lab's conclusive runs.
     pub lab: Option<Share>,
     /// The p value of Fisher's exact test that both probabilities are equal; `None` if a side has no conclusive run.
     pub p: Option<f64>,
@@ -92,7 +92,7 @@ pub struct Confusion {
 }
 
 impl Confusion {
-    /// Of tests, each with its simulation and its lab.
+    /// Counts tests, each with its simulation and its lab.
     pub fn of(tests: impl IntoIterator<Item = (Occurrences, Occurrences)>) -> Confusion {
         let mut counts = Confusion::default();
         for (simulation, lab) in tests {
@@ -108,17 +108,17 @@ impl Confusion {
         counts
     }
 
-    /// Of the tests with the event in the simulation, those that have it in the lab.
+    /// How many tests with the event in the simulation have it in the lab too.
     pub fn precision(self) -> Option<Share> {
         Share::new(self.both, self.both + self.false_alarms)
     }
 
-    /// Of the tests with the event in the lab, those that have it in the simulation.
+    /// How many tests with the event in the lab have it in the simulation too.
     pub fn recall(self) -> Option<Share> {
         Share::new(self.both, self.both + self.misses)
     }
 
-    /// Of the conclusive tests, those of which both sides say the same.
+    /// How many conclusive tests have the same answer on both sides.
     pub fn agreement(self) -> Option<Share> {
         let same = self.both + self.neither;
         Share::new(same, same + self.false_alarms + self.misses)

@@ -24,7 +24,7 @@ pub fn dtw(a: &[f64], b: &[f64], band: usize) -> Warping {
     assert!(!a.is_empty() && !b.is_empty(), "series that are compared have values");
     let band = band.max(a.len().abs_diff(b.len())).min(a.len().max(b.len()));
     let width = 2 * band + 1;
-    // Of each place in a row, the least sum of squares up to it, and the pairs of the shortest path with this sum. The
+    // For each place in a row: the least sum of squares up to it, and the pairs of the shortest path with this sum. The
     // place `k` of row `i` pairs the values `i` and `i + k - band`.
     let none = (f64::INFINITY, 0usize);
     let mut previous = vec![none; width + 1];
