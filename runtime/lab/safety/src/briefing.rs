@@ -83,7 +83,7 @@ pub struct ExpectedVerdict {
     pub verdict: Verdict,
     /// When it was violated, as begin and end in seconds, in order.
     pub violated: Vec<[f64; 2]>,
-    /// Of repeated runs, how many violate it and how many there are, if there were any.
+    /// How many repeated runs violate it and how many there are, if there were any.
     pub repeated: Option<[usize; 2]>,
 }
 

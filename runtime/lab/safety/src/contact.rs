@@ -58,7 +58,7 @@ pub struct Nearest {
 /// The contacts of two bodies.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contacts {
-    /// When both poses are known. Nothing is said about other times.
+    /// When both poses are known. Nothing is known about other times.
     pub known: Interval,
     /// When the bodies are in contact, in the order of time; disjoint. At each instant at which the signed distance is
     /// 0 or less, they are in contact; at each instant of an interval it is at most the tolerance. Thus a contact may
@@ -201,7 +201,7 @@ impl Found {
 struct Stretch<'b> {
     shapes: [&'b Shape; 2],
     times: [f64; 2],
-    /// Of each body, the pose at the start and the end.
+    /// The pose of each body at the start and the end.
     poses: [[Pose; 2]; 2],
     /// The way of the second body relative to the first one.
     way: Vector,
