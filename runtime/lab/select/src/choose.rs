@@ -136,7 +136,7 @@ fn worthless(problem: &Problem, usable: &[usize]) -> bool {
     !(apart && problem.lambda() > 0.0 || good && problem.lambda() < 1.0)
 }
 
-/// Of all choices of two and more tests the one with the smallest numbers.
+/// The choice with the smallest numbers among all choices of two and more tests.
 fn first_choice(problem: &Problem, usable: &[usize], forced: &[usize], mut money: f64) -> Vec<usize> {
     let tests = problem.tests();
     let mut chosen: Vec<usize> = Vec::new();
@@ -149,7 +149,7 @@ fn first_choice(problem: &Problem, usable: &[usize], forced: &[usize], mut money
             chosen.push(at);
             continue;
         }
-        // Beside it one more test must be affordable, unless there is one already.
+        // One more test must be affordable in addition to it, unless there is one already.
         let rest = money - tests[at].cost;
         let enough = chosen.len() + missing >= 1 || usable[place + 1..].iter().any(|&other| tests[other].cost <= rest);
         if rest >= 0.0 && enough {

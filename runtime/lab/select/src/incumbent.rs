@@ -52,7 +52,7 @@ impl Incumbent {
         self.found.push((value, choice));
     }
 
-    /// Of the choices found with the best value the one with the smallest numbers.
+    /// The choice with the smallest numbers among those found with the best value.
     pub(crate) fn choice(&self) -> Option<&Vec<usize>> {
         let equal = self.equal();
         self.found.iter().filter(|(value, _)| *value >= equal).map(|(_, choice)| choice).min()

@@ -1,4 +1,4 @@
-//! Of choices of equal value the one with the smallest numbers.
+//! The choice with the smallest numbers among choices of equal value.
 
 use crate::incumbent::{Incumbent, TOLERANCE};
 use crate::node::Fate;
