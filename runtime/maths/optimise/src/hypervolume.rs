@@ -47,7 +47,7 @@ pub struct Volume {
 pub struct Growth {
     /// The share, in `0..=1`, or an estimate of it.
     pub share: f64,
-    /// Of an estimate, an upper bound of the share with a confidence of about 95 %.
+    /// For an estimate: an upper bound of the share with a confidence of about 95 %.
     pub at_most: Option<f64>,
 }
 

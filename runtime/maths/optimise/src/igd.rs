@@ -15,7 +15,7 @@ pub struct IgdPlus {
     front: Vec<Vec<f64>>,
     /// What one unit of each objective is multiplied by.
     scale: Vec<f64>,
-    /// Of each point of the front the least squared distance to a point of the set; infinite before there is one.
+    /// For each point of the front: the least squared distance to a point of the set; infinite before there is one.
     nearest: Vec<f64>,
 }
 
@@ -58,7 +58,7 @@ impl IgdPlus {
     }
 }
 
-/// In what objectives are measured.
+/// The scale in which objectives are measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scaling {
     /// Each objective is divided by the range that the front has in it, where it has one.

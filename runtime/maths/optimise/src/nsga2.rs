@@ -35,11 +35,11 @@ pub struct Child<G> {
 /// Which of two parents a child has genes of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Heritage {
-    /// Of the first alone.
+    /// From the first alone.
     First,
-    /// Of the second alone.
+    /// From the second alone.
     Second,
-    /// Of both.
+    /// From both.
     Both,
 }
 
@@ -61,8 +61,8 @@ pub struct Settings {
 pub enum Survival {
     /// The best by the crowded comparison, as in the paper.
     Crowded,
-    /// Of solutions with equal objective values only one, as long as there are others. The crowded comparison would
-    /// fill the population with equal solutions where there are many.
+    /// Only one solution among those with equal objective values survives, as long as there are others. The crowded
+    /// comparison would fill the population with equal solutions where there are many.
     Distinct,
     /// By reference points, as in NSGA-III: for three and more objectives.
     ReferencePoints,

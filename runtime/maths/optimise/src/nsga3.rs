@@ -3,7 +3,7 @@
 //!
 //! Reference points are spread evenly over the unit simplex [Das and Dennis 1998]. Objectives are scaled by a
 //! hyperplane through the extreme points of the front; then each solution belongs to the reference line that is nearest
-//! to it, its niche. Of the last front that does not fit as a whole, solutions of the emptiest niches survive.
+//! to it, its niche. Solutions of the emptiest niches survive in the last front, which does not fit as a whole.
 
 use sesame_rng::Stream;
 
@@ -196,7 +196,7 @@ impl ReferencePoints {
         nearest
     }
 
-    /// Of a front that does not fit as a whole, the members that survive: in turn one of the emptiest niche, the
+    /// The members of a front that survive if it does not fit as a whole: in turn one of the emptiest niche, the
     /// nearest to its line if the niche is empty, any of its members otherwise.
     fn fill(
         &self,

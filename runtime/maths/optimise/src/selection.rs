@@ -103,7 +103,7 @@ pub fn distinct_survivors(fitness: &[&Fitness], n: usize) -> Vec<(usize, Rank)> 
         chosen.extend(best.into_iter().map(|(k, _)| group[k]));
     }
     chosen.sort_unstable();
-    // Those of each group were ranked by themselves.
+    // The members of each group were ranked by themselves.
     let ranks = ranks(&chosen.iter().map(|&position| fitness[position]).collect::<Vec<_>>());
     chosen.into_iter().zip(ranks).collect()
 }

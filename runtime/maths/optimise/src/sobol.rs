@@ -1,10 +1,11 @@
 //! Sobol' points: a sequence of points of which every beginning fills the unit box evenly (Sobol' 1967).
 //!
-//! Of the first 2ᵏ points, each of the 2ᵏ equal parts of each dimension holds one, and pairs of dimensions are filled
-//! evenly too. Direction numbers are those of Joe and Kuo (2008, their set of criterion D⁽⁶⁾) for the first 100
-//! dimensions; further ones, of which they have tables as well, continue with the next primitive polynomials and
-//! numbers drawn from the seed: each is filled as evenly by itself, only pairs of them are left to chance. Points are
-//! scrambled as Owen (1995) has it, so that each seed gives points of its own that are uniform each by itself.
+//! The first 2ᵏ points are spread evenly: each of the 2ᵏ equal parts of each dimension holds one, and pairs of
+//! dimensions are filled evenly too. Direction numbers are those of Joe and Kuo (2008, their set of criterion D⁽⁶⁾) for
+//! the first 100 dimensions; further ones, of which they have tables as well, continue with the next primitive
+//! polynomials and numbers drawn from the seed: each is filled as evenly by itself, only pairs of them are left to
+//! chance. Points are scrambled as Owen (1995) has it, so that each seed gives points of its own that are uniform each
+//! by itself.
 
 use sesame_rng::{derive_seed, keyed_unit};
 

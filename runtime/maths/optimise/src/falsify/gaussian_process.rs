@@ -10,7 +10,7 @@
 pub(super) struct SquaredDistances {
     points: usize,
     components: usize,
-    /// Of each pair `(row, column)` with `column < row`, row by row, its components.
+    /// For each pair `(row, column)` with `column < row`, row by row: its components.
     squares: Vec<f64>,
 }
 
