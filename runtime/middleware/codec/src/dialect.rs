@@ -7,7 +7,7 @@ use sesame_plan::Primitive;
 
 use crate::error::CodecError;
 
-/// In which order the bytes of a number come.
+/// The order in which the bytes of a number come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ByteOrder {
     /// The least significant one first.

@@ -14,13 +14,13 @@ pub(crate) const LENGTH: usize = size_of::<u32>();
 /// How many bytes a code unit of a `wstring` has.
 pub(crate) const WIDE: usize = size_of::<u32>();
 
-/// The shapes of a message and of all that it contains. The last one is the message.
+/// The structures of a message and of all that it contains. The last one is the message.
 #[derive(Debug)]
 pub(crate) struct Layout {
     pub(crate) shapes: Vec<Shape>,
 }
 
-/// A message on the wire.
+/// A message type on the wire.
 #[derive(Debug)]
 pub(crate) struct Shape {
     pub(crate) fields: Arc<Fields>,

@@ -1,4 +1,4 @@
-//! The codec of each dialect beside a naive one that knows nothing of selections, origins and runs.
+//! The codec of each dialect compared with a naive one that knows nothing of selections, origins and runs.
 
 #![expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "bits are cut to their primitive")]
 
