@@ -202,7 +202,7 @@ struct Network {
     url: String,
     files: Vec<String>,
     folder: PathBuf,
-    /// Those of the files, once they were read: a run does not change them.
+    /// The definitions of the files, once they were read: a run does not change them.
     definitions: Option<Definitions>,
     topics: Vec<Topic>,
     /// Lines by the sender and the number of their messages.
