@@ -28,7 +28,7 @@ pub(crate) struct Routes {
 }
 
 impl Routes {
-    /// Those of these lines. With `echoes`, what the runner publishes is heard, too.
+    /// The routes of these lines. With `echoes`, what the runner publishes is heard, too.
     pub(crate) fn new(plan: &CampaignPlan, mqtt: &Mqtt, lines: &[Line], echoes: bool) -> Routes {
         let mut routes = Routes::default();
         for (at, line) in lines.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! What is published at a broker: topics, how their messages are said, and what their payloads have in common.
+//! What is published at a broker: topics, how their messages are sent, and what their payloads have in common.
 //!
 //! Nothing is published. A broker tells neither who publishes nor who subscribes, and of topics only those on which
 //! something comes while it is listened to, or is retained.

@@ -84,7 +84,7 @@ struct Brokers {
     echoes: Option<Echoes>,
 }
 
-/// How a message is said, besides its payload.
+/// How a message is sent, apart from its payload.
 #[derive(Debug, Clone, Default)]
 struct Manner {
     retain: bool,
@@ -92,7 +92,8 @@ struct Manner {
 }
 
 impl Manner {
-    /// That of a message, for others that it is passed to: what is between this client and its broker is left out.
+    /// The manner of a message, for others that it is passed to: what is between this client and its broker is left
+    /// out.
     fn of(publish: &Publish) -> Manner {
         let properties = publish.properties.clone().map(|properties| PublishProperties {
             topic_alias: None,
