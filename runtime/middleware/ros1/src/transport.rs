@@ -71,7 +71,7 @@ fn at_place(plan: &CampaignPlan, place: Place) -> Box<dyn Transport> {
     on_bus(plan, Box::new(bus), Settings::of(plan), place)
 }
 
-/// What this process is called as a node: of two nodes of one name, the master ends the first.
+/// What this process is called as a node: if two nodes have one name, the master ends the first.
 fn node_name(plan: &CampaignPlan, worker: u32) -> String {
     match plan.monitors.iter().find(|monitor| monitor.publishes.is_some()) {
         Some(monitor) if plan.is_guest() => format!("{GUEST}{}", monitor.name),

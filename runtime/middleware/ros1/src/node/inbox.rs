@@ -9,7 +9,7 @@ use super::lock::lock;
 /// The most messages that wait.
 const MOST: usize = 10_000;
 
-/// The most bytes of messages that wait, beside the last message.
+/// The most bytes of messages that wait, in addition to the last message.
 const MOST_BYTES: usize = 256 << 20;
 
 /// The most notes; others could cause any number of them.

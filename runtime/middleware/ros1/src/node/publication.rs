@@ -41,7 +41,7 @@ pub(crate) struct Publication {
     /// Whether its type is what the space says, because nobody else publishes on it. The space knows no constants, so
     /// the MD5 of a subscriber that has a type of the same name is as good.
     pub(super) by_space: bool,
-    /// Those of its publishers that are latching: as many messages are kept for subscribers that come later.
+    /// Its publishers that are latching: as many messages are kept for subscribers that come later.
     pub(super) latching: BTreeSet<String>,
     pub(super) latest: VecDeque<Arc<[u8]>>,
     pub(super) links: Vec<Arc<Link>>,

@@ -14,7 +14,7 @@ use serde_json::Value as Json;
 /// How long anything may take: longer than it ever takes, on a machine that is busy too.
 pub(crate) const LIMIT: Duration = Duration::from_secs(120);
 
-/// The Python that has rospy. Without one the test is to be skipped, which is said here.
+/// The Python that has rospy. Without one it prints that the test is skipped.
 pub(crate) fn python() -> Option<PathBuf> {
     sesame_peers::named("SESAME_ROS1")
 }

@@ -15,7 +15,7 @@ fn clients_call_servers_through_the_runner() {
         &[
             ("on", "/switch", "std_srvs/srv/SetBool_Request", Request),
             ("done", "/switch", "std_srvs/srv/SetBool_Response", Reply),
-            // Of this one the space says the requests only.
+            // The space has only the requests of this one.
             ("question", "/ask", "std_srvs/srv/Trigger_Request", Request),
         ],
     );
