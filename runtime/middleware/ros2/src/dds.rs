@@ -57,7 +57,7 @@ pub(crate) struct Received {
     pub(crate) reader: ReaderId,
     /// Who wrote it, and its number there.
     pub(crate) identity: SampleIdentity,
-    /// The sample to which it belongs: of a reply, its request.
+    /// The sample to which it belongs: for a reply, its request.
     pub(crate) related: Option<SampleIdentity>,
     pub(crate) sample: Sample,
     /// When it arrived, to put the samples of several readers into order.

@@ -1,7 +1,7 @@
 //! Who is there: the nodes of a domain with their publishers and subscribers.
 //!
-//! Publishers and subscribers are announced by DDS; which node each of them belongs to is said by the middlewares of
-//! ROS on a topic of their own, `ros_discovery_info`.
+//! Publishers and subscribers are announced by DDS; the node that each of them belongs to is announced by the
+//! middlewares of ROS on a topic of their own, `ros_discovery_info`.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

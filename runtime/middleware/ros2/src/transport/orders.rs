@@ -55,7 +55,7 @@ impl System {
         Ok(())
     }
 
-    /// Whether something was done to a node; it is said if not.
+    /// Whether something was done to a node; if not, the results note it.
     fn running(&mut self, node: NodeId, done: bool) -> bool {
         if !done {
             let name = &self.plan.node(node).name;

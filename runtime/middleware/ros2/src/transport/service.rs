@@ -1,7 +1,7 @@
 //! Calls of services that take nothing: steps and resets.
 //!
-//! Requests and replies are topics; a reply names its request beside the data, as the middlewares of ROS on Fast DDS do
-//! it.
+//! Requests and replies are topics; a reply names its request in addition to the data, as the middlewares of ROS on
+//! Fast DDS do it.
 
 use std::time::Instant;
 

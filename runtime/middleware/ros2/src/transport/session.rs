@@ -38,7 +38,7 @@ pub(super) struct Session {
     pub(super) info_writer: WriterId,
     pub(super) lines: Vec<Connected>,
     pub(super) services: Vec<Served>,
-    /// Those of nodes on whose parameters operations act.
+    /// The parameters of nodes on whose parameters operations act.
     pub(super) parameters: BTreeMap<NodeId, Parameters>,
     /// Participants whose processes were killed.
     dead: Vec<[u8; PREFIX]>,

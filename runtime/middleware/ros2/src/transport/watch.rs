@@ -22,7 +22,7 @@ pub(super) enum Role {
     Serves,
 }
 
-/// A place at a wire: what is done there, and where.
+/// An endpoint that the space declares: what is done at a wire, and where.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Place {
     pub(super) role: Role,
@@ -34,7 +34,7 @@ pub(super) struct Place {
     pub(super) most: Option<usize>,
 }
 
-/// Somebody at a place.
+/// Somebody who is such an endpoint.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Present {
     pub(super) guid: GUID,
@@ -59,7 +59,7 @@ pub(super) struct Watch {
     gone: BTreeSet<Known>,
     /// Who is beyond those declared, in a sentence.
     beyond: BTreeMap<GUID, String>,
-    /// What was said in this run.
+    /// What was noted in this run.
     said: BTreeSet<String>,
 }
 
