@@ -1,6 +1,6 @@
 //! A client of a bridge, over a WebSocket: operations out, operations in, from a thread of its own.
 //!
-//! What stands (subscriptions, advertisements) is said again whenever the connection was lost and found again. Both
+//! What stands (subscriptions, advertisements) is sent again whenever the connection was lost and found again. Both
 //! queues are bounded: if nobody takes what comes in, the socket is not read, so the bridge has to wait.
 
 #![expect(
@@ -93,7 +93,7 @@ pub enum Incoming {
 pub struct Client {
     outgoing: mpsc::Sender<String>,
     incoming: Receiver<Incoming>,
-    /// What is said again to a bridge that is found again.
+    /// What is sent again to a bridge that is found again.
     standing: Arc<Mutex<Vec<String>>>,
     stands: Arc<AtomicBool>,
 }

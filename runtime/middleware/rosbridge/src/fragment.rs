@@ -75,7 +75,7 @@ pub enum PieceError {
 
 impl Pieces {
     /// Takes a piece; gives the whole once it is complete. At most `most` bytes wait: what waited longest is given up
-    /// for new ones. Of a piece that comes twice, the first counts.
+    /// for new ones. If a piece comes twice, the first counts.
     pub fn take(
         &mut self,
         id: &str,

@@ -27,7 +27,7 @@ pub enum Operation {
     },
     /// It will not any more.
     Unadvertise {
-        /// That of the `advertise` which is taken back.
+        /// The id of the `advertise` which is taken back.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         id: Option<String>,
         /// The topic.
@@ -71,7 +71,7 @@ pub enum Operation {
     },
     /// It does not any more.
     Unsubscribe {
-        /// That of the `subscribe` which is taken back; all of the topic if there is none.
+        /// The id of the `subscribe` which is taken back; all of the topic if there is none.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         id: Option<String>,
         /// The topic.
@@ -112,7 +112,7 @@ pub enum Operation {
     },
     /// What a service says.
     ServiceResponse {
-        /// That of the call.
+        /// The id of the call.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         id: Option<String>,
         /// The service.
@@ -133,7 +133,7 @@ pub enum Operation {
     },
     /// A report.
     Status {
-        /// That of what it is about.
+        /// The id of what it is about.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         id: Option<String>,
         /// How important it is.

@@ -30,7 +30,7 @@ pub struct Payloads {
 }
 
 impl Payloads {
-    /// Those of a plan, as a bridge to this ROS says them. Each interface follows those that it contains.
+    /// The payloads of a plan, as a bridge to this ROS writes them. Each interface follows those that it contains.
     pub fn new(plan: &CampaignPlan, dialect: Dialect, interfaces: &[Interface]) -> Self {
         let mut blanks = BTreeMap::new();
         for interface in interfaces {

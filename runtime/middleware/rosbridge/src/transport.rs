@@ -69,7 +69,7 @@ struct Bridge {
     /// Where it is, with placeholders filled.
     url: String,
     connected: Instant,
-    /// The place of a source or clock by its topic.
+    /// The position of a source or clock by its topic.
     topics: BTreeMap<String, Heard>,
     /// Calls of services that go on under numbers of ours.
     calls: BTreeMap<u64, Call>,
@@ -84,7 +84,7 @@ struct Bridge {
 #[derive(Debug, Clone)]
 struct Call {
     service: String,
-    /// That of the caller, if it gave one.
+    /// The id that the caller gave, if any.
     id: Option<String>,
 }
 
@@ -95,7 +95,7 @@ enum Heard {
         line: usize,
         source: usize,
     },
-    /// On which the runner publishes: what comes from there went through the bridge.
+    /// The runner publishes on it: what comes from there went through the bridge.
     Sink {
         line: usize,
         sink: usize,
@@ -297,7 +297,7 @@ impl Bridge {
         if result {
             return self.message(line, 0, Some(call), &values, arrived);
         }
-        // There is no reply that operations could act on: the client is told what the bridge said.
+        // There is no reply that operations could act on: the client gets the bridge's error.
         self.say(Operation::ServiceResponse { id, service, values: Some(values), result: false }.text())?;
         Ok(None)
     }

@@ -10,7 +10,7 @@ pub(super) struct Envelope<'a> {
 }
 
 impl<'a> Envelope<'a> {
-    /// That of a frame; an error says why it is none.
+    /// Reads the envelope of a frame; an error says why it is none.
     pub(super) fn read(frame: &'a str) -> Result<Self, String> {
         let fields = serde_json::from_str(frame).map_err(|error| format!("it is not an operation in JSON: {error}"))?;
         Ok(Envelope { fields })

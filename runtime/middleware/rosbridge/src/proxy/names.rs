@@ -24,7 +24,7 @@ pub(super) enum FromClient {
     Unchanged,
     /// This goes on in its place.
     Changed(String),
-    /// It does not go on, and the client is told this.
+    /// It is not passed on, and the client gets this answer.
     Refused(String),
     /// It is a piece of something that is not complete.
     Waits,

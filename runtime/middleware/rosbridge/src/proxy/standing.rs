@@ -1,4 +1,4 @@
-//! What a client has said that lasts: it is said again to a bridge that is found again.
+//! What a client has sent that lasts: it is sent again to a bridge that is found again.
 
 /// The most bytes that are kept for one client.
 const MOST: usize = 1 << 20;
@@ -11,7 +11,7 @@ pub(super) enum About {
     Serving,
 }
 
-/// What lasts, in the order in which it was said.
+/// What lasts, in the order in which it was sent.
 #[derive(Debug, Default)]
 pub(super) struct Standing {
     said: Vec<Said>,
