@@ -93,7 +93,7 @@ impl System {
         }
     }
 
-    /// Of which ROS it is; ROS 2 where it is of none.
+    /// The ROS that it speaks; ROS 2 if it speaks none.
     pub fn dialect(&self) -> Dialect {
         match self {
             System::Rosbridge { dialect, .. } => *dialect,

@@ -2,7 +2,7 @@
 //!
 //! A space may declare only what each message has: a message with a field less, or with one of another kind, would not
 //! be of its declared type. So fields that came in some messages only, or as values of several kinds, are left out, and
-//! it is said why.
+//! the reason is given.
 
 use sesame_notation::is_name;
 
@@ -40,11 +40,11 @@ pub enum Guess {
 pub enum Conventions {
     /// Payloads in JSON without a protocol around them.
     Json,
-    /// Those of a bridge to ROS.
+    /// The conventions of a bridge to ROS.
     Rosbridge,
-    /// Those of SimlogAPI, version 2.
+    /// The conventions of SimlogAPI, version 2.
     Simlog2,
-    /// Those of SimlogAPI, version 3.
+    /// The conventions of SimlogAPI, version 3.
     Simlog3,
 }
 

@@ -40,7 +40,7 @@ impl Payloads {
         self.parts += samples.parts() - before;
     }
 
-    /// Those of a topic.
+    /// The payloads of a topic.
     pub fn get(&self, topic: &str) -> Option<&Samples> {
         self.by_topic.get(topic)
     }
