@@ -44,7 +44,7 @@ pub struct Client {
     url: String,
     patience: Duration,
     api: Api,
-    /// Of version 3: which subscriber this is.
+    /// Which subscriber this is, in version 3.
     uuid: String,
     /// In milliseconds.
     step: i64,
@@ -231,7 +231,7 @@ impl Client {
         self.streams - 1
     }
 
-    /// Of version 3: opens the one stream that carries all topics.
+    /// Opens the one stream that carries all topics in version 3.
     fn create_subscriber(&mut self) {
         let Api::V3 { topics: mut api, .. } = self.api.clone() else { return };
         let subscriber = Subscriber { name: "sesame".to_owned(), uuid: self.uuid.clone() };
@@ -260,7 +260,7 @@ impl Client {
         });
     }
 
-    /// Of version 2: opens a stream in a task of its own.
+    /// Opens a stream of version 2 in a task of its own.
     fn open(
         &self,
         stream: usize,
@@ -289,7 +289,7 @@ impl Client {
         });
     }
 
-    /// Of version 3: whether there is such a topic. In version 2 nobody tells.
+    /// Whether there is such a topic in version 3. Version 2 does not say.
     pub fn has(&self, name: &str) -> Result<bool, ClientError> {
         let Api::V3 { topics: mut api, .. } = self.api.clone() else { return Ok(true) };
         let request = TopicInfoRequest { path: name.to_owned() };
@@ -299,7 +299,7 @@ impl Client {
         Ok(info.exists)
     }
 
-    /// Of version 3: the latest message of a topic, if there was one. Version 2 does not tell.
+    /// The latest message of a topic in version 3, if there was one. Version 2 does not say.
     pub fn read(&self, name: &str) -> Result<Vec<Message>, ClientError> {
         let Api::V3 { topics: mut api, .. } = self.api.clone() else { return Ok(Vec::new()) };
         let request = ReadRequest { path: vec![name.to_owned()] };
@@ -318,7 +318,7 @@ impl Client {
         Err(ClientError::NoTopic { url: self.url.clone(), name: name.to_owned() })
     }
 
-    /// Of version 3: adds a topic to the stream of all.
+    /// Adds a topic to the stream of all in version 3.
     fn subscribe(&self, name: &str, stream: usize) -> Result<(), ClientError> {
         let Api::V3 { topics: mut api, .. } = self.api.clone() else { return Ok(()) };
         self.inbox.name(name, stream);

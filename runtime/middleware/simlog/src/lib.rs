@@ -1,6 +1,6 @@
 //! SimlogAPI over gRPC: the protocol of the simulator that the original platform used, in both its versions.
 //!
-//! A payload of the wire is a [`Message`]; the declared types of a plan say as what it is read ([`Shape`]). The
+//! A payload of the wire is a [`Message`]; the declared types of a plan say as what it is read ([`ExpectedType`]). The
 //! runner's side is a `client::Client` that blocks, with `simlog` around it, the transport. The simulator's side
 //! serves any [`Simulator`](sesame_relay::simulator::Simulator) of ours (`server`).
 

@@ -13,9 +13,9 @@ use crate::{dynamic, ros};
 /// A message as it is on the wire.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Message {
-    /// Of version 2.
+    /// A message of version 2.
     V2(Box<RosMessage>),
-    /// Of version 3.
+    /// A message of version 3.
     V3(Box<SimlogMessage>),
 }
 

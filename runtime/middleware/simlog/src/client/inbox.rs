@@ -11,7 +11,7 @@ use crate::message::Message;
 /// A message that came in.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Heard {
-    /// On which of the client's streams, counted from 0 in the order in which they were asked for.
+    /// The client's stream that it came on, counted from 0 in the order in which they were asked for.
     pub stream: usize,
     /// The message.
     pub message: Message,

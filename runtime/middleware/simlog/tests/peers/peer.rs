@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 
 use sesame_peers::Ended;
 
-/// The Python of the peers. Without one the test is to be skipped, which is said here; with `CI=true` that is an error.
+/// The Python of the peers. Without one it prints that the test is skipped; with `CI=true` that is an error.
 pub(crate) fn python() -> Option<PathBuf> {
     sesame_peers::named("SESAME_SIMLOG")
 }

@@ -116,7 +116,7 @@ fn operations_act_on_messages_of_the_protocol() {
     let reference = evaluated(Vec::new());
     assert_eq!(reference.outcome, Outcome::Completed, "{reference:?}");
     assert_eq!(reference.metrics[0].value, Some(24.5));
-    // Those of 0.2 s to 0.4 s are larger by a quarter: of ten steps.
+    // The messages of 0.2 s to 0.4 s are larger by a quarter: of ten steps.
     let biased = evaluated(vec![use_of(0, 0.2, 0.4, value(0.25), 1)]);
     assert_eq!((biased.metrics[0].value, biased.operations[0].counters.changed), (Some(27.0), 10));
     // All before the last one are later by 0.1 s: that of 0.9 s is due at the end of the last step, and arrives in it.
