@@ -38,7 +38,8 @@ pub struct Differences {
 }
 
 impl Differences {
-    /// Of so many variables, about which nothing is known. Place 0 is the number zero, places from 1 on are variables.
+    /// Bounds on this many variables, about which nothing is known. Place 0 is the number zero, places from 1 on are
+    /// variables.
     pub fn new(variables: usize) -> Self {
         let size = variables + 1;
         let zero = Bound { most: 0.0, below: false };

@@ -93,7 +93,7 @@ impl TryFrom<Stored> for Latencies {
 /// The bucket of so many nanoseconds.
 fn bucket(nanos: u64) -> u16 {
     let octave = (u64::BITS - nanos.leading_zeros()).saturating_sub(u32::from(FINE) + 1);
-    // Of `nanos >> octave` the highest bit is set, unless the octave is the first.
+    // The highest bit of `nanos >> octave` is set, unless the octave is the first.
     u16::try_from((u64::from(octave) << FINE) + (nanos >> octave)).unwrap_or(BUCKETS - 1)
 }
 

@@ -126,8 +126,8 @@ pub struct Observation {
     pub end: f64,
     /// Per operation of the test, in its order; empty after a crash of the worker.
     pub operations: Vec<OperationEffect>,
-    /// Of a run that came to its end: names on the wire that operations of the campaign act on and that nobody heard,
-    /// in order of declaration. Neither did the simulator subscribe to them, nor reads them an outbound metric.
+    /// In a run that came to its end: names on the wire that operations of the campaign act on and that nobody heard,
+    /// in order of declaration. The simulator did not subscribe to them, and no outbound metric reads them.
     pub unheard: Vec<String>,
     /// In a run without operations: those of the campaign that would have found no message, in order of declaration.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -220,7 +220,7 @@ pub struct MetricObservation {
     pub not_finite: Option<f64>,
     /// Change points `(seconds, value)` in time order; the value holds until the next point. Always finite.
     pub series: Vec<(f64, f64)>,
-    /// Of the robustness of a formula its [signal](crate::robustness), thinned: change points as in `series`, but the
+    /// The [signal](crate::robustness) of the robustness of a formula, thinned: change points as in `series`, but the
     /// last one ends it and repeats the value before. Empty for other metrics. It follows from the run like everything
     /// else, and explains the value; it is neither part of the digest nor compared when a run is repeated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -242,7 +242,7 @@ pub struct Lost {
 }
 
 impl MetricObservation {
-    /// Of a run that came to its end, with nothing in it that was not finite.
+    /// The metric of a run that came to its end, with nothing in it that was not finite.
     pub fn whole(value: Option<f64>, set: bool, series: Vec<(f64, f64)>) -> Self {
         MetricObservation {
             value,
@@ -256,7 +256,7 @@ impl MetricObservation {
     }
 }
 
-/// The values that a metric could have had at the end of a run: of a run that came to its end, its value; of one that
+/// The values that a metric could have had at the end of a run: for a run that came to its end, its value; for one that
 /// broke off, all that the rest of the run might have made of it. It is never too narrow.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Reach {
@@ -275,7 +275,7 @@ impl Reach {
         Reach { low: Some(value), high: Some(value) }
     }
 
-    /// That of a metric with this value in a run that came to its end. Without a value nothing is known.
+    /// The reach of a metric with this value in a run that came to its end. Without a value nothing is known.
     pub fn of_whole_run(value: Option<f64>) -> Self {
         value.map_or(Reach::ANY, Reach::only)
     }
@@ -312,7 +312,7 @@ pub struct MetricValue {
 }
 
 impl MetricValue {
-    /// Of a run that came to its end, with nothing in it that was not finite.
+    /// The value of a run that came to its end, with nothing in it that was not finite.
     pub fn whole(value: Option<f64>, set: bool) -> Self {
         MetricValue { value, set, reach: Reach::of_whole_run(value), not_finite: None }
     }
@@ -326,12 +326,12 @@ impl From<&MetricObservation> for MetricValue {
 }
 
 impl Observation {
-    /// That of a run that left nothing but the cause of its crash.
+    /// The observation of a run that left nothing but the cause of its crash.
     pub fn crashed(message: String) -> Self {
         Observation::without_run(Outcome::Crash { message })
     }
 
-    /// That of a run of which nothing but the outcome is known.
+    /// The observation of a run of which only the outcome is known.
     pub fn without_run(outcome: Outcome) -> Self {
         Observation {
             outcome,

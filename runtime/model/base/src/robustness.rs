@@ -48,7 +48,7 @@ pub fn quantifier(formula: &Formula) -> Option<Quantifier> {
 
 /// When a robustness violated a bound, from its signal: change points `(seconds, value)`, the last of which ends it.
 ///
-/// Of a value that is beyond the bound on the side that single times decide, these are the times at which the signal is
+/// If the value is beyond the bound on the side that single times decide, these are the times at which the signal is
 /// beyond it; on the other side no time satisfied the bound, and the whole signal counts. Empty where the value
 /// satisfies the bound.
 pub fn lost(signal: &[(f64, f64)], quantifier: Option<Quantifier>, bound: Bound, value: f64) -> Vec<Span> {

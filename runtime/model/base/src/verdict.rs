@@ -158,7 +158,7 @@ mod tests {
         MetricValue::whole(value, set)
     }
 
-    /// That of a metric that was set in a run that broke off.
+    /// The value of a metric that was set in a run that broke off.
     fn cut_off(value: f64, trend: Option<Trend>) -> MetricValue {
         MetricValue { value: Some(value), set: true, reach: Reach::onwards(trend, Some(value)), not_finite: None }
     }

@@ -18,7 +18,7 @@ pub struct Traffic {
     pub last: f64,
     /// The longest time without a message between the first and the last one. Empty if all came in one instant.
     pub gap: Span,
-    /// The median of the times between successive instants with messages, in seconds; of a long run, of an even sample
+    /// The median of the times between successive instants with messages, in seconds; in a long run, of an even sample
     /// of them.
     pub median_gap: f64,
 }
