@@ -10,7 +10,7 @@ use crate::condition;
 use crate::text::block;
 use crate::unit::Unit;
 
-/// A clause of a campaign: its word, and what is said behind it.
+/// A clause of a campaign: its word, and what follows it.
 pub type Clause = (&'static str, String);
 
 /// The campaign of a plan as a `campaign` block, with every default written out. A failsafe is written as the number of
