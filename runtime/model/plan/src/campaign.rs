@@ -49,18 +49,18 @@ pub struct Campaign {
     /// that is stepped. `None` for a campaign that does not say.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub end_when: Option<Condition>,
-    /// Of which tests the messages and the activity of operations are recorded; `None` for none.
+    /// The tests whose messages and activity of operations are recorded; `None` for none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub record: Option<Recorded>,
 }
 
-/// Of which tests the messages and the activity of operations are recorded.
+/// The tests whose messages and activity of operations are recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Recorded {
-    /// Of those that violate a requirement, crash or time out, and of the reference runs to compare them with.
+    /// Those that violate a requirement, crash or time out, and the reference runs to compare them with.
     Failing,
-    /// Of all.
+    /// All tests.
     All,
 }
 

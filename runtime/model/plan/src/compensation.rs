@@ -21,7 +21,7 @@ pub struct Fit {
 pub enum Fitted {
     /// How much later messages reach their subscribers, in seconds; 0 or more.
     Delay {
-        /// On which topic; `None` for every topic that a node receives.
+        /// The topic; `None` for every topic that a node receives.
         topic: Option<TopicId>,
     },
     /// By what values are multiplied on their way to their subscribers.

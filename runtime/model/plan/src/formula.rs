@@ -66,9 +66,9 @@ pub enum Members {
     Sum,
     /// The latest. Those of several groups are of members at the same position.
     Each,
-    /// That of the first member of a pair: the formula is that of each pair of different members of one group.
+    /// The first member of a pair: the formula is that of each pair of different members of one group.
     First,
-    /// That of the second member of a pair.
+    /// The second member of a pair.
     Second,
 }
 
@@ -78,32 +78,32 @@ pub enum Members {
 pub enum Aggregate {
     /// The last value.
     Last {
-        /// Of what.
+        /// The expression.
         of: Expression,
     },
     /// The least value.
     Min {
-        /// Of what.
+        /// The expression.
         of: Expression,
     },
     /// The greatest value.
     Max {
-        /// Of what.
+        /// The expression.
         of: Expression,
     },
     /// The mean over messages.
     Mean {
-        /// Of what.
+        /// The expression.
         of: Expression,
     },
     /// The number of messages at which it held.
     Count {
-        /// Of what.
+        /// The condition.
         of: Condition,
     },
     /// The simulation time during which it held, in seconds.
     Duration {
-        /// Of what.
+        /// The condition.
         of: Condition,
     },
 }
@@ -145,7 +145,7 @@ pub enum Expression {
     Unary {
         /// Which.
         function: UnaryFunction,
-        /// Of what.
+        /// The argument.
         of: Box<Expression>,
     },
     /// A function of two numbers.
@@ -284,7 +284,7 @@ impl UnaryFunction {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BinaryFunction {
-    /// Of y and x: the angle from -π to π of the point (x, y), in radians.
+    /// The angle from -π to π of the point (x, y), in radians; the arguments are y and x.
     Atan2,
     /// The root of the sum of squares.
     Hypot,

@@ -49,7 +49,7 @@ pub struct LabCost {
 }
 
 impl LabCost {
-    /// Of a test with so many operations.
+    /// The cost of a test with this many operations.
     pub fn of(self, operations: usize) -> f64 {
         self.base + self.per_operation * operations as f64
     }

@@ -1,10 +1,10 @@
-//! The life of a system beside its simulator: what starts it, when it is ready, what ends it.
+//! The life of a system around its simulator: what starts it, when it is ready, what ends it.
 
 use serde::{Deserialize, Serialize};
 
 use crate::TopicId;
 
-/// What a system says beside its simulator.
+/// What a system says in addition to its simulator.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Lifecycle {
     /// What starts it as a whole; nodes may have launches of their own.

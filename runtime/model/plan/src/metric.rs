@@ -72,7 +72,7 @@ pub enum MetricSource {
     },
     /// By how much a formula of signal temporal logic is kept over the whole run; known when it is over.
     Robustness {
-        /// Of what.
+        /// The formula.
         robustness: Robustness,
     },
     /// Computed from messages as the space says.
@@ -84,7 +84,7 @@ pub enum MetricSource {
     Monitor {
         /// Which monitor.
         monitor: MonitorId,
-        /// What is said of it.
+        /// What it measures.
         score: Score,
     },
 }

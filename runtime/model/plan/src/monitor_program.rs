@@ -67,7 +67,7 @@ impl std::error::Error for NotAlone {}
 
 impl CampaignPlan {
     /// Whether the runner of this plan is a guest in a system that runs without it: it cuts nothing, starts nothing and
-    /// waits for nobody, and publishes beside the nodes.
+    /// waits for nobody, and publishes in addition to the nodes.
     pub fn is_guest(&self) -> bool {
         self.simulator.wiring.iter().any(|wiring| wiring.joined)
     }

@@ -29,7 +29,7 @@ pub struct Operation {
     pub kind: OperationKind,
     /// The parameters a test chooses, in the order that [`OperationKind`] documents.
     pub parameters: Vec<Parameter>,
-    /// The time outside of which it is never active (`within`); seconds, `start < end`. Of an offline operation, which
+    /// The time outside of which it is never active (`within`); seconds, `start < end`. For an offline operation, which
     /// is never active, the whole run.
     pub within: Span,
     /// How long it is active at a time (`for`): the length of a window, or of an activation by condition. Without it,

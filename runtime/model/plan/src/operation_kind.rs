@@ -6,14 +6,14 @@ use crate::NodeId;
 
 /// What an operation does to the messages of its topic, with the parameters that a test chooses for it.
 ///
-/// Of the values at an operation's places, only numbers, points, texts and truth values are changed as the kind says;
-/// the generator makes sure that they are of a type that the kind is for. Numbers are in the unit of their field.
-/// Results of whole numbers are rounded to the nearest whole number, halves away from zero, and held inside 64 bits.
+/// Only numbers, points, texts and truth values at an operation's places are changed as the kind says; the generator
+/// makes sure that they are of a type that the kind is for. Numbers are in the unit of their field. Results of whole
+/// numbers are rounded to the nearest whole number, halves away from zero, and held inside 64 bits.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum OperationKind {
     /// Replaces or shifts numbers and points by fresh uniform draws per message. Of numbers one parameter, a sub-range
-    /// ([`crate::Shape::Range`]) in the field's unit: `value` or `offset`. Of points three of them: `x`, `y`, `z`.
+    /// ([`crate::ChoiceKind::Range`]) in the field's unit: `value` or `offset`. Of points three of them: `x`, `y`, `z`.
     RandomValue {
         /// Whether the draw replaces the value or is added to it.
         mode: ValueMode,
@@ -135,7 +135,7 @@ pub enum Moment {
 }
 
 impl OperationKind {
-    /// Whether it acts beside the run, before its start or after its end: its activation in a test is then
+    /// Whether it acts outside the run, before its start or after its end: its activation in a test is then
     /// [`crate::Activation::Offline`], and it has no observed intervals.
     pub fn is_offline(&self) -> bool {
         matches!(self, OperationKind::Custom { moment: Moment::BeforeStart | Moment::AfterEnd })

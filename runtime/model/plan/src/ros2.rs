@@ -68,8 +68,8 @@ pub enum StepBy {
 /// How a topic is cut, so that its messages pass through the relay. It follows from all operations of the space, so
 /// that its campaigns need the same remappings.
 ///
-/// A topic that is not cut is only listened to. Of one that is cut, publishers are remapped to `TOPIC/undisturbed`, or
-/// to `TOPIC/from/NODE`; the relay publishes on `TOPIC`, and on `TOPIC/to/NODE` for each subscriber of its own.
+/// A topic that is not cut is only listened to. If it is cut, publishers are remapped to `TOPIC/undisturbed`, or to
+/// `TOPIC/from/NODE`; the relay publishes on `TOPIC`, and on `TOPIC/to/NODE` for each subscriber of its own.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Wiring {
     /// Whether an operation may act on its messages.
@@ -80,8 +80,8 @@ pub struct Wiring {
     /// The subscribers that operations distinguish (`to`).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub subscribers: Vec<NodeId>,
-    /// Whether the runner publishes there beside the nodes, which keep their names: it is a guest in their system. Such
-    /// a topic is not cut.
+    /// Whether the runner publishes there in addition to the nodes, which keep their names: it is a guest in their
+    /// system. Such a topic is not cut.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub joined: bool,
 }
@@ -125,14 +125,14 @@ pub enum WireType {
     },
     /// A fixed number of values, at least one.
     Array {
-        /// Of what type.
+        /// The type of the values.
         of: Box<WireType>,
         /// How many.
         length: u32,
     },
     /// Any number of values.
     Sequence {
-        /// Of what type.
+        /// The type of the values.
         of: Box<WireType>,
         /// At most how many; `None` for any number.
         #[serde(default, skip_serializing_if = "Option::is_none")]

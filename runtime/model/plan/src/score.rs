@@ -24,7 +24,7 @@ pub enum Score {
     },
     /// How many of its stays in the safe state had no hazard in them.
     FalseAlarms {
-        /// Of which requirement.
+        /// The requirement.
         requirement: RequirementId,
         /// A hazard so many seconds after the beginning of a stay is one of the stay, even if it is over; positive.
         #[serde(default, skip_serializing_if = "Option::is_none")]

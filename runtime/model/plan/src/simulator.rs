@@ -110,7 +110,7 @@ impl Simulator {
         self.ros.as_ref().is_some_and(|ros| matches!(ros.clock, Clock::Topic { .. }))
     }
 
-    /// Of which ROS its nodes are; `None` for a system that is none of ROS.
+    /// The ROS of its nodes; `None` for a system without ROS.
     pub fn dialect(&self) -> Option<Dialect> {
         match &self.transport {
             Transport::Rosbridge(rosbridge) => Some(rosbridge.dialect),
@@ -301,10 +301,10 @@ pub struct SimulatorProperties {
     pub feature_over_tls: Option<&'static str>,
     /// How its addresses begin; `None` if it has no address.
     pub address: Option<Schemes>,
-    /// As what a runner, or a monitor as a program of its own, stands between its nodes: `as a node of ROS 2`. `None`
-    /// where the simulator itself brings all messages, so that no topic is wired and no node told apart.
+    /// What a runner, or a monitor as a program of its own, is between its nodes: `as a node of ROS 2`. `None` where
+    /// the simulator itself brings all messages, so that no topic is wired and no node told apart.
     pub bus: Option<&'static str>,
-    /// Of which ROS its messages are, unless its settings say another; `None` if they are of none.
+    /// The ROS of its messages, unless its settings say another; `None` if they are of none.
     pub ros: Option<Dialect>,
     /// Whether it is a part of the runner, so that there is nothing to launch, and nothing to start again after a
     /// crash.

@@ -1,6 +1,6 @@
 //! Formulas of signal temporal logic over the input signals of a metric.
 //!
-//! Only what they are; what they mean, down to jumps and the end of a trace, is said in the runtime's room `stl`.
+//! Only what they are; what they mean, down to jumps and the end of a trace, is defined in the runtime's room `stl`.
 
 use serde::{Deserialize, Serialize};
 
@@ -30,7 +30,7 @@ pub struct Robustness {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Formula {
-    /// A signal beside a constant.
+    /// A signal compared with a constant.
     Predicate {
         /// Position in the metric's list of input signals.
         signal: u32,

@@ -123,7 +123,7 @@ pub struct Node {
     /// What it publishes in answer to what it receives, so that a lock-stepped run knows what to wait for.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub answers: Vec<Answer>,
-    /// On which topics it publishes one message in every step, on each of their paths, for the same reason.
+    /// The topics on which it publishes one message in every step, on each of their paths, for the same reason.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub every_step: Vec<TopicId>,
 }

@@ -64,12 +64,12 @@ pub enum Activation {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Choice {
-    /// One value ([`crate::Shape::Value`]).
+    /// One value ([`crate::ChoiceKind::Value`]).
     Value {
         /// The value.
         value: f64,
     },
-    /// A sub-range, `low <= high` ([`crate::Shape::Range`]).
+    /// A sub-range, `low <= high` ([`crate::ChoiceKind::Range`]).
     Range {
         /// Lower end.
         low: f64,

@@ -240,8 +240,8 @@ pub fn known_test(name: &str, test: Test) -> KnownTest {
     KnownTest { name: name.to_owned(), doc: String::new(), test, expectations: Vec::new(), simulator_seed: None }
 }
 
-/// An operation that is permitted in the first ten seconds, on whole messages of a topic; on no topic if it acts beside
-/// the run.
+/// An operation that is permitted in the first ten seconds, on whole messages of a topic; on no topic if it acts
+/// outside the run.
 pub fn operation_with(name: &str, topic: u32, kind: OperationKind, parameters: Vec<Parameter>) -> Operation {
     Operation {
         name: name.to_owned(),

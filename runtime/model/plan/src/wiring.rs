@@ -22,11 +22,11 @@ impl Remapping {
 /// The names that differ between the clients of a proxy and the server behind it.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Renamed {
-    /// Of topics, where they publish.
+    /// The topics that they publish on.
     pub publishes: Vec<Remapping>,
-    /// Of topics, where they subscribe.
+    /// The topics that they subscribe to.
     pub subscribes: Vec<Remapping>,
-    /// Of services that they offer.
+    /// The services that they offer.
     pub serves: Vec<Remapping>,
 }
 
@@ -360,7 +360,7 @@ mod tests {
         assert_eq!(stepped.relayable(), [ids(&[3, 4])]);
         let cut: Vec<TopicId> = stepped.relaying(0).cut().map(|(id, ..)| id).collect();
         assert_eq!(cut, ids(&[0, 1]));
-        // Of another simulator, those of operations.
+        // With another simulator, the topics of operations can be relayed.
         let plan = testing::plan(vec![testing::operation(1, crate::OperationKind::Blackhole)]);
         assert_eq!(plan.relayable(), [ids(&[1])]);
         assert_eq!(plan.relaying(0), plan);

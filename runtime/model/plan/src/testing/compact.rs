@@ -28,8 +28,8 @@ pub enum Tree {
     Struct {
         /// The name of the type or variant; empty for an object in JSON, whose type is known by its place.
         kind: String,
-        /// What is printed before the fields: the type, until a test finds better words; of an object its `kind`, which
-        /// is no field then.
+        /// What is printed before the fields: the type, until a test finds better words; for an object its `kind`,
+        /// which is no field then.
         head: String,
         /// Names and values, in order.
         fields: Vec<(String, Tree)>,

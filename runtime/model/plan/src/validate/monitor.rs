@@ -310,7 +310,7 @@ mod tests {
         assert_eq!(with(part), format!("{place}there is no evidence 2, there are 2"));
         let monitor = said(|plan| plan.metrics[3] = score("relies", 2, Score::Integrity));
         assert_eq!(monitor, "metrics[3].source.monitor: there is no monitor 2, there are 2");
-        // A requirement that bounds no metric of the plan is told of as such.
+        // A requirement that bounds no metric of the plan is reported as such.
         assert!(said(|plan| plan.requirements[0].metric = crate::MetricId(9)).contains("there is no metric 9"));
     }
 }
