@@ -163,7 +163,7 @@ pub fn candidates(repository: &Repository, selection: &Selection, terms: &Terms)
     Ok(found)
 }
 
-/// Those of these tests that a lab excludes, each with the reason: the tests that must not be run in it, whatever else
+/// The tests among these that a lab excludes, each with the reason: the tests that must not be run in it, whatever else
 /// speaks for them. One that has no value of a metric by which the lab excludes is among them, since nobody knows.
 pub fn excluded(repository: &Repository, lab: &Lab, tests: &[u32]) -> Result<Vec<(u32, LeftOut)>, RecordError> {
     if lab.exclude.is_empty() {

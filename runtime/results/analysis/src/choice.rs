@@ -20,7 +20,7 @@ pub enum ChoiceError {
     /// Nothing can be compared.
     #[error("none of these tests is a candidate")]
     NoCandidates,
-    /// A test that is said to have been run is not a candidate.
+    /// A test that is given as run already is not a candidate.
     #[error("T{test} is not a candidate, so it cannot count as run")]
     NotACandidate {
         /// Its number.
@@ -90,7 +90,7 @@ pub struct Choosing<'a> {
 }
 
 impl<'a> Choosing<'a> {
-    /// Of candidates, with the weight of difference against interest in `0..=1`. Tests that were run already are in
+    /// Takes candidates, and the weight of difference against interest in `0..=1`. Tests that were run already are in
     /// every choice and cost nothing: the budget is for others.
     pub fn new(
         candidates: &'a Candidates,

@@ -75,7 +75,7 @@ struct Measured {
     crashes: u32,
     timeouts: u32,
     front: Front,
-    /// Of each objective the worst finite value.
+    /// The worst finite value of each objective.
     worst: Vec<f64>,
     coverage: Option<f64>,
     hypervolume: Option<f64>,
@@ -85,7 +85,7 @@ struct Measured {
     joint_share: Option<f64>,
 }
 
-/// Runs beside each other.
+/// Runs side by side.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
     runs: Vec<Measured>,

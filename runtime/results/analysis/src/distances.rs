@@ -173,7 +173,7 @@ pub struct FrontDistance {
     pub set: Option<String>,
     /// The generation.
     pub generation: Option<u32>,
-    /// Tests that were evaluated by then; of a result set, its members.
+    /// Tests that were evaluated by then; for a result set, its members.
     pub evaluations: usize,
     /// Points on the front.
     pub front: usize,

@@ -1,7 +1,7 @@
-//! The reality gap: the results of a lab beside those of the campaign that its tests come from, per test, metric and
-//! requirement, and over the space of tests.
+//! The reality gap: the results of a lab compared with those of the campaign that its tests come from, per test, metric
+//! and requirement, and over the space of tests.
 //!
-//! Both sides are independent samples of a test's two distributions; the tests are the pairs. Of the simulation, fresh
+//! Both sides are independent samples of a test's two distributions; the tests are the pairs. In the simulation, fresh
 //! runs are the sample, where there are any: the run for which a test was chosen shows more than a test usually does.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -80,7 +80,7 @@ pub enum GapError {
     OtherModel {
         /// The lab's file.
         lab: PathBuf,
-        /// In what they differ.
+        /// How they differ.
         difference: String,
     },
 }
@@ -307,7 +307,8 @@ pub fn dimensions(lab: Option<&Lab>) -> Vec<Dimension> {
 
 /// The coordinates of these tests in these dimensions, by number.
 ///
-/// Those of variations are as planned: they rise from one to the next, also where operations of some had no effect.
+/// The points of variations are as planned: they rise from one to the next, also where operations of some had no
+/// effect.
 pub fn points(
     campaign: &Repository,
     tests: &BTreeSet<u32>,

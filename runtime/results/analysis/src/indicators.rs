@@ -21,9 +21,10 @@ pub struct Indicator {
     pub generation: Option<u32>,
     /// Tests evaluated by then; of an imported campaign as the set's name says.
     pub evaluations: Option<u32>,
-    /// Of these, not exact duplicates. `None`, as the next three, for imported results, in which they were not counted.
+    /// How many of these are not exact duplicates. `None`, as the next three, for imported results, in which they were
+    /// not counted.
     pub unique: Option<u32>,
-    /// Of these, without effect.
+    /// How many of these had no effect.
     pub no_effect: Option<u32>,
     /// How many of these crashed.
     pub crashes: Option<u32>,
@@ -51,7 +52,7 @@ pub struct IndicatorAnalysis {
     pub reference: Vec<(String, f64)>,
     /// Cells there are, where the campaign counts them.
     pub cells: Option<usize>,
-    /// Of these, those that a test can reach, as far as known.
+    /// How many of these a test can reach, as far as known.
     pub feasible: Option<usize>,
 }
 
@@ -63,8 +64,8 @@ struct Judged {
     cell: Option<usize>,
 }
 
-/// The indicators after each complete generation. Of an imported campaign, whose tests are of no generation,
-/// there is one for each result set: of the front of its members.
+/// The indicators after each complete generation. For an imported campaign, whose tests are of no generation, there is
+/// one for each result set: of the front of its members.
 ///
 /// Hypervolumes are measured from the `reference` given, a value per objective in its unit; else from the one that was
 /// fixed while the campaign ran; else, of an imported campaign, from a point found in the same way among all of its

@@ -4,8 +4,8 @@
 //! from beginning to end, and gives a [`Table`], which prints as a table, as CSV and as JSON. The same results give the
 //! same tables on every machine.
 //!
-//! Beside them is what a lab needs: the [`choice`] of its tests, the reality [`gap`] in metrics and in [`traces`], and
-//! what [`compensation`] makes of it.
+//! In addition there is what a lab needs: the [`choice`] of its tests, the reality [`gap`] in metrics and in
+//! [`traces`], and what [`compensation`] makes of it.
 
 // These macros panic where nothing can be written: on a full disk, or after the reader has gone.
 #![warn(clippy::print_stdout, clippy::print_stderr)]
@@ -88,7 +88,7 @@ pub enum Readers {
 
 /// What each file holds, one row per file, in their order.
 ///
-/// Of more than three result sets, a table for people has only the first, the last and their number.
+/// If there are more than three result sets, a table for people has only the first, the last and their number.
 pub fn campaigns(repositories: &[Repository], readers: Readers) -> Result<Table, RecordError> {
     let columns = ["file", "space", "campaign", "search", "seed", "tests", "front", "objectives", "sets", "ended"];
     let mut dataset = Table::new(columns.map(str::to_owned));
@@ -167,7 +167,7 @@ pub fn tests(repository: &Repository, selection: &Selection) -> Result<Table, Re
     Ok(dataset)
 }
 
-/// Of the results of a lab, the test of the campaign that each test is a run of, by number; of others nothing.
+/// For the results of a lab: the test of the campaign that each test is a run of, by number. Other results have none.
 fn runs_in_a_lab(repository: &Repository) -> Result<BTreeMap<u32, u32>, RecordError> {
     let Some(task) = repository.task().of_lab() else { return Ok(BTreeMap::new()) };
     let rows = repository.tests()?;

@@ -20,7 +20,7 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// Of finite numbers in any order, which makes no difference; `None` without one.
+    /// Summarises finite numbers in any order, which makes no difference; `None` without a number.
     pub fn of(numbers: impl IntoIterator<Item = f64>) -> Option<Sample> {
         let mut sorted: Vec<f64> = numbers.into_iter().collect();
         sorted.sort_by(f64::total_cmp);

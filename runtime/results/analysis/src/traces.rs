@@ -1,5 +1,5 @@
-//! The reality gap in traces: what signals of a lab are like beside those of a simulation, test by test, and how much
-//! later and how much greater they are over all tests.
+//! The reality gap in traces: how signals of a lab differ from those of a simulation, test by test, and how much later
+//! and how much greater they are over all tests.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -206,7 +206,7 @@ impl TraceGap {
         table
     }
 
-    /// What the traces say: of each signal, how much later and how much greater it is in the lab. Signals that agree
+    /// What the traces say: for each signal, how much later and how much greater it is in the lab. Signals that agree
     /// are counted.
     pub fn sentences(&self) -> Vec<String> {
         let mut sentences = Vec::new();

@@ -209,7 +209,7 @@ fn prune(node: &mut Node) {
 /// The probability that chance divides failing tests between two sides as unevenly as this, or more so in the same
 /// direction, twice (Fisher's exact test).
 pub(super) fn chance(all: Tally, side: Tally) -> f64 {
-    // Of the side on which more fail than would by chance.
+    // The side on which more tests fail than would by chance.
     let expected = all.failing as f64 * side.tests as f64 / all.tests as f64;
     let side = if side.failing as f64 >= expected { side } else { all.without(side) };
     let choose = |n: usize, k: usize| log_factorial(n) - log_factorial(k) - log_factorial(n - k);
