@@ -109,7 +109,7 @@ impl Differences {
 fn outcome(outcome: &Outcome) -> String {
     match outcome.message() {
         Some(message) => format!("{}: {message}", outcome.word()),
-        // Of a timeout, how long it was waited for is wall time.
+        // How long a timeout was waited for is wall time, and left out.
         None => outcome.word().to_owned(),
     }
 }

@@ -80,12 +80,12 @@ const PORTION: usize = 1 << 16;
 /// SHA-256 over the canonical content of results with this plan, as 64 hexadecimal digits.
 ///
 /// Wall times and limits of wall time, hosts, processes, session notes, paths, and the order of writing are left out,
-/// and so is what a plan says to people only: of the plan, its [meaning](CampaignPlan::meaning) is hashed.
-/// The rest is hashed in the order of this module's list: for each table its name as a text, then its rows, then the
-/// byte `;`. A row is the byte `(` and the content of its columns: `N` for null, `I` and 8 bytes (little endian) for an
-/// integer, `F` and the 8 bytes of the IEEE 754 double (little endian, zero without sign), `T`, the length in bytes as
-/// 8 bytes (little endian) and the UTF-8 bytes for a text, `B`, the length likewise and the bytes for a blob.
-/// Everything is read from the file each time: no stored hash is used.
+/// and so is what a plan says to people only: only the plan's [meaning](CampaignPlan::meaning) is hashed. The rest is
+/// hashed in the order of this module's list: for each table its name as a text, then its rows, then the byte `;`. A
+/// row is the byte `(` and the content of its columns: `N` for null, `I` and 8 bytes (little endian) for an integer,
+/// `F` and the 8 bytes of the IEEE 754 double (little endian, zero without sign), `T`, the length in bytes as 8 bytes
+/// (little endian) and the UTF-8 bytes for a text, `B`, the length likewise and the bytes for a blob. Everything is
+/// read from the file each time: no stored hash is used.
 ///
 /// The task of a run that is not the campaign is hashed with the plan, which it follows.
 ///

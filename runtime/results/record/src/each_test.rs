@@ -49,7 +49,7 @@ pub enum NoPoint {
 pub struct ScannedOperation {
     /// Which.
     pub operation: OperationId,
-    /// When it was to be active; `None` where conditions switch it, and for one beside the run.
+    /// When it was to be active; `None` where conditions switch it, and for one outside the run.
     pub planned: Option<Span>,
     /// What was chosen for its parameters.
     pub choices: Vec<Choice>,

@@ -20,7 +20,7 @@ pub const ENTERED_OUTCOMES: [&str; 8] =
 
 /// How a run ended, from one of [`ENTERED_OUTCOMES`]; `None` for any other word.
 ///
-/// Of a run that broke off no cause is entered. A lab runs in wall time, so the limit of a timeout is the length of a
+/// No cause is entered for a run that broke off. A lab runs in wall time, so the limit of a timeout is the length of a
 /// test.
 pub fn entered_outcome(word: &str, plan: &CampaignPlan) -> Option<Outcome> {
     let message = "entered by hand, without a cause".to_owned();
@@ -82,7 +82,7 @@ impl Provenance {
     /// The names of what it says, in this order everywhere.
     pub const NAMES: [&str; 4] = ["operator", "hardware", "software", "date"];
 
-    /// What was said under each name.
+    /// What was entered under each name.
     pub fn texts(&self) -> [Option<&str>; 4] {
         [&self.operator, &self.hardware, &self.software, &self.date].map(Option::as_deref)
     }
@@ -96,7 +96,7 @@ impl From<[Option<String>; 4]> for Provenance {
 
 /// A run as a test of the lab's results.
 ///
-/// Nobody counted what operations did. Of an outcome that says so, the times at which they were to be active stand for
+/// Nobody counted what operations did. If the outcome says so, the times at which they were to be active stand for
 /// those at which they were, as in an imported test.
 fn record(plan: &CampaignPlan, test: &Test, number: u32, entered: &Entered) -> TestRecord {
     let Entered { outcome, values, .. } = entered;

@@ -208,7 +208,7 @@ fn known_sets(known: &[String]) -> String {
     }
 }
 
-/// What the database says; of a failed write also the most common reason, which it does not know.
+/// What the database says; for a failed write also the most common reason, which it does not know.
 fn refusal(source: &rusqlite::Error) -> String {
     use rusqlite::ffi;
     const WRITING: [std::ffi::c_int; 6] = [

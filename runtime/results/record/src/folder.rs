@@ -45,7 +45,7 @@ pub fn claim_folder(results: &Path, name: &str) -> Result<Claim, RecordError> {
     }
 }
 
-/// The lock of a folder without results, unless another process has it. Of two that try at once, one gets it.
+/// The lock of a folder without results, unless another process has it. If two try at once, one gets it.
 fn locked_for_a_beginning(folder: &Path) -> Result<Option<Lock>, RecordError> {
     if !holds_nothing(folder)? {
         return Ok(None);

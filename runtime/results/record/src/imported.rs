@@ -1,5 +1,5 @@
-//! What imports record beside what runs record, as it is read: operations that were left out, and windows and ranges
-//! that are others in the plan.
+//! What imports record in addition to what runs record, as it is read: operations that were left out, and windows and
+//! ranges that are others in the plan.
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;

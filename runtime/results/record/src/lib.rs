@@ -266,7 +266,7 @@ pub struct GenerationCoverage {
 pub enum EventKind {
     /// Part of the content: an equal campaign has the same warnings.
     Warning,
-    /// Of one session (interrupted, resumed, a worker restarted); no part of the digest.
+    /// Part of one session (interrupted, resumed, a worker restarted), and not of the digest.
     Session,
 }
 

@@ -27,7 +27,7 @@ pub(super) const OBJECTS: [&str; 8] = [
 /// The tables of hazards, and the view of them: the first results with monitors have none.
 pub(super) const HAZARDS: &str = include_str!("hazards.sql");
 
-/// Those of schema 7, which knows the hazards of first runs only.
+/// The tables of schema 7, which knows the hazards of first runs only.
 pub(super) const HAZARDS_7: &str = include_str!("hazards_7.sql");
 
 pub(super) const HAZARD_OBJECTS: [&str; 3] = ["monitor_hazards", "repetition_hazards", "hazards"];

@@ -90,7 +90,7 @@ impl Recorder {
         let connection = Connection::open(&path).map_err(failed)?;
         tune(&connection).map_err(failed)?;
         let repository = Repository::from_connection(connection, path).map_err(|error| match error {
-            // Reading back needs room for what SQLite keeps beside the file.
+            // Reading back needs room for what SQLite keeps in addition to the file.
             RecordError::Database { source, path, doing: _ } => {
                 RecordError::database("begin the results", &path, source)
             }
@@ -104,7 +104,7 @@ impl Recorder {
         Recorder::open(folder, workers, false)
     }
 
-    /// Opens the results of a run that is finished, to record [repetitions](Recorder::put_repetition) beside them.
+    /// Opens the results of a run that is finished, to add [repetitions](Recorder::put_repetition) to them.
     pub fn reopen(folder: &Path, workers: u32) -> Result<Recorder, RecordError> {
         Recorder::open(folder, workers, true)
     }

@@ -174,7 +174,7 @@ impl Recorder {
             }
             write_hazards(&transaction, (*test, *position), hazards)?;
             for warning in warnings {
-                // Of the campaign: a test's own warnings are those of its own run.
+                // It is an event of the campaign: a test's own warnings are those of its own run.
                 let text = format!("repetition {position} of {}: {warning}", TestNumber(*test));
                 write_event(&transaction, &Event { kind: EventKind::Warning, test: None, text })?;
             }

@@ -122,7 +122,7 @@ impl Repository {
     /// SHA-256 over the canonical content of a results repository, as 64 hexadecimal digits.
     ///
     /// Wall times and limits of wall time, hosts, processes, session notes, paths, and the order of writing are left
-    /// out, and so is what a plan says to people only: of the plan, its [meaning](CampaignPlan::meaning) is hashed.
+    /// out, and so is what a plan says to people only: only the plan's [meaning](CampaignPlan::meaning) is hashed.
     /// Everything is read from the file each time: no stored hash is used.
     ///
     /// Operations that were one operation in an imported file are hashed last, if there are any, and so are runs of a

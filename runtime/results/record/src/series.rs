@@ -112,9 +112,9 @@ fn of_doubles(bytes: &[u8], count: usize) -> Option<Vec<f64>> {
 /// A table of pieces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Pieces {
-    /// Of the series of metrics.
+    /// The series of metrics.
     Series,
-    /// Of robustness signals.
+    /// Robustness signals.
     Robustness,
 }
 

@@ -255,7 +255,7 @@ proptest! {
         record.observation.outcome = [
             Outcome::Completed, Outcome::NoEffect, Outcome::Timeout { limit: 1.0 }, Outcome::Crash { message: String::new() },
         ][outcome].clone();
-        // Of a whole run and of one that broke off; also with values that do not fit their reach, which no run shows.
+        // A value of a whole run or of one that broke off; also values that do not fit their reach, which no run shows.
         let shown = MetricValue {
             reach: Reach { low: low.map(f64::from), high: more.map(|more| f64::from(low.unwrap_or(0) + more)) },
             not_finite: (!finite).then_some(1.5),
