@@ -422,7 +422,7 @@ pub(super) fn differences(differences: &[Difference]) -> Table {
     table
 }
 
-/// Metrics that a recording was fed to, beside what was recorded.
+/// Metrics that a recording was fed to, compared with what was recorded.
 pub(super) fn fed_metrics(metrics: &[FedMetric]) -> Table {
     let mut table = Table::with(["metric", "value", "recorded", ""].map(Column::words));
     for FedMetric { metric, unit, now, recorded, sameness } in metrics {

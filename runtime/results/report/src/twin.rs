@@ -1,4 +1,4 @@
-//! A test beside its twin without mitigation, as text for a terminal.
+//! A test and its twin without mitigation, as text for a terminal.
 
 use sesame_present::number::{join_words, plural};
 use sesame_present::table::{Column, Datum, Table, TextOptions};

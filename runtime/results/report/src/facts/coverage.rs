@@ -72,7 +72,7 @@ impl WorstOfCells {
         }
     }
 
-    /// Of each metric the worst value in a cell with its test; nothing where no test was.
+    /// The worst value of each metric in a cell with its test; nothing where no test was.
     pub(crate) fn of(&self, cell: usize) -> &[Option<(f64, u32)>] {
         self.values.get(&cell).map_or(&[], Vec::as_slice)
     }

@@ -202,7 +202,7 @@ pub struct VerdictReport {
     pub metric: String,
     /// The bound in words.
     pub bound: String,
-    /// The verdict of the test: of its fresh runs if it was run again, else of its only run.
+    /// The verdict of the test: from its fresh runs if it was run again, else from its only run.
     pub verdict: Verdict,
     /// The verdict of its first run.
     pub first: Verdict,

@@ -115,7 +115,7 @@ pub(crate) fn shrinking(repository: &Repository, rows: &[TestRow]) -> Result<Opt
             let Some(row) = rows.get(&number).filter(|row| row.test == candidate.test) else { break };
             results.push((number, fails(plan, failing, &row.outcome, |id| row.value(id))));
         }
-        // Of an unfinished run, only whole generations count.
+        // Only whole generations of an unfinished run count.
         if asked.is_empty() || results.len() < asked.len() {
             break;
         }

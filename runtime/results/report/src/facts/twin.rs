@@ -8,7 +8,7 @@ use sesame_base::test_number::TestNumber;
 use sesame_plan::{CampaignPlan, MetricSource, MonitorId, MonitorState, RequirementId};
 use sesame_record::TestRecord;
 
-/// What mitigation was worth in a test: what was recorded of it beside a run without mitigation.
+/// What mitigation was worth in a test: what was recorded of it compared with a run without mitigation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Twin {
     /// The test.

@@ -88,7 +88,7 @@ fn over_evaluations(markup: &mut Markup, coverage: &CoverageSummary, published: 
     markup.close();
 }
 
-/// One place of the map: all cells that differ in the dimensions not drawn only.
+/// A cell of the map: all cells of the grid that differ only in the dimensions that are not drawn.
 #[derive(Debug, Clone, Copy, Default)]
 struct Place {
     cells: usize,

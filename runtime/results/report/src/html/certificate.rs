@@ -1,4 +1,4 @@
-//! Certificates over time: of each monitor of a test its states and its evidence, against the violations of
+//! Certificates over time: for each monitor of a test its states and its evidence, against the violations of
 //! requirements. The lanes share the time axis of the test's timeline.
 
 use std::fmt::Write as _;

@@ -43,7 +43,7 @@ pub(crate) fn generations(
         return Ok(());
     }
     let mut analysis = indicators(repository, None)?;
-    // Of an imported campaign two sets tell of the same evaluations: all survivors, and the front among them.
+    // An imported campaign has two sets for the same evaluations: all survivors, and the front among them.
     let imported: Vec<Indicator> = std::mem::take(&mut analysis.generations);
     for generation in imported {
         match analysis.generations.last_mut() {
@@ -326,7 +326,7 @@ fn generation_fronts(repository: &Repository, rows: &[TestRow]) -> Result<Vec<Ge
     for (set, size) in repository.result_set_sizes()? {
         let Some(generation) = set.generation.filter(|_| size > 0) else { continue };
         match sets.last_mut() {
-            // Of an imported campaign the second is the front among the first.
+            // In an imported campaign the second is the front among the first.
             Some(last) if last.0 == generation => last.1 = set.name,
             _ => sets.push((generation, set.name)),
         }

@@ -94,7 +94,7 @@ pub(super) fn header(
     Ok(())
 }
 
-/// Who made runs that were entered by hand, with what and when: what was said, once each.
+/// Who made runs that were entered by hand, with what and when: each entry once.
 fn entered(repository: &Repository) -> Result<Vec<(&'static str, String)>, RecordError> {
     let runs = repository.entered_runs()?;
     let rows = ["Operator", "Hardware", "Software", "Date"].into_iter().enumerate().map(|(at, name)| {

@@ -334,7 +334,7 @@ fn step_path(
     path
 }
 
-/// The change points that make a difference to the eye: of each narrow column the first, the last, the least and the
+/// The change points that make a difference to the eye: in each narrow column the first, the last, the least and the
 /// largest.
 fn thin(series: &[(f64, f64)], end: f64) -> Vec<(f64, f64)> {
     let width = (end / COLUMNS).max(f64::MIN_POSITIVE);

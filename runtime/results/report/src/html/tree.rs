@@ -57,7 +57,7 @@ fn anchor(monitor: MonitorId) -> String {
 #[derive(Debug)]
 struct Node {
     class: &'static str,
-    /// Its lines; the second one is said more quietly.
+    /// Its lines; the second one is in a fainter colour.
     lines: Vec<String>,
     /// What it says in full, if that is more than the lines.
     title: Option<String>,

@@ -89,7 +89,7 @@ pub struct AddedToTopic {
     pub over_budget: bool,
 }
 
-/// A metric beside the runs in which nothing was relayed.
+/// A metric compared with the runs in which nothing was relayed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Drift {
     /// The metric.
@@ -113,7 +113,7 @@ pub fn mitm(stages: &[Repository]) -> Result<MitmTesting, RecordError> {
     // Then time stands still while the relay works.
     let lock_stepped = plan.simulator.step_ns().is_some();
     let lab = stages[0].task().lab().map(str::to_owned);
-    // Of the last stage: with fewer topics relayed, fewer are cut.
+    // The topics are those of the last stage: with fewer topics relayed, fewer are cut.
     let last = stages.last().map_or(plan, Repository::plan);
     let topics: Vec<(String, Vec<TopicId>)> = last.relayable().into_iter().map(|ids| (name(last, &ids), ids)).collect();
     let before = runs(&stages[0])?;

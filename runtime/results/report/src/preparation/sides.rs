@@ -33,7 +33,7 @@ pub struct Values {
 }
 
 impl Values {
-    /// Of all runs that have a value; `None` if none has.
+    /// Summarises all runs that have a value; `None` if none has.
     pub(super) fn of<'a>(runs: impl IntoIterator<Item = &'a TestRecord>, metric: MetricId) -> Option<Values> {
         let value = |record: &TestRecord| record.observation.value(metric).value.filter(|value| value.is_finite());
         let Sample { count, mean, deviation, min, max, median: _ } = Sample::of(runs.into_iter().filter_map(value))?;

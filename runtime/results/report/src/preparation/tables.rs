@@ -148,7 +148,7 @@ pub(super) fn stages(mitm: &MitmTesting) -> Table {
     table
 }
 
-/// Each metric in each stage, beside the runs in which nothing was relayed.
+/// Each metric in each stage, compared with the runs in which nothing was relayed.
 pub(super) fn drifts(mitm: &MitmTesting) -> Table {
     let columns = [Column::heading("metric"), Column::number("relayed")];
     let numbers = ["values", "drift", "spread without relay"].map(Column::number);

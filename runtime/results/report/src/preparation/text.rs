@@ -64,7 +64,7 @@ pub fn text(preparation: &Preparation, options: TextOptions) -> String {
     text
 }
 
-/// What is said of latency as a whole.
+/// What the report says of latency as a whole.
 pub(super) fn about_latency(mitm: &MitmTesting) -> String {
     let judged = mitm.budget.is_some_and(|budget| budget.latency.is_some() || budget.jitter.is_some());
     if mitm.lock_stepped {
@@ -80,7 +80,7 @@ pub(super) fn about_latency(mitm: &MitmTesting) -> String {
     }
 }
 
-/// What is said of a simulator for which all stages are alike.
+/// What the report says of a simulator for which all stages are alike.
 pub(super) fn about_stages(mitm: &MitmTesting) -> Option<&'static str> {
     const ALIKE: &str = "This simulator has no way for its messages but the runner, so a stage only says which topics are \
                          measured; of ROS 2 nodes, topics that are not relayed go past the relay.";

@@ -1,4 +1,4 @@
-//! The gap before and after a compensation: of each metric, how far the lab was from the simulation and how far it is
+//! The gap before and after a compensation: for each metric, how far the lab was from the simulation and how far it is
 //! from the simulation that was fitted to it.
 
 use sesame_analysis::gap::{Compared, Gap, MetricGap};

@@ -17,7 +17,7 @@ pub(crate) fn provenance(body: &mut Markup, files: &[(&str, &Repository)]) -> Re
     body.open("tbody", &[]);
     for (part, repository) in files {
         let facts = repository.campaign();
-        // Of runs without disturbance, the reference run is one.
+        // The reference run is one of the runs without disturbance.
         let runs = match repository.task().undisturbed() {
             Some(_) => repository.numbers()?.len(),
             None => repository.evaluated()?,
@@ -45,7 +45,8 @@ pub(crate) fn provenance(body: &mut Markup, files: &[(&str, &Repository)]) -> Re
     Ok(())
 }
 
-/// When and on which host results were recorded, and what was said of runs that people made in a lab; once each.
+/// When and on which host results were recorded, and what people entered with the runs that they made in a lab; each
+/// once.
 fn people(repository: &Repository) -> Result<String, RecordError> {
     let mut said = repository.days()?;
     for run in repository.entered_runs()? {

@@ -104,7 +104,7 @@ fn difference(one: &Signal, other: &Signal) -> Signal {
     difference
 }
 
-/// A line that looks like the whole: of each column, the first, least, greatest and last value in their order.
+/// A line that looks like the whole: in each column, the first, least, greatest and last value in their order.
 fn places(plot: &Plot, signal: &Signal) -> Vec<[f64; 2]> {
     let [left, _, right, _] = plot.edges;
     let column = |time: f64| libm::floor((plot.x(time) - left) / (right - left) * COLUMNS as f64);

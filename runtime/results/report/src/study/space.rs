@@ -194,8 +194,8 @@ impl Space {
     }
 }
 
-/// Of the edges along a dimension, the one beside which its name covers nothing: of upright ones the leftmost, of the
-/// others the lowest.
+/// The edge along a dimension beside which its name covers nothing: the leftmost of upright edges, the lowest of the
+/// others.
 fn outer_edge(dimension: usize, count: usize) -> [[f64; 3]; 2] {
     let corners = (0..1usize << count).filter(|bits| bits & (1 << dimension) == 0);
     let edge = |bits: usize| [corner(bits), corner(bits | (1 << dimension))];

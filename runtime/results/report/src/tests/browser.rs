@@ -22,7 +22,7 @@ enum Scheme {
     Dark,
 }
 
-/// The browser's program; `None` if there is none, which is said, and is a failure where `CI=true`.
+/// The browser's program; `None` if there is none, which it prints, and which is a failure where `CI=true`.
 fn browser() -> Option<&'static str> {
     let runs = |name: &&str| Command::new(name).arg("--version").output().is_ok_and(|output| output.status.success());
     let found = ["chromium", "chromium-browser", "google-chrome"].into_iter().find(runs);

@@ -29,8 +29,8 @@ pub(super) struct Event {
 }
 
 impl<'a> History<'a> {
-    /// Of what the monitors of this plan did; `None` if nothing is known of it, or no run can have made it because the
-    /// monitors cannot be run together.
+    /// The history of what the monitors of this plan did; `None` if nothing is known of it, or no run can have made it
+    /// because the monitors cannot be run together.
     pub(super) fn new(plan: &'a CampaignPlan, shown: &'a [MonitorObservation]) -> Option<Self> {
         if shown.is_empty() || shown.len() != plan.monitors.len() {
             return None;
@@ -77,7 +77,7 @@ impl<'a> History<'a> {
 pub(super) struct Values<'h> {
     history: &'h History<'h>,
     pub(super) truths: Vec<Truth>,
-    /// Of each piece of evidence its last change.
+    /// The last change of each piece of evidence.
     last: Vec<Option<&'h EvidenceChange>>,
 }
 
