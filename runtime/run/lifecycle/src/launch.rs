@@ -1,4 +1,4 @@
-//! The programs that a plan launches beside its simulator: what starts the system as a whole, and its nodes.
+//! The programs that a plan launches in addition to its simulator: what starts the system as a whole, and its nodes.
 //!
 //! A transport starts them with the seed of a run, asks [`poll_ready`](Launched::poll_ready) until all are ready, asks
 //! [`check`](Launched::check) while the run lasts, and ends them. Each is started without a shell, in the folder of the
@@ -90,7 +90,7 @@ pub struct Place {
     pub space: PathBuf,
     /// What `{domain}` stands for.
     pub domain: u32,
-    /// What is in the environment of all programs beside `SESAME_WORKER`, `SESAME_WORKER_FOLDER` and `SESAME_SEED`.
+    /// What is in the environment of all programs in addition to `SESAME_WORKER`, `SESAME_WORKER_FOLDER` and `SESAME_SEED`.
     /// Placeholders in its values are replaced as in arguments.
     pub environment: Vec<(String, String)>,
     /// What an argument `{ros-args}` stands for; nothing for what is not in it.

@@ -1,6 +1,7 @@
-//! What a program writes beside its protocol: the beginning of each test's part is logged, and the last lines are kept.
+//! What a program writes in addition to its protocol: the beginning of each test's part is logged, and the last lines
+//! are kept.
 //!
-//! Of a simulator that is its standard error; of a program in the background both its streams, as they come.
+//! For a simulator that is its standard error; for a program in the background both its streams, as they come.
 
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
@@ -86,14 +87,14 @@ impl Watch {
 }
 
 impl OutputTail {
-    /// Of a stream whose writer the log calls so.
+    /// Captures a stream whose writer has this name in the log.
     pub(crate) fn capture(from: impl Read + Send + 'static, writer: &str) -> Self {
         let (tail, sender) = OutputTail::of(writer);
         tail.read(Stream::Error, from, io::stderr(), Watch::default(), sender);
         tail
     }
 
-    /// Of both streams of a program.
+    /// Captures both streams of a program.
     pub(crate) fn capture_both(
         output: impl Read + Send + 'static,
         error: impl Read + Send + 'static,

@@ -39,7 +39,7 @@ pub struct Program {
     pub arguments: Vec<String>,
     /// The folder it runs in.
     pub folder: PathBuf,
-    /// What is in its environment beside what it inherits.
+    /// What is in its environment in addition to what it inherits.
     pub environment: Vec<(String, String)>,
     /// Whether this process is a runner, whose executable can be the keeper.
     #[cfg_attr(not(target_os = "linux"), expect(dead_code, reason = "only Linux has keepers"))]
@@ -91,7 +91,7 @@ impl Program {
             let reason = "there is no such folder; if the space has moved, run `sesamec generate` again";
             return Err(refused(reason.to_owned()));
         }
-        // A worker runs in its own folder; the program runs beside the space.
+        // A worker runs in its own folder; the program runs in the folder of the space.
         let own_folder = std::env::current_dir().map_err(|error| failed(&error))?;
         let (mut command, keeper) = self.command(background).map_err(|error| failed(&error))?;
         process_group::own(&mut command);
@@ -199,7 +199,7 @@ impl Drop for Input {
 pub struct PostMortem {
     /// The way it ended, as a phrase.
     pub how: String,
-    /// The last lines of its standard error; of a program in the background, of all that it wrote.
+    /// The last lines of its standard error; for a program in the background, of all that it wrote.
     pub last_lines: String,
     /// Whether it cannot have been started: the exit status says so by the convention of shells.
     pub not_found: bool,
@@ -296,7 +296,7 @@ impl Drop for Running {
 struct Handle {
     id: u32,
     kept: bool,
-    /// Of a program in the background, which has no input of its own: set if it ends unasked.
+    /// Set if a program in the background, which has no input of its own, ends unasked.
     alarm: Option<Alarm>,
     /// A program in the background was asked to end.
     asked: AtomicBool,

@@ -13,7 +13,7 @@ use crate::program::{Alarm, Program};
 /// How long the command may take; then it is ended, and so is what it should have ended.
 pub(super) const LIMIT: Duration = Duration::from_secs(10);
 
-/// Those of systems that are running.
+/// The commands of systems that are running.
 static PENDING: Mutex<Vec<Weak<Terminate>>> = Mutex::new(Vec::new());
 
 /// A command that is to be run at the end of what was launched.

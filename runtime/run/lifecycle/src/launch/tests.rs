@@ -280,7 +280,7 @@ fn a_node_is_paused_resumed_killed_and_started_again_with_all_its_processes() {
     assert!(system.launched.restart(NodeId(0)).unwrap(), "also while it runs");
     assert!(!system.launched.restart(NodeId(1)).unwrap(), "the plan does not launch it");
     system.launched.await_ready(&mut |_| false).unwrap();
-    // Those of the earlier starts are gone.
+    // The processes of the earlier starts are gone.
     patience::until("its child runs", || !system.file("child").is_empty() && is_alive(&system.file("child")));
     assert!(system.launched.pause(NodeId(0)));
     let parent = system.file("parent");
