@@ -79,7 +79,7 @@ pub enum Finding {
     Order {
         /// The monitor.
         monitor: MonitorId,
-        /// The position of the stronger guarantee: of those that may, the weakest.
+        /// The position of the stronger guarantee: the weakest of those that may.
         stronger: u32,
         /// The position of the weaker guarantee.
         weaker: u32,
@@ -136,7 +136,7 @@ pub struct Report {
     pub unproven: Vec<Question>,
 }
 
-/// How much work a check may take, if nothing else is said: some seconds.
+/// How much work a check may take, by default: some seconds.
 const PATIENCE: u64 = 50_000_000;
 
 /// Checks monitors, given what is known of the values of inputs (without tests of their texts).

@@ -27,7 +27,7 @@ pub struct Comparison<S> {
     /// The first position at which the states differ, or one sequence has ended; `None` if the sequences are the same,
     /// whatever their times.
     pub difference: Option<Difference<S>>,
-    /// Of each position before that: by how much the second is later than the first; negative if it is earlier.
+    /// For each position before that: by how much the second is later than the first; negative if it is earlier.
     pub shifts: Vec<SimTime>,
 }
 

@@ -3,8 +3,8 @@
 //!
 //! **What explains a disagreement.** At its beginning some evidence differs. Of this a set is taken without which the
 //! two would agree: if exactly this evidence had been in the second run as it was in the first, the monitor would have
-//! been in the same state. No part of the set can be left out. Of several such sets it is always the same one, which
-//! prefers evidence that is declared earlier.
+//! been in the same state. No part of the set can be left out. If there are several such sets, it is always the same
+//! one, which prefers evidence that is declared earlier.
 //!
 //! **How late.** Of evidence that differs, one run has changed and the other has not. If the other changes to the same
 //! value later, it is that much later.

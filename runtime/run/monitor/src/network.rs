@@ -20,7 +20,7 @@ pub(crate) use decide::Deciding;
 pub use decide::{Decision, State};
 pub use run::{Changes, EvidenceChange, Reading, Run};
 
-/// A piece of evidence of a network: its monitor's place first, then its position there, counted through.
+/// A piece of evidence of a network: its monitor's position first, then its own position there, counted through.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct EvidenceId(pub u32);
 
@@ -229,7 +229,7 @@ fn is_sound(gate: &Gate, monitor: &Monitor) -> bool {
 fn order(monitors: &[Monitor]) -> Result<Vec<MonitorId>, Invalid> {
     let mut order: Vec<MonitorId> = Vec::with_capacity(monitors.len());
     let mut ranked = vec![false; monitors.len()];
-    // Of each monitor: how many demands are not met yet, and who demands of it.
+    // For each monitor: how many demands are not met yet, and who demands of it.
     let mut open: Vec<usize> = monitors.iter().map(|monitor| monitor.demands.len()).collect();
     let mut demanding = vec![Vec::new(); monitors.len()];
     for (id, monitor) in ids(monitors) {

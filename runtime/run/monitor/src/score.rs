@@ -22,7 +22,7 @@ use crate::network::State;
 /// The score of one monitor, until some time.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Score {
-    /// What the monitor made of each hazard, in the order of time; of one instant, in the order of requirements.
+    /// What the monitor made of each hazard, in the order of time; within one instant, in the order of requirements.
     pub hazards: Vec<Hazard>,
     /// Alarms that were false: with no hazard in the stay, nor within the horizon after it began. Without a horizon
     /// they are alarms without a hazard, for which mitigation may be the reason.

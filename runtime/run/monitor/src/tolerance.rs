@@ -50,7 +50,7 @@ pub struct Recording {
 pub struct Message {
     /// When it was heard.
     pub at: SimTime,
-    /// In which stream.
+    /// The stream that it is in.
     pub stream: u32,
     /// Whether it is one event with the message before it: monitors decide on both together. It is the same message in
     /// another stream, delivered as soon as it was published. No evidence hears both streams.
@@ -94,7 +94,7 @@ pub enum Limit {
 /// A decision that a delay changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Broken {
-    /// Of which monitor.
+    /// The monitor that decides.
     pub monitor: MonitorId,
     /// Its position among the monitor's decisions.
     pub position: usize,
@@ -157,7 +157,7 @@ fn of_streams(
                 delayed: found.get(position).copied(),
             })
         });
-        // The earliest decision that is changed; of one time, that of the first monitor.
+        // The earliest decision that is changed; at one time, that of the first monitor.
         let at = |broken: &Broken| broken.recorded.or(broken.delayed).map_or(SimTime::MAX, |step| step.at);
         if let Some(broken) = broken.min_by_key(at) {
             return Tolerance { delay: delay - SimTime::from_nanos(1), limit: Limit::Decision(broken) };

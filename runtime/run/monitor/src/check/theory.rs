@@ -93,7 +93,7 @@ impl Theory {
                 sums.push((of, plus, at));
             }
         }
-        // Of sums of one term and constants, a greater constant never gives a smaller sum.
+        // Among sums of one term and constants, a greater constant never gives a smaller sum.
         sums.extend(sums.clone().into_iter().map(|(of, ..)| (of, 0.0, of)));
         sums.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         sums.dedup();

@@ -19,7 +19,7 @@ use crate::why::Moment;
 /// The share of all work that one question may take.
 const ONE_QUESTION: u64 = 10;
 
-/// Of which moments a question is.
+/// The moments that a question is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Sight {
     /// Evidence is what its condition says.
