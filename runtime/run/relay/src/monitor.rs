@@ -110,7 +110,7 @@ fn read_by<'a>(evidence: &'a Evidence, wires: &'a WireTable) -> impl Iterator<It
 }
 
 impl<'p> Monitors<'p> {
-    /// Those of the plan of these metrics, at time zero; `None` for a plan without monitors.
+    /// The monitors of the plan of these metrics, at time zero; `None` for a plan without monitors.
     pub(crate) fn new(metrics: &Metrics<'p>, wires: &'p WireTable) -> Option<Self> {
         let (plan, network) = (metrics.plan(), metrics.network()?);
         let mut counts = vec![0; plan.topics.len()];

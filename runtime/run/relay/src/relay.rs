@@ -107,7 +107,7 @@ pub struct Relay<'a> {
 struct Conditions {
     /// The operations that conditions switch.
     operations: Vec<usize>,
-    /// Those of them that have just become inactive; kept here so that an evaluation does not allocate.
+    /// The operations among them that have just become inactive; kept here so that an evaluation does not allocate.
     ended: Vec<usize>,
     /// Per wire: whether a condition reads a metric of its messages as they are published.
     read: Vec<bool>,

@@ -341,9 +341,9 @@ pub(super) fn pairs_of(inputs: &[Input], plan: &CampaignPlan) -> impl Iterator<I
 /// Whose values a message changed.
 #[derive(Debug, Clone, Copy)]
 struct Spoken {
-    /// Those of this member.
+    /// The values of this member.
     member: Option<usize>,
-    /// Those of every member.
+    /// The values of every member.
     all: bool,
 }
 

@@ -190,7 +190,7 @@ struct State<'p> {
     formula: Option<FormulaState<'p>>,
     robustness: Option<RobustnessState<'p>>,
     context: Context,
-    /// With what its value is compared by requirements and conditions.
+    /// What requirements and conditions compare its value with.
     compared: Vec<Operand>,
     /// Whether it is among those that wait.
     waits: bool,

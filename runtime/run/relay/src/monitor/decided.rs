@@ -33,7 +33,7 @@ pub struct Cause {
     pub by: ChangeCause,
 }
 
-/// What is told.
+/// The decisions for whoever asked for them, and the changes behind them.
 #[derive(Debug)]
 pub(super) struct Told {
     asked: bool,

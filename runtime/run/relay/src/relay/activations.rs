@@ -1,5 +1,5 @@
-//! When conditions switch operations, beside a model that looks at every nanosecond; what depends on it and what does
-//! not: copies of an operation, the tail of a delay, and who hears a message.
+//! When conditions switch operations, compared with a model that looks at every nanosecond; what depends on it and what
+//! does not: copies of an operation, the tail of a delay, and who hears a message.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;

@@ -125,7 +125,7 @@ fn a_normal_latency_stays_in_its_range_around_the_middle() {
         })
         .collect();
     assert!(delays.iter().all(|delay| (0.1..=0.5).contains(delay)));
-    // Of a normal distribution cut at two standard deviations, 0.8796 of the standard deviation are left.
+    // A normal distribution cut at two standard deviations keeps 0.8796 of its standard deviation.
     let (mean, deviation) = moments(&delays);
     assert!((mean - 0.3).abs() < 0.002 && (deviation - 0.08796).abs() < 0.001, "{mean} {deviation}");
 }

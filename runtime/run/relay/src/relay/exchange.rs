@@ -10,7 +10,7 @@ use crate::wire::{Wire, WireTable};
 /// A message that is to reach its subscribers now.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Delivery {
-    /// On which wire. A message on a wire that has links is for the subscribers without a link of their own.
+    /// The wire that it is on. A message on a wire that has links is for the subscribers without a link of their own.
     pub wire: Wire,
     /// It comes from the message with this number among those published on the wire, from 0.
     pub index: u64,

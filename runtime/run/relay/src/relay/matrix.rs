@@ -1,5 +1,5 @@
 //! Every operation, on every kind of payload that it is for, with every kind of activation: what the relay delivers and
-//! counts, beside naive models of what the operations mean.
+//! counts, compared with naive models of what the operations mean.
 //!
 //! Messages come every tenth of a second from 0 s to 8 s; the operation is active from 2 s to 5 s, be it by time, by
 //! conditions, or by a condition for a length.

@@ -354,7 +354,7 @@ fn monitors_that_cause_each_others_messages_without_end_are_stopped() {
     assert_eq!(ran.finished.warnings, [warning]);
 }
 
-/// The scores of a monitor beside the gap, in this order.
+/// The scores of a monitor in addition to the gap, in this order.
 fn scored(evidence: Evidence, scores: &[Score]) -> CampaignPlan {
     let mut plan = watched(vec![cell(evidence)]);
     plan.metrics.extend(scores.iter().map(|&scored| score(scored.name(), 0, scored)));

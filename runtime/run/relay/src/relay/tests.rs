@@ -1,4 +1,4 @@
-//! Behaviour of the relay on small message streams, and a naive model beside the release queue.
+//! Behaviour of the relay on small message streams, and the release queue compared with a naive model.
 
 use proptest::prelude::*;
 

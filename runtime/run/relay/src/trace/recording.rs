@@ -175,7 +175,7 @@ pub(super) struct Ending {
 
 /// How a recording ends.
 pub(super) enum End {
-    /// The run came to its end then; of a recording that no runner made, with its last message.
+    /// The run came to its end then; a recording that no runner made ends with its last message.
     Whole(SimTime),
     /// The run broke off, if that is known, then.
     BrokenOff(Option<SimTime>),
@@ -183,9 +183,9 @@ pub(super) enum End {
 
 /// Passes the messages of a recording on, in order of time and without a simulator.
 ///
-/// Those of a runner's trace come in the same order as in its run. Of any other recording, the JSON messages on topics
-/// of the space count, with times since the first of them, both as published and as delivered. The file is read once
-/// from start to end; memory holds one record at a time.
+/// The messages of a runner's trace come in the same order as in its run. In any other recording, the JSON messages on
+/// topics of the space count, with times since the first of them, both as published and as delivered. The file is read
+/// once from start to end; memory holds one record at a time.
 pub(super) fn pass(
     path: &Path,
     plan: &CampaignPlan,

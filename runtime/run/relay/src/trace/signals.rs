@@ -145,7 +145,7 @@ impl Collector<'_> {
             self.signals.insert(name.to_owned(), Signal::default());
         }
         let Some(Signal { times, values }) = self.signals.get_mut(name) else { return };
-        // Of messages of one instant the last one counts; an earlier one than before is out of order and left out.
+        // The last message of an instant counts; an earlier one than before is out of order and left out.
         match times.last() {
             Some(&last) if time < last => {}
             #[expect(clippy::float_cmp, reason = "they are the same instant")]

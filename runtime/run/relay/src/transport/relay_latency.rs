@@ -1,4 +1,4 @@
-//! What the relay adds to the way of messages: of each wire, how long its messages were kept from their arrival until
+//! What the relay adds to the way of messages: for each wire, how long its messages were kept from their arrival until
 //! they were passed on.
 //!
 //! A message that an operation holds back is not measured. It is wall time, and never part of results. Where the

@@ -48,7 +48,7 @@ pub struct Line {
 }
 
 impl Line {
-    /// Whether a delivery goes to the sinks: of a line that is not cut, only messages of the runner's own do.
+    /// Whether a delivery goes to the sinks: on a line that is not cut, only messages of the runner's own do.
     pub fn takes(&self, delivery: &Delivery) -> bool {
         self.cut || delivery.by_monitor
     }
@@ -56,8 +56,8 @@ impl Line {
 
 /// The lines of a plan's topics, in the order of the wires; those of services are not among them.
 ///
-/// Of a topic that is cut, publishers are on `TOPIC/undisturbed`, or on `TOPIC/from/NODE` where operations tell them
-/// apart; subscribers are on `TOPIC`, or on `TOPIC/to/NODE`.
+/// Publishers of a topic that is cut are on `TOPIC/undisturbed`, or on `TOPIC/from/NODE` where operations tell them
+/// apart; its subscribers are on `TOPIC`, or on `TOPIC/to/NODE`.
 pub fn lines(plan: &CampaignPlan, wires: &WireTable) -> Vec<Line> {
     let topics = wires.iter().filter(|&wire| plan.topic(wires.topic(wire)).channel == Channel::Topic);
     topics.map(|wire| line(plan, wires, wire)).collect()

@@ -1,4 +1,4 @@
-//! A random walk beside a straight sum of its steps, and its distribution over many seeds.
+//! A random walk compared with a straight sum of its steps, and its distribution over many seeds.
 
 use std::collections::BTreeMap;
 

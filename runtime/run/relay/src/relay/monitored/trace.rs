@@ -1,4 +1,4 @@
-//! Decisions in the relay beside those of `sesame_monitor`, fed with the messages of a trace.
+//! Decisions in the relay compared with those of `sesame_monitor`, fed with the messages of a trace.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

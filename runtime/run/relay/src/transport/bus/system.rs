@@ -60,7 +60,7 @@ pub(super) struct System {
     /// What was taken of that, and nobody has asked for.
     judged: Vec<AddedOnWire>,
     wires: WireTable,
-    /// What was noted in this run: each note is said once.
+    /// What was noted in this run: each note is made once.
     said: BTreeSet<String>,
 }
 

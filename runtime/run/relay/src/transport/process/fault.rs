@@ -1,4 +1,4 @@
-//! What is said of a simulator that cannot be started, or has a fault.
+//! What users read of a simulator that cannot be started, or has a fault.
 
 use crate::transport::process::session::Fault;
 use crate::transport::{Incidents, TransportError};

@@ -1,4 +1,4 @@
-//! The programs that a plan launches beside a simulator that is a program.
+//! The programs that a plan launches in addition to a simulator that is a program.
 
 use crate::transport::{Incidents, TransportError};
 use sesame_lifecycle::launch::Launched;

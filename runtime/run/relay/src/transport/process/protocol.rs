@@ -27,7 +27,7 @@ pub(super) enum SimulatorMessage<'a> {
     /// Messages of the current step, whose deliveries it waits for.
     #[serde(borrow)]
     Publish(Vec<Message<'a>>),
-    /// The step is over; of a free-running simulator, the scenario.
+    /// The step is over; for a free-running simulator, the scenario.
     #[serde(borrow)]
     Done(Done<'a>),
     /// The simulation time of a free-running simulator with a clock of its own, in seconds.
@@ -65,7 +65,7 @@ pub(super) struct Ready<'a> {
     /// Whether it can be reset again; if not, it is restarted for each test.
     #[serde(default)]
     pub(super) resets: bool,
-    /// Of a free-running simulator: whether it sends its simulation time; otherwise simulation time is wall time.
+    /// Whether a free-running simulator sends its simulation time; otherwise simulation time is wall time.
     #[serde(default)]
     pub(super) clock: bool,
     /// Whether it wants to know when each message was delivered.

@@ -518,7 +518,7 @@ fn launch_of(program: &str) -> sesame_plan::Launch {
     }
 }
 
-/// A stepped simulator beside which this is launched.
+/// A stepped simulator in addition to which this is launched.
 fn launching(resets: &str, step: &str, launched: &str) -> Option<Python> {
     if !python() {
         return None;

@@ -1,4 +1,4 @@
-//! What a step owes, beside a naive rule that knows nothing of wires.
+//! What a step owes, compared with a naive rule that knows nothing of wires.
 
 use proptest::collection::vec;
 use proptest::prelude::*;
