@@ -299,7 +299,7 @@ impl Until {
             }
         }
         self.right.extend(stretch, values, &mut self.input.right);
-        // What is said of a window that begins at once needs no shift.
+        // The robustness of a window that begins at once needs no shift.
         let ahead = if self.delay == 0 { &mut self.parts.right } else { &mut self.ahead };
         while let Some((end, left, right)) = self.input.pop() {
             self.within.push(end, left, right, ahead);
@@ -323,7 +323,7 @@ impl Until {
         put_decided(unknown, self.defined(unknown.known, whole), told, both, out);
     }
 
-    /// As [`Node::defined`].
+    /// As [`FormulaNode::defined`].
     fn defined(&self, end: i64, whole: bool) -> i64 {
         let ahead = if whole { self.delay + self.within.length().unwrap_or(0) } else { self.delay };
         self.left.defined(end, whole).min(self.right.defined(end, whole)).saturating_sub(ahead)

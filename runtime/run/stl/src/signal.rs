@@ -32,7 +32,7 @@ impl Signal {
         Signal(points)
     }
 
-    /// That of a formula without a quantifier: its robustness, from the time at which it was known.
+    /// The signal of a formula without a quantifier: its robustness, from the time at which it was known.
     pub(super) fn known_at(time: SimTime, robustness: f64, end: SimTime) -> Signal {
         let known = [(time.min(end), robustness), (end, robustness)];
         Signal(if robustness.is_finite() { known.to_vec() } else { Vec::new() })

@@ -393,7 +393,7 @@ proptest! {
         }
     }
 
-    // Of these the reach is exact: the worst and the best continuation come to its ends.
+    // The reach of these is exact: the worst and the best continuation come to its ends.
     #[test]
     fn the_reach_of_one_operator_is_no_wider_than_continuations_make_it(
         interval in any_interval(), trace in any_trace(), finally in any::<bool>(),

@@ -18,7 +18,7 @@ struct Passage {
 }
 
 impl Passage {
-    /// Of no time at all.
+    /// A passage that takes no time at all.
     const EMPTY: Passage = Passage { hold: f64::INFINITY, arrive: f64::NEG_INFINITY };
 
     fn new(left: f64, right: f64) -> Self {
