@@ -23,7 +23,7 @@ use sesame_optimise::falsify::Margin;
 /// The front of a campaign that confirms its tests.
 #[derive(Debug, Clone, Default)]
 pub struct ConfirmedFront {
-    /// Of all generations before the latest; every test on it is confirmed.
+    /// The front of all generations before the latest; every test on it is confirmed.
     settled: Front,
     /// What the repetitions of each confirmed test say, by its number.
     confirmed: BTreeMap<u32, Fitness>,

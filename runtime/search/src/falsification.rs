@@ -125,7 +125,7 @@ struct TestDomain {
 #[derive(Debug, Clone)]
 struct EmbeddedTest {
     test: Test,
-    /// Of each operation, its kind's place in the campaign, and its coordinates in shares of what is permitted.
+    /// For each operation: its kind's place in the campaign, and its coordinates in shares of what is permitted.
     operations: Vec<(usize, Vec<f64>)>,
     /// Per kind, the square of its sum of bumps.
     squares: Vec<f64>,

@@ -56,7 +56,7 @@ impl FixedTests {
             parents: Vec::new(),
             generation: 0,
             known: None,
-            // That of the reference run is number 0.
+            // The seed of the reference run has number 0.
             simulator_seed: Some(derive_seed(seed, "simulator", &[if task.equal_seeds { 0 } else { u64::from(run) }])),
         };
         FixedTests { candidates: (1..task.runs).map(run).collect(), awaited: 0 }

@@ -23,13 +23,13 @@ pub struct GenerationIndicators {
     pub generation: u32,
     /// Tests evaluated by then.
     pub evaluations: u32,
-    /// Of these, those that were simulated: no exact duplicates of an earlier one.
+    /// How many of these were simulated: exact duplicates of an earlier test are not.
     pub unique: u32,
-    /// Of these, those in which no operation had any effect.
+    /// How many of these had no operation with any effect.
     pub no_effect: u32,
-    /// Of these, those that ended in a crash.
+    /// How many of these ended in a crash.
     pub crashes: u32,
-    /// Of these, those that were stopped at their time limit.
+    /// How many of these were stopped at their time limit.
     pub timeouts: u32,
     /// Tests on the front.
     pub front: u32,
@@ -122,7 +122,7 @@ pub fn volume(front: &Front, reference: &[f64]) -> Option<Volume> {
     (volume.value.is_finite() && !reference.is_empty()).then_some(volume)
 }
 
-/// Of each objective the worst finite value, and half of the range of all beyond it; `None` where an objective has no
+/// The worst finite value of each objective, and half of the range of all beyond it; `None` where an objective has no
 /// finite value.
 pub fn reference_point<P: AsRef<[f64]>>(points: &[P]) -> Option<Vec<f64>> {
     let objectives = points.first()?.as_ref().len();

@@ -381,7 +381,7 @@ mod tests {
         }
     }
 
-    /// Of robots, for each rule the share of the seeds with which a stop's promise is so, and the median of the tests.
+    /// For robots: for each rule the share of the seeds with which a stop's promise is so, and the median of the tests.
     fn robots(rules: &[StopRule], robots: usize, seeds: u64, sample: u32) -> Vec<(String, f64, u32)> {
         const LONGEST: u32 = 5_000;
         let grid = Grid::parse("T1:0:1:6,T2:0:0.5:6,P1:0:1:3").unwrap();

@@ -64,14 +64,14 @@ pub struct Candidate {
     pub simulator_seed: Option<u64>,
 }
 
-/// A test with its result. What a strategy learns from beside the fitness, it derives from the runs itself.
+/// A test with its result. What a strategy learns from in addition to the fitness, it derives from the runs itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evaluated {
     /// The caller's number of the test, unique in the campaign.
     pub number: u32,
     /// The test, as asked.
     pub test: Test,
-    /// Its fitness, from [`fitness`](crate::fitness); of a confirmed test, from its fresh runs.
+    /// Its fitness, from [`fitness`](crate::fitness); for a confirmed test, from its fresh runs.
     pub fitness: Fitness,
     /// Where its run lies in the reduced parameter space, if it counts for coverage.
     pub point: Option<Point>,

@@ -13,7 +13,7 @@ use crate::space::condition;
 pub struct TestKey([u64; 2]);
 
 impl TestKey {
-    /// Of everything in a test. Tests with equal keys give equal runs.
+    /// A hash of everything in a test. Tests with equal keys give equal runs.
     pub fn exact(test: &Test) -> TestKey {
         let content = serde_json::to_vec(test).unwrap_or_else(|error| unreachable!("a test is plain data: {error}"));
         let number = |bytes: &[u8]| bytes.iter().fold(0, |number: u64, &byte| number << 8 | u64::from(byte));
@@ -21,8 +21,8 @@ impl TestKey {
         TestKey::of([length].into_iter().chain(content.chunks(8).map(number)))
     }
 
-    /// Of a test without operation seeds, its operations in any order, its conditions in any order and grouping: two
-    /// tests that a search need not both try.
+    /// A hash of a test without operation seeds, its operations in any order, its conditions in any order and grouping:
+    /// a search need not try two tests with equal ones.
     pub fn without_seeds(test: &Test) -> TestKey {
         let operations = identity(test).into_iter();
         TestKey::of(operations.flat_map(|numbers| [vec![numbers.len() as u64], numbers].concat()))

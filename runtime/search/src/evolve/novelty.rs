@@ -28,7 +28,7 @@ const FINEST: f64 = 1e-3;
 pub(crate) struct Novel {
     evolution: Nsga2<TestVariation>,
     archive: Archive,
-    /// Of the tests of the population, by number: their objectives and points.
+    /// The tests of the population, by number: their objectives and points.
     alive: BTreeMap<u32, (Fitness, Option<Point>)>,
 }
 

@@ -137,7 +137,7 @@ pub(crate) struct PredictingVariation {
     remembered: VecDeque<(Test, VariableTrajectories)>,
     reference_credibility: Credibility,
     parents_credibility: Credibility,
-    /// Of the generation asked last.
+    /// The predictions for the generation asked last.
     predictions: Vec<Prediction>,
 }
 

@@ -58,7 +58,7 @@ struct Kind {
 /// The levels of an operation's windows.
 #[derive(Debug, Clone)]
 enum WindowLevels {
-    /// At which windows begin and end.
+    /// The times at which windows begin and end.
     Ends(Vec<f64>),
     /// Windows of bounded lengths.
     Bounded(BoundedWindows),
@@ -140,7 +140,7 @@ struct BoundedWindows {
 
 impl BoundedWindows {
     fn new(range: Range, levels: u32) -> Self {
-        // What rounding leaves beside a window that takes all of the time is not a place to begin.
+        // What rounding leaves next to a window that takes all of the time is not a place to begin.
         let spare = range.high - range.low - range.longest;
         let last = if spare > 1e-9 * range.longest { range.high - range.longest } else { range.low };
         let starts = equally_spaced(Range::between(range.low, last), levels);
@@ -345,7 +345,7 @@ impl Sampling for FullFactorial {
 
 impl Kind {
     fn most_copies(&self) -> usize {
-        // Of a short time there may be fewer levels than the campaign asks for.
+        // A short time may have fewer levels than the campaign asks for.
         self.times.as_ref().map_or(1, |times| times.most_copies(self.copies))
     }
 
@@ -497,7 +497,7 @@ fn subset(of: usize, members: usize, mut size: u128, mut rank: u128) -> Vec<usiz
         if open == 0 {
             break;
         }
-        // Of the subsets that are left, this share has the thing. If all can be reached, it is a whole number.
+        // This share of the subsets that are left has the thing. If all can be reached, it is a whole number.
         let with = size * open / left;
         if rank < with {
             chosen.push(thing);

@@ -1,4 +1,4 @@
-//! Sobol' sampling: tests along Sobol' points, a baseline beside random and Latin hypercube tests.
+//! Sobol' sampling: tests along Sobol' points, a baseline like random and Latin hypercube tests.
 //!
 //! Every beginning of the search is spread evenly over each choice, not only the whole: so it may be stopped at any
 //! time. Campaigns by condition have no such choices and are not sampled so.

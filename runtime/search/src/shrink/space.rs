@@ -13,7 +13,7 @@ use crate::space::range::Range;
 /// the nearest whole number of this size, and by 1 at least.
 pub const RESOLUTION: f64 = 0.01;
 
-/// In what ways the tests of a campaign can be shrunk.
+/// The ways in which the tests of a campaign can be shrunk.
 #[derive(Debug, Clone)]
 pub(super) struct ShrinkSpace {
     /// Operations that a test holds at least.
@@ -51,7 +51,7 @@ pub(super) struct NeutralValue {
 }
 
 impl ShrinkSpace {
-    /// That of a plan's campaign, in steps of this share of what is permitted.
+    /// The space of a plan's campaign, in steps of this share of what is permitted.
     pub(super) fn from_plan(plan: &CampaignPlan, resolution: f64) -> ShrinkSpace {
         let campaign = &plan.campaign;
         let conditions = match &campaign.activation {

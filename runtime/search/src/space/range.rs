@@ -107,7 +107,7 @@ impl Range {
     /// An interval `low <= high`, uniform over all that fit (the triangle of feasible pairs).
     pub fn interval(self, stream: &mut Stream) -> (f64, f64) {
         if self.integer {
-            // Of n whole numbers there are n (n + 1) / 2 pairs. An n by n + 1 rectangle holds each twice: once on or
+            // There are n (n + 1) / 2 pairs of n whole numbers. An n by n + 1 rectangle holds each twice: once on or
             // below its diagonal, once above.
             let n = self.high - self.low + 1.0;
             let row = libm::floor(stream.uniform(0.0, n)).min(n - 1.0);
@@ -127,8 +127,8 @@ impl Range {
     /// uniform and independent give intervals that are uniform over all that fit.
     pub fn interval_at(self, [length, place]: [f64; 2]) -> (f64, f64) {
         let room = self.high - self.low - self.shortest;
-        // Of all pairs of ends, the share that is longer than x is (1 - x)²; of those that are not too long, `beyond`
-        // is left out.
+        // The share of all pairs of ends that is longer than x is (1 - x)²; `beyond` is left out of those that are not
+        // too long.
         let beyond = if self.longest.is_finite() {
             let left = 1.0 - ((self.longest - self.shortest) / room).clamp(0.0, 1.0);
             if room > 0.0 { left * left } else { 0.0 }
@@ -194,7 +194,7 @@ mod tests {
         assert!((share(|low, high| low + high > 30.0) - 0.5).abs() < 0.01);
     }
 
-    /// Beside intervals drawn anew until they are short enough, which are uniform by definition.
+    /// Compares with intervals drawn anew until they are short enough, which are uniform by definition.
     #[test]
     fn intervals_of_bounded_lengths_are_as_uniform_as_rejected_ones() {
         let range = Range { shortest: 0.5, longest: 3.0, ..Range::between(10.0, 20.0) };

@@ -213,7 +213,8 @@ mod tests {
         assert_eq!(touching, [(3.0, 9.0), (1.0, 3.0)]);
     }
 
-    /// Beside windows drawn anew until they are disjoint, which are uniform over the disjoint ones by definition.
+    /// Compares with windows drawn anew until they are disjoint, which are uniform over the disjoint ones by
+    /// definition.
     #[test]
     fn fresh_windows_are_as_uniform_as_rejected_ones() {
         let range = Range::window(0.0, 1.0);
@@ -239,7 +240,7 @@ mod tests {
         }
         let [ours, naive] = sums;
         assert!(ours.iter().zip(naive).all(|(a, b)| (a - b).abs() < 0.012), "{ours:?} {naive:?}");
-        // Of five gaps between four sorted numbers each is a fifth.
+        // Each of the five gaps around four sorted numbers is a fifth on average.
         assert!((ours[1] - 0.2).abs() < 0.01, "{ours:?}");
     }
 }

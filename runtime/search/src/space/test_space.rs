@@ -414,7 +414,7 @@ pub(crate) mod tests {
         wrong(start, space, space.depth)
     }
 
-    /// Two copies of one operation in a test that the plan does not permit beside each other, if there are any.
+    /// Two copies of one operation in a test that the plan does not permit together, if there are any.
     pub(crate) fn broken_copies(plan: &CampaignPlan, test: &Test) -> Option<String> {
         for (at, second) in test.operations.iter().enumerate() {
             for first in test.operations[..at].iter().filter(|first| first.operation == second.operation) {

@@ -21,7 +21,7 @@ pub fn extent(plan: &CampaignPlan, test_space: &TestSpace, dimension: Dimension)
     let by_condition = matches!(plan.campaign.activation, ActivationMode::Condition { .. });
     let offline = timed.len() < test_space.operations().len();
     let (fewest, most) = (test_space.fewest(), test_space.most());
-    // One that acts beside the run, or whose conditions never hold, counts in no dimension.
+    // One that acts outside the run, or whose conditions never hold, counts in no dimension.
     let fewest = if offline || by_condition { 1 } else { fewest };
     let least = |of: fn(&Timing) -> f64| timed.iter().map(of).fold(f64::INFINITY, f64::min);
     let greatest = |of: fn(&Timing) -> f64| timed.iter().map(of).fold(f64::NEG_INFINITY, f64::max);

@@ -26,8 +26,8 @@ impl Window {
         self.longest.min(self.end - self.start)
     }
 
-    /// That of an operation in a campaign; `None` for one that acts before the start or after the end. Where conditions
-    /// switch an operation, its intervals may be as short as they like.
+    /// The window of an operation in a campaign; `None` for one that acts before the start or after the end. Where
+    /// conditions switch an operation, its intervals may be as short as they like.
     pub(crate) fn of(plan: &CampaignPlan, operation_space: &OperationSpace) -> Option<Window> {
         let within = plan.operation(operation_space.operation).within;
         let share = |time: f64| (time - within.start) / within.length();

@@ -248,7 +248,7 @@ fn one_operation_has_no_spread_and_five_have_some() {
     let alone: Vec<Vec<u32>> = (0..grid.len()).filter(|&c| feasible.reaches(c)).map(|c| grid.place(c)).collect();
     assert!(alone.iter().filter(|place| place[2] == 0).eq([&vec![0, 0, 0]]));
     assert!(alone.contains(&vec![4, 4, 1]), "two at the ends of the window, one parameter at each end");
-    // Of three numbers in 0..=1 the greatest deviation is the square root of 2/9.
+    // The greatest deviation of three numbers in 0..=1 is the square root of 2/9.
     assert!(alone.contains(&vec![4, 4, 2]));
     plan.campaign.count = Count { min: 1, max: 1 };
     assert_eq!(Feasible::from_plan(&plan, &grid).count(), 1);

@@ -40,26 +40,26 @@ use crate::space::range::StepSizes;
 /// How often what is varied. All are probabilities except `steps` and `tries`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rates {
-    /// Of each pair: that its lists are crossed.
+    /// For each pair: that its lists are crossed.
     pub crossover: f64,
-    /// Of each two operations at the same place in the lists of a pair that was to be crossed: that their start
+    /// For each two operations at the same place in the lists of a pair that was to be crossed: that their start
     /// conditions exchange parts, and by a draw of their own their end conditions.
     pub exchange: f64,
-    /// Of each operation: that its window changes, or one of its conditions, or its length.
+    /// For each operation: that its window changes, or one of its conditions, or its length.
     pub window: f64,
-    /// Of each parameter of each operation: that it changes.
+    /// For each parameter of each operation: that it changes.
     pub parameter: f64,
-    /// Of each change of a window, length or parameter: that it is drawn anew instead of moved a little. Of each change
-    /// of a condition: that a part of it is grown anew, instead of one sign, number or variable changed.
+    /// For each change of a window, length or parameter: that it is drawn anew instead of moved a little. For each
+    /// change of a condition: that a part of it is grown anew, instead of one sign, number or variable changed.
     pub fresh: f64,
-    /// Of each operation: that a fresh instance of another operation takes its place and keeps its window or
+    /// For each operation: that a fresh instance of another operation takes its place and keeps its window or
     /// conditions, as far as that is permitted there.
     pub retarget: f64,
-    /// Of each test: that a fresh operation joins it.
+    /// For each test: that a fresh operation joins it.
     pub add: f64,
-    /// Of each test: that a copy of one of its operations, with its window or conditions changed, joins it.
+    /// For each test: that a copy of one of its operations, with its window or conditions changed, joins it.
     pub duplicate: f64,
-    /// Of each test: that an operation leaves it.
+    /// For each test: that an operation leaves it.
     pub drop: f64,
     /// How far windows and parameters move.
     pub steps: StepSizes,

@@ -53,7 +53,7 @@ fn levels_of(range: &Range, levels: u32) -> Vec<f64> {
         if range.high - range.low < f64::from(levels) {
             found = (0..=levels).map(|at| range.low + f64::from(at)).filter(|&number| number <= range.high).collect();
         }
-        // Of two whole numbers that are as near, the one whose distance from the least is even.
+        // If two whole numbers are as near, it is the one whose distance from the least is even.
         for number in &mut found {
             *number = range.low + libm::rint(*number - range.low);
         }
@@ -346,7 +346,7 @@ fn every_beginning_has_each_level_about_equally_often() {
 fn numbers_of_operations_take_turns_until_they_are_used_up() {
     let plan = one_operation(&[], Copies::Apart, Count { min: 1, max: 4 });
     let mut grid = grid(&plan, 4, 1).unwrap();
-    // Of three parts of the time: six windows, five disjoint pairs, all three parts.
+    // Three parts of the time give six windows and five disjoint pairs, and all three parts together.
     let lengths: Vec<usize> = (0..).map_while(|index| grid.test(index)).map(|test| test.operations.len()).collect();
     assert_eq!(lengths, [1, 2, 3, 1, 2, 1, 2, 1, 2, 1, 2, 1]);
     assert_eq!(grid.ended(5).unwrap(), "5 of the 12 tests of the grid were evaluated");

@@ -33,9 +33,9 @@ impl Member {
 /// The ranges that the numbers are to be in: lower bounds are inclusive, upper bounds exclusive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Wanted {
-    /// Of their mean.
+    /// The range of their mean.
     pub(super) mean: (f64, f64),
-    /// Of their population standard deviation, if it matters.
+    /// The range of their population standard deviation, if it matters.
     pub(super) spread: Option<(f64, f64)>,
     /// The greatest sum of their distances from the middles of their bounds.
     pub(super) budget: f64,

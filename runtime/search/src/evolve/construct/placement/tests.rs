@@ -120,8 +120,8 @@ fn witnessed(plan: &CampaignPlan, grid: &Grid, tests: u64) -> std::collections::
     cells
 }
 
-/// Of every `every`-th cell with a witness: those for which no test could be constructed from five fresh ones, and how
-/// many cells were tried.
+/// Tries every `every`-th cell with a witness; returns the cells for which no test could be constructed from five fresh
+/// ones, and how many cells were tried.
 fn not_built(plan: &CampaignPlan, grid: &Grid, tests: u64, every: usize) -> (Vec<Vec<u32>>, usize, usize) {
     let test_space = TestSpace::from_plan(plan).unwrap();
     let feasible = Feasible::from_plan(plan, grid);
@@ -178,7 +178,7 @@ fn copies_of_one_operation_are_constructed_disjoint_or_not_at_all() {
     plan.campaign.copies = Copies::Apart;
     let grid = Grid::parse("T1:0:1:6,T2:0:0.6:6,O0:0.5:4.5:4").unwrap();
     let (failed, feasible) = not_reached(&plan, &grid, 1);
-    // Of four copies in one window none can be longer than a quarter of it on average.
+    // None of four copies in one window can be longer than a quarter of it on average.
     let copies = |place: &Vec<u32>| f64::from(place[2] + 1);
     assert!(failed.iter().all(|place| place[2] > 0), "{failed:?}");
     let too_long = |place: &Vec<u32>| 0.1 * f64::from(place[1]) * copies(place) >= 1.0 - 1e-9;
