@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use crate::xml::{Element, printable};
 
-/// Old names of elements and attributes beside the last ones.
+/// Old names of elements and attributes with the last ones.
 const RENAMED: [(&str, &str); 12] = [
     ("possibleAttacks", "possibleFuzzingOperations"),
     ("attacks", "operations"),

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 pub enum Kind {
     /// It is called something else in newer files, or here.
     Renamed,
-    /// It is said in another way.
+    /// It is expressed in another way.
     Mapped,
     /// A probability to keep messages became one to lose them.
     Flipped,

@@ -24,7 +24,7 @@ pub struct Recorded {
     pub sets: usize,
 }
 
-/// One campaign of a file beside its plan.
+/// One campaign of a file with its plan.
 struct Importer<'o> {
     original: &'o Original,
     mapped: &'o Mapped,
@@ -67,7 +67,7 @@ pub(crate) fn record(
     Ok(Recorded { tests: campaign.tests.len(), sets: sets.len() })
 }
 
-/// What is recorded beside tests, for those that are not in the results as they are in the file.
+/// What is recorded in addition to tests, for those that are not in the results as they are in the file.
 #[derive(Debug, Default)]
 struct Beside {
     split: Vec<SplitOperation>,

@@ -166,7 +166,7 @@ impl Messages {
     }
 
     /// Makes sure that a path leads from a type to a number, if need be by declaring fields on the way. A step may name
-    /// an element of a list, `objects[0]`. What stands in the way is said in words.
+    /// an element of a list, `objects[0]`. The error says what stands in the way.
     pub(crate) fn reach(&mut self, from: &Type, path: &[String], names: &mut Names) -> Result<(), String> {
         let mut ty = from.clone();
         for (at, step) in path.iter().enumerate() {

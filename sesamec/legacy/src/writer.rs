@@ -47,7 +47,7 @@ pub(crate) struct Writer<'o> {
 }
 
 impl Writer<'_> {
-    /// A name for something of a kind, like the one it had; that it is another one is told.
+    /// A name for something of a kind, like the one it had; a note says if it is another one.
     pub(crate) fn name(&mut self, kind: &str, original: &str) -> String {
         let name = self.names.take(original, kind);
         if !original.is_empty() && name != original {
