@@ -19,7 +19,7 @@ pub struct Folders<'a> {
     pub written: &'a [String],
     /// The name of the file that names them; they are relative to its folder.
     pub file: &'a str,
-    /// Of which ROS their files are: a `.msg` file of ROS 1 has types that ROS 2 does not have.
+    /// The ROS that their files are for: a `.msg` file of ROS 1 has types that ROS 2 does not have.
     pub dialect: Dialect,
 }
 

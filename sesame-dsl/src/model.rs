@@ -46,7 +46,7 @@ pub struct Space {
     pub declaration: Declaration,
     /// The simulator under test.
     pub simulator: Simulator,
-    /// What the system needs beside it, and what a relay may cost.
+    /// What the system needs in addition to it, and what a relay may cost.
     pub lifecycle: Lifecycle,
     /// Message types, each after the types it contains, otherwise in declaration order.
     pub messages: Arena<MessageId, Message>,

@@ -25,7 +25,7 @@ pub struct SourceFile {
     line_starts: Vec<u32>,
 }
 
-/// A position: line and column count from 1, columns in characters unless something else is said.
+/// A position: line and column count from 1, columns in characters unless stated otherwise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct LineColumn {
     /// The line, from 1.
@@ -67,7 +67,7 @@ impl SourceMap {
         self.files.iter().map(|file| file.text.len()).sum()
     }
 
-    /// Why the file of a name cannot be read, if that was said.
+    /// Why the file of a name cannot be read, if that is known.
     pub fn unreadable(&self, name: &str) -> Option<&str> {
         self.unreadable.get(name).map(String::as_str)
     }

@@ -279,7 +279,7 @@ pub fn square_root(unit: Option<&Unit>) -> Option<(Option<Unit>, f64)> {
             None => powers.push((symbol, power)),
         }
     }
-    // Of `m*mm` no symbol has a root, but in base units it is `m^2`.
+    // No symbol has a root of `m*mm`, but in base units it is `m^2`.
     if powers.iter().any(|(_, power)| power % 2 != 0) {
         powers = BASE.into_iter().zip(unit.dimension.exponents).collect();
     }

@@ -1,8 +1,8 @@
 //! Columns: words that their author aligned in lines that follow each other.
 //!
-//! Whether a word is in a column is told by the blanks before it: two or more in any of the lines. So the author
-//! decides, and what was aligned once stays aligned when a name grows. How far a column stays away from the longest of
-//! what is before it is the author's too, within reason.
+//! The blanks before a word tell whether it is in a column: two or more in any of the lines. So the author decides, and
+//! what was aligned once stays aligned when a name grows. How far a column stays away from the longest of what is
+//! before it is the author's too, within reason.
 
 use super::lines::{Line, Placed};
 use super::tokens::Kind;

@@ -208,7 +208,7 @@ impl<'a> Indexer<'a> {
         id
     }
 
-    /// Of several definitions of one name the first counts, as in resolution.
+    /// The first of several definitions of one name counts, as in resolution.
     fn settle(&mut self, ranks: &BTreeMap<FileId, usize>) {
         let mut heads = std::mem::take(&mut self.heads);
         heads.sort_by_key(|(name, _)| (ranks.get(&name.span.file).copied(), name.span));
@@ -269,7 +269,7 @@ impl<'a> Indexer<'a> {
             TypeKind::Message(message) => {
                 let message = self.names.get(message.text.as_str()).copied();
                 let member = message.and_then(|message| self.members.get(&(message, name.text.as_str())).copied());
-                // What a type of ROS holds beside the fields of its block, only resolution knows.
+                // Only resolution knows what a type of ROS holds in addition to the fields of its block.
                 if member.is_none() && message.is_some_and(|message| self.of_ros.contains(&message)) {
                     return None;
                 }

@@ -38,7 +38,7 @@ pub struct Campaign {
     pub end_after: f64,
     /// What ends a test before that time. Default nothing.
     pub end_when: Option<Condition>,
-    /// Of which tests the messages are recorded. Default none.
+    /// The tests whose messages are recorded. Default none.
     pub record: Option<Recorded>,
 }
 

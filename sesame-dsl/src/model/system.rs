@@ -27,7 +27,7 @@ pub struct Simulator {
     pub proxies: Vec<Proxy>,
 }
 
-/// What a system says beside its simulator.
+/// What a system says in addition to its simulator.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Lifecycle {
     /// What starts it.
@@ -96,7 +96,8 @@ pub struct RelayBudget {
 pub struct Message {
     /// Its name and doc comment.
     pub declaration: Declaration,
-    /// Its fields, in declaration order; names are unique among them. Of a ROS type, in the order of the wire.
+    /// Its fields, in declaration order; names are unique among them. For a ROS type, they are in the order of the
+    /// wire.
     pub fields: Vec<Field>,
     /// Its type in ROS, for example `sensor_msgs/msg/JointState`: that of one of [`crate::model::Space::interfaces`].
     pub interface: Option<String>,
@@ -161,7 +162,7 @@ pub struct Node {
     pub launch: Option<Launch>,
     /// What it publishes for each message that it receives: topics that it subscribes to, with those that it publishes.
     pub answers: Vec<(TopicId, TopicId)>,
-    /// On which topics it publishes one message in every step of the simulator.
+    /// The topics on which it publishes one message in every step of the simulator.
     pub every_step: Vec<TopicId>,
     /// The address of its broker, where it is not that of the simulator.
     pub broker: Option<String>,

@@ -25,7 +25,7 @@ pub struct Robustness {
 /// What holds of signals over time, or does not.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Temporal {
-    /// A signal beside a constant, which is finite.
+    /// A signal compared with a constant, which is finite.
     Predicate(usize, Comparison, f64),
     /// It does not hold.
     Not(Box<Temporal>),

@@ -20,7 +20,7 @@ enum Computes {
     Distance,
     SignedDistance,
     Unary(UnaryFunction, Takes, Gives),
-    /// Of two numbers of one dimension, unless it takes plain ones.
+    /// A function of two numbers of one dimension, unless it takes plain ones.
     Binary(BinaryFunction, Takes, Gives),
 }
 
@@ -39,7 +39,7 @@ enum Takes {
 /// The unit of a value.
 #[derive(Clone, Copy)]
 enum Gives {
-    /// That of the arguments; of a square, that of its root.
+    /// The unit of the arguments; for a square, the unit of its root.
     Same,
     Plain,
     Angle,

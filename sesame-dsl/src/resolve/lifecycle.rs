@@ -1,4 +1,4 @@
-//! The clauses of a system beside its simulator: launching, terminating, the budget of the relay.
+//! The clauses of a system in addition to its simulator: launching, terminating, the budget of the relay.
 
 use super::placeholders::Place;
 use super::{Kind, Resolver};
@@ -9,7 +9,7 @@ use crate::syntax::ast::lifecycle as written;
 use crate::syntax::ast::{self, Name, Quantity, System, Text};
 use crate::units::Unit;
 
-/// What a node says beside its topics.
+/// What a node says in addition to its topics.
 pub(super) struct RestOfNode {
     pub(super) named: Option<String>,
     pub(super) launch: Option<model::Launch>,
@@ -70,7 +70,7 @@ impl<'a> Resolver<'a> {
         self.report(diagnostic);
     }
 
-    /// What a node says beside its topics.
+    /// What a node says in addition to its topics.
     pub(super) fn rest_of_node(
         &mut self,
         node: &'a ast::Node,

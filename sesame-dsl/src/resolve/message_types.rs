@@ -161,7 +161,7 @@ impl<'a> Resolver<'a> {
                 Some(name)
             }
             Layout::None => {
-                // Of a type that has a mistake nothing is known.
+                // Nothing is known of a type that has a mistake.
                 complete &= message.ros_type.is_none();
                 None
             }

@@ -11,8 +11,8 @@ use crate::span::Span;
 use crate::syntax::ast::{self, ExpressionKind, Prefix, PrefixWord, Relation};
 use crate::units::{Unit, convert, dimension};
 
-/// The robustness of `true`, and negated of `false`, beside numbers that are measured: greater than any of them, so
-/// that a `bool` decides and never limits.
+/// The robustness of `true`, and negated of `false`, compared with numbers that are measured: greater than any of them,
+/// so that a `bool` decides and never limits.
 const DECISIVE: f64 = 1e9;
 
 /// The signals that a formula compares.

@@ -17,7 +17,7 @@ impl<'a> Resolver<'a> {
         self.simulators().next()?.transport.as_ref()
     }
 
-    /// Of which ROS the simulator is; ROS 2 where it is of none.
+    /// The ROS of the simulator; ROS 2 if it has none.
     pub(super) fn dialect(&self) -> Dialect {
         let Some(transport) = self.transport() else { return Dialect::default() };
         let written = transport.settings.dialects.first().map(|(_, dialect)| *dialect);

@@ -80,7 +80,7 @@ fn broken_promise(text: &str, found: &Diagnostic, suggestion: &Suggestion, befor
     let (lo, hi) = moved(found.span, suggestion);
     let again = after.iter().find(|other| {
         let [start, end] = [i64::from(other.span.lo), i64::from(other.span.hi)];
-        // Of one place only the first mistake is told.
+        // Only the first mistake at a place is reported.
         let same = suggestion.applicability == Applicability::MachineApplicable
             || without_quotes(&other.title) == without_quotes(&found.title);
         other.code == found.code

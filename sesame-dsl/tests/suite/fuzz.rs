@@ -140,7 +140,7 @@ fn pieces(text: &str) -> Vec<&str> {
 
 /// A text made of a kept one, and sometimes of another.
 fn mutated(draws: &mut Draws, kept: &[String], words: &[String]) -> String {
-    // Of two the shorter one: short texts are tried faster.
+    // The shorter one of two: short texts are tried faster.
     let mut text = std::cmp::min_by_key(draws.one(kept), draws.one(kept), |text| text.len()).to_owned();
     for _ in 0..=draws.below(6) {
         let mut parts: Vec<&str> = pieces(&text);
@@ -205,7 +205,7 @@ fn hash(of: impl std::hash::Hash) -> u64 {
     hasher.finish()
 }
 
-/// Of what kinds an answer is: each mistake with what was said of it, what two were met in a row, what a model holds.
+/// The kinds of an answer: each mistake with what was said of it, what two were met in a row, what a model holds.
 fn kinds(analysis: &Analysis) -> BTreeSet<u64> {
     let mut kinds = BTreeSet::new();
     let mut before = 0;

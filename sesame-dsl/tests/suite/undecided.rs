@@ -1,4 +1,4 @@
-//! Certificates that are too hard for the check: what was not decided is said, and no more is claimed.
+//! Certificates that are too hard for the check: the check reports what it did not decide, and claims no more.
 
 use std::fmt::Write as _;
 

@@ -19,7 +19,7 @@ use crate::syntax::ast;
 /// Larger groups are not checked: see [`Group::size`].
 const LARGEST: usize = 200_000;
 
-/// Of more evidence it is not looked for which excludes each other.
+/// If there is more evidence, nobody looks for what excludes each other.
 const MOST_EVIDENCE: usize = 40;
 
 /// How many names a note lists.
@@ -267,7 +267,7 @@ impl<'a> Reporter<'a> {
     /// about.
     fn undecided(&self, questions: &[Question]) -> Vec<(Span, String)> {
         let mut notes: Vec<(MonitorId, [&str; 2], Vec<&Declaration>)> = Vec::new();
-        // Of what may never hold, it need not be said that it may never be the state.
+        // What may never hold need not be reported again as what may never be the state.
         let follows = |question: &&Question| match **question {
             Question::NeverState(monitor, at) => questions.contains(&Question::Never(monitor, at)),
             _ => false,

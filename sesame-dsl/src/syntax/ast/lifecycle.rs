@@ -1,9 +1,10 @@
-//! What a system says beside its simulator and messages: how it is launched and ended, and what a relay may cost.
+//! What a system says in addition to its simulator and messages: how it is launched and ended, and what a relay may
+//! cost.
 
 use super::words::{Name, Quantity, Text};
 use crate::span::Span;
 
-/// A program that the system needs beside its simulator.
+/// A program that the system needs in addition to its simulator.
 #[derive(Debug)]
 pub(crate) struct Launch {
     pub(crate) command: Command,
