@@ -412,7 +412,7 @@ const MODES: &[(&str, Act)] = &[
             });
         }),
     ),
-    // Floods beside the protocol.
+    // Floods in addition to the protocol.
     (
         "floods_standard_error",
         Does(|_| {

@@ -14,8 +14,7 @@ pub(crate) use sesame_patience::LIMIT;
 use sesame_peers::{Ended, lines, named};
 use sesame_tests::{Port, workspace};
 
-/// The folder of the peers' packages. Without one the test is to be skipped, which is said here; with `CI=true` that is
-/// an error.
+/// The folder of the peers' packages. Without one it prints that the test is skipped; with `CI=true` that is an error.
 pub(crate) fn packages() -> Option<PathBuf> {
     let packages = named("SESAME_MQTT")?;
     let has_broker = Command::new("mosquitto").arg("-h").stdout(Stdio::null()).status().is_ok();

@@ -37,7 +37,7 @@ impl Vendor {
         }
     }
 
-    /// Its Python. Without one the test is to be skipped, which is said here; with `CI=true` that is an error.
+    /// Its Python. Without one it prints that the test is skipped; with `CI=true` that is an error.
     pub(crate) fn python(self) -> Option<PathBuf> {
         sesame_peers::named(self.variable())
     }
@@ -53,8 +53,8 @@ impl Vendor {
     }
 }
 
-/// The folder of the packages of clients in JavaScript. Without them the test is to be skipped, which is said here;
-/// with `CI=true` that is an error.
+/// The folder of the packages of clients in JavaScript. Without them it prints that the test is skipped; with `CI=true`
+/// that is an error.
 pub(crate) fn packages_of_roslib() -> Option<PathBuf> {
     sesame_peers::named("SESAME_ROSLIB")
 }

@@ -1,4 +1,4 @@
-//! What other nodes do wrong is said with their names, and the next run of the same campaign completes.
+//! What other nodes do wrong is reported with their names, and the next run of the same campaign completes.
 
 use std::thread;
 use std::time::{Duration, Instant};

@@ -67,7 +67,7 @@ impl Pythons {
         Some(Pythons { jazzy: Vendor::Jazzy.python()?, bridge: Vendor::Rosbridge.python()? })
     }
 
-    /// That of the nodes behind the bridge.
+    /// The Python of the nodes behind the bridge.
     pub(crate) fn jazzy(&self) -> &Path {
         &self.jazzy
     }

@@ -105,7 +105,7 @@ pub struct Reader {
 }
 
 impl Reader {
-    /// Of a topic of this name and type, as DDS has them.
+    /// A reader of a topic of this name and type, as DDS has them.
     pub fn new(of: &DomainParticipant, name: &str, type_name: &str) -> Reader {
         let subscriber = of.create_subscriber(&qos()).expect("a subscriber can be had");
         let topic = topic(of, name, type_name);

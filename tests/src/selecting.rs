@@ -19,8 +19,8 @@ pub enum Points {
     Uniform,
     /// Near thirty centres, with qualities near those of their centre: near-duplicates, as fronts have them.
     Clustered,
-    /// Those of a campaign of the gearbox cell: first its front, then the front of the other tests, and so on. Beyond
-    /// the recorded tests come others near them, since a longer campaign has more of the same.
+    /// The tests of a campaign of the gearbox cell: first its front, then the front of the other tests, and so on.
+    /// Beyond the recorded tests come others near them, since a longer campaign has more of the same.
     Front,
 }
 

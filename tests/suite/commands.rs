@@ -1,5 +1,5 @@
-//! The commands of a runner beside `run`: known tests, repetitions, replays, exports, reports; and what a build server
-//! reads of them.
+//! The commands of a runner other than `run`: known tests, repetitions, replays, exports, reports; and what a build
+//! server reads of them.
 
 use std::fs;
 use std::path::Path;
@@ -7,7 +7,7 @@ use std::path::Path;
 use sesame_record::{DATABASE, Repository};
 use sesame_tests::{Done, Project, Runner};
 
-/// A known test that does not come out as expected, beside the example's own.
+/// A known test that does not come out as expected, in addition to the example's own.
 const MISTAKEN: &str = "
 test mistaken {
   jitter_link1 offset [0.27rad, 0.29rad] from 8s to 57s seed 5

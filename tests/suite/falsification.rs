@@ -1,4 +1,4 @@
-//! How often the strategies violate a requirement within 80 evaluations, on published problems beside published
+//! How often the strategies violate a requirement within 80 evaluations, on published problems compared with published
 //! figures.
 
 use std::fmt::Write as _;
@@ -148,7 +148,7 @@ fn nsga2(problem: FalsificationProblem, seed: u64) -> Option<usize> {
     )
 }
 
-/// Of vectors whose coordinates depend on nothing but their place.
+/// The number of the first violation among vectors whose coordinates depend on nothing but their place.
 fn sampled(problem: FalsificationProblem, mut value: impl FnMut(usize, u32) -> f64) -> Option<usize> {
     let mut all: Vec<Vec<f64>> =
         (0..BUDGET).map(|index| (0..problem.variables()).map(|variable| value(variable, index)).collect()).collect();

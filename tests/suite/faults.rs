@@ -1,5 +1,5 @@
-//! What goes wrong in simulators and hooks ends a test, never a campaign; what is wrong without any disturbance is said
-//! before anything is fuzzed.
+//! What goes wrong in simulators and hooks ends a test, never a campaign; what is wrong without any disturbance is
+//! reported before anything is fuzzed.
 
 use std::collections::BTreeMap;
 use std::fs;

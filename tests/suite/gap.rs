@@ -1,4 +1,4 @@
-//! Statistics of the reality gap beside those of SciPy, statsmodels and dtaidistance.
+//! Statistics of the reality gap compared with those of SciPy, statsmodels and dtaidistance.
 
 use sesame_gap::bootstrap::{Resampling, intervals};
 use sesame_gap::equivalence::compare;

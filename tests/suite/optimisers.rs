@@ -1,4 +1,4 @@
-//! The search beside other implementations of NSGA-II: what they reach on published problems, and how they sort.
+//! The search compared with other implementations of NSGA-II: what they reach on published problems, and how they sort.
 
 use proptest::prelude::*;
 use proptest::strategy::ValueTree as _;
@@ -127,7 +127,7 @@ fn fronts_and_crowding_distances_are_those_of_pymoo_on_random_and_tied_points() 
         for (front, theirs) in ours.iter().zip(&theirs.crowding) {
             let mut distinct: Vec<&Vec<f64>> = front.iter().map(|&at| &case.points[at]).collect();
             distinct.dedup();
-            // Of one or two points pymoo calls every one a boundary, copies too; of copies of one point it calls none.
+            // pymoo calls every one of one or two points a boundary, copies too, but none of copies of one point.
             if front.len() <= 2 || distinct.len() == 1 {
                 continue;
             }

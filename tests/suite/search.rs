@@ -44,7 +44,7 @@ pub(crate) fn quartiles(values: &[f64]) -> [f64; 3] {
         let at = share * last as f64;
         let below = (0..=last).rev().find(|&below| below as f64 <= at).unwrap();
         let (low, high) = (sorted[below], sorted[last.min(below + 1)]);
-        // Of two that were never reached there is nothing between.
+        // There is nothing between two that were never reached.
         if low == high { low } else { low + (high - low) * at.fract() }
     })
 }

@@ -43,7 +43,7 @@ fn table_four_of_the_paper_is_chosen_from_its_data() {
     let front = sets.iter().find(|set| set.name == "NONDOM-20_06_2023_18_50_18-intermediate-210").unwrap();
     let mut members = front.members.clone();
     members.sort_unstable();
-    // Of tests with equal points and values the first stays, as in the paper.
+    // The first of tests with equal points and values stays, as in the paper.
     let mut numbers: Vec<u32> = Vec::new();
     for number in members {
         if !numbers.iter().any(|&earlier| point(earlier) == point(number)) {

@@ -1,4 +1,5 @@
-//! Robustness of signal temporal logic beside that of another tool, on random formulas and uniformly sampled traces.
+//! Robustness of signal temporal logic compared with that of another tool, on random formulas and uniformly sampled
+//! traces.
 //!
 //! On such traces our dense time and rtamt's discrete time are the same: all interval ends are whole samples, and no
 //! robustness changes between samples. There is one difference of meaning, and one of notation. rtamt asks of

@@ -1,4 +1,4 @@
-//! Monitors verified on two recordings, and tests beside their twins without mitigation.
+//! Monitors verified on two recordings, and tests compared with their twins without mitigation.
 
 use std::fs;
 

@@ -634,7 +634,7 @@ impl Space {
         let bounded = operations.iter().any(|&at| self.operations[at].bounded);
         let operations: Vec<&str> = operations.iter().map(|&at| self.operations[at].name.as_str()).collect();
         let operations = operations.join(", ");
-        // There may be operations beside the run only, which a test holds once unless copies may overlap.
+        // There may be operations outside the run only, which a test holds once unless copies may overlap.
         let count = *self.draw.one(&[
             "1 per test each at most once",
             "1..3 per test",
