@@ -29,7 +29,7 @@ pub struct Advisory {
     pub date: String,
     /// `unmaintained`, `unsound` or `notice`; none for a vulnerability.
     pub informational: Option<String>,
-    /// Where more is said.
+    /// Where one can read more.
     pub url: Option<String>,
     /// The day on which it was taken back.
     pub withdrawn: Option<String>,
