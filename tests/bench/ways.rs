@@ -16,9 +16,9 @@ use sesamec::frontend::{Look, SESAME};
 /// Latencies in nanoseconds, ascending, and how long all messages took.
 #[derive(Debug)]
 pub struct Measured {
-    /// Of each message.
+    /// The latency of each message.
     pub latencies: Vec<u64>,
-    /// Of all messages together.
+    /// How long all messages together took, in seconds.
     pub seconds: f64,
 }
 

@@ -1,4 +1,5 @@
-//! What a test of a search costs beside its simulation, by the number of tests: relay, worker, search, database, page.
+//! What a test of a search costs in addition to its simulation, by the number of tests: relay, worker, search,
+//! database, page.
 //!
 //! A runner is generated, built and run with one worker; its database knows what the runs themselves took.
 

@@ -1,5 +1,5 @@
-//! What monitors cost per message, beside a relay without them: in a space with fifty pieces of evidence and twenty
-//! guarantees, and with more and more certificates that do not hear the message.
+//! What monitors cost per message, compared with a relay without them: in a space with fifty pieces of evidence and
+//! twenty guarantees, and with more and more certificates that do not hear the message.
 
 use std::fmt::Write as _;
 use std::hint::black_box;

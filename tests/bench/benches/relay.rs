@@ -1,4 +1,4 @@
-//! What the relay costs per message, beside a bare copy of the message.
+//! What the relay costs per message, compared with a bare copy of the message.
 
 use std::hint::black_box;
 

@@ -1,6 +1,6 @@
-//! What the relay adds to a message between two nodes of ROS 2: the latency beside that of the direct way, and of a
-//! bare relay over the same DDS library that only hands bytes on. At 200 Hz, and at saturation: as fast as messages
-//! pass with a hundred of them under way.
+//! What the relay adds to a message between two nodes of ROS 2: the latency compared with that of the direct way, and
+//! of a bare relay over the same DDS library that only hands bytes on. At 200 Hz, and at saturation: as fast as
+//! messages pass with a hundred of them under way.
 //!
 //! The nodes are participants of this process, on the loopback interface. The three ways take turns.
 

@@ -88,7 +88,7 @@ fn table(_: &mut Criterion) {
     }
 }
 
-/// What a solver makes of a choice beside ours.
+/// What a solver makes of a choice compared with ours.
 fn other(solver: &'static str, choice: Choice, ours: &Selection) -> String {
     let Some(solved) = ask(&Request::of(choice, solver, limit())) else { return "not asked".to_owned() };
     let solved = match solved {

@@ -1,5 +1,5 @@
-//! What strategies cost beside the simulations: seconds spent in whole campaigns of 100, 1,000 and 10,000 tests in
-//! which nothing is simulated, and how they grow. With each test come its point, the front, the cells, and the rules
+//! What strategies cost in addition to the simulations: seconds spent in whole campaigns of 100, 1,000 and 10,000 tests
+//! in which nothing is simulated, and how they grow. With each test come its point, the front, the cells, and the rules
 //! that stop.
 
 use std::sync::Arc;
@@ -45,7 +45,7 @@ fn plan(search: Search, exploration: Option<Exploration>) -> CampaignPlan {
         let space = ConditionSpace { variables: vec![variable], depth: 4, integers, end, times: 3 };
         plan.campaign.activation = ActivationMode::Condition { space };
     }
-    // Of no interest but to falsification, and hard to violate.
+    // Only falsification needs it, and it is hard to violate.
     let bound = Bound::AtLeast { value: -1e9 };
     plan.requirements.push(Requirement { name: "R1".to_owned(), text: String::new(), metric: MetricId(1), bound });
     plan.campaign.exploration = exploration;
@@ -97,7 +97,7 @@ fn observe(plan: &CampaignPlan, number: u32, operations: &[sesame_plan::TestOper
     }
 }
 
-/// Seconds that a campaign spends beside its runs.
+/// Seconds that a campaign spends in addition to its runs.
 fn spent(plan: &CampaignPlan) -> Duration {
     let mut spent = Duration::ZERO;
     let begun = Instant::now();
@@ -164,8 +164,8 @@ fn main() {
     for (name, search, exploration) in strategies {
         let row = counts.iter().map(|&count| {
             let plan = plan(search(count), exploration.clone());
-            // Of five, the quickest is the one least disturbed by other work of the machine; one that takes long
-            // is disturbed little.
+            // The quickest of five is the one least disturbed by other work of the machine; one that takes long is
+            // disturbed little.
             let first = spent(&plan);
             let more = if measured && first < Duration::from_secs(1) { 4 } else { 0 };
             let quickest = (0..more).map(|_| spent(&plan)).fold(first, Duration::min);

@@ -1,4 +1,4 @@
-//! What a test's trace costs beside the test itself, without a simulator: per message, on a disk.
+//! What a test's trace costs in addition to the test itself, without a simulator: per message, on a disk.
 
 use std::hint::black_box;
 

@@ -1,5 +1,5 @@
 //! What the relay adds to a message at 200 Hz, or to a step, over each transport but ROS 2 (`ros2_relay`): the latency
-//! beside that of the direct way, and of the barest forwarders over the same transport. The ways take turns.
+//! compared with that of the direct way, and of the barest forwarders over the same transport. The ways take turns.
 //!
 //! Over rosbridge (`SESAME_ROSBRIDGE` and `SESAME_ROS2_JAZZY`) all go through one server: a forwarder in Rust that
 //! replaces one text by another, and one in thirty lines of Python on roslibpy. Over MQTT they go through one broker:
