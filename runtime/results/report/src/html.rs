@@ -1,6 +1,7 @@
 //! Reports as HTML: the page, and its parts.
 
 mod all_tests;
+mod before_after;
 mod cells;
 pub(super) mod certificate;
 mod command;
@@ -8,7 +9,6 @@ mod front;
 mod generations;
 mod header;
 mod legend;
-mod mend;
 mod monitors;
 mod page;
 mod policy;

@@ -23,8 +23,8 @@ mod twin;
 
 pub use self::twin::twin_text;
 pub use export::{Expected, ExportError, Exported, export};
+pub use facts::certificate::before_after::{Mend, MendedTest, mend};
 pub use facts::certificate::campaign::{HazardSummary, MissedHazard, MonitorSummary, MonitorsSummary, StateShare};
-pub use facts::certificate::mend::{Mend, MendedTest, mend};
 pub use facts::certificate::moment::{MomentError, MomentReport, MonitorMoment, PartReport, show_at};
 pub use facts::certificate::test::{
     ChangeReport, DecisionReport, EvidenceReport, HazardReport, MonitorReport, StateReport,

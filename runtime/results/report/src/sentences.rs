@@ -9,8 +9,8 @@ use sesame_plan::{Confirmation, Span, Statistic};
 use sesame_present::number::{self, fixed, join_words, plural};
 use sesame_record::{Standing, Verdict};
 
+use crate::facts::certificate::before_after::Mend;
 use crate::facts::certificate::campaign::MonitorsSummary;
-use crate::facts::certificate::mend::Mend;
 use crate::facts::coverage::CoverageSummary;
 use crate::facts::readable::short_numbers;
 use crate::facts::repetition::ViolationRate;

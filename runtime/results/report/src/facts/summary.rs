@@ -17,8 +17,8 @@ use sesame_record::{
     is_quarantined, verdict,
 };
 
+use crate::facts::certificate::before_after::Mend;
 use crate::facts::certificate::campaign::{MonitorsSummary, monitors_summary};
-use crate::facts::certificate::mend::Mend;
 use crate::facts::coverage::{CoverageSummary, coverage};
 use crate::facts::readable;
 use crate::facts::repetition::{Repetition, repetition};

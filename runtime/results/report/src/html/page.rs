@@ -16,7 +16,7 @@ use crate::html::generations::generations;
 use crate::html::header::header;
 use crate::html::policy::policy;
 use crate::html::test::test;
-use crate::html::{cells, mend, monitors, regions, shrinking, tree};
+use crate::html::{before_after, cells, monitors, regions, shrinking, tree};
 use crate::sentences::{QUARANTINED, once_sentence};
 use crate::tables;
 
@@ -72,7 +72,7 @@ fn page_in(
     }
     monitors::monitors(&mut body, &summary, &drawn);
     if let Some(before) = before {
-        mend::before_and_after(&mut body, repository, before, &drawn)?;
+        before_after::before_and_after(&mut body, repository, before, &drawn)?;
     }
     requirements(&mut body, &summary, &drawn);
     front(&mut body, repository, &summary, &rows, &drawn);

@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use sesame_present::number;
 use sesame_present::table::{Cell, Column, Datum, Table};
 
+use crate::facts::certificate::before_after::Mend;
 use crate::facts::certificate::campaign::MonitorsSummary;
-use crate::facts::certificate::mend::Mend;
 use crate::facts::certificate::test::{HazardReport, MonitorReport};
 use crate::facts::certificate::why::cause_text;
 

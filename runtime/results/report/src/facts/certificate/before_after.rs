@@ -88,7 +88,7 @@ fn content(plan: &CampaignPlan, row: &TestRow) -> Vec<String> {
     row.test.operations.iter().map(|used| notation::test_operation(plan, used)).collect()
 }
 
-/// In what two plans differ beside their monitors.
+/// How two plans differ apart from their monitors.
 fn difference(before: &CampaignPlan, after: &CampaignPlan) -> Option<String> {
     let without = |plan: &CampaignPlan| CampaignPlan { monitors: after.monitors.clone(), ..plan.clone() };
     without(before).model_difference(&CampaignPlan { space: before.space.clone(), ..after.clone() })

@@ -4,7 +4,7 @@ use sesame_present::axis::Axis;
 use sesame_present::markup::{Markup, coordinate};
 use sesame_record::{RecordError, Repository, TestRecord};
 
-use crate::facts::certificate::mend::{MendedTest, mend};
+use crate::facts::certificate::before_after::{MendedTest, mend};
 use crate::facts::certificate::test::monitors;
 use crate::html::certificate;
 use crate::html::timeline::time_axis;
