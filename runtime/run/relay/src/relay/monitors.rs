@@ -10,11 +10,10 @@
 
 use sesame_base::activation::TICK;
 use sesame_base::time::SimTime;
-use sesame_plan::{MonitorId, NodeId, Side};
+use sesame_plan::{MonitorId, Side};
 
 use crate::monitor::Monitors;
-use crate::relay::release::Held;
-use crate::relay::{Delivery, Listener as _, PUBLISHED_LIMIT, Phase, Relay};
+use crate::relay::{Delivery, PUBLISHED_LIMIT, Phase, Relay};
 use crate::value::Value;
 use crate::wire::Wire;
 
@@ -86,38 +85,6 @@ impl Relay<'_> {
         if let Some(monitors) = &mut self.monitors {
             monitors.show(self.now, &mut self.metrics);
         }
-    }
-
-    /// A message was published: by a node, or by a monitor.
-    pub(super) fn publish(
-        &mut self,
-        now: SimTime,
-        wire: Wire,
-        publisher: Option<NodeId>,
-        by_monitor: bool,
-        value: Value,
-        deliveries: &mut Vec<Delivery>,
-    ) {
-        self.messages += 1;
-        let index = self.published[wire.index()];
-        self.published[wire.index()] += 1;
-        if self.traffic.is_awaited(wire) {
-            self.traffic.meets(now, self.wires, wire, publisher);
-        }
-        if !by_monitor {
-            self.traffic.heard(now, wire);
-        }
-        for tap in &mut self.taps {
-            tap.published(now, wire, index, &value);
-        }
-        self.metrics.published(now, wire, index, &value);
-        self.monitors_hear(Side::Inbound, wire, index, &value);
-        if self.conditions.read[wire.index()] {
-            self.evaluate_conditions();
-            self.release_due(deliveries);
-        }
-        let message = Held { wire, publisher, by_monitor, published: index, index, value, next_stage: 0 };
-        self.pass(now, message, deliveries);
     }
 
     /// Sends what monitors publish at time zero, once.

@@ -1,13 +1,49 @@
-//! The way of a message through its pipeline: each operation in turn acts on it, and what it adds follows it.
+//! The way of a message: a node or a monitor publishes it, and it goes through its pipeline, in which each operation in
+//! turn acts on it, and what it adds follows it.
 
 use sesame_base::time::SimTime;
-use sesame_plan::Side;
+use sesame_plan::{NodeId, Side};
 
 use crate::fuzz::{Action, Disturbance, HELD_LIMIT, KeyedRng, MessageContext};
 use crate::relay::release::{Held, Why};
 use crate::relay::{COPIES_LIMIT, Delivery, Listener as _, OperationEvent, Phase, Relay};
+use crate::value::Value;
+use crate::wire::Wire;
 
 impl Relay<'_> {
+    /// Publishes a message of a node or a monitor: it gets the next number of its wire, listeners, metrics and monitors
+    /// hear it, and it begins its way through the pipeline.
+    pub(super) fn publish(
+        &mut self,
+        now: SimTime,
+        wire: Wire,
+        publisher: Option<NodeId>,
+        by_monitor: bool,
+        value: Value,
+        deliveries: &mut Vec<Delivery>,
+    ) {
+        self.messages += 1;
+        let index = self.published[wire.index()];
+        self.published[wire.index()] += 1;
+        if self.traffic.is_awaited(wire) {
+            self.traffic.meets(now, self.wires, wire, publisher);
+        }
+        if !by_monitor {
+            self.traffic.heard(now, wire);
+        }
+        for tap in &mut self.taps {
+            tap.published(now, wire, index, &value);
+        }
+        self.metrics.published(now, wire, index, &value);
+        self.monitors_hear(Side::Inbound, wire, index, &value);
+        if self.conditions.read[wire.index()] {
+            self.evaluate_conditions();
+            self.release_due(deliveries);
+        }
+        let message = Held { wire, publisher, by_monitor, published: index, index, value, next_stage: 0 };
+        self.pass(now, message, deliveries);
+    }
+
     /// Takes a message through the rest of its pipeline.
     pub(super) fn pass(&mut self, now: SimTime, mut message: Held, deliveries: &mut Vec<Delivery>) {
         loop {
