@@ -10,7 +10,7 @@
 //! is used, so rounding cannot make a bound wrong.
 
 use crate::instance::Instance;
-use crate::node::Node;
+use crate::subproblem::Subproblem;
 
 /// With more free tests, the work grows beyond what the bounds gain.
 const MOST: usize = 240;
@@ -32,7 +32,7 @@ pub(crate) fn patience(free: usize) -> usize {
 
 /// Chooses the diagonal of an instance for a part of it that contains all others which are looked at from now on: what
 /// is not free in it is free in none. Returns whether the diagonal changed.
-pub(crate) fn tighten(instance: &mut Instance, part: &Node, free: &[usize]) -> bool {
+pub(crate) fn tighten(instance: &mut Instance, part: &Subproblem, free: &[usize]) -> bool {
     if free.len() < 3 || free.len() > MOST || part.left(instance) < 2 {
         return false;
     }

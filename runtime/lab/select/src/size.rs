@@ -1,9 +1,9 @@
 //! One number of tests, from all candidates to those that matter.
 
 use crate::instance::Instance;
-use crate::node::{Fate, Node};
 use crate::problem::Problem;
 use crate::start;
+use crate::subproblem::{Fate, Subproblem};
 use crate::tree::Search;
 
 /// The most rounds of the first ascent.
@@ -16,7 +16,7 @@ pub(crate) struct Size {
     pub(crate) instance: Instance,
     /// All choices; `None` once it is proved that none is good enough, and if the search was stopped before they were
     /// looked at.
-    pub(crate) root: Option<Node>,
+    pub(crate) root: Option<Subproblem>,
     /// No choice of this size has a greater value.
     pub(crate) bound: f64,
 }
@@ -31,7 +31,7 @@ impl Size {
         for choice in &starts {
             search.offer(&instance, choice);
         }
-        let root = starts.first().map(|best| Node::new(&mut instance, best));
+        let root = starts.first().map(|best| Subproblem::new(&mut instance, best));
         let mut own: Vec<f64> = (0..instance.len()).map(|at| instance.own(at)).collect();
         own.sort_by(|a, b| b.total_cmp(a));
         let pairs = (size * (size - 1) / 2) as f64;
@@ -88,7 +88,7 @@ impl Size {
     }
 
     /// Improves the choice that the greatest fractions suggest.
-    fn round(&mut self, root: &Node, search: &mut Search<'_>) {
+    fn round(&mut self, root: &Subproblem, search: &mut Search<'_>) {
         let mut order = root.free.clone();
         order.sort_by(|&a, &b| root.fraction[b].total_cmp(&root.fraction[a]).then(a.cmp(&b)));
         let mut chosen = root.inside.clone();

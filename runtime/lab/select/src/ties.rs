@@ -1,8 +1,8 @@
 //! The choice with the smallest numbers among choices of equal value.
 
 use crate::incumbent::{Incumbent, TOLERANCE};
-use crate::node::Fate;
 use crate::size::Size;
+use crate::subproblem::Fate;
 use crate::tree::Search;
 
 /// Replaces a choice of the proved value by the one with the smallest numbers that has the same value. Returns false if

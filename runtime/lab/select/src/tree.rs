@@ -3,7 +3,7 @@
 use crate::diagonal;
 use crate::incumbent::Incumbent;
 use crate::instance::Instance;
-use crate::node::Node;
+use crate::subproblem::Subproblem;
 
 /// An instance is rebuilt when at least this many of its tests, and half of them, are out.
 const SHRINK: usize = 24;
@@ -57,7 +57,7 @@ impl<'a> Search<'a> {
 
     /// Looks at all choices in a part that may be worth it. Returns the bound of those that were not looked at because
     /// the search was stopped, negative infinity without any.
-    pub(crate) fn explore(&mut self, instance: &mut Instance, root: Node) -> f64 {
+    pub(crate) fn explore(&mut self, instance: &mut Instance, root: Subproblem) -> f64 {
         let (mut here, free) = (0, root.free.clone());
         let mut parts = vec![root];
         let mut open = f64::NEG_INFINITY;
@@ -131,7 +131,7 @@ impl<'a> Search<'a> {
     }
 
     /// Offers all choices of a part in which one or two tests are left that are worth it.
-    fn finish(&mut self, instance: &mut Instance, part: &Node) {
+    fn finish(&mut self, instance: &mut Instance, part: &Subproblem) {
         let mut gain: Vec<f64> = part.free.iter().map(|&at| instance.own(at)).collect();
         for &at in &part.inside {
             let row = instance.row(at);

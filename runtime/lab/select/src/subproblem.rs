@@ -1,5 +1,5 @@
-//! A part of the search: some tests are in, some are out, and the others are free. Its relaxation lets free tests be
-//! chosen in fractions and charges a price for cost beyond the limit; the maximum is approached by moving fractions
+//! A subproblem of the search: some tests are in, some are out, and the others are free. Its relaxation lets free tests
+//! be chosen in fractions and charges a price for cost beyond the limit; the maximum is approached by moving fractions
 //! from one test to another, each time by the exact best amount (as SMO does for support vector machines [Platt 1998]).
 //!
 //! Since the objective is concave, its tangent plane at any point is above it. So every step of the ascent gives a
@@ -29,9 +29,9 @@ pub(crate) enum Fate {
     Out,
 }
 
-/// A part of the search.
+/// A subproblem of branch and bound.
 #[derive(Debug, Clone)]
-pub(crate) struct Node {
+pub(crate) struct Subproblem {
     pub(crate) fate: Vec<Fate>,
     /// The free tests, ascending.
     pub(crate) free: Vec<usize>,
@@ -72,11 +72,11 @@ struct Tangent {
 /// A price, and how much more than the money is spent at it.
 type Priced = (f64, f64);
 
-impl Node {
+impl Subproblem {
     /// All choices of an instance, with one of them as the beginning of the ascent.
     pub(crate) fn new(instance: &mut Instance, start: &[usize]) -> Self {
         let count = instance.len();
-        let mut node = Node {
+        let mut subproblem = Subproblem {
             fate: vec![Fate::Free; count],
             free: (0..count).filter(|&at| !instance.forced[at]).collect(),
             inside: (0..count).filter(|&at| instance.forced[at]).collect(),
@@ -88,20 +88,20 @@ impl Node {
             money: instance.limit,
             bound: f64::INFINITY,
         };
-        for &at in &node.inside {
-            node.fate[at] = Fate::In;
-            node.money -= instance.cost[at];
+        for &at in &subproblem.inside {
+            subproblem.fate[at] = Fate::In;
+            subproblem.money -= instance.cost[at];
         }
         for &at in start {
-            node.fraction[at] = 1.0;
+            subproblem.fraction[at] = 1.0;
         }
-        node.refresh(instance);
-        node
+        subproblem.refresh(instance);
+        subproblem
     }
 
     /// This part in an instance that has only these of its tests, of which none that is left out is in.
     pub(crate) fn among(&self, instance: &mut Instance, these: &[usize]) -> Self {
-        let mut node = Node {
+        let mut subproblem = Subproblem {
             fate: these.iter().map(|&at| self.fate[at]).collect(),
             free: Vec::new(),
             inside: self.inside.iter().map(|at| these.binary_search(at).expect("what is in stays")).collect(),
@@ -113,9 +113,9 @@ impl Node {
             money: self.money,
             bound: self.bound,
         };
-        node.free = (0..these.len()).filter(|&at| node.fate[at] == Fate::Free).collect();
-        node.refresh(instance);
-        node
+        subproblem.free = (0..these.len()).filter(|&at| subproblem.fate[at] == Fate::Free).collect();
+        subproblem.refresh(instance);
+        subproblem
     }
 
     /// Computes the slope anew.
@@ -170,7 +170,7 @@ impl Node {
                 if over.max(under) <= WHOLE {
                     break;
                 }
-                // Of this group and of the others one gives and one takes.
+                // Either this group gives and another one takes, or the other way round.
                 let (mut to, mut from) = ((f64::NEG_INFINITY, usize::MAX), (f64::INFINITY, usize::MAX));
                 for &at in &self.free {
                     let (score, its) = (self.score(instance, at), instance.group[at]);
@@ -408,7 +408,7 @@ impl Node {
     /// whether the part may hold such a choice.
     pub(crate) fn settle(&mut self, instance: &mut Instance, threshold: f64, rounds: usize) -> bool {
         let mut scores = Vec::with_capacity(self.free.len());
-        // Of the prices that were too low the last, and of those that were too high.
+        // The last price that was too low, and the last one that was too high.
         let (mut low, mut high): (Option<Priced>, Option<Priced>) = (None, None);
         for _ in 0..rounds {
             let done = self.ascend(instance, 12);
@@ -499,7 +499,7 @@ impl Node {
         self.money - cost[..left - 1].iter().sum::<f64>()
     }
 
-    /// Decides that a free test is in. Returns whether enough can be free beside it.
+    /// Decides that a free test is in. Returns whether enough others can be free.
     pub(crate) fn put_in(&mut self, instance: &mut Instance, at: usize) -> bool {
         if self.left(instance) == 0 || instance.cost[at] > self.money {
             return false;
