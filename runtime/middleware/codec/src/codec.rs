@@ -60,7 +60,7 @@ impl<D: Dialect> Codec<D> {
     /// Whether these bytes are a message of this layout.
     pub fn check(&self, message: &[u8]) -> Result<(), CodecError> {
         let mut input = Input::<D>::new(message)?;
-        input.skip_shape(&self.layout, self.layout.message())?;
+        input.skip_structure(&self.layout, self.layout.message())?;
         input.end()
     }
 }

@@ -3,14 +3,17 @@
 use sesame_plan::Primitive;
 use sesame_relay::value::Text;
 
-use crate::layout::{Layout, Meaning, Shape, Ty};
+use crate::layout::{Layout, Meaning, Structure, Ty};
 
 /// Where their layout differs from ours, in a phrase. What is hidden in one of them only makes no difference.
 pub(crate) fn difference(ours: &Layout, theirs: &Layout) -> Option<String> {
-    of_shapes((ours, ours.message()), (theirs, theirs.message()))
+    of_structures((ours, ours.message()), (theirs, theirs.message()))
 }
 
-fn of_shapes((our_layout, ours): (&Layout, &Shape), (their_layout, theirs): (&Layout, &Shape)) -> Option<String> {
+fn of_structures(
+    (our_layout, ours): (&Layout, &Structure),
+    (their_layout, theirs): (&Layout, &Structure),
+) -> Option<String> {
     if ours.meaning == theirs.meaning && matches!(ours.meaning, Meaning::Time(_)) {
         return None;
     }
@@ -22,21 +25,23 @@ fn of_shapes((our_layout, ours): (&Layout, &Shape), (their_layout, theirs): (&La
         return Some(format!("types `{our_types}` of `{our_names}`, not `{their_types}`"));
     }
     // One of them may have among its fields what the other one hides.
-    let skip = |shape: &Shape, other: &Shape| usize::from(shape.hidden.is_none() && other.hidden.is_some());
+    let skip =
+        |structure: &Structure, other: &Structure| usize::from(structure.hidden.is_none() && other.hidden.is_some());
     let our_fields = ours.types.iter().zip(ours.fields.names()).skip(skip(ours, theirs));
     let their_fields = theirs.types.iter().skip(skip(theirs, ours));
     our_fields.zip(their_fields).find_map(|((our, name), their)| {
-        let (our, their) = (&our_layout.shapes[innermost(our)?], &their_layout.shapes[innermost(their)?]);
-        let inside = of_shapes((our_layout, our), (their_layout, their))?;
+        let (our, their) = (&our_layout.structures[innermost(our)?], &their_layout.structures[innermost(their)?]);
+        let inside = of_structures((our_layout, our), (their_layout, their))?;
         Some(format!("in `{name}`: {inside}"))
     })
 }
 
 /// The names of its fields, and their types without those of messages, as they are on the wire.
-fn shown(shape: &Shape) -> [String; 2] {
-    let hidden = shape.hidden.iter();
-    let names = hidden.clone().map(|hidden| hidden.name).chain(shape.fields.names().iter().map(Text::as_str));
-    let types = hidden.map(|hidden| written(&Ty::Primitive(hidden.primitive))).chain(shape.types.iter().map(written));
+fn shown(structure: &Structure) -> [String; 2] {
+    let hidden = structure.hidden.iter();
+    let names = hidden.clone().map(|hidden| hidden.name).chain(structure.fields.names().iter().map(Text::as_str));
+    let types =
+        hidden.map(|hidden| written(&Ty::Primitive(hidden.primitive))).chain(structure.types.iter().map(written));
     [names.collect::<Vec<_>>().join(", "), types.collect::<Vec<_>>().join(", ")]
 }
 
@@ -48,7 +53,7 @@ fn written(ty: &Ty) -> String {
         Ty::Primitive(primitive) => primitive.name().to_owned(),
         Ty::String => "string".to_owned(),
         Ty::WString => "wstring".to_owned(),
-        Ty::Shape(_) => "message".to_owned(),
+        Ty::Structure(_) => "message".to_owned(),
         Ty::Array(of, length) => format!("{}[{length}]", written(of)),
         // At most how many elements there are makes no difference on the wire.
         Ty::Sequence(of, _) => format!("{}[]", written(of)),
@@ -58,7 +63,7 @@ fn written(ty: &Ty) -> String {
 /// The message in a type.
 fn innermost(ty: &Ty) -> Option<usize> {
     match ty {
-        Ty::Shape(at) => Some(*at),
+        Ty::Structure(at) => Some(*at),
         Ty::Array(of, _) | Ty::Sequence(of, _) => innermost(of),
         Ty::Primitive(_) | Ty::String | Ty::WString => None,
     }

@@ -17,12 +17,12 @@ pub(crate) const WIDE: usize = size_of::<u32>();
 /// The structures of a message and of all that it contains. The last one is the message.
 #[derive(Debug)]
 pub(crate) struct Layout {
-    pub(crate) shapes: Vec<Shape>,
+    pub(crate) structures: Vec<Structure>,
 }
 
 /// A message type on the wire.
 #[derive(Debug)]
-pub(crate) struct Shape {
+pub(crate) struct Structure {
     pub(crate) fields: Arc<Fields>,
     pub(crate) types: Vec<Ty>,
     pub(crate) meaning: Meaning,
@@ -47,8 +47,8 @@ pub(crate) enum Ty {
     Primitive(Primitive),
     String,
     WString,
-    /// Position in [`Layout::shapes`].
-    Shape(usize),
+    /// Position in [`Layout::structures`].
+    Structure(usize),
     Array(Box<Ty>, usize),
     Sequence(Box<Ty>, Option<u32>),
 }
@@ -120,12 +120,12 @@ impl Size {
     }
 
     /// The size of a value of this type. Shapes that it contains are among these.
-    pub(crate) fn of<D: Dialect>(ty: &Ty, shapes: &[Shape]) -> Self {
+    pub(crate) fn of<D: Dialect>(ty: &Ty, structures: &[Structure]) -> Self {
         match ty {
             Ty::Primitive(primitive) => Size::fixed(Run::number::<D>(primitive.size())),
             Ty::String | Ty::WString | Ty::Sequence(..) => Size { least: LENGTH, work: LENGTH, run: None },
-            Ty::Shape(at) => shapes[*at].size,
-            Ty::Array(of, length) => Size::of::<D>(of, shapes).times(*length),
+            Ty::Structure(at) => structures[*at].size,
+            Ty::Array(of, length) => Size::of::<D>(of, structures).times(*length),
         }
     }
 }
@@ -140,28 +140,28 @@ impl Layout {
             found.ok_or_else(|| LayoutError::Missing { name: name.to_owned() })
         };
         let last = position(name, interfaces.len())?;
-        let mut shapes: Vec<Shape> = Vec::with_capacity(last + 1);
+        let mut structures: Vec<Structure> = Vec::with_capacity(last + 1);
         for (at, interface) in interfaces[..=last].iter().enumerate() {
-            shapes.push(shape::<D>(interface, &names[at], &|name| position(name, at), &shapes)?);
+            structures.push(structure::<D>(interface, &names[at], &|name| position(name, at), &structures)?);
         }
-        Ok(Layout { shapes })
+        Ok(Layout { structures })
     }
 
     /// The message itself.
-    pub(crate) fn message(&self) -> &Shape {
-        &self.shapes[self.shapes.len() - 1]
+    pub(crate) fn message(&self) -> &Structure {
+        &self.structures[self.structures.len() - 1]
     }
 }
 
 /// The position of an interface among those before the one that names it.
 type Position<'a> = &'a dyn Fn(&str) -> Result<usize, LayoutError>;
 
-fn shape<D: Dialect>(
+fn structure<D: Dialect>(
     interface: &Interface,
     type_name: &str,
     position: Position<'_>,
-    shapes: &[Shape],
-) -> Result<Shape, LayoutError> {
+    structures: &[Structure],
+) -> Result<Structure, LayoutError> {
     let fields = || interface.fields.iter().filter(|field| D::has_field(&field.name));
     let names: Vec<&str> = fields().map(|field| field.name.as_str()).collect();
     let types = fields().map(|field| ty::<D>(&field.ty, interface, field, position)).collect::<Result<Vec<_>, _>>()?;
@@ -173,12 +173,12 @@ fn shape<D: Dialect>(
     };
     let hidden = D::hidden(type_name, &names);
     let before = hidden.map_or(Run::bytes(0), |hidden| Run::number::<D>(hidden.primitive.size()));
-    let mut size = types.iter().map(|ty| Size::of::<D>(ty, shapes)).fold(Size::fixed(before), Size::and);
+    let mut size = types.iter().map(|ty| Size::of::<D>(ty, structures)).fold(Size::fixed(before), Size::and);
     size.work = size.work.max(1);
     if size.work > LARGEST {
         return Err(LayoutError::TooLarge { name: interface.name.clone() });
     }
-    Ok(Shape { fields: Fields::new(names), types, meaning, hidden, size })
+    Ok(Structure { fields: Fields::new(names), types, meaning, hidden, size })
 }
 
 fn ty<D: Dialect>(
@@ -194,7 +194,7 @@ fn ty<D: Dialect>(
         WireType::WString => {
             return Err(LayoutError::Wide { name: interface.name.clone(), field: field.name.clone() });
         }
-        WireType::Interface { name } => Ty::Shape(position(name)?),
+        WireType::Interface { name } => Ty::Structure(position(name)?),
         WireType::Array { of, length } => {
             Ty::Array(Box::new(ty::<D>(of, interface, field, position)?), *length as usize)
         }

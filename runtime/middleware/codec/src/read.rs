@@ -8,7 +8,7 @@ use sesame_relay::wire::value_of;
 
 use crate::dialect::{ByteOrder, Dialect};
 use crate::error::CodecError;
-use crate::layout::{LENGTH, Layout, Meaning, Run, Shape, Size, Ty, WIDE};
+use crate::layout::{LENGTH, Layout, Meaning, Run, Size, Structure, Ty, WIDE};
 use crate::selection::Selection;
 
 /// The most elements of a sequence whose elements have no bytes, so that a few bytes cannot ask for much work.
@@ -148,10 +148,10 @@ impl<'a, D: Dialect> Input<'a, D> {
                 let units = self.wide_string()?;
                 self.take(Run::number::<D>(WIDE).times(units)).map(drop)
             }
-            Ty::Shape(at) => self.skip_shape(layout, &layout.shapes[*at]),
-            Ty::Array(of, length) => self.skip_items(layout, of, Size::of::<D>(of, &layout.shapes), *length),
+            Ty::Structure(at) => self.skip_structure(layout, &layout.structures[*at]),
+            Ty::Array(of, length) => self.skip_items(layout, of, Size::of::<D>(of, &layout.structures), *length),
             Ty::Sequence(of, bound) => {
-                let size = Size::of::<D>(of, &layout.shapes);
+                let size = Size::of::<D>(of, &layout.structures);
                 let length = self.length(size.least, *bound)?;
                 self.skip_items(layout, of, size, length)
             }
@@ -166,18 +166,18 @@ impl<'a, D: Dialect> Input<'a, D> {
     }
 
     /// Skips a message.
-    pub(crate) fn skip_shape(&mut self, layout: &Layout, shape: &Shape) -> Result<(), CodecError> {
-        if let Some(run) = shape.size.run {
+    pub(crate) fn skip_structure(&mut self, layout: &Layout, structure: &Structure) -> Result<(), CodecError> {
+        if let Some(run) = structure.size.run {
             return self.take(run).map(drop);
         }
-        self.hidden(shape)?;
-        let mut fields = shape.fields.names().iter().zip(&shape.types);
+        self.hidden(structure)?;
+        let mut fields = structure.fields.names().iter().zip(&structure.types);
         fields.try_for_each(|(name, ty)| self.skip(layout, ty).map_err(|error| error.inside(name)))
     }
 
     /// What is before the fields of a message and not among them.
-    pub(crate) fn hidden(&mut self, shape: &Shape) -> Result<&'a [u8], CodecError> {
-        match shape.hidden {
+    pub(crate) fn hidden(&mut self, structure: &Structure) -> Result<&'a [u8], CodecError> {
+        match structure.hidden {
             Some(hidden) => self.take(Run::number::<D>(hidden.primitive.size())),
             None => Ok(&[]),
         }
@@ -187,17 +187,17 @@ impl<'a, D: Dialect> Input<'a, D> {
 /// The wanted fields of a message.
 fn fields<D: Dialect>(
     layout: &Layout,
-    shape: &Shape,
+    structure: &Structure,
     selection: &Selection,
     input: &mut Input<'_, D>,
 ) -> Result<(Arc<Fields>, Vec<Value>), CodecError> {
     let (chosen, selections) = match selection {
         Selection::Fields(fields, selections) => (fields, Some(selections)),
-        Selection::All | Selection::Nothing => (&shape.fields, None),
+        Selection::All | Selection::Nothing => (&structure.fields, None),
     };
-    input.hidden(shape)?;
+    input.hidden(structure)?;
     let mut values = Vec::with_capacity(chosen.names().len());
-    for (at, (name, ty)) in shape.fields.names().iter().zip(&shape.types).enumerate() {
+    for (at, (name, ty)) in structure.fields.names().iter().zip(&structure.types).enumerate() {
         match selections.map_or(&Selection::All, |selections| &selections[at]) {
             Selection::Nothing => input.skip(layout, ty).map_err(|error| error.inside(name))?,
             selection => values.push(value(layout, ty, selection, input).map_err(|error| error.inside(name))?),
@@ -225,19 +225,19 @@ fn value<D: Dialect>(
         Ty::WString => input.wide_text().map(Value::Text),
         Ty::Array(of, length) => list(*length, of, input),
         Ty::Sequence(of, bound) => {
-            let length = input.length(Size::of::<D>(of, &layout.shapes).least, *bound)?;
+            let length = input.length(Size::of::<D>(of, &layout.structures).least, *bound)?;
             list(length, of, input)
         }
-        Ty::Shape(at) => {
-            let shape = &layout.shapes[*at];
-            match shape.meaning {
+        Ty::Structure(at) => {
+            let structure = &layout.structures[*at];
+            match structure.meaning {
                 Meaning::Message => {
-                    let (fields, values) = fields(layout, shape, selection, input)?;
+                    let (fields, values) = fields(layout, structure, selection, input)?;
                     Ok(Record::new(&fields, values).into())
                 }
                 Meaning::Point => {
                     let mut coordinate = |at: usize| {
-                        let read = value(layout, &shape.types[at], &Selection::All, input)?;
+                        let read = value(layout, &structure.types[at], &Selection::All, input)?;
                         Ok(read.number_at::<&str>(&[]).unwrap_or(f64::NAN))
                     };
                     Ok(Value::Point([coordinate(0)?, coordinate(1)?, coordinate(2)?]))

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use sesame_relay::value::{Fields, Text};
 use sesame_relay::wire::Wanted;
 
-use crate::layout::{Layout, Meaning, Shape, Ty};
+use crate::layout::{Layout, Meaning, Structure, Ty};
 
 /// What is read of a type.
 #[derive(Debug, Clone)]
@@ -19,19 +19,19 @@ pub(crate) enum Selection {
 impl Selection {
     /// What is wanted of the messages of a layout.
     pub(crate) fn new(layout: &Layout, wanted: &Wanted) -> Self {
-        of_shape(layout, layout.message(), wanted)
+        of_structure(layout, layout.message(), wanted)
     }
 }
 
-fn of_shape(layout: &Layout, shape: &Shape, wanted: &Wanted) -> Selection {
+fn of_structure(layout: &Layout, structure: &Structure, wanted: &Wanted) -> Selection {
     let Wanted::Fields(wanted) = wanted else { return Selection::All };
-    let names = shape.fields.names();
+    let names = structure.fields.names();
     let chosen = names.iter().filter(|name| wanted.contains_key(name.as_str()));
     let fields = Fields::new(chosen.map(Text::as_str));
-    let selections = names.iter().zip(&shape.types).map(|(name, ty)| match (wanted.get(name.as_str()), ty) {
+    let selections = names.iter().zip(&structure.types).map(|(name, ty)| match (wanted.get(name.as_str()), ty) {
         (None, _) => Selection::Nothing,
-        (Some(wanted), Ty::Shape(at)) if layout.shapes[*at].meaning == Meaning::Message => {
-            of_shape(layout, &layout.shapes[*at], wanted)
+        (Some(wanted), Ty::Structure(at)) if layout.structures[*at].meaning == Meaning::Message => {
+            of_structure(layout, &layout.structures[*at], wanted)
         }
         // Coordinates, elements.
         (Some(_), _) => Selection::All,

@@ -79,41 +79,41 @@ pub(crate) fn codec<D: Dialect>(all: &[Interface], wanted: &Wanted) -> Codec<D> 
 /// Interfaces, each of fields of any type over those before it.
 fn interfaces() -> impl Strategy<Value = Vec<Interface>> {
     #[derive(Debug, Clone)]
-    enum Shape {
+    enum AnyType {
         Primitive(usize),
         String,
         WString,
         Before(prop::sample::Index),
-        Array(Box<Shape>, u32),
-        Sequence(Box<Shape>),
+        Array(Box<AnyType>, u32),
+        Sequence(Box<AnyType>),
     }
-    fn ty(shape: &Shape, before: &[Interface]) -> WireType {
-        match shape {
-            Shape::Primitive(at) => WireType::Primitive { primitive: PRIMITIVES[*at] },
-            Shape::String => WireType::String,
-            Shape::WString => WireType::WString,
-            Shape::Before(_) if before.is_empty() => WireType::String,
-            Shape::Before(at) => WireType::Interface { name: at.get(before).name.clone() },
-            Shape::Array(of, length) => WireType::Array { of: Box::new(ty(of, before)), length: *length },
-            Shape::Sequence(of) => WireType::Sequence { of: Box::new(ty(of, before)), bound: None },
+    fn ty(drawn: &AnyType, before: &[Interface]) -> WireType {
+        match drawn {
+            AnyType::Primitive(at) => WireType::Primitive { primitive: PRIMITIVES[*at] },
+            AnyType::String => WireType::String,
+            AnyType::WString => WireType::WString,
+            AnyType::Before(_) if before.is_empty() => WireType::String,
+            AnyType::Before(at) => WireType::Interface { name: at.get(before).name.clone() },
+            AnyType::Array(of, length) => WireType::Array { of: Box::new(ty(of, before)), length: *length },
+            AnyType::Sequence(of) => WireType::Sequence { of: Box::new(ty(of, before)), bound: None },
         }
     }
     let leaf = prop_oneof![
-        4 => (0..PRIMITIVES.len()).prop_map(Shape::Primitive),
-        1 => Just(Shape::String),
-        1 => Just(Shape::WString),
-        2 => any::<prop::sample::Index>().prop_map(Shape::Before),
+        4 => (0..PRIMITIVES.len()).prop_map(AnyType::Primitive),
+        1 => Just(AnyType::String),
+        1 => Just(AnyType::WString),
+        2 => any::<prop::sample::Index>().prop_map(AnyType::Before),
     ];
-    let shape = leaf.prop_recursive(2, 6, 1, |inner| {
+    let drawn = leaf.prop_recursive(2, 6, 1, |inner| {
         prop_oneof![
-            (inner.clone(), 1u32..4).prop_map(|(of, length)| Shape::Array(Box::new(of), length)),
-            inner.prop_map(|of| Shape::Sequence(Box::new(of))),
+            (inner.clone(), 1u32..4).prop_map(|(of, length)| AnyType::Array(Box::new(of), length)),
+            inner.prop_map(|of| AnyType::Sequence(Box::new(of))),
         ]
     });
-    vec(vec(shape, 1..6), 1..4).prop_map(|interfaces| {
+    vec(vec(drawn, 1..6), 1..4).prop_map(|interfaces| {
         let mut made = Vec::new();
-        for (at, shapes) in interfaces.iter().enumerate() {
-            let fields = shapes.iter().enumerate().map(|(at, shape)| field(at, ty(shape, &made))).collect();
+        for (at, drawn) in interfaces.iter().enumerate() {
+            let fields = drawn.iter().enumerate().map(|(at, drawn)| field(at, ty(drawn, &made))).collect();
             made.push(Interface { name: format!("p/msg/M{at}"), fields });
         }
         made

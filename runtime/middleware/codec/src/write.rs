@@ -9,7 +9,7 @@ use sesame_relay::wire::{bits_of, seconds_and_nanos};
 
 use crate::dialect::{ByteOrder, Dialect};
 use crate::error::CodecError;
-use crate::layout::{LENGTH, Layout, Meaning, Run, Shape, Size, Ty, WIDE};
+use crate::layout::{LENGTH, Layout, Meaning, Run, Size, Structure, Ty, WIDE};
 use crate::read::Input;
 use crate::selection::Selection;
 
@@ -30,9 +30,9 @@ pub(crate) fn write<D: Dialect>(
     let mut input = Input::<D>::new(&origin.bytes)?;
     let mut output = Output::<D>::new(layout, input.order, Some(&origin.bytes));
     let mut pairs = record.values().iter().zip(&origin.values);
-    let shape = layout.message();
-    output.copy_hidden(shape, &mut input)?;
-    for (at, (ty, name)) in shape.types.iter().zip(shape.fields.names()).enumerate() {
+    let structure = layout.message();
+    output.copy_hidden(structure, &mut input)?;
+    for (at, (ty, name)) in structure.types.iter().zip(structure.fields.names()).enumerate() {
         let read = match selection {
             Selection::Fields(_, fields) => !matches!(fields[at], Selection::Nothing),
             Selection::All | Selection::Nothing => true,
@@ -84,13 +84,13 @@ impl<'a, D: Dialect> Output<'a, D> {
         };
         match ty {
             Ty::Primitive(_) | Ty::String | Ty::WString => self.replace(ty, now, input),
-            Ty::Shape(at) => {
-                let shape = &layout.shapes[*at];
-                if matches!(shape.meaning, Meaning::Time(_)) {
+            Ty::Structure(at) => {
+                let structure = &layout.structures[*at];
+                if matches!(structure.meaning, Meaning::Time(_)) {
                     return self.replace(ty, now, input);
                 }
-                self.copy_hidden(shape, input)?;
-                for (at, (ty, name)) in shape.types.iter().zip(shape.fields.names()).enumerate() {
+                self.copy_hidden(structure, input)?;
+                for (at, (ty, name)) in structure.types.iter().zip(structure.fields.names()).enumerate() {
                     let part = |value: &Value| match value {
                         Value::Point(point) => Some(Value::Real(point[at])),
                         Value::Record(record) => record.get(name).cloned(),
@@ -109,7 +109,7 @@ impl<'a, D: Dialect> Output<'a, D> {
             }
             Ty::Sequence(of, bound) => {
                 let (now, before) = (up_to(items(Some(now)), *bound), items(Some(before)));
-                let was = input.length(Size::of::<D>(of, &layout.shapes).least, *bound)?;
+                let was = input.length(Size::of::<D>(of, &layout.structures).least, *bound)?;
                 self.length(now.len());
                 for at in 0..was {
                     let copied = match now.get(at) {
@@ -151,18 +151,18 @@ impl<'a, D: Dialect> Output<'a, D> {
                 self.length(units);
                 self.copy_run(Run::number::<D>(WIDE).times(units), input)
             }
-            Ty::Shape(at) => {
-                let shape = &layout.shapes[*at];
-                if let Some(run) = shape.size.run {
+            Ty::Structure(at) => {
+                let structure = &layout.structures[*at];
+                if let Some(run) = structure.size.run {
                     return self.copy_run(run, input);
                 }
-                self.copy_hidden(shape, input)?;
-                let mut fields = shape.types.iter().zip(shape.fields.names());
+                self.copy_hidden(structure, input)?;
+                let mut fields = structure.types.iter().zip(structure.fields.names());
                 fields.try_for_each(|(ty, name)| self.copy_unchanged(ty, input).map_err(|error| error.inside(name)))
             }
-            Ty::Array(of, length) => self.copy_items(of, Size::of::<D>(of, &layout.shapes), *length, input),
+            Ty::Array(of, length) => self.copy_items(of, Size::of::<D>(of, &layout.structures), *length, input),
             Ty::Sequence(of, bound) => {
-                let size = Size::of::<D>(of, &layout.shapes);
+                let size = Size::of::<D>(of, &layout.structures);
                 let length = input.length(size.least, *bound)?;
                 self.length(length);
                 self.copy_items(of, size, length, input)
@@ -187,19 +187,19 @@ impl<'a, D: Dialect> Output<'a, D> {
     }
 
     /// Copies what is before the fields of a message and not among them.
-    fn copy_hidden(&mut self, shape: &Shape, input: &mut Input<'_, D>) -> Result<(), CodecError> {
-        match shape.hidden {
+    fn copy_hidden(&mut self, structure: &Structure, input: &mut Input<'_, D>) -> Result<(), CodecError> {
+        match structure.hidden {
             Some(hidden) => self.copy_run(Run::number::<D>(hidden.primitive.size()), input),
             None => Ok(()),
         }
     }
 
     /// Writes a message anew.
-    fn message(&mut self, shape: &Shape, message: Option<&Value>) {
-        if let Some(hidden) = shape.hidden {
+    fn message(&mut self, structure: &Structure, message: Option<&Value>) {
+        if let Some(hidden) = structure.hidden {
             self.bits(0, hidden.primitive.size());
         }
-        for (ty, name) in shape.types.iter().zip(shape.fields.names()) {
+        for (ty, name) in structure.types.iter().zip(structure.fields.names()) {
             let field = if let Some(Value::Record(record)) = message { record.get(name) } else { None };
             self.value(ty, field);
         }
@@ -233,20 +233,20 @@ impl<'a, D: Dialect> Output<'a, D> {
                     self.value(of, Some(item));
                 }
             }
-            Ty::Shape(at) => {
-                let shape = &self.layout.shapes[*at];
-                match (shape.meaning, value) {
+            Ty::Structure(at) => {
+                let structure = &self.layout.structures[*at];
+                match (structure.meaning, value) {
                     (Meaning::Time(seconds_type), Some(Value::Real(time))) => {
                         let (seconds, nanos) = seconds_and_nanos(*time);
                         self.bits(bits_of(seconds_type, Some(&Value::Int(seconds))), seconds_type.size());
                         self.bits(nanos.into(), Primitive::Uint32.size());
                     }
                     (Meaning::Point, Some(Value::Point(point))) => {
-                        for (ty, coordinate) in shape.types.iter().zip(point) {
+                        for (ty, coordinate) in structure.types.iter().zip(point) {
                             self.value(ty, Some(&Value::Real(*coordinate)));
                         }
                     }
-                    (_, value) => self.message(shape, value),
+                    (_, value) => self.message(structure, value),
                 }
             }
         }
