@@ -44,7 +44,7 @@
 
 use std::collections::VecDeque;
 
-use node::{Node, Stretch, Unknown};
+use node::{FormulaNode, Stretch, Unknown};
 use piece::{Piece, Span};
 use thiserror::Error;
 
@@ -116,7 +116,7 @@ pub enum FormulaError {
 /// ```
 #[derive(Debug, Clone)]
 pub struct Monitor {
-    root: Node,
+    root: FormulaNode,
     used: Vec<bool>,
     values: Vec<f64>,
     /// How many signals of the formula have had no sample yet, and which have.
@@ -137,7 +137,7 @@ impl Monitor {
     /// A monitor without samples, for a formula over this many signals.
     pub fn new(formula: &Formula, signals: usize) -> Result<Self, FormulaError> {
         let mut used = vec![false; signals];
-        let root = Node::new(formula, Span::FIRST_INSTANT, &mut used)?;
+        let root = FormulaNode::new(formula, Span::FIRST_INSTANT, &mut used)?;
         Ok(Monitor {
             root,
             unknown: used.iter().filter(|&&used| used).count(),

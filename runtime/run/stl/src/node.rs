@@ -52,7 +52,7 @@ impl Stretch<'_> {
 
 /// An operator, and the span for which its robustness is needed.
 #[derive(Debug, Clone)]
-pub(super) struct Node {
+pub(super) struct FormulaNode {
     asked: Span,
     /// The time up to which its robustness is known.
     told: i64,
@@ -67,17 +67,17 @@ enum Operator {
         constant: f64,
     },
     Not {
-        of: Box<Node>,
+        of: Box<FormulaNode>,
         input: VecDeque<Piece>,
     },
     And {
-        left: Box<Node>,
-        right: Box<Node>,
+        left: Box<FormulaNode>,
+        right: Box<FormulaNode>,
         input: Pair,
     },
     /// `kept` has all that came from `of`, of an operator whose signal is asked for.
     Always {
-        of: Box<Node>,
+        of: Box<FormulaNode>,
         input: VecDeque<Piece>,
         minimum: SlidingMinimum,
         kept: Option<VecDeque<Piece>>,
@@ -89,8 +89,8 @@ enum Operator {
 /// there on it is an `until` with a window that begins at once.
 #[derive(Debug, Clone)]
 struct Until {
-    left: Node,
-    right: Node,
+    left: FormulaNode,
+    right: FormulaNode,
     /// What came from the left.
     lead: VecDeque<Piece>,
     /// Both sides, from the beginning of the first window on.
@@ -105,7 +105,7 @@ struct Until {
     parts: Pair,
 }
 
-impl Node {
+impl FormulaNode {
     /// The operators of a formula of which a span is asked. Marks the signals it names.
     pub(super) fn new(formula: &Formula, asked: Span, used: &mut [bool]) -> Result<Self, FormulaError> {
         let operator = match formula {
@@ -118,32 +118,34 @@ impl Node {
                 *used.get_mut(index).ok_or(FormulaError::Signal { signal, count })? = true;
                 Operator::Predicate { signal: index, comparison, constant }
             }
-            Formula::Not { of } => return Ok(Node::new(of, asked, used)?.negated()),
-            Formula::And { left, right } => and(Node::new(left, asked, used)?, Node::new(right, asked, used)?),
+            Formula::Not { of } => return Ok(FormulaNode::new(of, asked, used)?.negated()),
+            Formula::And { left, right } => {
+                and(FormulaNode::new(left, asked, used)?, FormulaNode::new(right, asked, used)?)
+            }
             Formula::Or { left, right } => {
-                let (left, right) = (Node::new(left, asked, used)?, Node::new(right, asked, used)?);
-                return Ok(Node::from_operator(asked, and(left.negated(), right.negated())).negated());
+                let (left, right) = (FormulaNode::new(left, asked, used)?, FormulaNode::new(right, asked, used)?);
+                return Ok(FormulaNode::from_operator(asked, and(left.negated(), right.negated())).negated());
             }
             Formula::Implies { left, right } => {
-                let (left, right) = (Node::new(left, asked, used)?, Node::new(right, asked, used)?);
-                return Ok(Node::from_operator(asked, and(left, right.negated())).negated());
+                let (left, right) = (FormulaNode::new(left, asked, used)?, FormulaNode::new(right, asked, used)?);
+                return Ok(FormulaNode::from_operator(asked, and(left, right.negated())).negated());
             }
             Formula::Always { interval, of } => {
                 let window = window(*interval)?;
-                always(window, asked, Node::new(of, asked.seen_through(window), used)?)
+                always(window, asked, FormulaNode::new(of, asked.seen_through(window), used)?)
             }
             Formula::Eventually { interval, of } => {
                 let window = window(*interval)?;
-                let of = Node::new(of, asked.seen_through(window), used)?;
-                return Ok(Node::from_operator(asked, always(window, asked, of.negated())).negated());
+                let of = FormulaNode::new(of, asked.seen_through(window), used)?;
+                return Ok(FormulaNode::from_operator(asked, always(window, asked, of.negated())).negated());
             }
             Formula::Until { interval, left, right } => {
                 let window = window(*interval)?;
                 let seen = asked.seen_through(window);
                 let delay = Window { from: window.from, to: Some(window.from) };
                 Operator::Until(Box::new(Until {
-                    left: Node::new(left, Span { start: asked.start, end: seen.end }, used)?,
-                    right: Node::new(right, seen, used)?,
+                    left: FormulaNode::new(left, Span { start: asked.start, end: seen.end }, used)?,
+                    right: FormulaNode::new(right, seen, used)?,
                     lead: VecDeque::new(),
                     input: Pair::default(),
                     delay: window.from,
@@ -154,18 +156,18 @@ impl Node {
                 }))
             }
         };
-        Ok(Node::from_operator(asked, operator))
+        Ok(FormulaNode::from_operator(asked, operator))
     }
 
     fn from_operator(asked: Span, operator: Operator) -> Self {
-        Node { asked, told: asked.start, operator }
+        FormulaNode { asked, told: asked.start, operator }
     }
 
     /// Its negation; that of a negation is what was negated.
     fn negated(self) -> Self {
         match self.operator {
             Operator::Not { of, .. } => *of,
-            _ => Node::from_operator(self.asked, Operator::Not { of: Box::new(self), input: VecDeque::new() }),
+            _ => FormulaNode::from_operator(self.asked, Operator::Not { of: Box::new(self), input: VecDeque::new() }),
         }
     }
 
@@ -348,11 +350,11 @@ fn put_decided(unknown: &Unknown, defined: i64, told: i64, pieces: VecDeque<Piec
     }
 }
 
-fn and(left: Node, right: Node) -> Operator {
+fn and(left: FormulaNode, right: FormulaNode) -> Operator {
     Operator::And { left: Box::new(left), right: Box::new(right), input: Pair::default() }
 }
 
-fn always(window: Window, asked: Span, of: Node) -> Operator {
+fn always(window: Window, asked: Span, of: FormulaNode) -> Operator {
     Operator::Always {
         of: Box::new(of),
         input: VecDeque::new(),
