@@ -90,7 +90,7 @@ fn over_evaluations(markup: &mut Markup, coverage: &CoverageSummary, published: 
 
 /// A cell of the map: all cells of the grid that differ only in the dimensions that are not drawn.
 #[derive(Debug, Clone, Copy, Default)]
-struct Place {
+struct MapCell {
     cells: usize,
     covered: usize,
     feasible: usize,
@@ -107,8 +107,8 @@ fn map(markup: &mut Markup, plan: &CampaignPlan, coverage: &CoverageSummary, dra
     if columns * rows > MOST_DRAWN {
         return;
     }
-    let places = places(coverage, columns, rows);
-    let most = places.iter().map(|place| place.hits).max().unwrap_or(0).max(1) as f64;
+    let map_cells = map_cells(coverage, columns, rows);
+    let most = map_cells.iter().map(|map_cell| map_cell.hits).max().unwrap_or(0).max(1) as f64;
     let data = map_data(plan, coverage, drawn);
     markup.open("div", &[("class", "map"), ("data-cells", &data)]);
     markup.open("div", &[("class", "chart small")]);
@@ -117,20 +117,20 @@ fn map(markup: &mut Markup, plan: &CampaignPlan, coverage: &CoverageSummary, dra
     let (across, up) = (x.dimension.name(), y.map_or("", |y| y.dimension.name()));
     let label = format!("cells of {across} {up}: how many tests hit each").replace(" :", ":");
     markup.open("svg", &[("class", "scatter"), ("role", "img"), ("aria-label", &label)]);
-    for (at, place) in places.iter().enumerate() {
+    for (at, map_cell) in map_cells.iter().enumerate() {
         let (column, row) = (at % columns, at / columns);
-        let class = match place {
-            Place { feasible: 0, .. } => "cell infeasible",
-            Place { hits: 0, .. } => "cell empty",
+        let class = match map_cell {
+            MapCell { feasible: 0, .. } => "cell infeasible",
+            MapCell { hits: 0, .. } => "cell empty",
             _ => "cell",
         };
         let left = percent(column as f64 / columns as f64);
         // The first row is at the bottom.
         let top = percent(1.0 - (row + 1) as f64 / rows as f64);
         let (width, height) = (percent(1.0 / columns as f64), percent(1.0 / rows as f64));
-        let opacity = coordinate(0.2 + 0.8 * libm::sqrt(place.hits as f64 / most));
+        let opacity = coordinate(0.2 + 0.8 * libm::sqrt(map_cell.hits as f64 / most));
         markup.open("g", &[]);
-        markup.element("title", &[], &title(x, y, column, row, *place));
+        markup.element("title", &[], &title(x, y, column, row, *map_cell));
         let mut attributes = vec![("class", class), ("x", &left), ("y", &top), ("width", &width), ("height", &height)];
         if class == "cell" {
             attributes.push(("fill-opacity", &opacity));
@@ -209,21 +209,21 @@ fn rounded(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
 }
 
-fn places(coverage: &CoverageSummary, columns: usize, rows: usize) -> Vec<Place> {
-    let mut places = vec![Place::default(); columns * rows];
+fn map_cells(coverage: &CoverageSummary, columns: usize, rows: usize) -> Vec<MapCell> {
+    let mut map_cells = vec![MapCell::default(); columns * rows];
     for (cell, &hits) in coverage.counted.hits().iter().enumerate() {
         let at = coverage.counted.grid().place(cell);
         let row = at.get(1).map_or(0, |&row| row as usize);
-        let place = &mut places[row * columns + at[0] as usize];
-        place.cells += 1;
-        place.covered += usize::from(coverage.counted.is_covered(cell));
-        place.feasible += usize::from(coverage.reachable.reaches(cell) || hits > 0);
-        place.hits += u64::from(hits);
+        let map_cell = &mut map_cells[row * columns + at[0] as usize];
+        map_cell.cells += 1;
+        map_cell.covered += usize::from(coverage.counted.is_covered(cell));
+        map_cell.feasible += usize::from(coverage.reachable.reaches(cell) || hits > 0);
+        map_cell.hits += u64::from(hits);
     }
-    places
+    map_cells
 }
 
-fn title(x: &GridAxis, y: Option<&GridAxis>, column: usize, row: usize, place: Place) -> String {
+fn title(x: &GridAxis, y: Option<&GridAxis>, column: usize, row: usize, map_cell: MapCell) -> String {
     let span = |axis: &GridAxis, at: usize| {
         let edge = |at: usize| number::number(axis.low + (axis.high - axis.low) * at as f64 / f64::from(axis.cells));
         format!("{} {} to {}", axis.dimension.name(), edge(at), edge(at + 1))
@@ -232,11 +232,11 @@ fn title(x: &GridAxis, y: Option<&GridAxis>, column: usize, row: usize, place: P
     if let Some(y) = y {
         let _ = write!(text, ", {}", span(y, row));
     }
-    let tests = number::plural(usize::try_from(place.hits).unwrap_or(usize::MAX), "test", "tests");
-    match place {
-        Place { feasible: 0, .. } => format!("{text}: no test can get there"),
-        Place { cells: 1, .. } => format!("{text}: {tests}"),
-        Place { cells, covered, .. } => format!("{text}: {tests}, {covered} of {cells} cells covered"),
+    let tests = number::plural(usize::try_from(map_cell.hits).unwrap_or(usize::MAX), "test", "tests");
+    match map_cell {
+        MapCell { feasible: 0, .. } => format!("{text}: no test can get there"),
+        MapCell { cells: 1, .. } => format!("{text}: {tests}"),
+        MapCell { cells, covered, .. } => format!("{text}: {tests}, {covered} of {cells} cells covered"),
     }
 }
 

@@ -34,7 +34,7 @@ pub(super) fn certificates(body: &mut Markup, plan: &CampaignPlan) {
         if !monitor.doc.is_empty() {
             body.element("p", &[("class", "quiet")], &monitor.doc);
         }
-        let tree = Node::of(plan, monitor);
+        let tree = CertificatePart::of(plan, monitor);
         if tree.size() > MOST {
             let words = format!("The certificate has {} parts. ", tree.size());
             body.open("p", &[]);
@@ -55,7 +55,7 @@ fn anchor(monitor: MonitorId) -> String {
 
 /// A part of a certificate as a box.
 #[derive(Debug)]
-struct Node {
+struct CertificatePart {
     class: &'static str,
     /// Its lines; the second one is in a fainter colour.
     lines: Vec<String>,
@@ -63,24 +63,24 @@ struct Node {
     title: Option<String>,
     /// The certificate to which it leads.
     leads_to: Option<MonitorId>,
-    parts: Vec<Node>,
+    parts: Vec<CertificatePart>,
 }
 
-impl Node {
-    fn new(class: &'static str, lines: &[&str], parts: Vec<Node>) -> Node {
+impl CertificatePart {
+    fn new(class: &'static str, lines: &[&str], parts: Vec<CertificatePart>) -> CertificatePart {
         let is_long = |line: &&str| line.chars().count() > LETTERS;
         let title = lines.iter().any(is_long).then(|| lines.join(": "));
         let short = |line: &&str| {
             if is_long(line) { line.chars().take(LETTERS - 1).chain(['…']).collect() } else { (*line).to_owned() }
         };
-        Node { class, lines: lines.iter().map(short).collect(), title, leads_to: None, parts }
+        CertificatePart { class, lines: lines.iter().map(short).collect(), title, leads_to: None, parts }
     }
 
-    fn of(plan: &CampaignPlan, monitor: &Monitor) -> Node {
-        let mut parts: Vec<Node> = Vec::new();
+    fn of(plan: &CampaignPlan, monitor: &Monitor) -> CertificatePart {
+        let mut parts: Vec<CertificatePart> = Vec::new();
         for guarantee in &monitor.guarantees {
             let integrity = format!("integrity {}", guarantee.integrity);
-            parts.push(Node::new(
+            parts.push(CertificatePart::new(
                 "guarantee",
                 &[&guarantee.name, &integrity],
                 vec![gate(plan, monitor, &guarantee.gate)],
@@ -88,13 +88,13 @@ impl Node {
         }
         let sent = monitor.otherwise.mitigation.as_ref().map(|mitigation| notation::mitigation(plan, mitigation));
         let sent = sent.map_or("otherwise".to_owned(), |sent| format!("otherwise, with {sent}"));
-        parts.push(Node::new("otherwise", &[&monitor.otherwise.name, &sent], Vec::new()));
+        parts.push(CertificatePart::new("otherwise", &[&monitor.otherwise.name, &sent], Vec::new()));
         let external = if monitor.publishes.is_none() { "external monitor" } else { "monitor" };
-        Node::new("monitor", &[&monitor.name, external], parts)
+        CertificatePart::new("monitor", &[&monitor.name, external], parts)
     }
 
     fn size(&self) -> usize {
-        1 + self.parts.iter().map(Node::size).sum::<usize>()
+        1 + self.parts.iter().map(CertificatePart::size).sum::<usize>()
     }
 
     fn width(&self) -> f64 {
@@ -116,16 +116,19 @@ impl Node {
     }
 }
 
-fn gate(plan: &CampaignPlan, monitor: &Monitor, formula: &Gate) -> Node {
+fn gate(plan: &CampaignPlan, monitor: &Monitor, formula: &Gate) -> CertificatePart {
     match formula {
         Gate::Evidence(at) => {
             let evidence = &monitor.evidence[*at as usize];
-            Node::new("evidence", &[&evidence.name, &notation::evidence(plan, evidence)], Vec::new())
+            CertificatePart::new("evidence", &[&evidence.name, &notation::evidence(plan, evidence)], Vec::new())
         }
         Gate::Demand(at) => {
             let demand = &monitor.demands[*at as usize];
             let from = format!("demanded from {}", plan.monitor(demand.monitor).name);
-            Node { leads_to: Some(demand.monitor), ..Node::new("demand", &[&demand.name, &from], Vec::new()) }
+            CertificatePart {
+                leads_to: Some(demand.monitor),
+                ..CertificatePart::new("demand", &[&demand.name, &from], Vec::new())
+            }
         }
         Gate::All(_) | Gate::Any(_) | Gate::AtLeast { .. } => {
             let (needed, of) = (formula.needed().unwrap_or_default(), formula.parts().len());
@@ -134,12 +137,16 @@ fn gate(plan: &CampaignPlan, monitor: &Monitor, formula: &Gate) -> Node {
                 Gate::Any(_) => "or".to_owned(),
                 _ => format!("{needed} of {of}"),
             };
-            Node::new("gate", &[&name], formula.parts().iter().map(|part| gate(plan, monitor, part)).collect())
+            CertificatePart::new(
+                "gate",
+                &[&name],
+                formula.parts().iter().map(|part| gate(plan, monitor, part)).collect(),
+            )
         }
     }
 }
 
-fn draw(body: &mut Markup, tree: &Node, name: &str) {
+fn draw(body: &mut Markup, tree: &CertificatePart, name: &str) {
     let mut widths = Vec::new();
     tree.widths(0, &mut widths);
     let mut drawn = Drawing { boxes: Markup::default(), edges: Markup::default(), columns: Vec::new(), bottom: 1.0 };
@@ -148,7 +155,7 @@ fn draw(body: &mut Markup, tree: &Node, name: &str) {
         drawn.columns.push(x);
         x += width + BETWEEN;
     }
-    drawn.node(tree, 0);
+    drawn.part(tree, 0);
     let (width, height) = (coordinate(x - BETWEEN + 1.0), coordinate(drawn.bottom - GAP + 1.0));
     let frame = format!("0 0 {width} {height}");
     let label = format!("The certificate of {name}");
@@ -170,10 +177,10 @@ struct Drawing {
 
 impl Drawing {
     /// Draws a box with all its parts to the right of it; gives the height of its middle.
-    fn node(&mut self, node: &Node, column: usize) -> f64 {
+    fn part(&mut self, part: &CertificatePart, column: usize) -> f64 {
         let top = self.bottom;
-        let middles: Vec<f64> = node.parts.iter().map(|part| self.node(part, column + 1)).collect();
-        let (left, width, height) = (self.columns[column], node.width(), node.height());
+        let middles: Vec<f64> = part.parts.iter().map(|part| self.part(part, column + 1)).collect();
+        let (left, width, height) = (self.columns[column], part.width(), part.height());
         let middle = match (middles.first(), middles.last()) {
             (Some(first), Some(last)) => f64::midpoint(*first, *last).max(top + height / 2.0),
             _ => top + height / 2.0,
@@ -185,28 +192,28 @@ impl Drawing {
             self.edges.leaf("path", &[("class", "edge"), ("d", &format!("M{from} {start}H{bend}V{end}H{to}"))]);
         }
         let corner = [left, middle - height / 2.0];
-        let address = node.leads_to.map(|monitor| format!("#{}", anchor(monitor)));
+        let address = part.leads_to.map(|monitor| format!("#{}", anchor(monitor)));
         if let Some(address) = &address {
             self.boxes.open("a", &[("href", address)]);
         }
-        self.in_box(node, corner);
+        self.in_box(part, corner);
         if address.is_some() {
             self.boxes.close();
         }
         middle
     }
 
-    fn in_box(&mut self, node: &Node, [left, top]: [f64; 2]) {
-        let [x, y, width, height] = [left, top, node.width(), node.height()].map(coordinate);
-        let round = if node.class == "gate" { "11" } else { "4" };
-        let class = format!("box {}", node.class);
+    fn in_box(&mut self, part: &CertificatePart, [left, top]: [f64; 2]) {
+        let [x, y, width, height] = [left, top, part.width(), part.height()].map(coordinate);
+        let round = if part.class == "gate" { "11" } else { "4" };
+        let class = format!("box {}", part.class);
         let place = [("x", x.as_str()), ("y", &y), ("width", &width), ("height", &height), ("rx", round)];
         self.boxes.open("rect", &[&[("class", class.as_str())][..], &place].concat());
-        if let Some(title) = &node.title {
+        if let Some(title) = &part.title {
             self.boxes.element("title", &[], title);
         }
         self.boxes.close();
-        for (at, line) in node.lines.iter().enumerate() {
+        for (at, line) in part.lines.iter().enumerate() {
             let class = if at == 0 { "part" } else { "part says" };
             let (x, y) = (coordinate(left + INSET), coordinate(top + LINE * (at as f64 + 1.0)));
             self.boxes.element("text", &[("class", class), ("x", &x), ("y", &y)], line);
