@@ -10,7 +10,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use sesame_lifecycle::launch::Place;
+use sesame_lifecycle::launch::LaunchContext;
 use sesame_plan::{CampaignPlan, NodeId};
 use sesame_relay::transport::bus::{Bus, Event, Settings, on_bus};
 use sesame_relay::transport::{Connect, Transport, TransportError};
@@ -49,9 +49,9 @@ fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
     let sesame_plan::Transport::Mavlink { url, definitions } = &plan.simulator.transport else {
         unreachable!("the generator connects each kind of simulator by its own transport")
     };
-    let place = Place::of_worker(folder.to_owned()).remapping(plan);
+    let context = LaunchContext::of_worker(folder.to_owned()).remapping(plan);
     let bus = Network::new(plan, url.clone(), definitions.clone(), folder.to_owned());
-    on_bus(plan, Box::new(bus), Settings::of(plan), place)
+    on_bus(plan, Box::new(bus), Settings::of(plan), context)
 }
 
 /// The position of a link.

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use rumqttc::v5::mqttbytes::v5::{Publish, PublishProperties};
-use sesame_lifecycle::launch::Place;
+use sesame_lifecycle::launch::LaunchContext;
 use sesame_plan::{BrokerAt, CampaignPlan, Mqtt};
 use sesame_relay::json::Codec;
 use sesame_relay::transport::bus::echo::Echoes;
@@ -39,9 +39,9 @@ fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
     let Some(mqtt) = plan.simulator.brokers() else {
         unreachable!("the generator connects each kind of simulator by its own transport")
     };
-    let place = Place::of_worker(folder.to_owned()).remapping(plan);
+    let context = LaunchContext::of_worker(folder.to_owned()).remapping(plan);
     let bus = Brokers {
-        worker: place.worker,
+        worker: context.worker,
         codec: Codec::new(plan),
         echoes: plan.simulator.lifecycle.relay_budget.map(|_| Echoes::default()),
         plan: plan.clone(),
@@ -57,7 +57,7 @@ fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
         latest: BTreeMap::new(),
         misfits: BTreeSet::new(),
     };
-    on_bus(plan, Box::new(bus), Settings::of(plan), place)
+    on_bus(plan, Box::new(bus), Settings::of(plan), context)
 }
 
 struct Brokers {

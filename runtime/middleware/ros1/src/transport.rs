@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use sesame_lifecycle::launch::Place;
+use sesame_lifecycle::launch::LaunchContext;
 use sesame_plan::{CampaignPlan, Channel, Clock, Ros};
 use sesame_relay::transport::bus::{Bus, Event, FOUND_AGAIN_WITHIN, Settings, on_bus};
 use sesame_relay::transport::{Connect, Transport, TransportError};
@@ -48,27 +48,27 @@ pub fn ros1(folder: PathBuf) -> Connect {
 }
 
 fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
-    at_place(plan, Place::of_worker(folder.to_owned()))
+    in_context(plan, LaunchContext::of_worker(folder.to_owned()))
 }
 
-/// The transport of a worker whose programs run at this place.
-fn at_place(plan: &CampaignPlan, place: Place) -> Box<dyn Transport> {
+/// The transport of a worker whose programs run in this context.
+fn in_context(plan: &CampaignPlan, context: LaunchContext) -> Box<dyn Transport> {
     let (sesame_plan::Transport::Ros1(ros1), Some(ros)) = (&plan.simulator.transport, &plan.simulator.ros) else {
         unreachable!("the generator connects each kind of simulator by its own transport")
     };
-    let place = in_ros(plan, &ros1.master, place);
+    let context = in_ros(plan, &ros1.master, context);
     let bus = Ros1Bus {
         plan: plan.clone(),
         master: ros1.master.clone(),
         ros: ros.clone(),
-        name: node_name(plan, place.worker),
+        name: node_name(plan, context.worker),
         node: None,
         lines: Vec::new(),
         roles: Vec::new(),
         services: Vec::new(),
         clock: None,
     };
-    on_bus(plan, Box::new(bus), Settings::of(plan), place)
+    on_bus(plan, Box::new(bus), Settings::of(plan), context)
 }
 
 /// What this process is called as a node: if two nodes have one name, the master ends the first.
@@ -80,8 +80,8 @@ fn node_name(plan: &CampaignPlan, worker: u32) -> String {
 }
 
 /// What launched programs are given.
-fn in_ros(plan: &CampaignPlan, master: &str, place: Place) -> Place {
-    let own = |name: &str| place.folder.join(name).display().to_string();
+fn in_ros(plan: &CampaignPlan, master: &str, context: LaunchContext) -> LaunchContext {
+    let own = |name: &str| context.folder.join(name).display().to_string();
     let mut environment = vec![
         ("ROS_MASTER_URI".to_owned(), master.to_owned()),
         ("ROS_HOME".to_owned(), own("ros")),
@@ -90,7 +90,7 @@ fn in_ros(plan: &CampaignPlan, master: &str, place: Place) -> Place {
     if ["ROS_IP", "ROS_HOSTNAME"].iter().all(|name| std::env::var_os(name).is_none()) {
         environment.push(("ROS_IP".to_owned(), "127.0.0.1".to_owned()));
     }
-    Place { environment, ..place.remapping(plan) }
+    LaunchContext { environment, ..context.remapping(plan) }
 }
 
 struct Ros1Bus {

@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use sesame_base::time::SimTime;
-use sesame_lifecycle::launch::{Launched, Place};
+use sesame_lifecycle::launch::{LaunchContext, Launched};
 use sesame_plan::{CampaignPlan, NodeId, Ros};
 use sesame_relay::relay::{Delivery, Exchange};
 use sesame_relay::simulator::Progress;
@@ -114,8 +114,8 @@ impl Zero {
 
 impl System {
     fn new(plan: CampaignPlan, domain: u16, ros: Ros, folder: PathBuf) -> Self {
-        let place = Place::of_worker(folder).remapping(&plan).in_domain(domain);
-        let domain = u16::try_from(place.domain).unwrap_or(u16::MAX);
+        let context = LaunchContext::of_worker(folder).remapping(&plan).in_domain(domain);
+        let domain = u16::try_from(context.domain).unwrap_or(u16::MAX);
         let wires = WireTable::new(&plan);
         System {
             added: Vec::new(),
@@ -125,7 +125,7 @@ impl System {
             postponed: BTreeMap::new(),
             spoilt: false,
             restarted: BTreeSet::new(),
-            launched: Launched::new(&plan, place),
+            launched: Launched::new(&plan, context),
             domain,
             plan,
             ros,

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use sesame_lifecycle::launch::Place;
+use sesame_lifecycle::launch::LaunchContext;
 use sesame_plan::{CampaignPlan, Channel, Clock, Dialect, Ros, Rosbridge};
 use sesame_relay::transport::bus::echo::Echoes;
 use sesame_relay::transport::bus::secret::{Token, identity, trusted};
@@ -39,18 +39,18 @@ fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
         unreachable!("the generator connects each kind of simulator by its own transport")
     };
     let bridge = Bridge::new(plan, rosbridge, ros, folder);
-    on_bus(plan, Box::new(bridge), Settings::of(plan), place(plan, rosbridge, folder))
+    on_bus(plan, Box::new(bridge), Settings::of(plan), context(plan, rosbridge, folder))
 }
 
 /// Where launched programs run: as they would for a runner that is a node of ROS itself.
-fn place(plan: &CampaignPlan, rosbridge: &Rosbridge, folder: &Path) -> Place {
-    let place = Place::of_worker(folder.to_owned()).remapping(plan);
+fn context(plan: &CampaignPlan, rosbridge: &Rosbridge, folder: &Path) -> LaunchContext {
+    let context = LaunchContext::of_worker(folder.to_owned()).remapping(plan);
     match rosbridge.dialect {
         Dialect::Ros1 => {
-            let logs = ("ROS_LOG_DIR".to_owned(), place.folder.join("ros").display().to_string());
-            Place { environment: vec![logs], ..place }
+            let logs = ("ROS_LOG_DIR".to_owned(), context.folder.join("ros").display().to_string());
+            LaunchContext { environment: vec![logs], ..context }
         }
-        Dialect::Ros2 => place.in_domain(rosbridge.domain),
+        Dialect::Ros2 => context.in_domain(rosbridge.domain),
     }
 }
 

@@ -81,7 +81,7 @@ pub enum Probe {
 
 /// What programs are given of their worker and of their transport.
 #[derive(Debug, Clone)]
-pub struct Place {
+pub struct LaunchContext {
     /// The number of the worker.
     pub worker: u32,
     /// The worker's own folder.
@@ -90,8 +90,8 @@ pub struct Place {
     pub space: PathBuf,
     /// What `{domain}` stands for.
     pub domain: u32,
-    /// What is in the environment of all programs in addition to `SESAME_WORKER`, `SESAME_WORKER_FOLDER` and `SESAME_SEED`.
-    /// Placeholders in its values are replaced as in arguments.
+    /// What is in the environment of all programs in addition to `SESAME_WORKER`, `SESAME_WORKER_FOLDER` and
+    /// `SESAME_SEED`. Placeholders in its values are replaced as in arguments.
     pub environment: Vec<(String, String)>,
     /// What an argument `{ros-args}` stands for; nothing for what is not in it.
     pub ros_args: BTreeMap<Part, Vec<String>>,
@@ -99,11 +99,11 @@ pub struct Place {
     pub in_runner: bool,
 }
 
-impl Place {
-    /// That of the worker that this process is. The number of the worker is its domain.
+impl LaunchContext {
+    /// The context of the worker that this process is. The number of the worker is its domain.
     pub fn of_worker(space: PathBuf) -> Self {
         let worker = std::env::var("SESAME_WORKER").ok().and_then(|number| number.parse().ok()).unwrap_or(1);
-        Place {
+        LaunchContext {
             worker,
             folder: std::env::current_dir().unwrap_or_default(),
             space,
@@ -119,7 +119,7 @@ impl Place {
         let nodes = (0u32..).map(NodeId).take(plan.nodes.len());
         let ros_args = std::iter::once((Part::System, plan.ros_args(None)))
             .chain(nodes.map(|node| (Part::Node(node), plan.ros_args(Some(node)))));
-        Place { ros_args: ros_args.collect(), ..self }
+        LaunchContext { ros_args: ros_args.collect(), ..self }
     }
 
     /// The same for nodes of ROS 2, in the domain of this worker; `first` is that of the first one. Nothing beyond this
@@ -133,7 +133,7 @@ impl Place {
             ("ROS_LOG_DIR".to_owned(), self.folder.join("ros").display().to_string()),
             ("ROS_AUTOMATIC_DISCOVERY_RANGE".to_owned(), "LOCALHOST".to_owned()),
         ];
-        Place { domain: domain.into(), environment, ..self }
+        LaunchContext { domain: domain.into(), environment, ..self }
     }
 }
 
@@ -148,7 +148,7 @@ pub fn end_limit(plan: &CampaignPlan) -> Duration {
 
 /// The programs that a plan launches. Dropping it ends them.
 pub struct Launched {
-    place: Place,
+    context: LaunchContext,
     parts: Vec<(Part, Started)>,
     terminate: Option<Command>,
     seed: u64,
@@ -165,8 +165,8 @@ pub struct Launched {
 }
 
 impl Launched {
-    /// Those of this plan. Nothing is started yet.
-    pub fn new(plan: &CampaignPlan, place: Place) -> Self {
+    /// The programs of this plan. Nothing is started yet.
+    pub fn new(plan: &CampaignPlan, context: LaunchContext) -> Self {
         let awaited = |launch: &Launch| launch.ready.as_ref().map(|ready| phrase(plan, &ready.when));
         let part = |part, launch: &Launch, of: &str| {
             let shown = format!("the program `{}` of {of}", shown(&launch.command));
@@ -177,7 +177,7 @@ impl Launched {
             node.launch.as_ref().map(|launch| part(Part::Node(id), launch, &format!("node `{}`", node.name)))
         });
         Launched {
-            place,
+            context,
             parts: system.into_iter().chain(nodes).collect(),
             terminate: plan.simulator.lifecycle.terminate.clone(),
             seed: 0,
@@ -245,7 +245,7 @@ impl Launched {
     /// Reserves the port that `{port}` stands for, if programs ask for it and there is none yet.
     pub fn reserve_port(&mut self) -> Result<(), LaunchError> {
         if self.port.is_none() && self.asks_for_port() {
-            let reserved = Port::reserve(self.place.worker).map_err(|error| LaunchError::Failed {
+            let reserved = Port::reserve(self.context.worker).map_err(|error| LaunchError::Failed {
                 what: "`{port}`".to_owned(),
                 problem: format!("cannot be replaced: {error}"),
                 last_lines: String::new(),
@@ -311,7 +311,7 @@ impl Launched {
 
     /// The number of the worker that it runs for.
     pub fn worker(&self) -> u32 {
-        self.place.worker
+        self.context.worker
     }
 
     /// A text with its placeholders replaced by what this worker has.
@@ -405,7 +405,7 @@ impl Launched {
 
     /// The program of a command for the current run.
     fn program(&self, command: &Command, part: Part) -> Program {
-        let Place { worker, folder, space, environment, ros_args, in_runner, .. } = &self.place;
+        let LaunchContext { worker, folder, space, environment, ros_args, in_runner, .. } = &self.context;
         let own = self.own();
         let list = ros_args.get(&part).map_or(&[][..], Vec::as_slice);
         let filled = environment.iter().map(|(name, value)| (name.clone(), own.fill(value)));
@@ -425,10 +425,10 @@ impl Launched {
 
     fn own(&self) -> Own {
         Own {
-            worker: self.place.worker,
-            domain: self.place.domain,
+            worker: self.context.worker,
+            domain: self.context.domain,
             port: self.port(),
-            folder: self.place.folder.display().to_string(),
+            folder: self.context.folder.display().to_string(),
             seed: self.seed,
         }
     }
@@ -441,7 +441,7 @@ impl Launched {
         let asks = |command: &Command| command.arguments.iter().any(|argument| asks_for_port(argument));
         self.parts.iter().any(|(_, started)| asks(&started.launch.command) || ready(&started.launch))
             || self.terminate.as_ref().is_some_and(asks)
-            || self.place.environment.iter().any(|(_, value)| asks_for_port(value))
+            || self.context.environment.iter().any(|(_, value)| asks_for_port(value))
     }
 
     /// The port on which a program is awaited, if one is.

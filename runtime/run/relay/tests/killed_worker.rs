@@ -14,7 +14,7 @@ mod linux {
     use std::time::Duration;
     use std::{env, fs, thread};
 
-    use sesame_lifecycle::launch::{Launched, Place};
+    use sesame_lifecycle::launch::{LaunchContext, Launched};
     use sesame_patience as patience;
     use sesame_plan::testing::{minimal, node};
     use sesame_plan::{CampaignPlan, Launch, Ready, ReadyWhen};
@@ -87,7 +87,7 @@ mod linux {
 
     /// What a worker does: launches, says so, and then ends in some way.
     fn worker(folder: &Path, end: &str) -> ExitCode {
-        let mut launched = Launched::new(&plan(end), Place::of_worker(folder.to_owned()));
+        let mut launched = Launched::new(&plan(end), LaunchContext::of_worker(folder.to_owned()));
         launched.start(1).unwrap();
         let ready = launched.await_ready(&mut |_| false);
         if end == "finds no program" {

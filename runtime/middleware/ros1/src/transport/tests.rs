@@ -33,22 +33,23 @@ fn plan() -> CampaignPlan {
     plan
 }
 
-/// That of a second worker in a folder of its own; a test is not a runner.
-fn place_in(folder: &Path) -> Place {
+/// The context of a second worker in a folder of its own; a test is not a runner.
+fn context_in(folder: &Path) -> LaunchContext {
     let folder = folder.to_owned();
-    Place { worker: 2, folder: folder.clone(), in_runner: false, ..Place::of_worker(folder) }
+    LaunchContext { worker: 2, folder: folder.clone(), in_runner: false, ..LaunchContext::of_worker(folder) }
 }
 
 #[test]
 fn launched_programs_find_the_master_of_their_worker_and_write_into_its_folder() {
     let plan = plan();
-    let place = in_ros(&plan, MASTER, place_in(Path::new("folder")));
-    let value = |name: &str| place.environment.iter().find(|(other, _)| other == name).map(|(_, value)| value.as_str());
+    let context = in_ros(&plan, MASTER, context_in(Path::new("folder")));
+    let value =
+        |name: &str| context.environment.iter().find(|(other, _)| other == name).map(|(_, value)| value.as_str());
     assert_eq!(value("ROS_MASTER_URI"), Some("http://127.0.0.1:{port}"), "which is filled in at the launch");
     assert_eq!(value("ROS_HOME"), Some("folder/ros"));
     assert_eq!(value("ROS_LOG_DIR"), Some("folder/ros/log"));
-    assert_eq!(place.ros_args[&Part::Node(NodeId(0))], ["/peer:=/peer/undisturbed"]);
-    assert!(place.ros_args[&Part::Node(NodeId(1))].is_empty());
+    assert_eq!(context.ros_args[&Part::Node(NodeId(0))], ["/peer:=/peer/undisturbed"]);
+    assert!(context.ros_args[&Part::Node(NodeId(1))].is_empty());
 }
 
 /// With a master and nodes of an installed ROS 1.
@@ -79,7 +80,7 @@ mod real {
         plan.nodes[1].launch = Some(peer("subscriber.py", &["600"]));
         plan.validate().unwrap();
         let folder = tempfile::tempdir().unwrap();
-        let mut transport = at_place(&plan, place_in(folder.path()));
+        let mut transport = in_context(&plan, context_in(folder.path()));
         // The second run has a master of its own again.
         let both = [(), ()].map(|()| {
             let wires = WireTable::new(&plan);

@@ -66,7 +66,7 @@ fn system(whole: Option<Launch>, nodes: Vec<Launch>, terminate: Option<Command>)
         plan.nodes.push(sesame_plan::Node { launch: Some(launch), ..node(&format!("n{at}")) });
     }
     let folder = tempfile::tempdir().unwrap();
-    let place = Place {
+    let context = LaunchContext {
         worker: 7,
         folder: folder.path().to_owned(),
         space: folder.path().to_owned(),
@@ -75,7 +75,7 @@ fn system(whole: Option<Launch>, nodes: Vec<Launch>, terminate: Option<Command>)
         ros_args: BTreeMap::from([(Part::System, vec!["--ros-args".to_owned(), "-r".to_owned(), "a:=b".to_owned()])]),
         in_runner: false,
     };
-    let launched = Launched::new(&plan, place);
+    let launched = Launched::new(&plan, context);
     System { folder, launched }
 }
 

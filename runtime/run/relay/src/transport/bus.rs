@@ -27,7 +27,7 @@ use sesame_plan::CampaignPlan;
 use crate::transport::{Transport, TransportError};
 use crate::value::Value;
 use crate::wire::Line;
-use sesame_lifecycle::launch::Place;
+use sesame_lifecycle::launch::LaunchContext;
 
 use self::system::System;
 
@@ -144,7 +144,12 @@ impl Settings {
     }
 }
 
-/// The transport to a system on a bus. Launched programs run at this place.
-pub fn on_bus(plan: &CampaignPlan, bus: Box<dyn Bus>, settings: Settings, place: Place) -> Box<dyn Transport> {
-    Box::new(System::new(plan, bus, settings, place))
+/// The transport to a system on a bus. Launched programs run in this context.
+pub fn on_bus(
+    plan: &CampaignPlan,
+    bus: Box<dyn Bus>,
+    settings: Settings,
+    context: LaunchContext,
+) -> Box<dyn Transport> {
+    Box::new(System::new(plan, bus, settings, context))
 }

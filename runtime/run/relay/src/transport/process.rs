@@ -32,7 +32,7 @@ use self::free_running::FreeRunning;
 use self::lock_stepped::LockStepped;
 use crate::transport::{Connect, Transport};
 #[cfg(target_os = "linux")]
-use sesame_lifecycle::launch::{Launched, Place};
+use sesame_lifecycle::launch::{LaunchContext, Launched};
 use sesame_lifecycle::{Kept, Program};
 
 pub use self::beside::{Beside, BesideError, beside};
@@ -107,7 +107,7 @@ fn transport(plan: &CampaignPlan, folder: PathBuf, in_runner: bool) -> Box<dyn T
     let Some((program, arguments)) = plan.simulator.program() else {
         unreachable!("the generator connects each kind of simulator by its own transport")
     };
-    let launched = Launched::new(plan, Place { in_runner, ..Place::of_worker(folder.clone()) });
+    let launched = Launched::new(plan, LaunchContext { in_runner, ..LaunchContext::of_worker(folder.clone()) });
     let program =
         Program { name: program.to_owned(), arguments: arguments.to_vec(), folder, environment: Vec::new(), in_runner };
     match plan.simulator.step_ns() {

@@ -24,7 +24,7 @@ use crate::metric::MetricTable;
 use crate::transport::TransportError;
 use crate::value::Value;
 use crate::wire::{Line, WireTable};
-use sesame_lifecycle::launch::Place;
+use sesame_lifecycle::launch::LaunchContext;
 
 /// The system ticks each twentieth of a second for five seconds, and says how far it is from a wall and how fast it is.
 const TICK: i64 = 50_000_000;
@@ -195,8 +195,8 @@ fn plan() -> CampaignPlan {
 fn ran(plan: &CampaignPlan, faults: &[Fault], distances: &[f64], disturbed: bool) -> Observation {
     let bus = Faulty { faults: faults.to_vec(), distances: distances.to_vec(), next: VecDeque::new(), passed: 0 };
     let settings = Settings { has_clock: true, resets: false, addresses: Vec::new() };
-    let place = Place { in_runner: false, ..Place::of_worker(PathBuf::from(".")) };
-    let mut transport = on_bus(plan, Box::new(bus), settings, place);
+    let context = LaunchContext { in_runner: false, ..LaunchContext::of_worker(PathBuf::from(".")) };
+    let mut transport = on_bus(plan, Box::new(bus), settings, context);
     let wires = WireTable::new(plan);
     let metrics = MetricTable::new(plan, &wires, &[]).unwrap();
     let operations = if disturbed { vec![use_of(0, 1.0, 2.0, Vec::new(), 1)] } else { Vec::new() };

@@ -14,7 +14,7 @@ use crate::transport::clock::Ticks;
 use crate::transport::relay_latency::{Added, AddedOnWire, FEWEST, objections};
 use crate::transport::{Capabilities, Incidents, Transport, TransportError, wall_time_since};
 use crate::wire::{Line, Wire, WireTable, lines, service_lines};
-use sesame_lifecycle::launch::{LaunchError, Launched, Place, Probe};
+use sesame_lifecycle::launch::{LaunchContext, LaunchError, Launched, Probe};
 
 /// How long a system may take until it is complete, where nothing else is declared.
 const COMPLETE_WITHIN: Duration = Duration::from_secs(30);
@@ -101,9 +101,9 @@ impl Heard {
 }
 
 impl System {
-    pub(super) fn new(plan: &CampaignPlan, bus: Box<dyn Bus>, settings: Settings, place: Place) -> Self {
+    pub(super) fn new(plan: &CampaignPlan, bus: Box<dyn Bus>, settings: Settings, context: LaunchContext) -> Self {
         System {
-            launched: Launched::new(plan, place),
+            launched: Launched::new(plan, context),
             plan: plan.clone(),
             settings,
             bus,

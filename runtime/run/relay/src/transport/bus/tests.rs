@@ -45,8 +45,8 @@ fn times(resets: bool, before: &[i64], after_reset: &[i64], events: usize) -> Ve
     let events_before = before.iter().copied().map(Event::Clock).collect();
     let bus = Written { events: events_before, after_reset: after_reset.to_vec() };
     let settings = Settings { has_clock: true, resets, addresses: Vec::new() };
-    let place = Place { in_runner: false, ..Place::of_worker(PathBuf::from(".")) };
-    let mut transport = on_bus(&plan, Box::new(bus), settings, place);
+    let context = LaunchContext { in_runner: false, ..LaunchContext::of_worker(PathBuf::from(".")) };
+    let mut transport = on_bus(&plan, Box::new(bus), settings, context);
     let mut run = || {
         let wires = WireTable::new(&plan);
         let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();

@@ -71,7 +71,7 @@ fn stepped(plan: &CampaignPlan, folder: PathBuf) -> LockStepped {
 }
 
 fn launched_of(plan: &CampaignPlan, folder: &Path) -> Launched {
-    Launched::new(plan, Place { in_runner: false, ..Place::of_worker(folder.to_owned()) })
+    Launched::new(plan, LaunchContext { in_runner: false, ..LaunchContext::of_worker(folder.to_owned()) })
 }
 
 fn program_of(plan: &CampaignPlan, folder: PathBuf) -> Program {
