@@ -12,7 +12,7 @@ use sesame_relay::transport::TransportError;
 use super::served::Served;
 use super::session::{ClockReader, Connected, Session, Stepper};
 use super::wall_clock::now;
-use super::watch::{Place, Present, Role};
+use super::watch::{DeclaredEndpoint, Present, Role};
 use crate::dds::{DdsError, Endpoint};
 use crate::graph::DISCOVERY_TOPIC;
 use crate::names;
@@ -62,39 +62,39 @@ impl Session {
 
     /// Who is at the wires and at the clock.
     fn present(&self, plan: &CampaignPlan) -> Vec<Present> {
-        let mut places = Vec::new();
-        let mut place = |role, path: &str, topic: String, most| {
-            places.push(Place { role, path: path.to_owned(), topic, most });
+        let mut endpoints = Vec::new();
+        let mut declare = |role, path: &str, topic: String, most| {
+            endpoints.push(DeclaredEndpoint { role, path: path.to_owned(), topic, most });
         };
         for Connected { line, .. } in &self.lines {
             let declared = declared(plan, line.topic);
             for source in &line.sources {
                 let most = if source.publisher.is_some() { 1 } else { declared };
-                place(Role::Publishes, &line.path, names::topic(&source.path), Some(most));
+                declare(Role::Publishes, &line.path, names::topic(&source.path), Some(most));
             }
             if line.cut {
                 // Whoever publishes there gets past the relay.
-                place(Role::Publishes, &line.path, names::topic(&line.path), Some(0));
+                declare(Role::Publishes, &line.path, names::topic(&line.path), Some(0));
                 for sink in &line.sinks {
-                    place(Role::Subscribes, &line.path, names::topic(&sink.path), None);
+                    declare(Role::Subscribes, &line.path, names::topic(&sink.path), None);
                 }
             } else {
-                place(Role::Subscribes, &line.path, names::topic(&line.path), None);
+                declare(Role::Subscribes, &line.path, names::topic(&line.path), None);
             }
         }
         for service in &self.services {
-            place(Role::Serves, &service.path, names::request(&service.server()), None);
+            declare(Role::Serves, &service.path, names::request(&service.server()), None);
         }
         if let ClockReader::Topic { path, .. } = &self.clock {
-            place(Role::Publishes, path, names::topic(path), None);
+            declare(Role::Publishes, path, names::topic(path), None);
         }
         let (publishers, subscribers) = (self.publishers(), self.subscribers());
         let mut present = Vec::new();
-        for place in places {
-            let all = if place.role == Role::Publishes { &publishers } else { &subscribers };
-            present.extend(all.iter().filter(|endpoint| endpoint.topic == place.topic).map(|endpoint| Present {
+        for declared in endpoints {
+            let all = if declared.role == Role::Publishes { &publishers } else { &subscribers };
+            present.extend(all.iter().filter(|endpoint| endpoint.topic == declared.topic).map(|endpoint| Present {
                 guid: endpoint.guid,
-                place: place.clone(),
+                declared: declared.clone(),
                 name: self.nodes.name(endpoint.guid).map(str::to_owned),
                 will_be_named: self.will_be_named(endpoint.guid),
             }));

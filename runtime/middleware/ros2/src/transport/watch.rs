@@ -24,7 +24,7 @@ pub(super) enum Role {
 
 /// An endpoint that the space declares: what is done at a wire, and where.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Place {
+pub(super) struct DeclaredEndpoint {
     pub(super) role: Role,
     /// The name in ROS that the space has for the topic or service.
     pub(super) path: String,
@@ -38,8 +38,8 @@ pub(super) struct Place {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Present {
     pub(super) guid: GUID,
-    pub(super) place: Place,
-    /// Of its node, as far as its participant has said.
+    pub(super) declared: DeclaredEndpoint,
+    /// The name of its node, as far as its participant has said it.
     pub(super) name: Option<String>,
     /// Whether the name is yet to come.
     pub(super) will_be_named: bool,
@@ -116,10 +116,10 @@ impl Watch {
                 continue;
             }
             self.fresh.remove(&guid);
-            let there = present.values().filter(|other| other.place == newcomer.place).count();
+            let there = present.values().filter(|other| other.declared == newcomer.declared).count();
             if self.gone.remove(&known(newcomer)) {
                 notes.push(came_back(&known(newcomer)));
-            } else if let Some(most) = newcomer.place.most.filter(|&most| there > most) {
+            } else if let Some(most) = newcomer.declared.most.filter(|&most| there > most) {
                 self.beyond.insert(guid, too_many(newcomer, there, most));
             }
             self.there.insert(guid, newcomer.clone());
@@ -131,8 +131,8 @@ impl Watch {
     }
 }
 
-fn known(Present { guid, place, name, .. }: &Present) -> Known {
-    (place.role, place.path.clone(), name.clone().unwrap_or_else(|| format!("participant {:?}", guid.prefix)))
+fn known(Present { guid, declared, name, .. }: &Present) -> Known {
+    (declared.role, declared.path.clone(), name.clone().unwrap_or_else(|| format!("participant {:?}", guid.prefix)))
 }
 
 fn came_back((role, path, name): &Known) -> String {
@@ -153,7 +153,7 @@ fn has_gone((role, path, name): &Known) -> String {
 
 fn too_many(present: &Present, there: usize, most: usize) -> String {
     let (_, _, name) = known(present);
-    let path = present.place.topic.strip_prefix("rt").unwrap_or(&present.place.topic);
+    let path = present.declared.topic.strip_prefix("rt").unwrap_or(&present.declared.topic);
     match most {
         0 => format!("`{name}` publishes on `{path}` past the relay since the run began"),
         1 => format!("`{name}` publishes on `{path}` since the run began: {there} publish there, and 1 is declared"),
@@ -171,8 +171,8 @@ mod tests {
         let guid = GUID::from_bytes(std::array::from_fn(|at| if at < 12 { participant } else { role as u8 }));
         let most = (role == Role::Publishes).then_some(1);
         let topic = if role == Role::Publishes { "rt/arm/undisturbed" } else { "rt/arm" };
-        let place = Place { role, path: "/arm".to_owned(), topic: topic.to_owned(), most };
-        Present { guid, place, name: name.map(str::to_owned), will_be_named: name.is_none() }
+        let declared = DeclaredEndpoint { role, path: "/arm".to_owned(), topic: topic.to_owned(), most };
+        Present { guid, declared, name: name.map(str::to_owned), will_be_named: name.is_none() }
     }
 
     /// What each look says, one every half a second.
