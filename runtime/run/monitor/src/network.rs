@@ -34,7 +34,7 @@ impl EvidenceId {
 /// Monitors that are run together.
 #[derive(Debug, Clone)]
 pub struct Network {
-    places: Vec<Place>,
+    positions: Vec<MonitorPositions>,
     order: Vec<MonitorId>,
     rules: Vec<Rule>,
     /// The monitor of each piece of evidence.
@@ -46,7 +46,7 @@ pub struct Network {
 
 /// Where a monitor is in a network.
 #[derive(Debug, Clone, Default)]
-struct Place {
+struct MonitorPositions {
     /// Its position in the order.
     rank: u32,
     first_evidence: u32,
@@ -102,18 +102,18 @@ impl Network {
         let order = order(monitors)?;
 
         let mut circuit = Circuit::default();
-        let mut places: Vec<Place> = Vec::with_capacity(monitors.len());
+        let mut positions: Vec<MonitorPositions> = Vec::with_capacity(monitors.len());
         let (mut rules, mut owners, mut guarantors) = (Vec::new(), Vec::new(), Vec::new());
         for (id, monitor) in ids(monitors) {
             let first_evidence = position(rules.len());
             rules.extend(monitor.evidence.iter().map(Rule::of));
             owners.extend(monitor.evidence.iter().map(|_| id));
             monitor.evidence.iter().for_each(|_| _ = circuit.add());
-            places.push(Place { first_evidence, ..Place::default() });
+            positions.push(MonitorPositions { first_evidence, ..MonitorPositions::default() });
         }
         for (id, monitor) in ids(monitors) {
-            places[id.index()].first_guarantee = position(circuit.size());
-            places[id.index()].guarantees = position(monitor.guarantees.len());
+            positions[id.index()].first_guarantee = position(circuit.size());
+            positions[id.index()].guarantees = position(monitor.guarantees.len());
             for _ in &monitor.guarantees {
                 circuit.add();
                 guarantors.push(id);
@@ -123,7 +123,7 @@ impl Network {
         for (rank, &id) in (0..).zip(&order) {
             let monitor = &monitors[id.index()];
             let demands = monitor.demands.iter().map(|demand| {
-                let first = places[demand.monitor.index()].first_guarantee;
+                let first = positions[demand.monitor.index()].first_guarantee;
                 if demand.guarantee == 0 {
                     return first;
                 }
@@ -134,18 +134,18 @@ impl Network {
                 })
             });
             let demands: Vec<NodeIndex> = demands.collect();
-            let place = &mut places[id.index()];
-            (place.rank, place.demands) = (rank, demands);
-            for (node, guarantee) in (place.first_guarantee..).zip(&monitor.guarantees) {
+            let positions = &mut positions[id.index()];
+            (positions.rank, positions.demands) = (rank, demands);
+            for (node, guarantee) in (positions.first_guarantee..).zip(&monitor.guarantees) {
                 let (need, parts) = match gate::parts(&guarantee.gate) {
                     Some((need, parts)) => (need, parts),
                     None => (1, std::slice::from_ref(&guarantee.gate)),
                 };
-                let parts = parts.iter().map(|part| node_of(part, place, &mut circuit)).collect();
+                let parts = parts.iter().map(|part| node_of(part, positions, &mut circuit)).collect();
                 circuit.define(node, need, parts);
             }
         }
-        Ok(Network { places, order, rules, owners, circuit, guarantors })
+        Ok(Network { positions, order, rules, owners, circuit, guarantors })
     }
 
     /// The monitors in the order in which they are decided.
@@ -160,13 +160,13 @@ impl Network {
 
     /// The evidence at this position of a monitor.
     pub fn evidence(&self, monitor: MonitorId, position: u32) -> EvidenceId {
-        EvidenceId(self.places[monitor.index()].first_evidence + position)
+        EvidenceId(self.positions[monitor.index()].first_evidence + position)
     }
 
     /// The monitor of a piece of evidence, and its position there.
     pub fn owner(&self, evidence: EvidenceId) -> (MonitorId, u32) {
         let monitor = self.owners[evidence.index()];
-        (monitor, evidence.0 - self.places[monitor.index()].first_evidence)
+        (monitor, evidence.0 - self.positions[monitor.index()].first_evidence)
     }
 
     /// How a piece of evidence follows from its condition.
@@ -176,7 +176,7 @@ impl Network {
 
     /// How many guarantees a monitor has.
     pub fn guarantees(&self, monitor: MonitorId) -> u32 {
-        self.places[monitor.index()].guarantees
+        self.positions[monitor.index()].guarantees
     }
 
     pub(crate) fn circuit(&self) -> &Circuit {
@@ -184,13 +184,13 @@ impl Network {
     }
 
     pub(crate) fn guarantee_node(&self, monitor: MonitorId, position: u32) -> NodeIndex {
-        self.places[monitor.index()].first_guarantee + position
+        self.positions[monitor.index()].first_guarantee + position
     }
 
     /// The nodes of a monitor's demands, equal ones for equal demands. That of a demand for another monitor's strongest
     /// guarantee is the guarantee's.
     pub(crate) fn demand_nodes(&self, monitor: MonitorId) -> &[NodeIndex] {
-        &self.places[monitor.index()].demands
+        &self.positions[monitor.index()].demands
     }
 
     /// The monitor of a guarantee; `None` for another node.
@@ -200,13 +200,13 @@ impl Network {
 }
 
 /// The node of a gate, which is added with all its parts.
-fn node_of(gate: &Gate, place: &Place, circuit: &mut Circuit) -> NodeIndex {
+fn node_of(gate: &Gate, positions: &MonitorPositions, circuit: &mut Circuit) -> NodeIndex {
     match gate {
-        Gate::Evidence(at) => place.first_evidence + at,
-        Gate::Demand(at) => place.demands[*at as usize],
+        Gate::Evidence(at) => positions.first_evidence + at,
+        Gate::Demand(at) => positions.demands[*at as usize],
         Gate::All(_) | Gate::Any(_) | Gate::AtLeast { .. } => {
             let (need, parts) = gate::parts(gate).expect("a leaf was handled above");
-            let parts = parts.iter().map(|part| node_of(part, place, circuit)).collect();
+            let parts = parts.iter().map(|part| node_of(part, positions, circuit)).collect();
             let node = circuit.add();
             circuit.define(node, need, parts);
             node

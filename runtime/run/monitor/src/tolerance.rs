@@ -37,8 +37,8 @@ const PATIENCE: u64 = 20_000_000;
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Recording {
     /// All messages, in the order in which they were heard.
-    pub messages: Vec<Message>,
-    /// Of each piece of evidence of the network: the streams that its condition reads, each once. A stream is whatever
+    pub messages: Vec<RecordedMessage>,
+    /// For each piece of evidence of the network: the streams that its condition reads, each once. A stream is whatever
     /// has a latest message of its own: a topic, or a member of a group, before or after operations.
     pub streams: Vec<Vec<u32>>,
     /// When the run ended.
@@ -47,7 +47,7 @@ pub struct Recording {
 
 /// A message of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Message {
+pub struct RecordedMessage {
     /// When it was heard.
     pub at: SimTime,
     /// The stream that it is in.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use sesame_plan::{Input, Members, Side};
 
 use super::logic::{Literal, Logic};
-use super::theory::{Comparison, Shape, Term, TermIndex};
+use super::theory::{Comparison, Term, TermIndex, TermKind};
 use crate::network::EvidenceId;
 
 /// What is known of the values of an input, besides that its numbers are finite.
@@ -107,10 +107,10 @@ impl Atoms {
     pub(super) fn is_loose(&self, term: TermIndex) -> bool {
         self.loose_terms[term]
             || self.input_terms.iter().any(|(&input, &at)| at == term && self.inputs[input].loose)
-            || match self.terms[term].shape {
-                Shape::Own => false,
-                Shape::Difference(a, b) => self.is_loose(a) || self.is_loose(b),
-                Shape::Sum(of, _) => self.is_loose(of),
+            || match self.terms[term].kind {
+                TermKind::Own => false,
+                TermKind::Difference(a, b) => self.is_loose(a) || self.is_loose(b),
+                TermKind::Sum(of, _) => self.is_loose(of),
             }
     }
 
@@ -125,20 +125,20 @@ impl Atoms {
         if let Some(&term) = self.input_terms.get(&input) {
             return term;
         }
-        let term = Term { shape: Shape::Own, range: (values.least, values.greatest), whole: values.whole };
+        let term = Term { kind: TermKind::Own, range: (values.least, values.greatest), whole: values.whole };
         let term = self.add_term(term, false);
         self.input_terms.insert(input, term);
         term
     }
 
     /// A term made of others.
-    pub(super) fn made_term(&mut self, shape: Shape) -> TermIndex {
-        let same = |term: &Term| term.shape == shape;
+    pub(super) fn made_term(&mut self, kind: TermKind) -> TermIndex {
+        let same = |term: &Term| term.kind == kind;
         if let Some(at) = self.terms.iter().position(same) {
             return at;
         }
         let range = (f64::NEG_INFINITY, f64::INFINITY);
-        self.add_term(Term { shape, range, whole: false }, false)
+        self.add_term(Term { kind, range, whole: false }, false)
     }
 
     /// A term of which nothing is known but what it is called.
@@ -147,7 +147,7 @@ impl Atoms {
             return term;
         }
         let range = (f64::NEG_INFINITY, f64::INFINITY);
-        let term = self.add_term(Term { shape: Shape::Own, range, whole: false }, true);
+        let term = self.add_term(Term { kind: TermKind::Own, range, whole: false }, true);
         self.named_terms.insert(name, term);
         term
     }

@@ -10,7 +10,7 @@ use sesame_plan::{Comparison, Condition, Evidence, Expression, Input, TextTest};
 use super::arithmetic::{Core, boundary, chain, constant, is_number, text};
 use super::atoms::{Atoms, Known, Values};
 use super::logic::Literal;
-use super::theory::{Shape, TermIndex};
+use super::theory::{TermIndex, TermKind};
 use crate::network::EvidenceId;
 
 /// Whether something holds for sure, and whether it does not for sure. Never both.
@@ -195,7 +195,7 @@ impl Reader<'_> {
                 if a == b {
                     return None;
                 }
-                Some((self.atoms.made_term(Shape::Difference(a.min(b), a.max(b))), a > b))
+                Some((self.atoms.made_term(TermKind::Difference(a.min(b), a.max(b))), a > b))
             }
         }
     }
@@ -247,7 +247,7 @@ impl Reader<'_> {
             Some((input, 0.0)) => self.input_term(input),
             Some((input, plus)) => {
                 let input = self.input_term(input);
-                self.atoms.made_term(Shape::Sum(input, plus))
+                self.atoms.made_term(TermKind::Sum(input, plus))
             }
             None => {
                 let inputs: Vec<usize> = (0..).take(self.evidence.inputs.len()).map(|at| self.input(at)).collect();

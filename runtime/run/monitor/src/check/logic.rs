@@ -35,7 +35,7 @@ impl Not for Literal {
 
 /// What a node is.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Node {
+pub(super) enum LogicNode {
     /// The constant, or something that may be true or false.
     Atom,
     /// It is true if at least `need` of the parts are, from 1 to all of two or more.
@@ -45,17 +45,17 @@ pub(super) enum Node {
 /// All nodes. Parts come before what they are part of.
 #[derive(Debug, Clone)]
 pub(super) struct Logic {
-    nodes: Vec<Node>,
-    known: BTreeMap<Node, Literal>,
+    nodes: Vec<LogicNode>,
+    known: BTreeMap<LogicNode, Literal>,
     users: Vec<Vec<(u32, bool)>>,
 }
 
 impl Logic {
     pub(super) fn new() -> Self {
-        Logic { nodes: vec![Node::Atom], known: BTreeMap::new(), users: vec![Vec::new()] }
+        Logic { nodes: vec![LogicNode::Atom], known: BTreeMap::new(), users: vec![Vec::new()] }
     }
 
-    pub(super) fn nodes(&self) -> &[Node] {
+    pub(super) fn nodes(&self) -> &[LogicNode] {
         &self.nodes
     }
 
@@ -64,10 +64,10 @@ impl Logic {
         &self.users[node]
     }
 
-    fn add(&mut self, node: Node) -> Literal {
+    fn add(&mut self, node: LogicNode) -> Literal {
         let literal = Literal::of(self.nodes.len());
         let at = literal.0 / 2;
-        if let Node::AtLeast { parts, .. } = &node {
+        if let LogicNode::AtLeast { parts, .. } = &node {
             for part in parts {
                 self.users[part.node()].push((at, part.is_positive()));
             }
@@ -79,7 +79,7 @@ impl Logic {
 
     /// Something new that may be true or false.
     pub(super) fn atom(&mut self) -> Literal {
-        self.add(Node::Atom)
+        self.add(LogicNode::Atom)
     }
 
     /// Whether at least so many of these hold.
@@ -110,7 +110,7 @@ impl Logic {
         if let [only] = open[..] {
             return only;
         }
-        let node = Node::AtLeast { need, parts: open };
+        let node = LogicNode::AtLeast { need, parts: open };
         if let Some(&known) = self.known.get(&node) {
             return known;
         }

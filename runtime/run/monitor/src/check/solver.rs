@@ -3,7 +3,7 @@
 //! it depends, so that a contradiction undoes those that led to it and not those that happened to come later
 //! [Prosser 1993].
 
-use super::logic::{Literal, Logic, Node};
+use super::logic::{Literal, Logic, LogicNode};
 use super::theory::{Comparison, Theory};
 
 /// The answer to a question.
@@ -38,7 +38,7 @@ pub(super) fn solve(
     while goals.len() != before {
         before = goals.len();
         laws.retain(|&law| {
-            let Node::AtLeast { parts, .. } = &logic.nodes()[law.node()] else { return false };
+            let LogicNode::AtLeast { parts, .. } = &logic.nodes()[law.node()] else { return false };
             let concerned = parts.iter().filter(|part| solver.matters[part.node()]).count() > 1;
             if concerned {
                 goals.push(law);
@@ -149,7 +149,7 @@ impl<'a> Solver<'a> {
             if std::mem::replace(&mut self.matters[node], true) {
                 continue;
             }
-            if let Node::AtLeast { parts, .. } = &self.logic.nodes()[node] {
+            if let LogicNode::AtLeast { parts, .. } = &self.logic.nodes()[node] {
                 waiting.extend(parts.iter().map(|part| part.node()));
             }
             let Some(comparison) = self.comparisons.get(node).copied().flatten() else { continue };
@@ -284,7 +284,7 @@ impl<'a> Solver<'a> {
     fn examine(&mut self, node: usize) -> Fits {
         self.work += 1;
         let logic = self.logic;
-        let Node::AtLeast { need, parts } = &logic.nodes()[node] else { return Ok(()) };
+        let LogicNode::AtLeast { need, parts } = &logic.nodes()[node] else { return Ok(()) };
         let (holding, failing, spare) = (self.holding[node], self.failing[node], parts.len() - need);
         let literal = Literal::of(node);
         if holding >= *need {
@@ -317,7 +317,7 @@ impl<'a> Solver<'a> {
     /// A part to be set for a node whose value does not follow from its parts yet.
     fn unjustified(&self) -> Option<Literal> {
         self.trail.iter().find_map(|&node| {
-            let Node::AtLeast { need, parts } = &self.logic.nodes()[node] else { return None };
+            let LogicNode::AtLeast { need, parts } = &self.logic.nodes()[node] else { return None };
             let value = self.values[node]?;
             let justified = if value { self.holding[node] >= *need } else { self.failing[node] > parts.len() - need };
             if justified {

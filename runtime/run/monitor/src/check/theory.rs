@@ -14,7 +14,7 @@ pub(super) type TermIndex = usize;
 
 /// What is known of the structure of a term.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Shape {
+pub(super) enum TermKind {
     /// A number on its own.
     Own,
     /// A difference in floating point of two terms.
@@ -26,7 +26,7 @@ pub(super) enum Shape {
 /// A term.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Term {
-    pub(super) shape: Shape,
+    pub(super) kind: TermKind,
     /// The least and greatest value.
     pub(super) range: (f64, f64),
     /// Whether it takes whole numbers only.
@@ -77,10 +77,10 @@ impl Theory {
         }
         let mut made_of = vec![Vec::new(); terms.len()];
         for (at, term) in terms.iter().enumerate() {
-            match term.shape {
-                Shape::Own => {}
-                Shape::Sum(of, _) => made_of[of].push(at),
-                Shape::Difference(a, b) => [a, b].into_iter().for_each(|of| made_of[of].push(at)),
+            match term.kind {
+                TermKind::Own => {}
+                TermKind::Sum(of, _) => made_of[of].push(at),
+                TermKind::Difference(a, b) => [a, b].into_iter().for_each(|of| made_of[of].push(at)),
             }
         }
         let ranges = terms.iter().map(|term| term.range).collect();
@@ -89,7 +89,7 @@ impl Theory {
         let mut fits = true;
         for (at, term) in terms.iter().enumerate() {
             fits &= theory.narrow(at, term.range);
-            if let Shape::Sum(of, plus) = term.shape {
+            if let TermKind::Sum(of, plus) = term.kind {
                 sums.push((of, plus, at));
             }
         }
@@ -131,16 +131,16 @@ impl Theory {
     /// The number of the group of terms with which a term has to do; for one that is compared with numbers only, a
     /// number of its own.
     pub(super) fn group(&self, term: TermIndex) -> usize {
-        let member = match self.terms[term].shape {
-            Shape::Difference(of, _) => of,
-            Shape::Own | Shape::Sum(..) => term,
+        let member = match self.terms[term].kind {
+            TermKind::Difference(of, _) => of,
+            TermKind::Own | TermKind::Sum(..) => term,
         };
         self.groups_of[member].map_or(self.groups.len() + member, |(group, _)| group)
     }
 
     /// Whether a term is not made of others.
     pub(super) fn is_own(&self, term: TermIndex) -> bool {
-        self.terms[term].shape == Shape::Own
+        self.terms[term].kind == TermKind::Own
     }
 
     /// What is known of a term by itself.
@@ -177,9 +177,9 @@ impl Theory {
 
     /// A term as a term and what is added to it.
     fn sum(&self, term: TermIndex) -> (TermIndex, f64) {
-        match self.terms[term].shape {
-            Shape::Sum(of, plus) => (of, plus),
-            Shape::Own | Shape::Difference(..) => (term, 0.0),
+        match self.terms[term].kind {
+            TermKind::Sum(of, plus) => (of, plus),
+            TermKind::Own | TermKind::Difference(..) => (term, 0.0),
         }
     }
 
@@ -195,10 +195,10 @@ impl Theory {
         // Rounding keeps order, so what a term is made of bounds it exactly.
         for at in 0..self.made_of[term].len() {
             let made = self.made_of[term][at];
-            let range = match self.terms[made].shape {
-                Shape::Own => continue,
-                Shape::Sum(_, plus) => (range.0 + plus, range.1 + plus),
-                Shape::Difference(a, b) => {
+            let range = match self.terms[made].kind {
+                TermKind::Own => continue,
+                TermKind::Sum(_, plus) => (range.0 + plus, range.1 + plus),
+                TermKind::Difference(a, b) => {
                     let (a, b) = (self.ranges[a], self.ranges[b]);
                     (a.0 - b.1, a.1 - b.0)
                 }
@@ -209,10 +209,10 @@ impl Theory {
             }
         }
         let fits = self.bound_by_zero(term, range);
-        match self.terms[term].shape {
-            Shape::Own | Shape::Sum(..) => fits,
+        match self.terms[term].kind {
+            TermKind::Own | TermKind::Sum(..) => fits,
             // What is at most a number after rounding is below the next number before.
-            Shape::Difference(a, b) => {
+            TermKind::Difference(a, b) => {
                 let below = |most: f64| Bound { most, below: true };
                 fits && (range.1 == f64::INFINITY || self.bound(a, b, below(range.1.next_up())))
                     && (range.0 == f64::NEG_INFINITY || self.bound(b, a, below(-range.0.next_down())))
@@ -254,10 +254,10 @@ fn grouped(terms: &[Term], orders: &[(TermIndex, TermIndex)]) -> Vec<Vec<TermInd
         join(a, b);
     }
     for (at, term) in terms.iter().enumerate() {
-        match term.shape {
-            Shape::Own => {}
-            Shape::Difference(a, b) => join(a, b),
-            Shape::Sum(of, _) => join(at, of),
+        match term.kind {
+            TermKind::Own => {}
+            TermKind::Difference(a, b) => join(a, b),
+            TermKind::Sum(of, _) => join(at, of),
         }
     }
     let members = |of: TermIndex| (0..terms.len()).filter(|&at| group[at] == of).collect::<Vec<_>>();

@@ -62,9 +62,9 @@ impl Deciding {
     pub(crate) fn new(network: &Network) -> Self {
         Deciding {
             values: Values::new(network.circuit()),
-            states: vec![State::Safe; network.places.len()],
-            touched: Vec::with_capacity(network.places.len()),
-            is_touched: vec![false; network.places.len()],
+            states: vec![State::Safe; network.positions.len()],
+            touched: Vec::with_capacity(network.positions.len()),
+            is_touched: vec![false; network.positions.len()],
         }
     }
 
@@ -88,7 +88,7 @@ impl Deciding {
             }
             let Some(monitor) = network.guarantor(node) else { return };
             if !std::mem::replace(&mut is_touched[monitor.index()], true) {
-                touched.push(network.places[monitor.index()].rank);
+                touched.push(network.positions[monitor.index()].rank);
             }
         });
     }
@@ -99,9 +99,9 @@ impl Deciding {
         for rank in self.touched.drain(..) {
             let monitor = network.order[rank as usize];
             self.is_touched[monitor.index()] = false;
-            let place = &network.places[monitor.index()];
-            let holds = |&position: &u32| self.values.get(place.first_guarantee + position) == Truth::True;
-            let state = (0..place.guarantees).find(holds).map_or(State::Safe, State::Guarantee);
+            let positions = &network.positions[monitor.index()];
+            let holds = |&position: &u32| self.values.get(positions.first_guarantee + position) == Truth::True;
+            let state = (0..positions.guarantees).find(holds).map_or(State::Safe, State::Guarantee);
             let before = std::mem::replace(&mut self.states[monitor.index()], state);
             if before != state {
                 decided(Decision { monitor, state, at, mitigate: state == State::Safe });

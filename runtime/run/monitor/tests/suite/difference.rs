@@ -9,12 +9,12 @@ use sesame_monitor::why::Moment;
 use sesame_monitor::{Changes, EvidenceId, Network, Run, State, Truth};
 use sesame_plan::{Gate, MonitorId};
 
-use crate::random::{self, END, Heard, Message};
+use crate::random::{self, END, Heard, HeardMessage};
 use crate::run::heard;
 
 const T: fn(i64) -> SimTime = SimTime::from_nanos;
 
-fn course(network: &Arc<Network>, messages: &[Message]) -> Course {
+fn course(network: &Arc<Network>, messages: &[HeardMessage]) -> Course {
     let (mut changes, mut course) = (Changes::default(), Course { end: T(END), ..Course::default() });
     let mut run = Run::start(Arc::clone(network), &mut changes);
     for message in messages {
@@ -46,12 +46,12 @@ prop_compose! {
         late in prop::collection::vec(prop_oneof![4 => (0..6_i64).prop_map(Some), 1 => Just(None)], messages.len()),
         monitors in Just(monitors),
         messages in Just(messages),
-    ) -> (Vec<sesame_plan::Monitor>, Vec<Message>, Vec<Message>) {
+    ) -> (Vec<sesame_plan::Monitor>, Vec<HeardMessage>, Vec<HeardMessage>) {
         let shifted = messages.iter().zip(late).filter_map(|(message, late)| {
             let at = message.at + late?;
-            (at <= END).then(|| Message { at, ..message.clone() })
+            (at <= END).then(|| HeardMessage { at, ..message.clone() })
         });
-        let mut other: Vec<Message> = shifted.collect();
+        let mut other: Vec<HeardMessage> = shifted.collect();
         other.sort_by_key(|message| message.at);
         (monitors, messages, other)
     }
@@ -100,7 +100,7 @@ proptest! {
 fn evidence_that_is_late_is_named_with_its_delay() {
     let monitor = random::monitor(random::plain(2), vec![Gate::All(vec![Gate::Evidence(0), Gate::Evidence(1)])]);
     let network = Arc::new(Network::new(&[monitor]).unwrap());
-    let message = |when: i64, at: u32, truth| Message {
+    let message = |when: i64, at: u32, truth| HeardMessage {
         at: when,
         heard: vec![Heard { monitor: MonitorId(0), at, truth, oldest: when }],
     };

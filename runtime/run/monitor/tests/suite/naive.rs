@@ -3,7 +3,7 @@
 use sesame_monitor::{State, Truth};
 use sesame_plan::{Gate, Monitor, MonitorId, StaleIs};
 
-use crate::random::{Heard, Message};
+use crate::random::{Heard, HeardMessage};
 
 /// A decision: when, and for what.
 pub(crate) type Step = (i64, State);
@@ -24,7 +24,7 @@ fn nanos(seconds: f64) -> i64 {
 /// A moment: what was heard until then, and the time.
 pub(crate) struct Moment<'a> {
     pub(crate) monitors: &'a [Monitor],
-    pub(crate) heard: &'a [Message],
+    pub(crate) heard: &'a [HeardMessage],
     pub(crate) now: i64,
 }
 
@@ -98,7 +98,7 @@ impl Moment<'_> {
 }
 
 /// The moments after each event until the end: each instant before its messages, and after each of them.
-pub(crate) fn moments<'a>(monitors: &'a [Monitor], messages: &'a [Message], end: i64) -> Vec<Moment<'a>> {
+pub(crate) fn moments<'a>(monitors: &'a [Monitor], messages: &'a [HeardMessage], end: i64) -> Vec<Moment<'a>> {
     let mut moments = Vec::new();
     for now in 0..=end {
         let before = messages.iter().filter(|message| message.at < now).count();
@@ -109,7 +109,7 @@ pub(crate) fn moments<'a>(monitors: &'a [Monitor], messages: &'a [Message], end:
 }
 
 /// The decisions of each monitor.
-pub(crate) fn decisions(monitors: &[Monitor], messages: &[Message], end: i64) -> Vec<Vec<Step>> {
+pub(crate) fn decisions(monitors: &[Monitor], messages: &[HeardMessage], end: i64) -> Vec<Vec<Step>> {
     let mut decisions = vec![vec![(0, State::Safe)]; monitors.len()];
     for moment in moments(monitors, messages, end) {
         for (id, steps) in (0..).zip(&mut decisions) {

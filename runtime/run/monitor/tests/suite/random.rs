@@ -15,7 +15,7 @@ pub(crate) const END: i64 = 40;
 
 /// What all conditions of evidence say at a message: by monitor and position.
 #[derive(Debug, Clone)]
-pub(crate) struct Message {
+pub(crate) struct HeardMessage {
     pub(crate) at: i64,
     pub(crate) heard: Vec<Heard>,
 }
@@ -35,25 +35,25 @@ fn seconds(nanos: i64) -> f64 {
 
 /// A gate as numbers that say nothing about how many leaves there are.
 #[derive(Debug, Clone)]
-pub(crate) enum Shape {
+pub(crate) enum RawGate {
     Leaf(u8),
-    Node(u8, Vec<Shape>),
+    Node(u8, Vec<RawGate>),
 }
 
-pub(crate) fn any_shape() -> impl Strategy<Value = Shape> {
-    any::<u8>().prop_map(Shape::Leaf).prop_recursive(3, 12, 4, |inner| {
-        (any::<u8>(), prop::collection::vec(inner, 2..=4)).prop_map(|(kind, parts)| Shape::Node(kind, parts))
+pub(crate) fn any_raw_gate() -> impl Strategy<Value = RawGate> {
+    any::<u8>().prop_map(RawGate::Leaf).prop_recursive(3, 12, 4, |inner| {
+        (any::<u8>(), prop::collection::vec(inner, 2..=4)).prop_map(|(kind, parts)| RawGate::Node(kind, parts))
     })
 }
 
-/// A gate of this shape over so many pieces of evidence and demands.
-pub(crate) fn gate(shape: &Shape, evidence: u32, demands: u32) -> Gate {
-    match shape {
-        Shape::Leaf(at) => {
+/// The gate that these numbers give over so many pieces of evidence and demands.
+pub(crate) fn gate(raw: &RawGate, evidence: u32, demands: u32) -> Gate {
+    match raw {
+        RawGate::Leaf(at) => {
             let at = u32::from(*at) % (evidence + demands);
             if at < evidence { Gate::Evidence(at) } else { Gate::Demand(at - evidence) }
         }
-        Shape::Node(kind, parts) => {
+        RawGate::Node(kind, parts) => {
             let of: Vec<Gate> = parts.iter().map(|part| gate(part, evidence, demands)).collect();
             match kind % 3 {
                 0 => Gate::All(of),
@@ -122,14 +122,14 @@ pub(crate) fn monitor(evidence: Vec<Evidence>, gates: Vec<Gate>) -> Monitor {
 pub(crate) fn any_monitors() -> impl Strategy<Value = Vec<Monitor>> {
     let one = (
         prop::collection::vec(any_evidence(), 1..=4),
-        prop::collection::vec(any_shape(), 1..=3),
+        prop::collection::vec(any_raw_gate(), 1..=3),
         prop::collection::vec((any::<u8>(), any::<u8>()), 0..=2),
     );
     let order = Just((0..4_u32).collect::<Vec<_>>()).prop_shuffle();
     (prop::collection::vec(one, 1..=4), order).prop_map(|(many, order)| {
         let order: Vec<u32> = order.into_iter().filter(|&at| (at as usize) < many.len()).collect();
         let mut monitors: Vec<Option<Monitor>> = vec![None; many.len()];
-        for (rank, (evidence, shapes, demands)) in many.into_iter().enumerate() {
+        for (rank, (evidence, raw_gates, demands)) in many.into_iter().enumerate() {
             let demands = demands.into_iter().filter(|_| rank > 0).map(|(of, guarantee)| {
                 let other = order[of as usize % rank];
                 let guarantees = monitors[other as usize].as_ref().unwrap().guarantees.len();
@@ -140,7 +140,7 @@ pub(crate) fn any_monitors() -> impl Strategy<Value = Vec<Monitor>> {
                 }
             });
             let demands: Vec<Demand> = demands.collect();
-            let gates = shapes.iter().map(|shape| gate(shape, evidence.len() as u32, demands.len() as u32)).collect();
+            let gates = raw_gates.iter().map(|raw| gate(raw, evidence.len() as u32, demands.len() as u32)).collect();
             monitors[order[rank] as usize] = Some(Monitor { demands, ..monitor(evidence, gates) });
         }
         monitors.into_iter().map(Option::unwrap).collect()
@@ -157,7 +157,7 @@ fn any_age() -> impl Strategy<Value = i64> {
 }
 
 /// Monitors and messages to some of their evidence.
-pub(crate) fn any_run() -> impl Strategy<Value = (Vec<Monitor>, Vec<Message>)> {
+pub(crate) fn any_run() -> impl Strategy<Value = (Vec<Monitor>, Vec<HeardMessage>)> {
     any_monitors().prop_flat_map(|monitors| {
         let evidence: Vec<(MonitorId, u32)> = (0..)
             .zip(&monitors)
@@ -180,7 +180,7 @@ pub(crate) fn any_run() -> impl Strategy<Value = (Vec<Monitor>, Vec<Message>)> {
                     *oldest = (at - age).max(*oldest);
                     Heard { monitor, at: position, truth, oldest: *oldest }
                 });
-                Message { at, heard: heard.collect() }
+                HeardMessage { at, heard: heard.collect() }
             };
             messages.into_iter().map(message).collect()
         });

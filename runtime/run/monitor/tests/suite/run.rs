@@ -8,11 +8,11 @@ use sesame_monitor::{Changes, EvidenceId, Invalid, Network, Reading, Run, State,
 use sesame_plan::{Demand, Gate, Monitor, MonitorId};
 
 use crate::naive::{self, Moment, Step};
-use crate::random::{self, END, Message};
+use crate::random::{self, END, HeardMessage};
 
 const T: fn(i64) -> SimTime = SimTime::from_nanos;
 
-pub(crate) fn heard(network: &Network, message: &Message) -> Vec<Reading> {
+pub(crate) fn heard(network: &Network, message: &HeardMessage) -> Vec<Reading> {
     let heard = message.heard.iter();
     heard
         .map(|heard| Reading {
@@ -24,7 +24,7 @@ pub(crate) fn heard(network: &Network, message: &Message) -> Vec<Reading> {
 }
 
 /// The decisions of each monitor.
-fn decisions(monitors: &[Monitor], messages: &[Message], end: i64) -> Vec<Vec<Step>> {
+fn decisions(monitors: &[Monitor], messages: &[HeardMessage], end: i64) -> Vec<Vec<Step>> {
     let network = Arc::new(Network::new(monitors).unwrap());
     let mut changes = Changes::default();
     let mut run = Run::start(Arc::clone(&network), &mut changes);

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use proptest::prelude::*;
 use sesame_base::time::SimTime;
 use sesame_monitor::compare::{Step, steps};
-use sesame_monitor::tolerance::{Limit, Message, Recording, tolerance, tolerances};
+use sesame_monitor::tolerance::{Limit, RecordedMessage, Recording, tolerance, tolerances};
 use sesame_monitor::{Changes, EvidenceId, Network, Reading, Run, State, Truth};
 use sesame_plan::{Gate, Monitor, MonitorId};
 
@@ -98,15 +98,15 @@ prop_compose! {
     ) -> (Vec<Monitor>, Recording, Vec<u8>) {
         messages.sort_by_key(|message| message.0);
         let values = messages.iter().map(|message| message.2).collect();
-        let mut all: Vec<Message> = Vec::new();
+        let mut all: Vec<RecordedMessage> = Vec::new();
         for (at, stream, _, joined) in messages {
             // A message is joined with the same one in another stream, and no evidence hears both.
-            let apart = |last: &Message| {
+            let apart = |last: &RecordedMessage| {
                 let both = |of: &Vec<u32>| of.contains(&stream) && of.contains(&last.stream);
                 last.at == T(at) && last.stream != stream && !last.joined && !streams.iter().any(both)
             };
             let joined = joined && all.last().is_some_and(apart);
-            all.push(Message { at: T(at), stream, joined });
+            all.push(RecordedMessage { at: T(at), stream, joined });
         }
         (monitors, Recording { messages: all, streams, end: T(END) }, values)
     }
@@ -148,7 +148,7 @@ fn a_pulse_that_comes_too_late_is_found() {
     monitor.name = "both".into();
     let network = Network::new(&[monitor]).unwrap();
     let at = [(0, 1), (100, 0), (150, 0), (200, 1)];
-    let messages = at.iter().map(|&(at, stream)| Message { at: T(at), stream, joined: false }).collect();
+    let messages = at.iter().map(|&(at, stream)| RecordedMessage { at: T(at), stream, joined: false }).collect();
     let recording = Recording { messages, streams: vec![vec![0], vec![1]], end: T(1000) };
     // The first is true from 100 to 150, the second from 0 to 200.
     let mut conditions = |_, heard: usize, _: &[usize]| Truth::from(heard < 2);

@@ -149,11 +149,11 @@ proptest! {
 
     #[test]
     fn gates_with_much_sharing_are_explained_exactly(
-        shapes in prop::collection::vec(random::any_shape(), 3..=5),
+        raw_gates in prop::collection::vec(random::any_raw_gate(), 3..=5),
         truths in prop::collection::vec(random::any_truth(), 8),
     ) {
         let evidence = random::plain(8);
-        let gates = shapes.iter().map(|shape| random::gate(shape, 8, 0)).collect();
+        let gates = raw_gates.iter().map(|raw| random::gate(raw, 8, 0)).collect();
         let monitors = [random::monitor(evidence, vec![Gate::AtLeast { count: 2, of: gates }])];
         let network = Network::new(&monitors).unwrap();
         let moment = Moment::new(&network, |evidence| truths[evidence.index()]);

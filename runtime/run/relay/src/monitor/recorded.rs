@@ -6,7 +6,7 @@ use std::sync::Arc;
 use sesame_base::observation::ChangeCause;
 use sesame_base::time::SimTime;
 use sesame_monitor::difference::Course;
-use sesame_monitor::tolerance::{Conditions, Message, Recording, Tolerance, tolerances};
+use sesame_monitor::tolerance::{Conditions, RecordedMessage, Recording, Tolerance, tolerances};
 use sesame_monitor::{Changes, EvidenceChange, EvidenceId, Network, Reading, Run, Truth};
 use sesame_plan::{CampaignPlan, MonitorId, Side};
 
@@ -113,7 +113,7 @@ impl<'p> RecordedMonitors<'p> {
             let other = &self.streams[last.stream as usize];
             last.at == at && number == index && other.wire == wire && last.stream != stream
         });
-        self.recording.messages.push(Message { at, stream, joined });
+        self.recording.messages.push(RecordedMessage { at, stream, joined });
         self.contents.push(content);
         self.indices.push(index);
     }
@@ -199,7 +199,7 @@ impl<'p> RecordedMonitors<'p> {
             let wire = wire_of(&self.recording.messages[position].stream);
             ChangeCause::Message { topic: self.wires.path(wire).to_owned(), index: self.indices[position] }
         };
-        let numbered: Vec<(usize, &Message)> = self.recording.messages.iter().enumerate().collect();
+        let numbered: Vec<(usize, &RecordedMessage)> = self.recording.messages.iter().enumerate().collect();
         for instant in numbered.chunk_by(|(_, one), (_, next)| one.at == next.at) {
             let at = instant[0].1.at;
             found.pass(&mut run, at, &mut changes);
