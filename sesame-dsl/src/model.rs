@@ -30,9 +30,9 @@ use std::collections::BTreeMap;
 // What holds no names and no units is the same here and in a plan.
 pub use sesame_plan::stl::Interval;
 pub use sesame_plan::{
-    Aggregate, Averaging, BinaryFunction, BoostedChildren, Bound, Channel, Choice, Clock, Comparison, Condition,
-    Confirmation, Copies, Dimension, Direction, Distance, Distribution, Drain, Exploration, Expression, Interface,
-    Members, Moment, NotFinite, OperationKind, OwnSetting, Point, Recorded, Region, Ros, Setting, Shape,
+    Aggregate, Averaging, BinaryFunction, BoostedChildren, Bound, Channel, Choice, ChoiceKind, Clock, Comparison,
+    Condition, Confirmation, Copies, Dimension, Direction, Distance, Distribution, Drain, Exploration, Expression,
+    Interface, Members, Moment, NotFinite, OperationKind, OwnSetting, Point, Recorded, Region, Ros, Setting,
     SignedDistance, Statistic, Step, StepBy, Stepping, StopRule, Strategy, StrategyKind, StrategyProperties, TextTest,
     Transport, Trend, UnaryFunction, ValueMode,
 };

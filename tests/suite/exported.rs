@@ -203,8 +203,8 @@ fn the_ends_of_what_is_permitted_read_back_as_they_are() {
                         Domain::Number { low, high, shape, .. } => {
                             let end = if first { *low } else { *high };
                             match shape {
-                                sesame_plan::Shape::Value => Choice::Value { value: end },
-                                sesame_plan::Shape::Range => Choice::Range { low: end, high: end },
+                                sesame_plan::ChoiceKind::Value => Choice::Value { value: end },
+                                sesame_plan::ChoiceKind::Range => Choice::Range { low: end, high: end },
                             }
                         }
                         Domain::Point { low, high } => Choice::Point { point: if first { *low } else { *high } },

@@ -102,7 +102,7 @@ impl Coverage {
 mod tests {
     use proptest::prelude::*;
 
-    use sesame_plan::{Dimension, GridAxis, Shape, Span};
+    use sesame_plan::{ChoiceKind, Dimension, GridAxis, Span};
 
     use super::*;
     use crate::sspr::{Class, Convention, Disturbance, Intensity};
@@ -113,7 +113,7 @@ mod tests {
             class: Class::Value,
             window: Span { start: 0.0, end: 1.0 },
             intervals: vec![Span { start: t1 - t2 / 2.0, end: t1 + t2 / 2.0 }],
-            parameters: vec![Intensity { permitted: (0.0, 1.0), chosen: (p1, p1), shape: Shape::Value }],
+            parameters: vec![Intensity { permitted: (0.0, 1.0), chosen: (p1, p1), shape: ChoiceKind::Value }],
         };
         Point::from_disturbances(&[disturbance], Convention::Ours).unwrap()
     }

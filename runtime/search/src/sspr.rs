@@ -16,7 +16,7 @@ mod legacy;
 mod tests;
 mod window;
 
-use sesame_plan::{Dimension, Shape, Span};
+use sesame_plan::{ChoiceKind, Dimension, Span};
 
 pub use adapt::{disturbance, observed, observed_point, planned};
 pub use extent::extent;
@@ -44,7 +44,7 @@ pub struct Intensity {
     /// What the test chose, lower end first; both ends are equal for a single value.
     pub chosen: (f64, f64),
     /// Whether the test chooses a value or a sub-range.
-    pub shape: Shape,
+    pub shape: ChoiceKind,
 }
 
 /// Whose formulas are used. New campaigns always use [`Convention::Ours`]; the others reproduce old numbers.
@@ -151,7 +151,7 @@ impl Intensity {
         Some(match (convention, class) {
             (Convention::Original, Class::Loss) => (high - to) / width,
             (Convention::Original, Class::Delay) => (from - low) / width,
-            _ if self.shape == Shape::Range => (to - from) / width,
+            _ if self.shape == ChoiceKind::Range => (to - from) / width,
             (Convention::Paper, _) => from / width,
             _ => (from - low) / width,
         })

@@ -1,7 +1,7 @@
 //! Variations of a test along one dimension of the reduced space: the same operations, stronger or milder, later or
 //! earlier, longer or shorter. They show where a reality gap begins and ends [SESAME 2023, Section 4.6].
 
-use sesame_plan::{Activation, CampaignPlan, Choice, Copies, Dimension, Domain, Parameter, Shape, Span, Test};
+use sesame_plan::{Activation, CampaignPlan, Choice, ChoiceKind, Copies, Dimension, Domain, Parameter, Span, Test};
 
 use crate::sspr::{Convention, Point, disturbance, planned};
 
@@ -182,8 +182,8 @@ fn strengthen(parameter: &Parameter, choice: &mut Choice, by: f64) {
             let to = moved(*value, low, high);
             *value = if integer { libm::round(to) } else { to };
         }
-        // Of a range, its width is what counts.
-        (&Domain::Number { low, high, shape: Shape::Range, integer }, Choice::Range { low: from, high: to }) => {
+        // For a range, only its width counts.
+        (&Domain::Number { low, high, shape: ChoiceKind::Range, integer }, Choice::Range { low: from, high: to }) => {
             let width = ((*to - *from) + by * (high - low)).clamp(0.0, high - low);
             let middle = f64::midpoint(*from, *to).clamp(low + width / 2.0, high - width / 2.0);
             let ends = [(middle - width / 2.0).max(low), (middle + width / 2.0).min(high)];

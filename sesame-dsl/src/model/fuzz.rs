@@ -1,7 +1,7 @@
 //! Fuzzing operations and the known tests that apply them.
 
 use super::condition::{Condition, Constraint};
-use sesame_plan::{Bound, Choice, Moment, OperationKind, Shape, Step};
+use sesame_plan::{Bound, Choice, ChoiceKind, Moment, OperationKind, Step};
 
 use super::declaration::Declaration;
 use super::ids::{MetricId, NodeId, OperationId, TopicId};
@@ -83,7 +83,7 @@ pub enum Domain {
         /// What is permitted.
         range: Range,
         /// What a test chooses.
-        shape: Shape,
+        shape: ChoiceKind,
         /// Whether only whole numbers are permitted; the ends of the range then are whole as well.
         integer: bool,
     },

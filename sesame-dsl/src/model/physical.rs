@@ -54,7 +54,7 @@ pub struct Shape {
     /// What it looks like.
     pub form: Form,
     /// Where it is.
-    pub place: Place,
+    pub place: ShapePlace,
     /// How much larger it is taken to be on every side, in metres; 0 or more. Default 0.
     pub expand: f64,
 }
@@ -70,7 +70,7 @@ pub enum Form {
 
 /// Where a body is.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Place {
+pub enum ShapePlace {
     /// It moves with the pose of this name.
     Pose(String),
     /// Its centre is here, in metres.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::Resolver;
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
-use crate::model::{self, Domain, Moment, OperationKind, Parameter, Shape, Target};
+use crate::model::{self, ChoiceKind, Domain, Moment, OperationKind, Parameter, Target};
 use crate::span::Span;
 use crate::syntax::ast;
 use crate::units::Unit;
@@ -88,7 +88,7 @@ impl<'a> Resolver<'a> {
                     }
                 }
                 self.one_value(permitted, range.span);
-                Some((unit, Domain::Number { range: permitted, shape: Shape::Value, integer: *integer }))
+                Some((unit, Domain::Number { range: permitted, shape: ChoiceKind::Value, integer: *integer }))
             }
             ast::Domain::Point { unit, corners } => {
                 let [low, high] = &**corners;

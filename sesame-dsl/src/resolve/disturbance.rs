@@ -8,8 +8,8 @@ use super::resource::acts_on_nodes;
 use super::words::type_in_words;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{
-    Distribution, Domain, Drain, Id as _, NotFinite, OperationKind, Parameter, Range, Shape, Step, Target, TopicId,
-    Type, ValueMode,
+    ChoiceKind, Distribution, Domain, Drain, Id as _, NotFinite, OperationKind, Parameter, Range, Step, Target,
+    TopicId, Type, ValueMode,
 };
 use crate::span::Span;
 use crate::syntax::ast;
@@ -74,9 +74,9 @@ impl<'a> Resolver<'a> {
                     self.report(diagnostic);
                 }
                 let (distribution, shape) = match distribution.first() {
-                    None | Some((_, ast::Distribution::Fixed)) => (Distribution::Fixed, Shape::Value),
-                    Some((_, ast::Distribution::Uniform)) => (Distribution::Uniform, Shape::Range),
-                    Some((_, ast::Distribution::Normal)) => (Distribution::Normal, Shape::Range),
+                    None | Some((_, ast::Distribution::Fixed)) => (Distribution::Fixed, ChoiceKind::Value),
+                    Some((_, ast::Distribution::Uniform)) => (Distribution::Uniform, ChoiceKind::Range),
+                    Some((_, ast::Distribution::Normal)) => (Distribution::Normal, ChoiceKind::Range),
                 };
                 let drain = self.drain(drain);
                 let domain = Domain::Number { range: self.times(range, "the delay")?, shape, integer: false };
@@ -168,7 +168,7 @@ impl<'a> Resolver<'a> {
                 {
                     return None;
                 }
-                let domain = Domain::Number { range: copies, shape: Shape::Value, integer: true };
+                let domain = Domain::Number { range: copies, shape: ChoiceKind::Value, integer: true };
                 let parameter = Parameter { name: "copies".to_owned(), doc: String::new(), unit: None, domain };
                 Some((target?, OperationKind::Duplicate, vec![parameter]))
             }
@@ -249,7 +249,7 @@ impl<'a> Resolver<'a> {
             name: name.to_owned(),
             doc: String::new(),
             unit: permitted.unit.clone(),
-            domain: Domain::Number { range, shape: Shape::Range, integer },
+            domain: Domain::Number { range, shape: ChoiceKind::Range, integer },
         };
         let (integer, parameters) = match &permitted.domain {
             Domain::Number { range, integer, .. } => (*integer, vec![sub_range(name, *range, *integer)]),
@@ -300,7 +300,7 @@ impl<'a> Resolver<'a> {
         if integer && !self.whole_ends(skew, range, "`skew`") {
             return None;
         }
-        let domain = Domain::Number { range: skew, shape: Shape::Value, integer };
+        let domain = Domain::Number { range: skew, shape: ChoiceKind::Value, integer };
         let parameter = Parameter { name: "skew".to_owned(), doc: String::new(), unit, domain };
         Some((found, OperationKind::ClockSkew, vec![parameter]))
     }
@@ -334,7 +334,7 @@ impl<'a> Resolver<'a> {
                 if *integer && !self.whole_ends(permitted, range, &what) {
                     return None;
                 }
-                (unit, Domain::Number { range: permitted, shape: Shape::Value, integer: *integer })
+                (unit, Domain::Number { range: permitted, shape: ChoiceKind::Value, integer: *integer })
             }
             (Held::Point { unit }, ast::Amounts::Corners(corners, _)) => {
                 let (low, high) = self.corners(corners, unit.as_ref(), &what)?;
@@ -441,7 +441,14 @@ impl<'a> Resolver<'a> {
         Some((Target { topic, places: found.into_iter().map(|(_, steps, _)| steps).collect() }, ty))
     }
 
-    fn report_unfit(&mut self, place: &ast::Place, user: &str, wants: &str, ty: &Type, is_for: impl Fn(&Type) -> bool) {
+    fn report_unfit(
+        &mut self,
+        place: &ast::ValuePath,
+        user: &str,
+        wants: &str,
+        ty: &Type,
+        is_for: impl Fn(&Type) -> bool,
+    ) {
         let written = self.text(place.span);
         let title = format!("{user} needs {wants}, but `{written}` is {}", type_in_words(ty));
         let mut diagnostic = Diagnostic::new(Code::WRONG_TYPE, place.span, title).label(format!("expected {wants}"));
@@ -464,7 +471,7 @@ impl<'a> Resolver<'a> {
     }
 
     /// Where a place is, and its type.
-    fn place(&mut self, place: &'a ast::Place) -> Option<(TopicId, Vec<Step>, Type)> {
+    fn place(&mut self, place: &'a ast::ValuePath) -> Option<(TopicId, Vec<Step>, Type)> {
         let index = self.find(&place.topic, super::Kind::Topic)?;
         let mut ty = self.system.topics[index].as_ref()?.ty.clone();
         let mut holder = format!("topic `{}`", place.topic.text);
@@ -518,6 +525,6 @@ fn whole_or_parts(target: Target) -> Target {
 
 /// A parameter of which a test chooses one number.
 pub(super) fn number(name: &str, unit: Option<Unit>, range: Range) -> Parameter {
-    let domain = Domain::Number { range, shape: Shape::Value, integer: false };
+    let domain = Domain::Number { range, shape: ChoiceKind::Value, integer: false };
     Parameter { name: name.to_owned(), doc: String::new(), unit, domain }
 }

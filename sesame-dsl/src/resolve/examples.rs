@@ -5,7 +5,7 @@ use sesame_notation::quoted;
 use super::quantity::percent;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{self, Domain, Moment, OperationKind, Parameter, Range, Shape};
+use crate::model::{self, ChoiceKind, Domain, Moment, OperationKind, Parameter, Range};
 use crate::span::Span;
 use crate::syntax::ast::eddi::{Eddi, State};
 use crate::units::{Unit, convert};
@@ -87,8 +87,10 @@ pub(super) fn value(parameter: &Parameter, kind: &OperationKind) -> String {
         if probability { format!("{}%", convert(value, None, Some(&percent()))) } else { format!("{value}{unit}") }
     };
     match &parameter.domain {
-        Domain::Number { range, shape: Shape::Value, .. } => number(range.low),
-        Domain::Number { range, shape: Shape::Range, .. } => format!("[{}, {}]", number(range.low), number(range.high)),
+        Domain::Number { range, shape: ChoiceKind::Value, .. } => number(range.low),
+        Domain::Number { range, shape: ChoiceKind::Range, .. } => {
+            format!("[{}, {}]", number(range.low), number(range.high))
+        }
         Domain::Point { low: [x, y, z], .. } => format!("({x}, {y}, {z}){unit}"),
         Domain::Texts(items) | Domain::Files(items) => quoted(items.first().map_or("", String::as_str)),
     }

@@ -7,7 +7,9 @@ use super::quantity::percent;
 use super::words::list;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{self, Activation, Choice, Domain, Id as _, OperationId, OperationKind, Parameter, Range, Shape};
+use crate::model::{
+    self, Activation, Choice, ChoiceKind, Domain, Id as _, OperationId, OperationKind, Parameter, Range,
+};
 
 use crate::span::Span;
 use crate::syntax::ast;
@@ -397,7 +399,7 @@ impl<'a> Resolver<'a> {
         choice: &ast::Choice,
         index: usize,
         (parameter, probability): (&Parameter, bool),
-        (permitted_range, shape, integer): (Range, Shape, bool),
+        (permitted_range, shape, integer): (Range, ChoiceKind, bool),
         example: &str,
     ) -> Option<Choice> {
         // Probabilities are percentages in the language and fractions in the model.
@@ -406,16 +408,16 @@ impl<'a> Resolver<'a> {
         let what = format!("`{}`", parameter.name);
         let span = choice.span();
         let (found, chosen) = match (choice, shape) {
-            (ast::Choice::Value(quantity), Shape::Value) => {
+            (ast::Choice::Value(quantity), ChoiceKind::Value) => {
                 let value = self.value(quantity, unit, &what)?;
                 let value = if probability { self.probability(quantity, value) } else { value };
                 (Range { low: value, high: value }, Choice::Value { value })
             }
-            (ast::Choice::Range(range), Shape::Range) => {
+            (ast::Choice::Range(range), ChoiceKind::Range) => {
                 let range = self.range(range, unit, &what)?;
                 (range, Choice::Range { low: range.low, high: range.high })
             }
-            (_, Shape::Range) => {
+            (_, ChoiceKind::Range) => {
                 let written = self.text(span);
                 let diagnostic = Diagnostic::new(Code::WRONG_CHOICE, span, format!("{what} must be a range in a test"))
                     .label(format!("expected a range, for example `{example}`"))
@@ -424,7 +426,7 @@ impl<'a> Resolver<'a> {
                 self.report(diagnostic);
                 return None;
             }
-            (_, Shape::Value) => {
+            (_, ChoiceKind::Value) => {
                 let mut diagnostic = Diagnostic::new(
                     Code::WRONG_CHOICE,
                     span,

@@ -1,6 +1,6 @@
 //! The clauses of a system in addition to its simulator: launching, terminating, the budget of the relay.
 
-use super::placeholders::Place;
+use super::placeholders::Purpose;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{self, Id as _, Lifecycle, ReadyWhen, TopicId};
@@ -154,7 +154,7 @@ impl<'a> Resolver<'a> {
 
     /// The number of a port, or a text that is one once its placeholders are replaced.
     fn port(&mut self, port: &Text) -> Option<String> {
-        if port.text.trim().is_empty() || !self.placeholders(port, Place::Port) {
+        if port.text.trim().is_empty() || !self.placeholders(port, Purpose::Port) {
             return None;
         }
         let replaced = port.text.contains("{port}") || port.text.contains("{worker}");
@@ -192,7 +192,7 @@ impl<'a> Resolver<'a> {
     }
 
     fn command(&mut self, span: Span, command: &'a written::Command) -> Option<model::Command> {
-        let sound = command.arguments.iter().map(|argument| self.placeholders(argument, Place::Argument));
+        let sound = command.arguments.iter().map(|argument| self.placeholders(argument, Purpose::Argument));
         let sound = sound.fold(true, |all, one| all & one);
         // Empty texts were reported where they were read.
         let arguments = command.arguments.iter().map(|argument| argument.text.clone()).collect();

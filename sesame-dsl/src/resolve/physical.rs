@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::ros2::is_of_ros;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::physical::{Fit, Form, LabBudget, LabCost, Physical, Place, RankOrder, Shape};
+use crate::model::physical::{Fit, Form, LabBudget, LabCost, Physical, RankOrder, Shape, ShapePlace};
 use crate::model::{Dimension, Domain, Id as _, MetricId, Parameter, Simulator, Type};
 use crate::similar::most_similar;
 use crate::span::Span;
@@ -221,8 +221,8 @@ impl<'a> Resolver<'a> {
             written::Form::Box(edges) => self.vector(edges, true).map(Form::Box),
         };
         let place = match &shape.place {
-            written::ShapePlace::Carried(pose) => self.plain_text(pose).map(Place::Pose),
-            written::ShapePlace::Fixed(point) => self.vector(point, false).map(Place::Point),
+            written::ShapePlace::Carried(pose) => self.plain_text(pose).map(ShapePlace::Pose),
+            written::ShapePlace::Fixed(point) => self.vector(point, false).map(ShapePlace::Point),
         };
         let expand = match &shape.expand {
             Some(expand) => self.not_negative(expand, Some(&metre), "the margin of a shape"),

@@ -12,7 +12,7 @@ const KNOWN: [&str; 6] = ["worker", "domain", "port", "folder", "seed", "ros-arg
 
 /// What a text is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Place {
+pub(super) enum Purpose {
     /// An argument of a program.
     Argument,
     /// The number of a port.
@@ -21,10 +21,10 @@ pub(super) enum Place {
 
 impl Resolver<'_> {
     /// Reports placeholders that are not replaced; returns whether there is none of them.
-    pub(super) fn placeholders(&mut self, text: &Text, place: Place) -> bool {
-        let permitted = match place {
-            Place::Argument => &KNOWN[..],
-            Place::Port => &["worker", "port"],
+    pub(super) fn placeholders(&mut self, text: &Text, purpose: Purpose) -> bool {
+        let permitted = match purpose {
+            Purpose::Argument => &KNOWN[..],
+            Purpose::Port => &["worker", "port"],
         };
         let mut sound = true;
         for word in words(&text.text) {

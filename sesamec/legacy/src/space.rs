@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use sesame_notation::{self as notation, Clauses, Unit, doc_comment, quoted};
 use sesame_plan::condition::Integers;
-use sesame_plan::{self as plan, Shape};
+use sesame_plan::{self as plan, ChoiceKind};
 
 use crate::campaigns;
 use crate::dialect::Dialect;
@@ -385,11 +385,11 @@ impl Writer<'_> {
             let domain = match &set.domain {
                 Domain::Reals(low, high) => {
                     let (low, high) = ordered(*low, *high, &of, self.notes);
-                    plan::Domain::Number { low, high, shape: Shape::Value, integer: false }
+                    plan::Domain::Number { low, high, shape: ChoiceKind::Value, integer: false }
                 }
                 Domain::Integers(low, high) => {
                     let (low, high) = ordered(*low, *high, &of, self.notes);
-                    plan::Domain::Number { low: low as f64, high: high as f64, shape: Shape::Value, integer: true }
+                    plan::Domain::Number { low: low as f64, high: high as f64, shape: ChoiceKind::Value, integer: true }
                 }
                 Domain::Points(one, other) => {
                     let axis = |axis: usize, notes: &mut Notes| ordered(one[axis], other[axis], &of, notes);

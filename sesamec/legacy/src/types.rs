@@ -63,7 +63,7 @@ pub(crate) enum Type {
 }
 
 #[derive(Debug)]
-struct Message {
+struct MessageType {
     name: String,
     fields: Vec<(String, Type)>,
 }
@@ -71,7 +71,7 @@ struct Message {
 /// The message types of a file, as they are needed.
 #[derive(Debug, Default)]
 pub(crate) struct Messages {
-    list: Vec<Message>,
+    list: Vec<MessageType>,
     known: BTreeMap<String, usize>,
 }
 
@@ -160,7 +160,7 @@ impl Messages {
     fn add(&mut self, name: &str, names: &mut Names) -> usize {
         let short = name.rsplit('/').next().unwrap_or_default();
         let at = self.list.len();
-        self.list.push(Message { name: names.take(short, "Message"), fields: Vec::new() });
+        self.list.push(MessageType { name: names.take(short, "Message"), fields: Vec::new() });
         self.known.insert(name.to_owned(), at);
         at
     }

@@ -6,7 +6,7 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 
 use sesame_base::time::SimTime;
 use sesame_plan::condition::{Comparison, Condition, Operand};
-use sesame_plan::{Activation, CampaignPlan, Choice, Domain, MetricId, OperationId, Shape, Test, TestOperation};
+use sesame_plan::{Activation, CampaignPlan, Choice, ChoiceKind, Domain, MetricId, OperationId, Test, TestOperation};
 use sesame_relay::metric::MetricTable;
 use sesame_relay::relay::{Exchange as _, Relay};
 use sesame_relay::value::{Fields, Record, Value};
@@ -22,8 +22,8 @@ fn active(plan: &CampaignPlan, names: &[&str]) -> Test {
             let Domain::Number { low, high, shape, .. } = parameter.domain else { panic!("these have numbers only") };
             let (low, high) = (low * 0.75 + high * 0.25, high * 0.75 + low * 0.25);
             match shape {
-                Shape::Value => Choice::Value { value: f64::midpoint(low, high) },
-                Shape::Range => Choice::Range { low, high },
+                ChoiceKind::Value => Choice::Value { value: f64::midpoint(low, high) },
+                ChoiceKind::Range => Choice::Range { low, high },
             }
         });
         TestOperation {

@@ -3,7 +3,7 @@
 use sesame_plan::condition::{Constraint, Integers};
 use sesame_plan::{
     CampaignPlan, Distribution, Domain, Drain, Lengths, Metric, Operation, OperationKind, Parameter, Span,
-    place_in_words,
+    value_path_in_words,
 };
 
 use crate::text::{list, one_of, quoted};
@@ -15,7 +15,7 @@ pub fn operation(plan: &CampaignPlan, operation: &Operation) -> String {
     if let Some(topic) = operation.topic {
         let topic = plan.topic(topic).name.as_str();
         let mut targets: Vec<String> =
-            operation.places.iter().map(|place| format!("{topic}{}", place_in_words(place))).collect();
+            operation.places.iter().map(|place| format!("{topic}{}", value_path_in_words(place))).collect();
         if targets.is_empty() {
             targets.push(topic.to_owned());
         }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Place, TopicId};
+use crate::{TopicId, ValuePath};
 
 /// Something of a simulation that may be fitted to a lab, and the range that is permitted.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -45,7 +45,7 @@ pub struct Values {
     pub topic: TopicId,
     /// Where in each message; none for the message itself.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub places: Vec<Place>,
+    pub places: Vec<ValuePath>,
 }
 
 /// What is set in a simulation so that it is closer to a lab. It acts during the whole of every run, after the

@@ -24,7 +24,7 @@ pub struct Operation {
     pub to: Vec<NodeId>,
     /// The values in each message that it changes, in written order; none exactly where it acts on whole messages.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub places: Vec<Place>,
+    pub places: Vec<ValuePath>,
     /// What it does to them.
     pub kind: OperationKind,
     /// The parameters a test chooses, in the order that [`OperationKind`] documents.
@@ -110,7 +110,7 @@ pub enum Times {
 }
 
 /// Where in a message a value is: from the message inwards; empty for the message itself.
-pub type Place = Vec<Step>;
+pub type ValuePath = Vec<Step>;
 
 /// One step into a message.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -124,14 +124,14 @@ pub enum Step {
     Each,
 }
 
-/// A place behind a topic's name, as the `.sesame` file has it: `.level`, `[3]`, `.ranges[*]`.
-pub fn place_in_words(place: &[Step]) -> String {
+/// The path to a value behind a topic's name, as the `.sesame` file has it: `.level`, `[3]`, `.ranges[*]`.
+pub fn value_path_in_words(path: &[Step]) -> String {
     let step = |step: &Step| match step {
         Step::Field(name) => format!(".{name}"),
         Step::Element(at) => format!("[{at}]"),
         Step::Each => "[*]".to_owned(),
     };
-    place.iter().map(step).collect()
+    path.iter().map(step).collect()
 }
 
 /// A parameter of an operation: what is permitted in the space, and what a test makes of it.
@@ -156,7 +156,7 @@ pub enum Domain {
         /// Upper end of what is permitted.
         high: f64,
         /// What a test chooses.
-        shape: Shape,
+        shape: ChoiceKind,
         /// Whether only whole numbers are permitted.
         integer: bool,
     },
@@ -193,7 +193,7 @@ impl Domain {
 /// What a test chooses of a permitted range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Shape {
+pub enum ChoiceKind {
     /// One value of it.
     Value,
     /// A sub-range of it.

@@ -7,12 +7,12 @@
 pub mod compact;
 
 use crate::{
-    Activation, ActivationMode, Bound, Campaign, CampaignPlan, Channel, Choice, Comparison, Compression, Copies, Count,
-    Demand, Dialect, Distribution, Domain, Drain, Evidence, Expression, Field, FieldRef, Gate, Guarantee, Input,
-    KnownTest, Lab, LabCost, Members, MessageId, MessageType, Metric, MetricId, MetricSource, Monitor, MonitorId, Node,
-    Operation, OperationId, OperationKind, Parameter, Remote, Requirement, Ros, Ros1, Ros2, Rosbridge, SCHEMA,
-    SafeState, Score, Search, Shape, Side, Simlog, SimlogVersion, Simulator, Span, Step, Strategy, Test, TestOperation,
-    Topic, TopicId, Transport, Type, ValueMode, WireNames, Wiring, formula,
+    Activation, ActivationMode, Bound, Campaign, CampaignPlan, Channel, Choice, ChoiceKind, Comparison, Compression,
+    Copies, Count, Demand, Dialect, Distribution, Domain, Drain, Evidence, Expression, Field, FieldRef, Gate,
+    Guarantee, Input, KnownTest, Lab, LabCost, Members, MessageId, MessageType, Metric, MetricId, MetricSource,
+    Monitor, MonitorId, Node, Operation, OperationId, OperationKind, Parameter, Remote, Requirement, Ros, Ros1, Ros2,
+    Rosbridge, SCHEMA, SafeState, Score, Search, Side, Simlog, SimlogVersion, Simulator, Span, Step, Strategy, Test,
+    TestOperation, Topic, TopicId, Transport, Type, ValueMode, WireNames, Wiring, formula,
 };
 
 /// The smallest valid plan: a simulator, and [a campaign](campaign) that may not use anything.
@@ -268,12 +268,12 @@ pub fn parameter(name: &str, domain: Domain) -> Parameter {
 
 /// A parameter of which a test chooses one real number.
 pub fn value(name: &str, low: f64, high: f64) -> Parameter {
-    parameter(name, Domain::Number { low, high, shape: Shape::Value, integer: false })
+    parameter(name, Domain::Number { low, high, shape: ChoiceKind::Value, integer: false })
 }
 
 /// A parameter of which a test chooses a sub-range of real numbers.
 pub fn range(name: &str, low: f64, high: f64) -> Parameter {
-    parameter(name, Domain::Number { low, high, shape: Shape::Range, integer: false })
+    parameter(name, Domain::Number { low, high, shape: ChoiceKind::Range, integer: false })
 }
 
 /// A plan of topic `command` of reals and topic `zones` with two members of `Zone { level: real, count: int }`, and of
@@ -301,10 +301,10 @@ pub fn plan(operations: Vec<Operation>) -> CampaignPlan {
 /// [`operation_with`].
 pub fn operation(topic: u32, kind: OperationKind) -> Operation {
     let whole =
-        |name: &str, low, high| parameter(name, Domain::Number { low, high, shape: Shape::Value, integer: true });
+        |name: &str, low, high| parameter(name, Domain::Number { low, high, shape: ChoiceKind::Value, integer: true });
     let parameters = match &kind {
         OperationKind::RandomValue { integer, mode } => {
-            let domain = Domain::Number { low: -9.0, high: 9.0, shape: Shape::Range, integer: *integer };
+            let domain = Domain::Number { low: -9.0, high: 9.0, shape: ChoiceKind::Range, integer: *integer };
             vec![parameter(random_word(*mode), domain)]
         }
         OperationKind::PacketLoss => vec![value("loss", 0.0, 1.0)],

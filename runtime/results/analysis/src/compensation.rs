@@ -2,7 +2,7 @@
 
 use sesame_gap::equivalence::Verdict;
 use sesame_gap::samples::{Samples, moments};
-use sesame_plan::{CampaignPlan, Compensation, Fit, Fitted, Type, Values, place_in_words};
+use sesame_plan::{CampaignPlan, Compensation, Fit, Fitted, Type, Values, value_path_in_words};
 use sesame_present::number::quantity;
 use sesame_present::table::Table;
 
@@ -16,7 +16,7 @@ pub fn fitted(plan: &CampaignPlan, what: &Fitted) -> String {
         match values.places.as_slice() {
             [] => topic.clone(),
             places => {
-                let places = places.iter().map(|place| format!("{topic}{}", place_in_words(place)));
+                let places = places.iter().map(|place| format!("{topic}{}", value_path_in_words(place)));
                 places.collect::<Vec<_>>().join(", ")
             }
         }

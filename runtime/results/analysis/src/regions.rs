@@ -12,7 +12,7 @@ mod tests;
 mod tree;
 
 use feature::{Feature, features, numbers};
-use tree::{Columns, Growth, Node, Question};
+use tree::{Columns, Growth, Question, TreeNode};
 
 use sesame_plan::{CampaignPlan, RequirementId};
 use sesame_record::{Judge, Origin, RecordError, Repository, ScannedTest, Verdict};
@@ -46,7 +46,7 @@ pub struct Regions {
     pub all: Tally,
     /// The regions, those with the largest share of failing tests first.
     pub rules: Vec<Rule>,
-    root: Node,
+    root: TreeNode,
     plan_features: Vec<Feature>,
 }
 
@@ -211,7 +211,7 @@ fn fails(plan: &CampaignPlan, judge: &Judge<'_>, target: Target, test: &ScannedT
 }
 
 /// Shows every leaf with the questions above it, in the order of the tree.
-fn leaves(node: &Node, path: &mut Vec<Step>, each: &mut impl FnMut(&[Step], Tally)) {
+fn leaves(node: &TreeNode, path: &mut Vec<Step>, each: &mut impl FnMut(&[Step], Tally)) {
     let Some(split) = &node.split else { return each(path, node.tally) };
     for (holds, below) in [(true, &split.holds), (false, &split.fails)] {
         path.push(Step { question: split.question, holds, missing: split.missing });

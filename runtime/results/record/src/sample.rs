@@ -11,9 +11,9 @@ use sesame_base::observation::{Counters, MetricObservation, Observation, Operati
 use sesame_plan::condition::{Comparison, Condition, ConditionEnd, ConditionSpace, Integers, Operand, Variable};
 use sesame_plan::testing;
 use sesame_plan::{
-    Activation, ActivationMode, Bound, Campaign, CampaignPlan, Choice, CoverageGoal, Dimension, Direction, Domain,
-    GridAxis, KnownTestId, Metric, MetricId, MetricSource, Moment, Operation, OperationId, OperationKind, Parameter,
-    Requirement, Search, Shape, Span, Strategy, Test, TestOperation, TopicId, Trend, Type, ValueMode,
+    Activation, ActivationMode, Bound, Campaign, CampaignPlan, Choice, ChoiceKind, CoverageGoal, Dimension, Direction,
+    Domain, GridAxis, KnownTestId, Metric, MetricId, MetricSource, Moment, Operation, OperationId, OperationKind,
+    Parameter, Requirement, Search, Span, Strategy, Test, TestOperation, TopicId, Trend, Type, ValueMode,
 };
 use sesame_rng::Stream;
 use sesame_search as search;
@@ -275,8 +275,8 @@ fn random_test(plan: &CampaignPlan, seed: u64, number: u32) -> Test {
                     };
                     let (a, b) = (stream.uniform(low, high), stream.uniform(low, high));
                     match shape {
-                        Shape::Value => Choice::Value { value: a },
-                        Shape::Range => Choice::Range { low: a.min(b), high: a.max(b) },
+                        ChoiceKind::Value => Choice::Value { value: a },
+                        ChoiceKind::Range => Choice::Range { low: a.min(b), high: a.max(b) },
                     }
                 })
                 .collect();

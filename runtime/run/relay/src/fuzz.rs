@@ -29,7 +29,7 @@ mod stale;
 mod stuck_at;
 
 use sesame_base::time::SimTime;
-use sesame_plan::{Activation, Choice, Domain, Drain, Operation, OperationKind, Shape, TestOperation, ValueMode};
+use sesame_plan::{Activation, Choice, ChoiceKind, Domain, Drain, Operation, OperationKind, TestOperation, ValueMode};
 
 use crate::value::{Text, Value};
 
@@ -279,7 +279,7 @@ fn mismatch(domain: &Domain, choice: &Choice) -> Option<String> {
         (Domain::Number { low: least, high: most, shape, integer }, Choice::Value { .. } | Choice::Range { .. }) => {
             let (low, high) = bounds(choice);
             let fits = *least <= low && low <= high && high <= *most;
-            let whole = !integer || *shape == Shape::Range || libm::trunc(low) == low;
+            let whole = !integer || *shape == ChoiceKind::Range || libm::trunc(low) == low;
             (!(fits && whole)).then(|| format!("permits [{least}, {most}], not [{low}, {high}]"))
         }
         (Domain::Point { low, high }, Choice::Point { point }) => {

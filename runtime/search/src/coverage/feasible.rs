@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use sesame_plan::{ActivationMode, CampaignPlan, Copies, Dimension, Domain, GridAxis, OperationId, Shape};
+use sesame_plan::{ActivationMode, CampaignPlan, ChoiceKind, Copies, Dimension, Domain, GridAxis, OperationId};
 use sesame_rng::derive_seed;
 
 use crate::coverage::grid::{Grid, place_on};
@@ -232,7 +232,7 @@ impl Values {
         }
     }
 
-    fn of_number((low, high): (f64, f64), range: Range, shape: Shape) -> Option<Values> {
+    fn of_number((low, high): (f64, f64), range: Range, shape: ChoiceKind) -> Option<Values> {
         let width = high - low;
         if width.is_nan() || width <= 0.0 {
             return None;
@@ -241,8 +241,8 @@ impl Values {
             return Some(Values::All);
         }
         let first = match shape {
-            Shape::Value => (range.low - low) / width,
-            Shape::Range => 0.0,
+            ChoiceKind::Value => (range.low - low) / width,
+            ChoiceKind::Range => 0.0,
         };
         let steps = range.high - range.low;
         // So many values are treated as all.

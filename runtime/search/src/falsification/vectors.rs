@@ -4,7 +4,7 @@
 //! Operations before the start or after the end of a run make such campaigns: a test is then the numbers that they
 //! choose. As nothing is hit or missed in time, a process over these numbers foresees what a test does.
 
-use sesame_plan::{Activation, Choice, Shape, Test, TestOperation};
+use sesame_plan::{Activation, Choice, ChoiceKind, Test, TestOperation};
 use sesame_rng::derive_seed;
 
 use crate::space::parameter_space::ParameterSpace;
@@ -33,9 +33,9 @@ impl Vectors {
             for parameter in &kind.parameters {
                 variables += match parameter {
                     _ if parameter.is_fixed() => 0,
-                    ParameterSpace::Number(_, Shape::Value) => 1,
+                    ParameterSpace::Number(_, ChoiceKind::Value) => 1,
                     ParameterSpace::Point(axes) => axes.iter().filter(|axis| !axis.is_fixed()).count(),
-                    ParameterSpace::Number(_, Shape::Range) | ParameterSpace::Items(_) => return None,
+                    ParameterSpace::Number(_, ChoiceKind::Range) | ParameterSpace::Items(_) => return None,
                 };
             }
         }
@@ -93,7 +93,7 @@ mod tests {
             operation.topic = None;
             for parameter in &mut operation.parameters {
                 if let Domain::Number { shape, .. } = &mut parameter.domain {
-                    *shape = Shape::Value;
+                    *shape = ChoiceKind::Value;
                 }
             }
         }

@@ -1,6 +1,6 @@
 //! Tests made of numbers in `0..1`, one for each of their choices: what sampling along such numbers has in common.
 
-use sesame_plan::{Activation, Choice, Shape, Test, TestOperation};
+use sesame_plan::{Activation, Choice, ChoiceKind, Test, TestOperation};
 use sesame_rng::derive_seed;
 
 use crate::space::initial::{fresh_kinds, place};
@@ -52,8 +52,8 @@ fn choice(parameter_space: &ParameterSpace, value: &mut impl FnMut() -> f64) -> 
         }
     };
     match parameter_space {
-        ParameterSpace::Number(range, Shape::Value) => Choice::Value { value: number(range, value()) },
-        ParameterSpace::Number(range, Shape::Range) => {
+        ParameterSpace::Number(range, ChoiceKind::Value) => Choice::Value { value: number(range, value()) },
+        ParameterSpace::Number(range, ChoiceKind::Range) => {
             let (low, high) = range.interval_at([value(), value()]);
             let whole = |x: f64| if range.integer { libm::rint(x) } else { x };
             Choice::Range { low: whole(low), high: whole(high) }

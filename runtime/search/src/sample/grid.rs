@@ -18,7 +18,7 @@
 
 use std::collections::VecDeque;
 
-use sesame_plan::{Activation, CampaignPlan, Choice, Copies, OperationId, Shape, Test, TestOperation};
+use sesame_plan::{Activation, CampaignPlan, Choice, ChoiceKind, Copies, OperationId, Test, TestOperation};
 use sesame_rng::derive_seed;
 
 use crate::SearchError;
@@ -370,8 +370,8 @@ impl Kind {
 impl Levels {
     fn new(parameter: &ParameterSpace, levels: u32) -> Self {
         match parameter {
-            ParameterSpace::Number(range, Shape::Value) => Levels::Value(equally_spaced(*range, levels)),
-            ParameterSpace::Number(range, Shape::Range) => Levels::Range(equally_spaced(*range, levels)),
+            ParameterSpace::Number(range, ChoiceKind::Value) => Levels::Value(equally_spaced(*range, levels)),
+            ParameterSpace::Number(range, ChoiceKind::Range) => Levels::Range(equally_spaced(*range, levels)),
             ParameterSpace::Point(axes) => Levels::Point(axes.map(|axis| equally_spaced(axis, levels))),
             ParameterSpace::Items(items) => Levels::Items(items.clone()),
         }

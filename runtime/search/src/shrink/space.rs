@@ -2,7 +2,7 @@
 
 use sesame_plan::condition::{Condition, ConditionSpace};
 use sesame_plan::{
-    Activation, ActivationMode, CampaignPlan, Choice, Domain, Lengths, OperationId, Shape, Test, TestOperation,
+    Activation, ActivationMode, CampaignPlan, Choice, ChoiceKind, Domain, Lengths, OperationId, Test, TestOperation,
 };
 
 use crate::space::condition::is_allowed;
@@ -69,7 +69,7 @@ impl ShrinkSpace {
                     let step = if range.integer { libm::round(step).max(1.0) } else { step };
                     let end = operation.kind.neutral_value(&parameter.name).map(|end| end.clamp(range.low, range.high));
                     // A value that is not stronger than another is left as it is.
-                    let known = end.is_some() || shape == Shape::Range;
+                    let known = end.is_some() || shape == ChoiceKind::Range;
                     (known && !range.is_fixed()).then_some(NeutralValue { end, step })
                 };
                 match ParameterSpace::from_domain(&parameter.domain)? {
@@ -77,7 +77,7 @@ impl ShrinkSpace {
                     ParameterSpace::Point(axes) => {
                         let fixed = |range: Range| NeutralValue { end: Some(range.low), step: 0.0 };
                         operation.kind.neutral_value(&parameter.name)?;
-                        Some(Parameter::Point(axes.map(|axis| neutral(axis, Shape::Value).unwrap_or(fixed(axis)))))
+                        Some(Parameter::Point(axes.map(|axis| neutral(axis, ChoiceKind::Value).unwrap_or(fixed(axis)))))
                     }
                     ParameterSpace::Items(_) => None,
                 }
@@ -195,7 +195,7 @@ fn strength_of(plan: &CampaignPlan, used: &TestOperation) -> f64 {
         let mut add = |(low, high): (f64, f64), (from, to): (f64, f64), shape| {
             let share = match end.map(|end| end.clamp(low, high)) {
                 Some(end) => (from - end).abs().max((to - end).abs()) / (high - end).max(end - low),
-                None if shape == Shape::Range => (to - from) / (high - low),
+                None if shape == ChoiceKind::Range => (to - from) / (high - low),
                 None => return,
             };
             if low < high {
@@ -211,7 +211,7 @@ fn strength_of(plan: &CampaignPlan, used: &TestOperation) -> f64 {
             }
             (Domain::Point { low, high }, Choice::Point { point }) => {
                 for axis in 0..3 {
-                    add((low[axis], high[axis]), (point[axis], point[axis]), Shape::Value);
+                    add((low[axis], high[axis]), (point[axis], point[axis]), ChoiceKind::Value);
                 }
             }
             _ => {}

@@ -5,7 +5,7 @@ use proptest::test_runner::TestCaseResult;
 
 use sesame_plan::condition::ConditionEnd;
 use sesame_plan::{
-    Activation, ActivationMode, Choice, Domain, OperationId, OperationKind, Search, Shape, Strategy, TestOperation,
+    Activation, ActivationMode, Choice, ChoiceKind, Domain, OperationId, OperationKind, Search, Strategy, TestOperation,
 };
 use sesame_rng::Stream;
 
@@ -246,7 +246,8 @@ fn losses() -> CampaignPlan {
     let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(Strategy::Random, 1));
     for operation in &mut plan.operations {
         operation.kind = OperationKind::PacketLoss;
-        operation.parameters[0].domain = Domain::Number { low: 0.0, high: 1.0, shape: Shape::Value, integer: false };
+        operation.parameters[0].domain =
+            Domain::Number { low: 0.0, high: 1.0, shape: ChoiceKind::Value, integer: false };
     }
     plan
 }
@@ -340,7 +341,8 @@ fn a_value_goes_to_what_disturbs_least_of_its_kind() {
         let mut plan = losses();
         plan.operations[0].kind = kind;
         plan.operations[0].parameters[0].name = name.to_owned();
-        plan.operations[0].parameters[0].domain = Domain::Number { low, high, shape: Shape::Value, integer: false };
+        plan.operations[0].parameters[0].domain =
+            Domain::Number { low, high, shape: ChoiceKind::Value, integer: false };
         let original = offsets(&[(0, (2.0, 50.0), Choice::Value { value: low * 0.4 + high * 0.6 })]);
         let shrink = shrunk(Shrink::new(&plan, shrinking(original, 1, 500)), |_, _| true);
         let Choice::Value { value } = smallest(&shrink).unwrap().operations[0].parameters[0] else { panic!("a value") };

@@ -1,6 +1,6 @@
 //! Choosing a parameter: anew, or near what was chosen.
 
-use sesame_plan::{Choice, Domain, Shape};
+use sesame_plan::{Choice, ChoiceKind, Domain};
 use sesame_rng::Stream;
 
 use crate::space::range::{Range, StepSizes};
@@ -9,7 +9,7 @@ use crate::space::range::{Range, StepSizes};
 #[derive(Debug, Clone, PartialEq)]
 pub enum ParameterSpace {
     /// A number of a range, or a sub-range of it.
-    Number(Range, Shape),
+    Number(Range, ChoiceKind),
     /// A point: its range on each axis.
     Point([Range; 3]),
     /// One of these texts or files; at least one.
@@ -45,8 +45,8 @@ impl ParameterSpace {
     /// A choice: values, points and items are uniform over what is permitted, sub-ranges over all feasible pairs.
     pub fn fresh(&self, stream: &mut Stream) -> Choice {
         match self {
-            ParameterSpace::Number(range, Shape::Value) => Choice::Value { value: range.number(stream) },
-            ParameterSpace::Number(range, Shape::Range) => {
+            ParameterSpace::Number(range, ChoiceKind::Value) => Choice::Value { value: range.number(stream) },
+            ParameterSpace::Number(range, ChoiceKind::Range) => {
                 let (low, high) = range.interval(stream);
                 Choice::Range { low, high }
             }

@@ -295,7 +295,7 @@ pub(crate) mod tests {
 
     use sesame_base::condition::constant::has_constant_part;
     use sesame_plan::condition::{ConditionEnd, Integers};
-    use sesame_plan::{Activation, Choice, Domain, Drain, Operation, OperationKind, Search, Shape, Span, Test};
+    use sesame_plan::{Activation, Choice, ChoiceKind, Domain, Drain, Operation, OperationKind, Search, Span, Test};
 
     use super::*;
     use crate::space::condition::contains;
@@ -314,7 +314,7 @@ pub(crate) mod tests {
                     } else {
                         b - 50.0 + f64::from(integer)
                     },
-                    shape: if value { Shape::Value } else { Shape::Range },
+                    shape: if value { ChoiceKind::Value } else { ChoiceKind::Range },
                     integer,
                 }
             });
@@ -491,8 +491,8 @@ pub(crate) mod tests {
                     }
                     (Domain::Number { low: least, high: most, shape, integer }, choice) => {
                         let (low, high) = match (choice, shape) {
-                            (Choice::Value { value }, Shape::Value) => (*value, *value),
-                            (Choice::Range { low, high }, Shape::Range) => (*low, *high),
+                            (Choice::Value { value }, ChoiceKind::Value) => (*value, *value),
+                            (Choice::Range { low, high }, ChoiceKind::Range) => (*low, *high),
                             _ => return Some("shape of a parameter".to_owned()),
                         };
                         let whole = !integer || (libm::trunc(low) == low && libm::trunc(high) == high);
@@ -523,7 +523,7 @@ pub(crate) mod tests {
 
         let mut no_number = plan();
         let offset = &mut no_number.operations[1].parameters[0];
-        offset.domain = Domain::Number { low: 0.2, high: 0.8, shape: Shape::Range, integer: true };
+        offset.domain = Domain::Number { low: 0.2, high: 0.8, shape: ChoiceKind::Range, integer: true };
         assert!(refusal(&no_number).contains("the range of `offset` in operation `jitter1` contains no whole number"));
 
         let mut unreachable = SYNTHETIC_ROBOTS[0]

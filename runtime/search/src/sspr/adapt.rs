@@ -1,7 +1,7 @@
 //! Disturbances of a plan's tests, as planned and as observed.
 
 use sesame_base::observation::{Observation, Outcome};
-use sesame_plan::{Activation, CampaignPlan, Choice, Domain, OperationId, Parameter, Shape, Span, Test};
+use sesame_plan::{Activation, CampaignPlan, Choice, ChoiceKind, Domain, OperationId, Parameter, Span, Test};
 
 use crate::sspr::{Convention, Disturbance, Intensity, Point};
 
@@ -31,7 +31,7 @@ fn intensities(parameter: &Parameter, choice: &Choice) -> Vec<Intensity> {
             .map(|axis| Intensity {
                 permitted: (low[axis], high[axis]),
                 chosen: (point[axis], point[axis]),
-                shape: Shape::Value,
+                shape: ChoiceKind::Value,
             })
             .collect(),
         _ => Vec::new(),

@@ -1,6 +1,6 @@
 //! Between what a campaign's tests lie in the reduced parameter space.
 
-use sesame_plan::{ActivationMode, CampaignPlan, Dimension, Shape};
+use sesame_plan::{ActivationMode, CampaignPlan, ChoiceKind, Dimension};
 
 use crate::space::parameter_space::ParameterSpace;
 use crate::space::test_space::{OperationSpace, TestSpace};
@@ -74,7 +74,9 @@ fn shares(plan: &CampaignPlan, test_space: &TestSpace) -> Vec<(f64, f64)> {
 
 fn shares_of(parameter: &ParameterSpace) -> Vec<(f64, f64)> {
     match parameter {
-        ParameterSpace::Number(range, Shape::Value | Shape::Range) if range.low < range.high => vec![(0.0, 1.0)],
+        ParameterSpace::Number(range, ChoiceKind::Value | ChoiceKind::Range) if range.low < range.high => {
+            vec![(0.0, 1.0)]
+        }
         ParameterSpace::Point(axes) => axes.iter().filter(|axis| axis.low < axis.high).map(|_| (0.0, 1.0)).collect(),
         ParameterSpace::Number(..) | ParameterSpace::Items(_) => Vec::new(),
     }

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use roxmltree::{Document, Node};
 
-use sesame_plan::{Dimension, GridAxis, Shape, Span};
+use sesame_plan::{ChoiceKind, Dimension, GridAxis, Span};
 
 use crate::coverage::{Coverage, Grid};
 use crate::sspr::{Class, Convention, Disturbance, Intensity, Point};
@@ -54,7 +54,7 @@ fn performed(text: &str, campaign: &str) -> Vec<Performed> {
         let template = document.descendants().find(|element| element.attribute(id) == Some(template));
         let (window, permitted) = bounds(&template.expect("the template is there"));
         let (interval, chosen) = bounds(&operation);
-        let parameters = vec![Intensity { permitted, chosen, shape: Shape::Range }];
+        let parameters = vec![Intensity { permitted, chosen, shape: ChoiceKind::Range }];
         Disturbance { class: Class::Value, window, intervals: vec![interval], parameters }
     };
     tests

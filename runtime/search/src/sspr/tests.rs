@@ -6,8 +6,8 @@
 use proptest::prelude::*;
 
 use sesame_plan::{
-    Activation, CampaignPlan, Choice, Dimension, Distribution, Domain, Drain, Operation, OperationKind, Shape, Span,
-    Test,
+    Activation, CampaignPlan, Choice, ChoiceKind, Dimension, Distribution, Domain, Drain, Operation, OperationKind,
+    Span, Test,
 };
 use sesame_rng::Stream;
 
@@ -26,11 +26,11 @@ fn disturbance(class: Class, intervals: &[(f64, f64)], parameters: &[Intensity])
 }
 
 fn range(low: f64, high: f64) -> Intensity {
-    Intensity { permitted: (-1.0, 1.0), chosen: (low, high), shape: Shape::Range }
+    Intensity { permitted: (-1.0, 1.0), chosen: (low, high), shape: ChoiceKind::Range }
 }
 
 fn value(value: f64) -> Intensity {
-    Intensity { permitted: (0.2, 1.2), chosen: (value, value), shape: Shape::Value }
+    Intensity { permitted: (0.2, 1.2), chosen: (value, value), shape: ChoiceKind::Value }
 }
 
 fn coordinates(point: &Point) -> Vec<Option<f64>> {
@@ -123,7 +123,7 @@ fn what_was_never_active_is_no_part_of_the_point() {
 
 #[test]
 fn a_test_without_parameters_has_no_intensity() {
-    let fixed = Intensity { permitted: (0.5, 0.5), chosen: (0.5, 0.5), shape: Shape::Value };
+    let fixed = Intensity { permitted: (0.5, 0.5), chosen: (0.5, 0.5), shape: ChoiceKind::Value };
     let point =
         Point::from_disturbances(&[disturbance(Class::Loss, &[(20.0, 40.0)], &[fixed])], Convention::Ours).unwrap();
     assert_eq!(point.get(Dimension::P1), None);

@@ -5,14 +5,14 @@ use serde::Serialize;
 use sesame_base::visible::visible_json;
 
 use crate::diagnostic::{Applicability, Diagnostic, Severity};
-use crate::place::Place;
+use crate::location::Location;
 use crate::source::SourceMap;
 
 /// A part of the source with what is said about it.
 #[derive(Serialize)]
 struct Label<'a> {
     /// Where it is.
-    at: Place<'a>,
+    at: Location<'a>,
     /// A note on it; may be empty.
     text: &'a str,
 }
@@ -52,14 +52,14 @@ struct Suggested<'a> {
 #[derive(Serialize)]
 struct Edit<'a> {
     /// What is replaced; empty where something is inserted.
-    at: Place<'a>,
+    at: Location<'a>,
     /// The new text.
     replacement: &'a str,
 }
 
 /// One JSON object per line and diagnostic.
 pub fn json(diagnostics: &[Diagnostic], sources: &SourceMap) -> String {
-    let place = |span| Place::new(sources, span);
+    let at = |span| Location::new(sources, span);
     let mut out = String::new();
     for diagnostic in diagnostics {
         let line = Line {
@@ -69,8 +69,8 @@ pub fn json(diagnostics: &[Diagnostic], sources: &SourceMap) -> String {
                 Severity::Warning => "warning",
             },
             title: &diagnostic.title,
-            primary: Label { at: place(diagnostic.span), text: &diagnostic.label },
-            secondary: diagnostic.secondary.iter().map(|(span, text)| Label { at: place(*span), text }).collect(),
+            primary: Label { at: at(diagnostic.span), text: &diagnostic.label },
+            secondary: diagnostic.secondary.iter().map(|(span, text)| Label { at: at(*span), text }).collect(),
             notes: &diagnostic.notes,
             suggestions: diagnostic
                 .suggestions
@@ -84,7 +84,7 @@ pub fn json(diagnostics: &[Diagnostic], sources: &SourceMap) -> String {
                     edits: suggestion
                         .edits
                         .iter()
-                        .map(|(span, replacement)| Edit { at: place(*span), replacement })
+                        .map(|(span, replacement)| Edit { at: at(*span), replacement })
                         .collect(),
                 })
                 .collect(),

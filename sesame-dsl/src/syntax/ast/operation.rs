@@ -37,7 +37,7 @@ pub(crate) struct Target {
     /// The topic of the first place.
     pub(crate) topic: Name,
     /// At least one.
-    pub(crate) places: Vec<Place>,
+    pub(crate) places: Vec<ValuePath>,
     pub(crate) span: Span,
 }
 
@@ -51,7 +51,7 @@ pub(crate) struct Resource {
 
 /// A place in the messages of a topic.
 #[derive(Debug)]
-pub(crate) struct Place {
+pub(crate) struct ValuePath {
     pub(crate) topic: Name,
     pub(crate) steps: Vec<Step>,
     pub(crate) span: Span,

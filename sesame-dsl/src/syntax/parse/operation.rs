@@ -7,7 +7,7 @@ use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::span::Span;
 use crate::syntax::ast::{
     Amounts, Contained, Custom, CustomParameter, Distribution, Domain, Drain, Moment, NotFinite, Operation,
-    OperationBody, OperationKind, Place, Point, Range, Resource, Step, Stuck, Target, Text, UnitName,
+    OperationBody, OperationKind, Point, Range, Resource, Step, Stuck, Target, Text, UnitName, ValuePath,
 };
 
 impl Reader<'_> {
@@ -67,12 +67,12 @@ impl Reader<'_> {
     }
 
     pub(super) fn target(&mut self, pair: &Pair<'_>) -> Target {
-        let places: Vec<Place> = children(pair, Rule::target).map(|place| self.place(&place)).collect();
+        let places: Vec<ValuePath> = children(pair, Rule::target).map(|place| self.place(&place)).collect();
         let topic = places.first().expect("an operation has a target").topic.clone();
         Target { topic, places, span: self.span(pair) }
     }
 
-    fn place(&mut self, pair: &Pair<'_>) -> Place {
+    fn place(&mut self, pair: &Pair<'_>) -> ValuePath {
         let steps = pair.clone().into_inner().filter_map(|step| match step.as_rule() {
             Rule::field_name => Some(Step::Field(self.field_name(&step))),
             Rule::element => Some(match child(&step, Rule::number) {
@@ -82,7 +82,7 @@ impl Reader<'_> {
             _ => None,
         });
         let steps = steps.collect();
-        Place { topic: self.name(&expect_child(pair, Rule::name)), steps, span: self.span(pair) }
+        ValuePath { topic: self.name(&expect_child(pair, Rule::name)), steps, span: self.span(pair) }
     }
 
     fn operation_kind(&mut self, kind: &Pair<'_>) -> OperationKind {

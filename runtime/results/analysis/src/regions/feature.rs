@@ -1,7 +1,7 @@
 //! What is known of a test that may tell whether it fails, in numbers: its point in the reduced space, and of each
 //! operation how often, when, how long and how strong.
 
-use sesame_plan::{CampaignPlan, Dimension, Domain, OperationId, Shape, Span};
+use sesame_plan::{CampaignPlan, ChoiceKind, Dimension, Domain, OperationId, Span};
 use sesame_present::number;
 use sesame_record::ScannedTest;
 use sesame_search::sspr::{Convention, disturbance};
@@ -78,8 +78,8 @@ fn strength(plan: &CampaignPlan, id: OperationId, share: f64, way: &str) -> Opti
     let (factor, unit) = number::scale(&operation.kind, parameter, high);
     let written = |value: f64| number::with_unit(number::number(value * factor), unit);
     Some(match shape {
-        Shape::Value => format!("{} {way} {}", parameter.name, written(low + share * (high - low))),
-        Shape::Range => format!("{} {way} {} wide", parameter.name, written(share * (high - low))),
+        ChoiceKind::Value => format!("{} {way} {}", parameter.name, written(low + share * (high - low))),
+        ChoiceKind::Range => format!("{} {way} {} wide", parameter.name, written(share * (high - low))),
     })
 }
 

@@ -5,7 +5,7 @@ use sesame_plan::CampaignPlan;
 use sesame_present::markup::{Markup, percent};
 
 use crate::regions::Regions;
-use crate::regions::tree::{Node, Tally};
+use crate::regions::tree::{Tally, TreeNode};
 
 /// Height of a band, in pixels.
 const BAND: f64 = 46.0;
@@ -55,7 +55,7 @@ fn height(regions: &Regions) -> f64 {
     f64::from(levels(&regions.root)) * BAND
 }
 
-fn levels(node: &Node) -> u32 {
+fn levels(node: &TreeNode) -> u32 {
     1 + node.split.as_ref().map_or(0, |split| levels(&split.holds).max(levels(&split.fails)))
 }
 
@@ -74,7 +74,7 @@ struct Drawing<'a> {
 }
 
 impl Drawing<'_> {
-    fn bar(&self, markup: &mut Markup, node: &Node, words: &str, (before, top): (f64, f64)) {
+    fn bar(&self, markup: &mut Markup, node: &TreeNode, words: &str, (before, top): (f64, f64)) {
         let Drawing { regions, plan, screens, all } = *self;
         let width = node.tally.tests as f64 / all;
         let failing = node.tally.failing as f64 / node.tally.tests.max(1) as f64;

@@ -88,7 +88,7 @@ proptest! {
         let all: Vec<usize> = (0..table.len()).collect();
         let naive = least_impurity(&columns, &all, &labels, least);
         let found = columns.whole_tree(&labels, growth(1, least));
-        let tally = |node: &Node| (node.tally.tests as f64, node.tally.failing as f64);
+        let tally = |node: &TreeNode| (node.tally.tests as f64, node.tally.failing as f64);
         let impurity = |(n, k): (f64, f64)| k * (n - k) / n;
         let left = match &found.split {
             Some(split) => impurity(tally(&split.holds)) + impurity(tally(&split.fails)),

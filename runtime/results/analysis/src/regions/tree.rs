@@ -35,7 +35,7 @@ pub struct Tally {
 
 /// A tree.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Node {
+pub(super) struct TreeNode {
     pub(super) tally: Tally,
     pub(super) split: Option<Box<Split>>,
 }
@@ -48,8 +48,8 @@ pub(super) struct Split {
     pub(super) missing: bool,
     /// The questions that were weighed, this one included.
     weighed: u64,
-    pub(super) holds: Node,
-    pub(super) fails: Node,
+    pub(super) holds: TreeNode,
+    pub(super) fails: TreeNode,
 }
 
 /// How far a tree grows.
@@ -104,14 +104,14 @@ impl Columns {
     }
 
     /// The tree of the rows that have a label: whether they fail.
-    pub(super) fn tree(&self, labels: &[Option<bool>], growth: Growth) -> Node {
+    pub(super) fn tree(&self, labels: &[Option<bool>], growth: Growth) -> TreeNode {
         let mut node = self.whole_tree(labels, growth);
         prune(&mut node);
         node
     }
 
     /// The same with splits that tell nothing.
-    pub(super) fn whole_tree(&self, labels: &[Option<bool>], growth: Growth) -> Node {
+    pub(super) fn whole_tree(&self, labels: &[Option<bool>], growth: Growth) -> TreeNode {
         let fails: Vec<bool> = labels.iter().map(|label| label.unwrap_or(false)).collect();
         let labelled = |row: &u32| labels[*row as usize].is_some();
         let order = self.order.iter().map(|rows| rows.iter().copied().filter(labelled).collect()).collect();
@@ -121,8 +121,8 @@ impl Columns {
         self.grow(order, tally, &fails, &mut side, growth)
     }
 
-    fn grow(&self, order: Vec<Vec<u32>>, tally: Tally, fails: &[bool], side: &mut [bool], growth: Growth) -> Node {
-        let leaf = Node { tally, split: None };
+    fn grow(&self, order: Vec<Vec<u32>>, tally: Tally, fails: &[bool], side: &mut [bool], growth: Growth) -> TreeNode {
+        let leaf = TreeNode { tally, split: None };
         if growth.depth == 0 || tally.failing == 0 || tally.failing == tally.tests {
             return leaf;
         }
@@ -150,7 +150,7 @@ impl Columns {
         let growth = Growth { depth: growth.depth - 1, ..growth };
         let holds = self.grow(held, below, fails, side, growth);
         let fails = self.grow(other, tally.without(below), fails, side, growth);
-        Node { tally, split: Some(Box::new(Split { question, missing, weighed, holds, fails })) }
+        TreeNode { tally, split: Some(Box::new(Split { question, missing, weighed, holds, fails })) }
     }
 
     /// The question of least impurity, if one is better than none, and how many were weighed.
@@ -196,7 +196,7 @@ impl Columns {
 const CHANCE: f64 = 0.05;
 
 /// Takes back splits that may be chance, from below: those on whose both sides there is no other split.
-fn prune(node: &mut Node) {
+fn prune(node: &mut TreeNode) {
     let Some(split) = &mut node.split else { return };
     prune(&mut split.holds);
     prune(&mut split.fails);

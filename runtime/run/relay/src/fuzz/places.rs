@@ -1,6 +1,6 @@
 //! The values of a message that an operation changes.
 
-use sesame_plan::{Place, Step};
+use sesame_plan::{Step, ValuePath};
 
 use crate::fuzz::action::Action;
 use crate::value::Value;
@@ -10,11 +10,11 @@ const DRAWS_PER_VALUE: u64 = 8;
 
 /// The places of an operation in messages of its topic.
 #[derive(Debug, Clone)]
-pub struct Places(Vec<Place>);
+pub struct Places(Vec<ValuePath>);
 
 impl Places {
     /// These places, or the whole message if the list is empty.
-    pub fn new(places: &[Place]) -> Self {
+    pub fn new(places: &[ValuePath]) -> Self {
         Places(if places.is_empty() { vec![Vec::new()] } else { places.to_vec() })
     }
 
@@ -62,8 +62,8 @@ impl Places {
 #[derive(Debug, Clone, Default)]
 pub struct Memory(Vec<(u64, Value)>);
 
-fn visit(value: &mut Value, place: &[Step], next: &mut u64, change: &mut impl FnMut(&mut Value, u64) -> bool) -> bool {
-    let Some((step, rest)) = place.split_first() else {
+fn visit(value: &mut Value, path: &[Step], next: &mut u64, change: &mut impl FnMut(&mut Value, u64) -> bool) -> bool {
+    let Some((step, rest)) = path.split_first() else {
         let draw = *next;
         *next += DRAWS_PER_VALUE;
         return change(value, draw);
@@ -82,8 +82,8 @@ fn visit(value: &mut Value, place: &[Step], next: &mut u64, change: &mut impl Fn
     }
 }
 
-fn collect(value: &Value, place: &[Step], next: &mut u64, memory: &mut Memory) {
-    let Some((step, rest)) = place.split_first() else {
+fn collect(value: &Value, path: &[Step], next: &mut u64, memory: &mut Memory) {
+    let Some((step, rest)) = path.split_first() else {
         memory.0.push((*next, value.clone()));
         *next += DRAWS_PER_VALUE;
         return;

@@ -9,7 +9,7 @@ use sesame_plan::condition::{Comparison, Condition, Operand};
 use sesame_plan::testing::{self, plan};
 use sesame_plan::{
     Activation, CampaignPlan, Choice, Distribution, Domain, Drain, FieldRef, MetricId, MetricSource, NotFinite,
-    Operation, OperationId, OperationKind, Place, Span, Step, Test, TestOperation, TopicId, Type, ValueMode,
+    Operation, OperationId, OperationKind, Span, Step, Test, TestOperation, TopicId, Type, ValueMode, ValuePath,
 };
 
 use crate::fuzz::KeyedRng;
@@ -76,7 +76,7 @@ impl Payload {
         }
     }
 
-    fn places(self) -> Vec<Place> {
+    fn places(self) -> Vec<ValuePath> {
         let field = |name: &str| Step::Field(name.to_owned());
         match self {
             Payload::Nested => vec![vec![field("inner"), field("level")]],

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use sesame_plan::{CampaignPlan, FieldRef, Input, MetricSource, OperationKind, Place, Step, TopicId};
+use sesame_plan::{CampaignPlan, FieldRef, Input, MetricSource, OperationKind, Step, TopicId, ValuePath};
 
 /// Which fields of a message are read.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -81,9 +81,9 @@ pub fn wanted(plan: &CampaignPlan, topic: TopicId) -> Wanted {
     wanted
 }
 
-/// The fields up to the first list of a place.
-fn fields(place: &Place) -> impl Iterator<Item = &str> {
-    place.iter().map_while(|step| match step {
+/// The fields up to the first list of a path.
+fn fields(path: &ValuePath) -> impl Iterator<Item = &str> {
+    path.iter().map_while(|step| match step {
         Step::Field(name) => Some(name.as_str()),
         Step::Element(_) | Step::Each => None,
     })

@@ -45,12 +45,12 @@ fn found(plan: &CampaignPlan, grid: &Grid, tests: u64) -> BTreeSet<usize> {
             }
             for (choice, parameter_space) in operation.parameters.iter_mut().zip(&kind.parameters) {
                 *choice = match (stream.below(4), parameter_space) {
-                    (0, ParameterSpace::Number(range, Shape::Value)) => Choice::Value { value: range.low },
-                    (0, ParameterSpace::Number(range, Shape::Range)) => {
+                    (0, ParameterSpace::Number(range, ChoiceKind::Value)) => Choice::Value { value: range.low },
+                    (0, ParameterSpace::Number(range, ChoiceKind::Range)) => {
                         Choice::Range { low: range.low, high: range.low }
                     }
-                    (1, ParameterSpace::Number(range, Shape::Value)) => Choice::Value { value: range.high },
-                    (1, ParameterSpace::Number(range, Shape::Range)) => {
+                    (1, ParameterSpace::Number(range, ChoiceKind::Value)) => Choice::Value { value: range.high },
+                    (1, ParameterSpace::Number(range, ChoiceKind::Range)) => {
                         Choice::Range { low: range.low, high: range.high }
                     }
                     (0, ParameterSpace::Point(axes)) => Choice::Point { point: axes.map(|axis| axis.low) },
@@ -259,7 +259,7 @@ fn whole_numbers_reach_the_values_they_have() {
     let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(sesame_plan::Strategy::Random, 1));
     for operation in &mut plan.operations {
         let parameter = &mut operation.parameters[0];
-        parameter.domain = Domain::Number { low: 0.0, high: 2.0, shape: Shape::Value, integer: true };
+        parameter.domain = Domain::Number { low: 0.0, high: 2.0, shape: ChoiceKind::Value, integer: true };
     }
     plan.campaign.count = Count { min: 1, max: 2 };
     // Cells around 0, 1/4, 1/2, 3/4 and 1, with the eighths between them.

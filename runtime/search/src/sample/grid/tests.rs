@@ -89,8 +89,8 @@ fn instances(kind: &OperationSpace, levels: u32) -> Vec<(Option<[i64; 2]>, Vec<i
                 let levels = levels_of(range, levels);
                 let from = |low: f64| -> Vec<Vec<i64>> {
                     match shape {
-                        Shape::Value => vec![vec![rounded(low)]],
-                        Shape::Range => levels
+                        ChoiceKind::Value => vec![vec![rounded(low)]],
+                        ChoiceKind::Range => levels
                             .iter()
                             .filter(|&&high| high >= low)
                             .map(|&high| vec![rounded(low), rounded(high)])
@@ -179,7 +179,7 @@ fn one_operation(domains: &[Domain], copies: Copies, count: Count) -> CampaignPl
     plan
 }
 
-fn number(low: f64, high: f64, shape: Shape, integer: bool) -> Domain {
+fn number(low: f64, high: f64, shape: ChoiceKind, integer: bool) -> Domain {
     Domain::Number { low, high, shape, integer }
 }
 
@@ -290,7 +290,7 @@ fn numbers_take_both_ends_and_whole_numbers_are_not_repeated() {
 
 #[test]
 fn windows_and_sub_ranges_begin_and_end_at_levels() {
-    let plan = one_operation(&[number(-1.0, 1.0, Shape::Range, false)], Copies::Once, ONCE);
+    let plan = one_operation(&[number(-1.0, 1.0, ChoiceKind::Range, false)], Copies::Once, ONCE);
     let ActivationSpace::Time(within) = TestSpace::from_plan(&plan).unwrap().operations()[0].activation else {
         panic!()
     };
@@ -308,7 +308,7 @@ fn windows_and_sub_ranges_begin_and_end_at_levels() {
     }
     assert_eq!(windows, [[start, middle], [start, end], [middle, end]].map(|window| window.map(rounded)).into());
     // The example of the reference.
-    let domains = [number(-0.3, 0.3, Shape::Range, false)];
+    let domains = [number(-0.3, 0.3, ChoiceKind::Range, false)];
     let counts =
         [1, 3].map(|max| grid(&one_operation(&domains, Copies::Apart, Count { min: 1, max }), 4, 1).unwrap().tests);
     assert_eq!(counts, [60, 1_560]);
@@ -318,7 +318,7 @@ fn windows_and_sub_ranges_begin_and_end_at_levels() {
 
 #[test]
 fn every_beginning_has_each_level_about_equally_often() {
-    let domains = [number(0.0, 1.0, Shape::Value, false), number(5.0, 6.0, Shape::Value, false)];
+    let domains = [number(0.0, 1.0, ChoiceKind::Value, false), number(5.0, 6.0, ChoiceKind::Value, false)];
     let plan = one_operation(&domains, Copies::Once, ONCE);
     for seed in 0..20 {
         let mut grid = grid(&plan, 5, seed).unwrap();
@@ -354,7 +354,7 @@ fn numbers_of_operations_take_turns_until_they_are_used_up() {
 
 #[test]
 fn a_grid_too_large_to_count_is_searched_all_the_same() {
-    let domains = [number(0.0, 1.0, Shape::Range, false), number(0.0, 1.0, Shape::Range, false)];
+    let domains = [number(0.0, 1.0, ChoiceKind::Range, false), number(0.0, 1.0, ChoiceKind::Range, false)];
     for copies in [Copies::Apart, Copies::MayOverlap] {
         let plan = one_operation(&domains, copies, Count { min: 40, max: 60 });
         let space = TestSpace::from_plan(&plan).unwrap();
@@ -378,7 +378,7 @@ fn a_grid_too_large_to_count_is_searched_all_the_same() {
 
 #[test]
 fn seeds_change_the_order_and_not_the_tests() {
-    let plan = one_operation(&[number(0.0, 1.0, Shape::Value, false)], Copies::Apart, Count { min: 1, max: 2 });
+    let plan = one_operation(&[number(0.0, 1.0, ChoiceKind::Value, false)], Copies::Apart, Count { min: 1, max: 2 });
     let [one, other] = [1, 2].map(|seed| all_of(grid(&plan, 3, seed).unwrap()).iter().map(shown).collect::<Vec<_>>());
     assert_ne!(one, other);
     assert_eq!(one.into_iter().collect::<BTreeSet<_>>(), other.into_iter().collect());
@@ -393,7 +393,7 @@ fn more_copies_than_levels_have_room_for_are_refused() {
 
 #[test]
 fn a_search_ends_when_the_grid_does_and_is_brought_back_by_its_results() {
-    let mut plan = one_operation(&[number(0.0, 1.0, Shape::Range, false)], Copies::Once, ONCE);
+    let mut plan = one_operation(&[number(0.0, 1.0, ChoiceKind::Range, false)], Copies::Once, ONCE);
     let tests = |plan: &CampaignPlan| {
         let mut search = crate::strategy(plan, 3).unwrap();
         let tests = SYNTHETIC_ROBOTS[0].campaign_of(plan, search.as_mut()).tests;

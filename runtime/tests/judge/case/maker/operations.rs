@@ -2,8 +2,8 @@
 
 use sesame_plan::testing;
 use sesame_plan::{
-    Activation, Choice, Copies, Distribution, Domain, Drain, Metric, MetricId, MetricSource, NotFinite, Operation,
-    OperationId, OperationKind, Shape, Span, Step, TestOperation, ValueMode, condition as switch,
+    Activation, Choice, ChoiceKind, Copies, Distribution, Domain, Drain, Metric, MetricId, MetricSource, NotFinite,
+    Operation, OperationId, OperationKind, Span, Step, TestOperation, ValueMode, condition as switch,
 };
 
 use super::Maker;
@@ -86,14 +86,16 @@ impl Maker {
         let number = |name: &str, low: f64, high: f64, shape, integer| {
             testing::parameter(name, Domain::Number { low, high, shape, integer })
         };
-        let value = |name: &str, low, high| number(name, low, high, Shape::Value, false);
+        let value = |name: &str, low, high| number(name, low, high, ChoiceKind::Value, false);
         let parameters = match &kind {
             Kind::RandomValue { mode, integer } => {
                 let name = if *mode == ValueMode::Offset { "offset" } else { "value" };
-                vec![number(name, -8.0, 8.0, Shape::Range, *integer)]
+                vec![number(name, -8.0, 8.0, ChoiceKind::Range, *integer)]
             }
-            Kind::StuckAt { truth: None } => vec![number("value", -8.0, 8.0, Shape::Value, carries == Carries::Int)],
-            Kind::Bias => vec![number("bias", -8.0, 8.0, Shape::Value, carries == Carries::Int)],
+            Kind::StuckAt { truth: None } => {
+                vec![number("value", -8.0, 8.0, ChoiceKind::Value, carries == Carries::Int)]
+            }
+            Kind::Bias => vec![number("bias", -8.0, 8.0, ChoiceKind::Value, carries == Carries::Int)],
             Kind::Drift => vec![value("rate", -8.0, 8.0)],
             Kind::Noise | Kind::RandomWalk => vec![value("sigma", 0.0, 8.0)],
             Kind::Scale => vec![value("factor", -8.0, 8.0)],
@@ -102,9 +104,9 @@ impl Maker {
             Kind::BurstLoss => ["enter", "leave"].map(|name| value(name, 0.0, 1.0)).to_vec(),
             Kind::RateLimit => vec![value("rate", 0.1, 100.0)],
             Kind::Latency { distribution: Distribution::Fixed, .. } => vec![value("delay", 0.0, 5.0)],
-            Kind::Latency { .. } => vec![number("delay", 0.0, 5.0, Shape::Range, false)],
+            Kind::Latency { .. } => vec![number("delay", 0.0, 5.0, ChoiceKind::Range, false)],
             Kind::Reorder { .. } => vec![value("window", 0.0, 5.0)],
-            Kind::Duplicate => vec![number("copies", 1.0, 100.0, Shape::Value, true)],
+            Kind::Duplicate => vec![number("copies", 1.0, 100.0, ChoiceKind::Value, true)],
             _ => Vec::new(),
         };
         let whole = matches!(
@@ -166,7 +168,7 @@ impl Maker {
                     _ => self.quarters(-4, 4),
                 };
                 match parameter.domain {
-                    Domain::Number { shape: Shape::Range, .. } => {
+                    Domain::Number { shape: ChoiceKind::Range, .. } => {
                         let width =
                             if parameter.name == "delay" { self.ticks(0, 6) } else { f64::from(self.between(0, 3)) };
                         Choice::Range { low: value, high: value + width }

@@ -105,8 +105,10 @@ fn witnessed(plan: &CampaignPlan, grid: &Grid, tests: u64) -> std::collections::
                 if let (true, ParameterSpace::Number(range, shape)) = (stream.chance(0.4), parameter_space) {
                     let high = stream.chance(0.5);
                     *choice = match shape {
-                        sesame_plan::Shape::Value => Choice::Value { value: if high { range.high } else { range.low } },
-                        sesame_plan::Shape::Range => {
+                        sesame_plan::ChoiceKind::Value => {
+                            Choice::Value { value: if high { range.high } else { range.low } }
+                        }
+                        sesame_plan::ChoiceKind::Range => {
                             Choice::Range { low: range.low, high: if high { range.high } else { range.low } }
                         }
                     };

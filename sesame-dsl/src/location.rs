@@ -7,7 +7,7 @@ use crate::span::Span;
 
 /// A place in a file; its end is exclusive.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Place<'a> {
+pub struct Location<'a> {
     /// The file's name as shown to people.
     pub file: &'a str,
     /// Where it starts.
@@ -25,21 +25,21 @@ pub struct Position {
     pub line: u32,
     /// Its column in characters, from 1.
     pub column: u32,
-    /// Its column in units of UTF-16, from 1; only for definitions and uses ([`Place::with_utf16`]).
+    /// Its column in units of UTF-16, from 1; only for definitions and uses ([`Location::with_utf16`]).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub utf16_column: Option<u32>,
 }
 
-impl<'a> Place<'a> {
+impl<'a> Location<'a> {
     /// The place of a span.
     pub fn new(sources: &'a SourceMap, span: Span) -> Self {
-        Place::between(sources.file(span.file), span, |_| None)
+        Location::between(sources.file(span.file), span, |_| None)
     }
 
     /// The place of a span, also with columns as editors count them.
     pub fn with_utf16(sources: &'a SourceMap, span: Span) -> Self {
         let file = sources.file(span.file);
-        Place::between(file, span, |byte| Some(file.position_utf16(byte).column))
+        Location::between(file, span, |byte| Some(file.position_utf16(byte).column))
     }
 
     fn between(file: &'a SourceFile, span: Span, utf16_column: impl Fn(u32) -> Option<u32>) -> Self {
@@ -47,6 +47,6 @@ impl<'a> Place<'a> {
             let at = file.position(byte);
             Position { byte, line: at.line, column: at.column, utf16_column: utf16_column(byte) }
         };
-        Place { file: file.name(), start: position(span.lo), end: position(span.hi) }
+        Location { file: file.name(), start: position(span.lo), end: position(span.hi) }
     }
 }
