@@ -80,13 +80,13 @@ struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
     #[command(flatten)]
-    run: run::Options,
+    run: run::RunArgs,
 }
 
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Run the campaign (what the runner does when no command is given)
-    Run(run::Options),
+    Run(run::RunArgs),
     #[command(flatten)]
     Running(Running),
     #[command(flatten)]
@@ -159,7 +159,7 @@ fn dispatch(session: &Session, arguments: impl Iterator<Item = std::ffi::OsStrin
     };
     match cli.command {
         None => run::run(session, &cli.run),
-        Some(Command::Run(options)) => run::run(session, &options),
+        Some(Command::Run(args)) => run::run(session, &args),
         Some(Command::Running(command)) => command.carry_out(session),
         Some(Command::Showing(command)) => command.carry_out(&session.results),
         Some(Command::Internal(command)) => command.carry_out(Some(session)),

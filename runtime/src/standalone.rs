@@ -39,7 +39,7 @@ const ABOUT: &str = "Exit codes: 0 done: the recording or the input has ended, o
 
 #[derive(Debug, Parser)]
 #[command(version, after_help = ABOUT)]
-struct Options {
+struct StandaloneArgs {
     /// Run on a recording instead of a system: an MCAP file, as campaigns record with `record mcap`
     #[arg(long, value_name = "FILE", conflicts_with_all = ["program", "domain", "url"])]
     recording: Option<PathBuf>,
@@ -85,15 +85,15 @@ fn carried_out(standalone: &Standalone) -> Result<ExitCode, Failure> {
     let Some(monitor) = published.cloned() else {
         return Err(Failure("this monitor's plan has no monitor that publishes".to_owned()));
     };
-    let options = options(&plan, &monitor);
-    let on_a_bus = options.recording.is_none() && options.program.is_empty();
-    let plan = if on_a_bus { at(plan, &options)? } else { plan };
-    let mut shown = Shown::new(&plan, options.format, options.decisions.as_deref())?;
-    if let Some(recording) = &options.recording {
+    let args = args(&plan, &monitor);
+    let on_a_bus = args.recording.is_none() && args.program.is_empty();
+    let plan = if on_a_bus { at(plan, &args)? } else { plan };
+    let mut shown = Shown::new(&plan, args.format, args.decisions.as_deref())?;
+    if let Some(recording) = &args.recording {
         return on_recording(&plan, recording, shown);
     }
-    if let Some((program, arguments)) = options.program.split_first() {
-        refuse_address(&options, "a simulator behind `--`")?;
+    if let Some((program, arguments)) = args.program.split_first() {
+        refuse_address(&args, "a simulator behind `--`")?;
         return beside::run(&plan, program, arguments, &mut shown);
     }
     let Some(connect) = &standalone.connect else {
@@ -107,7 +107,7 @@ fn carried_out(standalone: &Standalone) -> Result<ExitCode, Failure> {
     guest::run(&plan, connect, &mut shown)
 }
 
-fn options(plan: &CampaignPlan, monitor: &Monitor) -> Options {
+fn args(plan: &CampaignPlan, monitor: &Monitor) -> StandaloneArgs {
     let mut about = format!("Monitor `{}` of the space `{}`.", monitor.name, plan.space);
     if !monitor.doc.is_empty() {
         about = format!("{about}\n\n{}", monitor.doc);
@@ -121,31 +121,31 @@ fn options(plan: &CampaignPlan, monitor: &Monitor) -> Options {
     if !relied_on.is_empty() {
         about = format!("{about}\n\nIt relies on {}, which it evaluates, too.", relied_on.join(", "));
     }
-    let command = Options::command().name(monitor.name.clone()).about(visible_lines(&about).into_owned());
+    let command = StandaloneArgs::command().name(monitor.name.clone()).about(visible_lines(&about).into_owned());
     let matches = command.try_get_matches().unwrap_or_else(|error| error.exit());
-    Options::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
+    StandaloneArgs::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
 }
 
 /// The plan with the address and the names that were asked for.
-fn at(mut plan: CampaignPlan, options: &Options) -> Result<CampaignPlan, Failure> {
-    for rule in options.remap.iter().chain(&options.remap_too) {
+fn at(mut plan: CampaignPlan, args: &StandaloneArgs) -> Result<CampaignPlan, Failure> {
+    for rule in args.remap.iter().chain(&args.remap_too) {
         remap(&mut plan, rule)?;
     }
     let url = match plan.simulator.endpoint() {
         Some(Endpoint::Domain(domain)) => {
-            if options.url.is_some() {
+            if args.url.is_some() {
                 return Err(Failure("a system of ROS 2 has no address: choose its domain with `--domain`".to_owned()));
             }
-            *domain = options.domain.unwrap_or(*domain);
+            *domain = args.domain.unwrap_or(*domain);
             return Ok(plan);
         }
         Some(Endpoint::Address(url)) => url,
         None => return Ok(plan),
     };
-    if options.domain.is_some() {
+    if args.domain.is_some() {
         return Err(Failure("only a system of ROS 2 has a domain: choose an address with `--url`".to_owned()));
     }
-    if let Some(asked) = &options.url {
+    if let Some(asked) = &args.url {
         url.clone_from(asked);
     }
     if !is_shared(url) {
@@ -168,8 +168,8 @@ fn remap(plan: &mut CampaignPlan, rule: &str) -> Result<(), Failure> {
     Ok(())
 }
 
-fn refuse_address(options: &Options, what: &str) -> Result<(), Failure> {
-    match (&options.domain, &options.url) {
+fn refuse_address(args: &StandaloneArgs, what: &str) -> Result<(), Failure> {
+    match (&args.domain, &args.url) {
         (None, None) => Ok(()),
         _ => Err(Failure(format!("`--domain` and `--url` are for a system on a bus, not for {what}"))),
     }

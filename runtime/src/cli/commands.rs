@@ -23,49 +23,49 @@ use crate::runner::Runner;
 #[derive(Debug, Subcommand)]
 pub enum Running {
     /// Continue a run that was stopped, to the same results
-    Resume(run::ResumeOptions),
+    Resume(run::ResumeArgs),
     /// Run the regression tests and check their expectations
-    Known(known::Options),
+    Known(known::KnownArgs),
     /// Run one test several times, to see how much of its result is chance
-    Repeat(repeat::Options),
+    Repeat(repeat::RepeatArgs),
     /// Run recorded tests again with fresh simulator seeds, and report whether their findings recur
-    Confirm(confirm::Options),
+    Confirm(confirm::ConfirmArgs),
     /// Run variations of a recorded test along one dimension, to see where something begins and ends
-    Explore(explore::Options),
+    Explore(explore::ExploreArgs),
     /// Run recorded tests in a lab, and record the lab's results
     #[cfg(feature = "process")]
-    Physical(physical::Options),
+    Physical(physical::PhysicalArgs),
     /// Run the scenario without disturbance, in simulation and in a lab, and compare
     #[cfg(feature = "process")]
-    Null(null::Options),
+    Null(null::NullArgs),
     /// Let topics pass through the relay, one more in each stage, and measure what that adds and changes
     #[cfg(feature = "process")]
-    Mitm(mitm::Options),
+    Mitm(mitm::MitmArgs),
     /// Prepare a campaign: `null`, `mitm`, `known` and `monitors` in this order, up to the first that fails
     #[cfg(feature = "process")]
-    Prepare(prepare::Options),
+    Prepare(prepare::PrepareArgs),
     /// Fit the simulation to the recordings of a lab, and report how much smaller the reality gap becomes
     #[cfg(all(feature = "process", feature = "mcap"))]
-    Compensate(compensate::Options),
+    Compensate(compensate::CompensateArgs),
     /// Run a recorded test again unchanged, and report whether its result is the same, bit for bit
-    Replay(replay::Options),
+    Replay(replay::ReplayArgs),
     /// Reduce a failing test while it still fails in the same way: fewer operations, shorter, milder
-    Shrink(shrink::Options),
+    Shrink(shrink::ShrinkArgs),
     /// Feed a recording to the campaign's metrics, without a simulator
-    ReplayRecording(replay_recording::Options),
+    ReplayRecording(replay_recording::ReplayRecordingArgs),
     /// Compare what the monitors decide on two recordings, and report how late messages may be
-    Monitors(monitors::Options),
+    Monitors(monitors::MonitorsArgs),
     /// Run a recorded test again without the mitigation of its monitors, and report what the mitigation was worth
-    Twin(twin::Options),
+    Twin(twin::TwinArgs),
 }
 
 /// What shows recorded results: it needs neither the runner nor its plan.
 #[derive(Debug, Subcommand)]
 pub enum Showing {
     /// Print a recorded test as a `test` block for the `.sesame` file
-    Export(export::Options),
+    Export(export::ExportArgs),
     /// Write the page again and print the findings, also of an unfinished run
-    Report(report::Options),
+    Report(report::ReportArgs),
     /// List all tests of a run
     List(view::Which),
     /// Show one test in full: operations, effects, metrics, requirements
@@ -141,26 +141,26 @@ pub enum Internal {
 impl Running {
     pub(super) fn carry_out(&self, session: &Session) -> Result<ExitCode, Failure> {
         match self {
-            Running::Resume(options) => run::resume(session, options),
-            Running::Known(options) => known::known(session, options),
-            Running::Repeat(options) => repeat::repeat(session, options),
-            Running::Confirm(options) => confirm::confirm(session, options),
-            Running::Explore(options) => explore::explore(session, options),
+            Running::Resume(args) => run::resume(session, args),
+            Running::Known(args) => known::known(session, args),
+            Running::Repeat(args) => repeat::repeat(session, args),
+            Running::Confirm(args) => confirm::confirm(session, args),
+            Running::Explore(args) => explore::explore(session, args),
             #[cfg(feature = "process")]
-            Running::Physical(options) => physical::physical(session, options),
+            Running::Physical(args) => physical::physical(session, args),
             #[cfg(feature = "process")]
-            Running::Null(options) => null::null(session, options),
+            Running::Null(args) => null::null(session, args),
             #[cfg(feature = "process")]
-            Running::Mitm(options) => mitm::mitm(session, options),
+            Running::Mitm(args) => mitm::mitm(session, args),
             #[cfg(feature = "process")]
-            Running::Prepare(options) => prepare::prepare(session, options),
+            Running::Prepare(args) => prepare::prepare(session, args),
             #[cfg(all(feature = "process", feature = "mcap"))]
-            Running::Compensate(options) => compensate::compensate(session, options),
-            Running::Replay(options) => replay::replay(session, options),
-            Running::Shrink(options) => shrink::shrink(session, options),
-            Running::ReplayRecording(options) => replay_recording::replay_recording(session, options),
-            Running::Monitors(options) => monitors::monitors(session, options),
-            Running::Twin(options) => twin::twin(session, options),
+            Running::Compensate(args) => compensate::compensate(session, args),
+            Running::Replay(args) => replay::replay(session, args),
+            Running::Shrink(args) => shrink::shrink(session, args),
+            Running::ReplayRecording(args) => replay_recording::replay_recording(session, args),
+            Running::Monitors(args) => monitors::monitors(session, args),
+            Running::Twin(args) => twin::twin(session, args),
         }
     }
 }
@@ -169,8 +169,8 @@ impl Showing {
     /// Carries it out on the runs in a folder of results.
     pub(super) fn carry_out(&self, results: &Path) -> Result<ExitCode, Failure> {
         match self {
-            Showing::Export(options) => export::export(results, options),
-            Showing::Report(options) => report::report(results, options),
+            Showing::Export(args) => export::export(results, args),
+            Showing::Report(args) => report::report(results, args),
             Showing::List(which) => view::list(results, which),
             Showing::Show { test, at, which } => view::show(results, which, test, *at),
             Showing::Digest(which) => view::digest(results, which),

@@ -43,7 +43,7 @@ const ONE_IN: usize = 3;
 
 /// To what the simulation is fitted, and how.
 #[derive(Debug, Args)]
-pub struct Options {
+pub struct CompensateArgs {
     /// Folder with the results of the lab, for example `results/42-hall`
     #[arg(value_name = "LAB")]
     lab: PathBuf,
@@ -92,13 +92,13 @@ struct Side {
     discrepancy_after: f64,
 }
 
-pub(super) fn compensate(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
+pub(super) fn compensate(session: &Session, args: &CompensateArgs) -> Result<ExitCode, Failure> {
     let Session { results, .. } = session;
-    let lab = Repository::open(&run_folder(results, &options.lab))?;
+    let lab = Repository::open(&run_folder(results, &args.lab))?;
     let Some(task) = lab.task().in_lab().cloned() else {
         return Err(Failure(format!("{} has no results of a lab: `physical` runs tests in one", shown(lab.path()))));
     };
-    let campaign = campaign_of(session, &lab, &task, options.results.as_deref())?;
+    let campaign = campaign_of(session, &lab, &task, args.results.as_deref())?;
     refuse_other_model(session, &campaign)?;
     // Asked first, since it says whether the results belong together.
     let runs_in_lab = lab_runs(&campaign, &lab)?;
@@ -117,7 +117,7 @@ pub(super) fn compensate(session: &Session, options: &Options) -> Result<ExitCod
             shown(lab.folder())
         )));
     }
-    let (fitted_to, held_out) = split(&campaign, &traces, &options.hold_out)?;
+    let (fitted_to, held_out) = split(&campaign, &traces, &args.hold_out)?;
     if held_out.is_empty() {
         say(format_args!("note: with so few tests none is held out, so nothing shows how the fit does on others"));
     }
@@ -135,20 +135,20 @@ pub(super) fn compensate(session: &Session, options: &Options) -> Result<ExitCod
         say(format_args!("Continuing a fit of which {} sets of values were tried", journal.known()));
     }
     let of = (&found, &task, seed);
-    let fit = fitted(session, options, &campaign, of, (&fitted_to, &held_out), &mut journal, &interrupted);
+    let fit = fitted(session, args, &campaign, of, (&fitted_to, &held_out), &mut journal, &interrupted);
     files.finish()?;
     let Some(outcome) = fit? else {
         say(format_args!("stopped; the same command continues from the tried values in {}", shown(&tried)));
         return Ok(ExitCode::from(STOPPED));
     };
-    let for_people = options.output.format() == Format::Text;
+    let for_people = args.output.format() == Format::Text;
     if for_people {
         print(&fitted_text(&session.plan, &found.fits, &outcome, (&fitted_to, &held_out)))?;
     }
 
     let again = Again {
         session,
-        options,
+        args,
         results: lab.folder().parent().unwrap_or(results).to_owned(),
         plan: CampaignPlan { compensation: Some(outcome.compensation.clone()), ..session.plan.clone() },
         interrupted: &interrupted,
@@ -167,13 +167,13 @@ pub(super) fn compensate(session: &Session, options: &Options) -> Result<ExitCod
     }
 
     let mut campaign_again = None;
-    if !options.no_campaign {
+    if !args.no_campaign {
         let seed = campaign.campaign().seed;
         let name = compensated_name(&seed.to_string(), &found.name);
         let done = again.run(&name, &Task::Campaign, seed)?;
         let Some((repository, folder)) = done else { return Ok(ExitCode::from(STOPPED)) };
         if for_people {
-            report_outcome(&repository, &folder, &folder.join("report.html"), &options.output)?;
+            report_outcome(&repository, &folder, &folder.join("report.html"), &args.output)?;
         }
         campaign_again = Some(folder);
     }
@@ -252,7 +252,7 @@ fn split<'t>(
 /// Fits; `None` when the user stopped it.
 fn fitted(
     session: &Session,
-    options: &Options,
+    args: &CompensateArgs,
     campaign: &Repository,
     (lab, task, seed): (&Lab, &LabTask, u64),
     (fitted_to, held_out): (&[&LabTraces], &[&LabTraces]),
@@ -263,17 +263,17 @@ fn fitted(
     let longest = fitted_to.iter().chain(held_out).map(|test| Ok(limit(&campaign.test(test.number)?)));
     let longest = longest.collect::<Result<Vec<_>, Failure>>()?.into_iter().max().unwrap_or(Duration::from_secs(60));
     let mut pool = Pool::start(&PoolSettings {
-        workers: usize::try_from(options.execution.workers(&session.plan)).unwrap_or(1),
+        workers: usize::try_from(args.execution.workers(&session.plan)).unwrap_or(1),
         program: session.program.clone().recording(true),
         directory: scratch.path().to_owned(),
-        timeout: options.execution.timeout().unwrap_or(longest),
+        timeout: args.execution.timeout().unwrap_or(longest),
     })?;
     let mut simulations =
         Simulations { plan: &session.plan, executor: &mut pool, folder: scratch.path().to_owned(), interrupted };
     let settings = Settings {
         lab: &lab.name,
         fits: &lab.fits,
-        evaluations: usize::try_from(options.evaluations).unwrap_or(usize::MAX),
+        evaluations: usize::try_from(args.evaluations).unwrap_or(usize::MAX),
         repeats: task.repeats,
         seed,
     };
@@ -299,7 +299,7 @@ fn fitted(
 /// How the compensated simulation runs.
 struct Again<'a> {
     session: &'a Session,
-    options: &'a Options,
+    args: &'a CompensateArgs,
     /// The folder for folders of results.
     results: PathBuf,
     plan: CampaignPlan,
@@ -309,13 +309,13 @@ struct Again<'a> {
 impl Again<'_> {
     /// Runs a task; `None` when the user stopped it.
     fn run(&self, name: &str, task: &Task, seed: u64) -> Result<Option<(Repository, PathBuf)>, Failure> {
-        let Again { session, options, results, plan, interrupted } = self;
+        let Again { session, args, results, plan, interrupted } = self;
         let plan = task.plan(plan);
         let files = claim_files(&session.runner, &plan)?;
-        let (recorder, folder) = begin(session, results, name, &plan, task, seed, &options.execution)?;
+        let (recorder, folder) = begin(session, results, name, &plan, task, seed, &args.execution)?;
         say(format_args!("   Running {} in {}", task.keyword(&plan), shown(&folder)));
         let again = |more: &[&str]| session.caller.command("resume", &[more, &[&shown(&folder)]].concat());
-        let done = perform(session, recorder, &folder, &options.execution, files, interrupted, &again)?;
+        let done = perform(session, recorder, &folder, &args.execution, files, interrupted, &again)?;
         Ok(done.map(|repository| (repository, folder)))
     }
 }

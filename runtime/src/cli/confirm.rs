@@ -24,7 +24,7 @@ const LINE_EVERY: Duration = Duration::from_secs(10);
 
 /// Which tests are run again, and how.
 #[derive(Debug, Args)]
-pub struct Options {
+pub struct ConfirmArgs {
     /// The tests, for example `T158 T17`; by default those of the front (with `--violations` those that violate)
     #[arg(value_name = "TEST")]
     tests: Vec<String>,
@@ -48,18 +48,18 @@ pub struct Options {
     execution: ExecutionArgs,
 }
 
-pub(super) fn confirm(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
-    let session = &*options.world.of(session)?;
+pub(super) fn confirm(session: &Session, args: &ConfirmArgs) -> Result<ExitCode, Failure> {
+    let session = &*args.world.of(session)?;
     let Session { plan, results, .. } = session;
-    let repository = open(results, options.results.as_deref())?;
-    let mut tests = match options.tests.as_slice() {
-        [] if options.violations => run_once(&repository)?,
+    let repository = open(results, args.results.as_deref())?;
+    let mut tests = match args.tests.as_slice() {
+        [] if args.violations => run_once(&repository)?,
         [] => repository.latest_result_set()?.map_or_else(Vec::new, |set| set.members),
         names => names.iter().map(|name| repository.find(name)).collect::<Result<_, _>>()?,
     };
-    if tests.is_empty() && options.violations {
+    if tests.is_empty() && args.violations {
         say(format_args!("no test that violates a requirement was run only once"));
-        return report_outcome(&repository, &tests, options);
+        return report_outcome(&repository, &tests, args);
     }
     if tests.is_empty() {
         return Err(Failure(format!(
@@ -80,12 +80,12 @@ pub(super) fn confirm(session: &Session, options: &Options) -> Result<ExitCode, 
     let folder = repository.folder().to_owned();
     drop(repository);
 
-    let mut recorder = Recorder::reopen(&folder, options.execution.workers(&session.plan))?;
+    let mut recorder = Recorder::reopen(&folder, args.execution.workers(&session.plan))?;
     let files = claim_files(&session.runner, plan)?;
     refuse_unfilled(&session.runner, plan, true)?;
-    let settings = options.execution.settings(session, seed, &files);
+    let settings = args.execution.settings(session, seed, &files);
     let interrupted = interruptible()?;
-    let confirmations = Confirmations { tests, times: options.times };
+    let confirmations = Confirmations { tests, times: args.times };
     let mut said = Instant::now();
     let complete = confirm_recorded(
         &mut recorder,
@@ -108,7 +108,7 @@ pub(super) fn confirm(session: &Session, options: &Options) -> Result<ExitCode, 
         return Ok(ExitCode::from(STOPPED));
     }
     report::write_page(&repository, &folder.join("report.html"))?;
-    report_outcome(&repository, &confirmations.tests, options)
+    report_outcome(&repository, &confirmations.tests, args)
 }
 
 /// The tests that violate a requirement and were run once only, by number; none of a duplicate.
@@ -123,11 +123,11 @@ fn run_once(repository: &Repository) -> Result<Vec<u32>, Failure> {
 }
 
 /// Prints what fresh runs say of these tests. The exit code is for all that is recorded.
-fn report_outcome(repository: &Repository, tests: &[u32], options: &Options) -> Result<ExitCode, Failure> {
+fn report_outcome(repository: &Repository, tests: &[u32], args: &ConfirmArgs) -> Result<ExitCode, Failure> {
     let summary = report::summary(repository)?;
-    let code = options.gate.code(&summary, repository);
+    let code = args.gate.code(&summary, repository);
     let confirmed: Vec<_> = summary.confirmed.into_iter().filter(|test| tests.contains(&test.number)).collect();
-    match options.format {
+    match args.format {
         Format::Text => print(&report::confirmed_text(&confirmed, text_options()))?,
         Format::Json => print_json(&confirmed)?,
     };

@@ -25,7 +25,7 @@ const ALL: [Dimension; 3] = [Dimension::T1, Dimension::T2, Dimension::P1];
 
 /// Which test is varied, and how.
 #[derive(Debug, Args)]
-pub struct Options {
+pub struct ExploreArgs {
     /// The test, for example `T158`
     test: String,
     /// The dimension: P1 for how strong the operations are, T1 for when they are active, T2 for how long
@@ -57,26 +57,26 @@ fn dimension(text: &str) -> Result<Dimension, String> {
     known.ok_or_else(|| "tests are varied along P1 (how strong), T1 (when) or T2 (how long)".to_owned())
 }
 
-pub(super) fn explore(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
-    let session = &*options.world.of(session)?;
-    let repository = open(&session.results, options.results.as_deref())?;
-    let number = repository.find(&options.test)?;
+pub(super) fn explore(session: &Session, args: &ExploreArgs) -> Result<ExitCode, Failure> {
+    let session = &*args.world.of(session)?;
+    let repository = open(&session.results, args.results.as_deref())?;
+    let number = repository.find(&args.test)?;
     refuse_changed(session, &repository, number)?;
     let test = repository.row(number)?.test;
     let plan = &session.plan;
-    let tests = variations(plan, &test, options)?;
-    say_nearest(&repository, number, &test, options.vary)?;
+    let tests = variations(plan, &test, args)?;
+    say_nearest(&repository, number, &test, args.vary)?;
     let name = TestNumber(number).to_string();
-    let folder = format!("{}-{name}-{}", named(&repository), options.vary.name());
-    let task = Task::Variations(Variations { name, dimension: options.vary, tests });
+    let folder = format!("{}-{name}-{}", named(&repository), args.vary.name());
+    let task = Task::Variations(Variations { name, dimension: args.vary, tests });
     let seed = repository.campaign().seed;
     let results = repository.folder().parent().unwrap_or(&session.results).to_owned();
     drop(repository);
     let plan = task.plan(plan);
     let files = claim_files(&session.runner, &plan)?;
     refuse_unfilled(&session.runner, &plan, true)?;
-    let (recorder, folder) = begin(session, &results, &folder, &plan, &task, seed, &options.execution)?;
-    execute(session, recorder, &folder, &options.execution, &options.output, files)
+    let (recorder, folder) = begin(session, &results, &folder, &plan, &task, seed, &args.execution)?;
+    execute(session, recorder, &folder, &args.execution, &args.output, files)
 }
 
 /// The name of the folder of results.
@@ -85,15 +85,15 @@ fn named(repository: &Repository) -> String {
 }
 
 /// The variations, no two equal, in the order of their coordinates.
-fn variations(plan: &CampaignPlan, test: &Test, options: &Options) -> Result<Vec<Test>, Failure> {
-    let Options { vary: dimension, from, to, times, .. } = *options;
+fn variations(plan: &CampaignPlan, test: &Test, args: &ExploreArgs) -> Result<Vec<Test>, Failure> {
+    let ExploreArgs { vary: dimension, from, to, times, .. } = *args;
     let [least, greatest] = reach(plan, test, dimension)?;
     let (from, to) = (from.unwrap_or(least).max(least), to.unwrap_or(greatest).min(greatest));
     if from.is_nan() || to.is_nan() || from > to {
         return Err(Failure(format!(
             "{} of {} can be from {least:.3} to {greatest:.3}; give `--from` and `--to` in this range, in this order",
             dimension.name(),
-            options.test
+            args.test
         )));
     }
     let mut tests: Vec<Test> = Vec::new();

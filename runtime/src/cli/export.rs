@@ -18,7 +18,7 @@ use crate::cli::view::Which;
 
 /// Which test is written, and under which name.
 #[derive(Debug, Args)]
-pub struct Options {
+pub struct ExportArgs {
     /// The test, for example `T158`
     test: String,
     /// Name of the block; by default made of the campaign's name and the test's
@@ -39,11 +39,11 @@ fn name(text: &str) -> Result<String, String> {
     }
 }
 
-pub(super) fn export(results: &Path, options: &Options) -> Result<ExitCode, Failure> {
-    let repository = open(results, options.which.results.as_deref())?;
-    let expected = if options.pin { Expected::Values } else { Expected::Requirements };
-    let exported = report::export(&repository, &options.test, options.name.as_deref(), expected)?;
-    match options.which.format {
+pub(super) fn export(results: &Path, args: &ExportArgs) -> Result<ExitCode, Failure> {
+    let repository = open(results, args.which.results.as_deref())?;
+    let expected = if args.pin { Expected::Values } else { Expected::Requirements };
+    let exported = report::export(&repository, &args.test, args.name.as_deref(), expected)?;
+    match args.which.format {
         // A block is the test to the last sign of its texts; on a terminal some of these would do more than be read.
         Format::Text if console::Term::stdout().is_term() => print(&visible_lines(&exported.block)),
         Format::Text => print(&exported.block),

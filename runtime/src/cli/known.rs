@@ -24,7 +24,7 @@ use crate::cli::terminal::say;
 
 /// Which regression tests are run, and how.
 #[derive(Debug, Args)]
-pub struct Options {
+pub struct KnownArgs {
     /// Names of regression tests; by default all that this campaign can run
     #[arg(value_name = "NAME")]
     names: Vec<String>,
@@ -51,39 +51,39 @@ pub struct Options {
     output: OutputArgs,
 }
 
-pub(super) fn known(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
-    let session = &*options.world.of(session)?;
+pub(super) fn known(session: &Session, args: &KnownArgs) -> Result<ExitCode, Failure> {
+    let session = &*args.world.of(session)?;
     #[cfg(feature = "process")]
-    if let Some(lab) = &options.lab {
-        return in_lab(session, lab, options);
+    if let Some(lab) = &args.lab {
+        return in_lab(session, lab, args);
     }
     let Session { plan, results, .. } = session;
-    let task = Task::Known { tests: chosen(plan, &options.names).map_err(Failure)?, lab: None };
-    let plan = plan_of(plan, &task, options.seed);
+    let task = Task::Known { tests: chosen(plan, &args.names).map_err(Failure)?, lab: None };
+    let plan = plan_of(plan, &task, args.seed);
     let files = claim_files(&session.runner, &plan)?;
     refuse_unfilled(&session.runner, &plan, true)?;
-    let seed = options.seed.unwrap_or(plan.campaign.seed);
-    let results = options.results.as_deref().unwrap_or(results);
-    let (recorder, folder) = begin(session, results, "known", &plan, &task, seed, &options.execution)?;
-    execute(session, recorder, &folder, &options.execution, &options.output, files)
+    let seed = args.seed.unwrap_or(plan.campaign.seed);
+    let results = args.results.as_deref().unwrap_or(results);
+    let (recorder, folder) = begin(session, results, "known", &plan, &task, seed, &args.execution)?;
+    execute(session, recorder, &folder, &args.execution, &args.output, files)
 }
 
 /// Runs them in simulation and in a lab.
 #[cfg(feature = "process")]
-fn in_lab(session: &Session, lab: &str, options: &Options) -> Result<ExitCode, Failure> {
+fn in_lab(session: &Session, lab: &str, args: &KnownArgs) -> Result<ExitCode, Failure> {
     let lab = crate::lab::find(&session.plan, Some(lab))?;
     refuse_unfilled(&session.runner, &session.plan, true)?;
-    chosen(&session.plan, &options.names).map_err(Failure)?;
+    chosen(&session.plan, &args.names).map_err(Failure)?;
     let mut command = vec!["known".to_owned()];
-    command.extend(options.names.iter().cloned());
+    command.extend(args.names.iter().cloned());
     command.extend(["--lab".to_owned(), lab.name.clone()]);
-    command.extend(options.seed.iter().flat_map(|seed| ["--seed".to_owned(), seed.to_string()]));
+    command.extend(args.seed.iter().flat_map(|seed| ["--seed".to_owned(), seed.to_string()]));
     let name = format!("known-{}", lab.name);
-    let preparation = PreparationArgs::of(options.resume.clone(), options.results.clone(), options.output.format());
-    let call = Call { name: &name, command, options: &preparation, execution: &options.execution };
+    let preparation = PreparationArgs::of(args.resume.clone(), args.results.clone(), args.output.format());
+    let call = Call { name: &name, command, args: &preparation, execution: &args.execution };
     carry_out(session, call, |work| {
         let mut found = Found::default();
-        let ended = sides(session, work, Some(lab), &options.names, options.seed, &mut found)?;
+        let ended = sides(session, work, Some(lab), &args.names, args.seed, &mut found)?;
         Ok(ended.then_some(found))
     })
 }

@@ -15,7 +15,7 @@ use crate::lab::find;
 
 /// How often each stage is run, and where.
 #[derive(Debug, Args)]
-pub struct Options {
+pub struct MitmArgs {
     /// The number of runs of each stage
     #[arg(long, default_value_t = 3, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     runs: u32,
@@ -31,17 +31,17 @@ pub struct Options {
     execution: ExecutionArgs,
 }
 
-pub(super) fn mitm(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
-    let lab = match &options.lab {
+pub(super) fn mitm(session: &Session, args: &MitmArgs) -> Result<ExitCode, Failure> {
+    let lab = match &args.lab {
         Some(name) => Some(find(&session.plan, Some(name))?.name.as_str()),
         None => None,
     };
     refuse_unfilled(&session.runner, &session.plan, true)?;
-    let seed = options.seed.unwrap_or(session.plan.campaign.seed);
-    let mut command = vec!["mitm".to_owned(), "--runs".to_owned(), options.runs.to_string()];
+    let seed = args.seed.unwrap_or(session.plan.campaign.seed);
+    let mut command = vec!["mitm".to_owned(), "--runs".to_owned(), args.runs.to_string()];
     command.extend(lab.iter().flat_map(|&lab| ["--lab".to_owned(), lab.to_owned()]));
-    command.extend(options.seed.iter().flat_map(|seed| ["--seed".to_owned(), seed.to_string()]));
-    let call = Call { name: "mitm", command, options: &options.preparation, execution: &options.execution };
+    command.extend(args.seed.iter().flat_map(|seed| ["--seed".to_owned(), seed.to_string()]));
+    let call = Call { name: "mitm", command, args: &args.preparation, execution: &args.execution };
     let here;
     let session = match lab {
         Some(name) => {
@@ -55,7 +55,7 @@ pub(super) fn mitm(session: &Session, options: &Options) -> Result<ExitCode, Fai
     }
     carry_out(session, call, |work| {
         let mut found = Found::default();
-        let ended = stages(session, work, lab, options.runs, seed, &mut found)?;
+        let ended = stages(session, work, lab, args.runs, seed, &mut found)?;
         Ok(ended.then_some(found))
     })
 }

@@ -17,7 +17,7 @@ pub(super) use compared::compared;
 
 /// Which recordings are compared.
 #[derive(Debug, Args)]
-pub struct Options {
+pub struct MonitorsArgs {
     /// The first recording: a file, a test of the run such as `T17`, or a test of another run such as `42-hall/T3`
     first: PathBuf,
     /// The second recording, in the same notation
@@ -43,8 +43,8 @@ fn not_negative(text: &str) -> Result<f64, String> {
 }
 
 #[cfg(not(feature = "mcap"))]
-pub(super) fn monitors(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
-    let Options { first, second, .. } = options;
+pub(super) fn monitors(session: &Session, args: &MonitorsArgs) -> Result<ExitCode, Failure> {
+    let MonitorsArgs { first, second, .. } = args;
     Err(Failure(format!(
         "the runner of `{}` was built without the feature `mcap` of sesame-runtime, so it cannot read {} and {}",
         session.plan.campaign.name,
@@ -54,21 +54,21 @@ pub(super) fn monitors(session: &Session, options: &Options) -> Result<ExitCode,
 }
 
 #[cfg(feature = "mcap")]
-pub(super) fn monitors(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
+pub(super) fn monitors(session: &Session, args: &MonitorsArgs) -> Result<ExitCode, Failure> {
     use sesame_report::monitors_text;
 
     use crate::cli::failure::NOT_AS_REQUIRED;
     use crate::cli::terminal::{print, print_json, say, text_options};
 
     let plan = &session.plan;
-    let chosen = chosen(plan, &options.monitors, |_| true)?;
-    let files = [&options.first, &options.second].map(|named| recording(session, options, named));
+    let chosen = chosen(plan, &args.monitors, |_| true)?;
+    let files = [&args.first, &args.second].map(|named| recording(session, args, named));
     let [first, second] = files;
-    let found = compared(plan, [&first?, &second?], &chosen, options.within)?;
+    let found = compared(plan, [&first?, &second?], &chosen, args.within)?;
     for warning in &found.warnings {
         say(format_args!("warning: {warning}"));
     }
-    match options.format {
+    match args.format {
         Format::Text => print(&monitors_text(&found, text_options()))?,
         Format::Json => print_json(&found)?,
     };
@@ -152,7 +152,7 @@ pub(super) fn chosen(
 
 /// The file that the user means: by its name, or by that of a test that was recorded.
 #[cfg(feature = "mcap")]
-fn recording(session: &Session, options: &Options, named: &std::path::Path) -> Result<PathBuf, Failure> {
+fn recording(session: &Session, args: &MonitorsArgs, named: &std::path::Path) -> Result<PathBuf, Failure> {
     use sesame_base::test_number::TestNumber;
 
     use crate::cli::execution::shown;
@@ -166,7 +166,7 @@ fn recording(session: &Session, options: &Options, named: &std::path::Path) -> R
     }
     let folder = named.parent().filter(|folder| !folder.as_os_str().is_empty());
     let test = named.file_name().unwrap_or_default().to_string_lossy();
-    let repository = open(&session.results, folder.or(options.results.as_deref()))?;
+    let repository = open(&session.results, folder.or(args.results.as_deref()))?;
     let number = repository.find(&test)?;
     let duplicate_of = repository.row(number)?.duplicate_of;
     repository.trace(number, duplicate_of).ok_or_else(|| {

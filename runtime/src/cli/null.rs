@@ -16,7 +16,7 @@ use crate::cli::session::Session;
 
 /// How often the scenario is run, and where.
 #[derive(Debug, Args)]
-pub struct Options {
+pub struct NullArgs {
     /// The number of runs on each side
     #[arg(long, default_value_t = 3, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     runs: u32,
@@ -32,17 +32,17 @@ pub struct Options {
     execution: ExecutionArgs,
 }
 
-pub(super) fn null(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
-    let lab = lab_of(&session.plan, options.lab.as_deref())?;
+pub(super) fn null(session: &Session, args: &NullArgs) -> Result<ExitCode, Failure> {
+    let lab = lab_of(&session.plan, args.lab.as_deref())?;
     refuse_unfilled(&session.runner, &session.plan, true)?;
-    let seed = options.seed.unwrap_or(session.plan.campaign.seed);
-    let mut command = vec!["null".to_owned(), "--runs".to_owned(), options.runs.to_string()];
+    let seed = args.seed.unwrap_or(session.plan.campaign.seed);
+    let mut command = vec!["null".to_owned(), "--runs".to_owned(), args.runs.to_string()];
     command.extend(lab.iter().flat_map(|lab| ["--lab".to_owned(), lab.name.clone()]));
-    command.extend(options.seed.iter().flat_map(|seed| ["--seed".to_owned(), seed.to_string()]));
-    let call = Call { name: "null", command, options: &options.preparation, execution: &options.execution };
+    command.extend(args.seed.iter().flat_map(|seed| ["--seed".to_owned(), seed.to_string()]));
+    let call = Call { name: "null", command, args: &args.preparation, execution: &args.execution };
     carry_out(session, call, |work| {
         let mut found = Found::default();
-        let ended = observe(session, work, lab, options.runs, seed, &mut found)?;
+        let ended = observe(session, work, lab, args.runs, seed, &mut found)?;
         Ok(ended.then_some(found))
     })
 }

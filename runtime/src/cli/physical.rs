@@ -25,7 +25,7 @@ const CHOICE_LIMIT: Duration = Duration::from_secs(60);
 
 /// Which tests are run in a lab, and how often.
 #[derive(Debug, Args)]
-pub struct Options {
+pub struct PhysicalArgs {
     /// Recorded tests, for example `T158 T17`; by default those that the lab's `budget` chooses from the front
     #[arg(value_name = "TEST")]
     tests: Vec<String>,
@@ -50,12 +50,12 @@ pub struct Options {
     output: OutputArgs,
 }
 
-pub(super) fn physical(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
-    let lab = find(&session.plan, options.lab.as_deref())?;
-    let repository = open(&session.results, options.results.as_deref())?;
+pub(super) fn physical(session: &Session, args: &PhysicalArgs) -> Result<ExitCode, Failure> {
+    let lab = find(&session.plan, args.lab.as_deref())?;
+    let repository = open(&session.results, args.results.as_deref())?;
     let mut numbers = Vec::new();
-    let chosen = if options.tests.is_empty() { chosen(&repository, lab)? } else { Vec::new() };
-    for name in options.tests.iter().chain(&chosen) {
+    let chosen = if args.tests.is_empty() { chosen(&repository, lab)? } else { Vec::new() };
+    for name in args.tests.iter().chain(&chosen) {
         let number = repository.find(name)?;
         refuse_changed(session, &repository, number)?;
         // A duplicate is what its original is.
@@ -65,7 +65,7 @@ pub(super) fn physical(session: &Session, options: &Options) -> Result<ExitCode,
         }
         numbers.push(number);
     }
-    if !options.although_excluded
+    if !args.although_excluded
         && let Some(excluded) = exclusions(&repository, lab, &numbers)?
     {
         return Err(Failure(format!("{excluded}; leave them out, or pass `--although-excluded`")));
@@ -85,12 +85,12 @@ pub(super) fn physical(session: &Session, options: &Options) -> Result<ExitCode,
         lab: lab.name.clone(),
         results: repository.digest()?,
         tests,
-        repeats: options.times.unwrap_or(lab.repeats),
+        repeats: args.times.unwrap_or(lab.repeats),
     };
     // The lab has seeds of its own: equal ones would make a stand-in for the lab repeat the runs of the simulation.
     let seed = derive_seed(repository.campaign().seed, &format!("lab {}", lab.name), &[]);
     let name = format!("{}-{}", repository.folder().file_name().unwrap_or_default().display(), lab.name);
-    let results = match &options.into {
+    let results = match &args.into {
         Some(into) => into.clone(),
         None => repository.folder().parent().unwrap_or(&session.results).to_owned(),
     };
@@ -102,9 +102,9 @@ pub(super) fn physical(session: &Session, options: &Options) -> Result<ExitCode,
     let files = claim_files(&session.runner, &plan)?;
     refuse_unfilled(&session.runner, &plan, true)?;
     // There is one lab.
-    let execution = options.execution.one_at_a_time();
+    let execution = args.execution.one_at_a_time();
     let (recorder, folder) = begin(&session, &results, &name, &plan, &task, seed, &execution)?;
-    execute(&session, recorder, &folder, &execution, &options.output, files)
+    execute(&session, recorder, &folder, &execution, &args.output, files)
 }
 
 /// The names of the tests that a lab's budget chooses; it prints them.

@@ -144,7 +144,7 @@ pub(super) struct Call<'a> {
     pub(super) name: &'a str,
     /// The words with which it is called again to go on: its command and what it was given.
     pub(super) command: Vec<String>,
-    pub(super) options: &'a PreparationArgs,
+    pub(super) args: &'a PreparationArgs,
     pub(super) execution: &'a ExecutionArgs,
 }
 
@@ -155,15 +155,15 @@ pub(super) fn carry_out(
     call: Call<'_>,
     steps: impl FnOnce(&Work<'_>) -> Result<Option<Found>, Failure>,
 ) -> Result<ExitCode, Failure> {
-    let Call { name, command, options, execution } = call;
-    let (folder, claim) = if let Some(folder) = &options.resume {
+    let Call { name, command, args, execution } = call;
+    let (folder, claim) = if let Some(folder) = &args.resume {
         let folder = run_folder(&session.results, folder);
         if !folder.is_dir() {
             return Err(Failure(format!("there is nothing to go on with: {} is not a folder", shown(&folder))));
         }
         (folder, None)
     } else {
-        let results = options.results.as_deref().unwrap_or(&session.results);
+        let results = args.results.as_deref().unwrap_or(&session.results);
         let claim = record::claim_folder(results, name)?;
         (claim.folder.clone(), Some(claim))
     };
@@ -173,7 +173,7 @@ pub(super) fn carry_out(
     // Others kept out of the folder as long as nothing was in it.
     drop(claim);
     match found {
-        Some(found) => found.show(session, &folder, options.format),
+        Some(found) => found.show(session, &folder, args.format),
         None => Ok(ExitCode::from(STOPPED)),
     }
 }

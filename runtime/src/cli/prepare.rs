@@ -13,7 +13,7 @@ use crate::cli::{known, mitm, monitors, null};
 
 /// How often things are run, and where.
 #[derive(Debug, Args)]
-pub struct Options {
+pub struct PrepareArgs {
     /// The number of runs without disturbance on each side, and in each stage
     #[arg(long, default_value_t = 3, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     runs: u32,
@@ -35,22 +35,22 @@ pub struct Options {
 /// A step of the preparation.
 type Step<'s> = (&'static str, &'s dyn Fn(&Work<'_>, &mut Found) -> Result<bool, Failure>);
 
-pub(super) fn prepare(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
-    let lab = lab_of(&session.plan, options.lab.as_deref())?;
+pub(super) fn prepare(session: &Session, args: &PrepareArgs) -> Result<ExitCode, Failure> {
+    let lab = lab_of(&session.plan, args.lab.as_deref())?;
     refuse_unfilled(&session.runner, &session.plan, true)?;
-    let seed = options.seed.unwrap_or(session.plan.campaign.seed);
-    let mut command = vec!["prepare".to_owned(), "--runs".to_owned(), options.runs.to_string()];
+    let seed = args.seed.unwrap_or(session.plan.campaign.seed);
+    let mut command = vec!["prepare".to_owned(), "--runs".to_owned(), args.runs.to_string()];
     command.extend(lab.iter().flat_map(|lab| ["--lab".to_owned(), lab.name.clone()]));
-    command.extend(options.seed.iter().flat_map(|seed| ["--seed".to_owned(), seed.to_string()]));
-    command.extend(options.keep_going.then(|| "--keep-going".to_owned()));
-    let call = Call { name: "prepare", command, options: &options.preparation, execution: &options.execution };
-    let observe = |work: &Work<'_>, found: &mut Found| null::observe(session, work, lab, options.runs, seed, found);
+    command.extend(args.seed.iter().flat_map(|seed| ["--seed".to_owned(), seed.to_string()]));
+    command.extend(args.keep_going.then(|| "--keep-going".to_owned()));
+    let call = Call { name: "prepare", command, args: &args.preparation, execution: &args.execution };
+    let observe = |work: &Work<'_>, found: &mut Found| null::observe(session, work, lab, args.runs, seed, found);
     let relay = |work: &Work<'_>, found: &mut Found| {
         if session.plan.relayable().is_empty() {
             found.preparation.left_out.push(format!("`mitm` is left out: {}.", mitm::nothing_to_relay(session)));
             return Ok(true);
         }
-        mitm::stages(session, work, None, options.runs, seed, found)
+        mitm::stages(session, work, None, args.runs, seed, found)
     };
     let test = |work: &Work<'_>, found: &mut Found| {
         if session.plan.tests.is_empty() {
@@ -59,7 +59,7 @@ pub(super) fn prepare(session: &Session, options: &Options) -> Result<ExitCode, 
             found.preparation.left_out.push(sentence);
             return Ok(true);
         }
-        known::sides(session, work, lab, &[], options.seed, found)
+        known::sides(session, work, lab, &[], args.seed, found)
     };
     let verify = |_: &Work<'_>, found: &mut Found| {
         monitors::of_both_sides(session, lab, found)?;
@@ -69,7 +69,7 @@ pub(super) fn prepare(session: &Session, options: &Options) -> Result<ExitCode, 
     if !session.plan.monitors.is_empty() {
         steps.push(("monitors", &verify));
     }
-    carry_out(session, call, |work| in_order(work, &steps, options.keep_going))
+    carry_out(session, call, |work| in_order(work, &steps, args.keep_going))
 }
 
 /// Carries out the steps up to the first that fails, or all of them.

@@ -16,7 +16,7 @@ use crate::cli::session::{Session, World};
 
 /// Which test is repeated, and how.
 #[derive(Debug, Args)]
-pub struct Options {
+pub struct RepeatArgs {
     /// A regression test's name, or a recorded test, for example `T158`
     test: String,
     /// The number of runs
@@ -51,10 +51,10 @@ struct Repeated {
     results: PathBuf,
 }
 
-pub(super) fn repeat(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
-    let session = &*options.world.of(session)?;
+pub(super) fn repeat(session: &Session, args: &RepeatArgs) -> Result<ExitCode, Failure> {
+    let session = &*args.world.of(session)?;
     let Session { plan, results, .. } = session;
-    let declared = plan.tests.iter().find(|test| test.name == options.test && options.results.is_none());
+    let declared = plan.tests.iter().find(|test| test.name == args.test && args.results.is_none());
     let Repeated { name, test, plan, seed, results } = match declared {
         Some(KnownTest { name, test, .. }) => Repeated {
             name: name.clone(),
@@ -63,23 +63,23 @@ pub(super) fn repeat(session: &Session, options: &Options) -> Result<ExitCode, F
             seed: plan.campaign.seed,
             results: results.to_owned(),
         },
-        None => recorded(session, options)?,
+        None => recorded(session, args)?,
     };
-    let seed = options.seed.unwrap_or_else(|| derive_seed(seed, &format!("repeat {name}"), &[]));
+    let seed = args.seed.unwrap_or_else(|| derive_seed(seed, &format!("repeat {name}"), &[]));
     let folder_name = format!("repeat-{name}");
-    let task = Task::Repeat { name, test, times: options.times };
+    let task = Task::Repeat { name, test, times: args.times };
     let plan = task.plan(&plan);
     let files = claim_files(&session.runner, &plan)?;
     refuse_unfilled(&session.runner, &plan, true)?;
-    let results = options.into.as_deref().unwrap_or(&results);
-    let (recorder, folder) = begin(session, results, &folder_name, &plan, &task, seed, &options.execution)?;
-    execute(session, recorder, &folder, &options.execution, &options.output, files)
+    let results = args.into.as_deref().unwrap_or(&results);
+    let (recorder, folder) = begin(session, results, &folder_name, &plan, &task, seed, &args.execution)?;
+    execute(session, recorder, &folder, &args.execution, &args.output, files)
 }
 
-fn recorded(session: &Session, options: &Options) -> Result<Repeated, Failure> {
+fn recorded(session: &Session, args: &RepeatArgs) -> Result<Repeated, Failure> {
     let results = &session.results;
-    let repository = open(results, options.results.as_deref())?;
-    let number = repository.find(&options.test)?;
+    let repository = open(results, args.results.as_deref())?;
+    let number = repository.find(&args.test)?;
     refuse_changed(session, &repository, number)?;
     let run = repository.path().parent().unwrap_or(results);
     Ok(Repeated {

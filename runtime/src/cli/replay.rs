@@ -20,7 +20,7 @@ use crate::cli::view::Which;
 
 /// Which test is run once more.
 #[derive(Debug, Args)]
-pub struct Options {
+pub struct ReplayArgs {
     /// The test, for example `T158`
     test: String,
     #[command(flatten)]
@@ -34,13 +34,13 @@ pub struct Options {
     timeout: Option<Duration>,
 }
 
-pub(super) fn replay(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
+pub(super) fn replay(session: &Session, args: &ReplayArgs) -> Result<ExitCode, Failure> {
     let asked = Asked {
         run: "replay",
-        test: &options.test,
-        results: options.which.results.as_deref(),
-        record: options.record,
-        timeout: options.timeout,
+        test: &args.test,
+        results: args.which.results.as_deref(),
+        record: args.record,
+        timeout: args.timeout,
         withheld: Vec::new(),
     };
     let Some(again) = run_again(session, asked)? else { return Ok(ExitCode::from(STOPPED)) };
@@ -59,12 +59,12 @@ pub(super) fn replay(session: &Session, options: &Options) -> Result<ExitCode, F
         return Err(Failure(format!("the trace of {} could not be written: {reason}", replay.test)));
     }
     // The trace gets its place once it is known to be of the recorded run.
-    if options.record && replay.same {
+    if args.record && replay.same {
         let file = trace_file(repository.folder(), record.number);
         keep(&again.trace, &file)?;
         say(format_args!("recorded in {}", shown(&file)));
     }
-    match options.which.format {
+    match args.which.format {
         Format::Text => print(&replay_text(&replay, text_options()))?,
         Format::Json => print_json(&replay)?,
     };

@@ -14,7 +14,7 @@ use crate::cli::terminal::Format;
 
 /// Which recording is fed.
 #[derive(Debug, Args)]
-pub struct Options {
+pub struct ReplayRecordingArgs {
     /// The recording, for example `results/42/traces/T17.mcap`
     #[arg(value_name = "FILE")]
     recording: PathBuf,
@@ -24,8 +24,8 @@ pub struct Options {
 }
 
 #[cfg(not(feature = "mcap"))]
-pub(super) fn replay_recording(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
-    let Options { recording, format: _ } = options;
+pub(super) fn replay_recording(session: &Session, args: &ReplayRecordingArgs) -> Result<ExitCode, Failure> {
+    let ReplayRecordingArgs { recording, format: _ } = args;
     Err(Failure(format!(
         "the runner of `{}` was built without the feature `mcap` of sesame-runtime, so it cannot read {}",
         session.plan.campaign.name,
@@ -34,7 +34,7 @@ pub(super) fn replay_recording(session: &Session, options: &Options) -> Result<E
 }
 
 #[cfg(feature = "mcap")]
-pub(super) fn replay_recording(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
+pub(super) fn replay_recording(session: &Session, args: &ReplayRecordingArgs) -> Result<ExitCode, Failure> {
     use std::panic::{self, AssertUnwindSafe};
 
     use sesame_relay::metric::MetricTable;
@@ -51,14 +51,14 @@ pub(super) fn replay_recording(session: &Session, options: &Options) -> Result<E
     let wires = WireTable::new(plan);
     let table = MetricTable::new(plan, &wires, runner.hooks)?;
     panic_capture::install();
-    let fed = AssertUnwindSafe(|| trace::feed(&options.recording, plan, &wires, &table));
+    let fed = AssertUnwindSafe(|| trace::feed(&args.recording, plan, &wires, &table));
     let fed = panic::catch_unwind(fed)
         .map_err(|_| Failure(format!("a hook cannot take this recording: {}", panic_capture::take())))??;
-    let replay = compared(plan, options, fed);
+    let replay = compared(plan, args, fed);
     for warning in &replay.warnings {
         say(format_args!("warning: {warning}"));
     }
-    match options.format {
+    match args.format {
         Format::Text => print(&recording_text(&replay, text_options()))?,
         Format::Json => print_json(&replay)?,
     };
@@ -67,7 +67,11 @@ pub(super) fn replay_recording(session: &Session, options: &Options) -> Result<E
 
 /// What metrics are now, compared with what was recorded.
 #[cfg(feature = "mcap")]
-fn compared(plan: &CampaignPlan, options: &Options, fed: sesame_relay::trace::Fed) -> sesame_report::RecordingReplay {
+fn compared(
+    plan: &CampaignPlan,
+    args: &ReplayRecordingArgs,
+    fed: sesame_relay::trace::Fed,
+) -> sesame_report::RecordingReplay {
     use sesame_base::visible::visible;
     use sesame_record::MetricValue;
     use sesame_report::{FedMetric, RecordingReplay, Sameness};
@@ -94,7 +98,7 @@ fn compared(plan: &CampaignPlan, options: &Options, fed: sesame_relay::trace::Fe
         })
         .collect();
     RecordingReplay {
-        recording: options.recording.clone(),
+        recording: args.recording.clone(),
         run: fed.run.as_ref().map(|run| visible(&format!("{} of {} ({})", run.test, run.campaign, run.outcome))),
         messages: fed.messages,
         same: metrics.iter().all(|metric| metric.sameness != Sameness::Differs),

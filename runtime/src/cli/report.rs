@@ -11,7 +11,7 @@ use crate::cli::results_folder::open;
 
 /// Which run is reported on, and where to.
 #[derive(Debug, Args)]
-pub struct Options {
+pub struct ReportArgs {
     /// Folder of the run, for example `results/42`; by default the latest
     #[arg(long, value_name = "DIR")]
     results: Option<PathBuf>,
@@ -26,11 +26,11 @@ pub struct Options {
     outcome: OutputArgs,
 }
 
-pub(super) fn report(results: &Path, options: &Options) -> Result<ExitCode, Failure> {
-    let repository = open(results, options.results.as_deref())?;
+pub(super) fn report(results: &Path, args: &ReportArgs) -> Result<ExitCode, Failure> {
+    let repository = open(results, args.results.as_deref())?;
     let folder = repository.path().parent().unwrap_or(results);
-    let page = options.output.clone().unwrap_or_else(|| folder.join("report.html"));
-    let before = options.before.as_deref().map(|before| open(results, Some(before))).transpose()?;
+    let page = args.output.clone().unwrap_or_else(|| folder.join("report.html"));
+    let before = args.before.as_deref().map(|before| open(results, Some(before))).transpose()?;
     if let Some(before) = &before
         && let Some(side) = [before, &repository].into_iter().find(|side| side.plan().monitors.is_empty())
     {
@@ -39,5 +39,5 @@ pub(super) fn report(results: &Path, options: &Options) -> Result<ExitCode, Fail
             shown(side.path())
         )));
     }
-    report_against(&repository, before.as_ref(), folder, &page, &options.outcome)
+    report_against(&repository, before.as_ref(), folder, &page, &args.outcome)
 }

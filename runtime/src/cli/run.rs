@@ -17,7 +17,7 @@ use crate::cli::session::{Session, World};
 
 /// How a campaign is run. Nothing here but the seed and the number of evaluations changes results.
 #[derive(Debug, Args)]
-pub(super) struct Options {
+pub(super) struct RunArgs {
     /// The seed that determines everything; by default the campaign's
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
@@ -47,7 +47,7 @@ pub(super) struct Options {
 
 /// How a stopped run is taken up again.
 #[derive(Debug, Args)]
-pub struct ResumeOptions {
+pub struct ResumeArgs {
     /// Folder of the run, for example `results/42`; by default the latest that is unfinished
     #[arg(value_name = "DIR")]
     results: Option<PathBuf>,
@@ -59,16 +59,16 @@ pub struct ResumeOptions {
     output: OutputArgs,
 }
 
-pub(super) fn run(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
-    let session = &*options.world.of(session)?;
+pub(super) fn run(session: &Session, args: &RunArgs) -> Result<ExitCode, Failure> {
+    let session = &*args.world.of(session)?;
     let Session { plan, results, .. } = session;
     let mut plan = plan.clone();
-    if let Some(wanted) = options.evaluations {
+    if let Some(wanted) = args.evaluations {
         plan.campaign.search.set_evaluations(wanted);
     }
-    let seed = options.seed.unwrap_or(plan.campaign.seed);
-    let mut name = format!("{seed}{}", options.world.suffix());
-    if let Some(folder) = &options.compensation {
+    let seed = args.seed.unwrap_or(plan.campaign.seed);
+    let mut name = format!("{seed}{}", args.world.suffix());
+    if let Some(folder) = &args.compensation {
         let compensated = open(results, Some(folder))?;
         refuse_other_model(session, &compensated)?;
         let Some(compensation) = compensated.plan().compensation.clone() else {
@@ -80,14 +80,14 @@ pub(super) fn run(session: &Session, options: &Options) -> Result<ExitCode, Fail
         name = compensated_name(&name, &compensation.lab);
         plan.compensation = Some(compensation);
     }
-    let results = options.results.as_deref().unwrap_or(results);
-    if !options.over_budget {
+    let results = args.results.as_deref().unwrap_or(results);
+    if !args.over_budget {
         refuse_over_budget(session, results)?;
     }
     let files = claim_files(&session.runner, &plan)?;
-    refuse_unfilled(&session.runner, &plan, options.allow_unimplemented)?;
-    let (recorder, folder) = begin(session, results, &name, &plan, &Task::Campaign, seed, &options.execution)?;
-    execute(session, recorder, &folder, &options.execution, &options.output, files)
+    refuse_unfilled(&session.runner, &plan, args.allow_unimplemented)?;
+    let (recorder, folder) = begin(session, results, &name, &plan, &Task::Campaign, seed, &args.execution)?;
+    execute(session, recorder, &folder, &args.execution, &args.output, files)
 }
 
 /// The name of the results of a campaign whose simulation is compensated for a lab.
@@ -95,30 +95,30 @@ pub(super) fn compensated_name(seed: &str, lab: &str) -> String {
     format!("{seed}-like-{lab}")
 }
 
-pub(super) fn resume(session: &Session, options: &ResumeOptions) -> Result<ExitCode, Failure> {
-    let session = &*options.world.of(session)?;
+pub(super) fn resume(session: &Session, args: &ResumeArgs) -> Result<ExitCode, Failure> {
+    let session = &*args.world.of(session)?;
     let results = &session.results;
-    let folder = match &options.results {
+    let folder = match &args.results {
         Some(folder) => run_folder(results, folder),
         None => record::latest_unfinished(results)?.ok_or_else(|| {
             Failure(format!("there is nothing to go on with: no run in {} is unfinished", results.display()))
         })?,
     };
-    let recorder = Recorder::resume(&folder, options.execution.workers(&session.plan))?;
+    let recorder = Recorder::resume(&folder, args.execution.workers(&session.plan))?;
     let task = recorder.repository().task().clone();
     #[cfg(feature = "process")]
     if let Some(lab) = task.lab() {
-        let (mut session, execution) = (session.in_lab(lab)?, options.execution.one_at_a_time());
+        let (mut session, execution) = (session.in_lab(lab)?, args.execution.one_at_a_time());
         if let Some(undisturbed) = task.undisturbed() {
             session = session.relaying(undisturbed.relayed);
         }
-        return go_on(&session, recorder, &folder, &execution, &options.output);
+        return go_on(&session, recorder, &folder, &execution, &args.output);
     }
     if let Some(undisturbed) = task.undisturbed() {
-        let (session, execution) = (session.relaying(undisturbed.relayed), options.execution.one_at_a_time());
-        return go_on(&session, recorder, &folder, &execution, &options.output);
+        let (session, execution) = (session.relaying(undisturbed.relayed), args.execution.one_at_a_time());
+        return go_on(&session, recorder, &folder, &execution, &args.output);
     }
-    go_on(session, recorder, &folder, &options.execution, &options.output)
+    go_on(session, recorder, &folder, &args.execution, &args.output)
 }
 
 fn go_on(

@@ -20,7 +20,7 @@ use crate::cli::session::{Session, World};
 
 /// Which test is shrunk, and how.
 #[derive(Debug, Args)]
-pub struct Options {
+pub struct ShrinkArgs {
     /// The test, for example `T158`; to shrink a regression test, run `known` and give its folder with `--results`
     test: String,
     /// Folder of the run that recorded the test, for example `results/42`; by default the latest
@@ -48,30 +48,30 @@ pub struct Options {
     output: OutputArgs,
 }
 
-pub(super) fn shrink(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
-    let session = &*options.world.of(session)?;
+pub(super) fn shrink(session: &Session, args: &ShrinkArgs) -> Result<ExitCode, Failure> {
+    let session = &*args.world.of(session)?;
     let Session { results, .. } = session;
-    if options.evaluations < options.runs {
+    if args.evaluations < args.runs {
         return Err(Failure(format!(
             "--evaluations {} is less than --runs {}: not even the test itself could be run that often",
-            options.evaluations, options.runs
+            args.evaluations, args.runs
         )));
     }
-    let declared = session.plan.tests.iter().any(|test| test.name == options.test);
-    if declared && options.results.is_none() && record::latest_folder(results)?.is_none() {
-        return Err(not_recorded(&session.caller, &options.test));
+    let declared = session.plan.tests.iter().any(|test| test.name == args.test);
+    if declared && args.results.is_none() && record::latest_folder(results)?.is_none() {
+        return Err(not_recorded(&session.caller, &args.test));
     }
-    let repository = open(results, options.results.as_deref())?;
-    let number = match repository.find(&options.test) {
-        Err(RecordError::NoSuchTest { .. }) if declared => return Err(not_recorded(&session.caller, &options.test)),
+    let repository = open(results, args.results.as_deref())?;
+    let number = match repository.find(&args.test) {
+        Err(RecordError::NoSuchTest { .. }) if declared => return Err(not_recorded(&session.caller, &args.test)),
         found => found?,
     };
     let record = repository.test(number)?;
     let name = TestNumber(record.number).to_string();
-    let failing = failing(&repository, &record, &options.requirement)?;
+    let failing = failing(&repository, &record, &args.requirement)?;
     refuse_changed(session, &repository, record.number)?;
     let run = repository.path().parent().unwrap_or(results);
-    let into = options.into.as_deref().or(run.parent()).unwrap_or(run);
+    let into = args.into.as_deref().or(run.parent()).unwrap_or(run);
     let seed = repository.campaign().seed;
     let folder_name = format!("shrink-{name}");
     let task = Task::Shrink(Shrinking {
@@ -79,14 +79,14 @@ pub(super) fn shrink(session: &Session, options: &Options) -> Result<ExitCode, F
         test: record.test,
         failing,
         simulator_seed: record.simulator_seed,
-        runs: options.runs,
-        evaluations: options.evaluations,
+        runs: args.runs,
+        evaluations: args.evaluations,
     });
     let plan = task.plan(repository.plan());
     let files = claim_files(&session.runner, &plan)?;
     refuse_unfilled(&session.runner, &plan, true)?;
-    let (recorder, folder) = begin(session, into, &folder_name, &plan, &task, seed, &options.execution)?;
-    execute(session, recorder, &folder, &options.execution, &options.output, files)
+    let (recorder, folder) = begin(session, into, &folder_name, &plan, &task, seed, &args.execution)?;
+    execute(session, recorder, &folder, &args.execution, &args.output, files)
 }
 
 /// What to do for a regression test that these results do not have.

@@ -19,7 +19,7 @@ use crate::cli::view::Which;
 
 /// Which test is run without mitigation.
 #[derive(Debug, Args)]
-pub struct Options {
+pub struct TwinArgs {
     /// The test, for example `T158`
     test: String,
     /// Withhold the mitigation of this monitor only; may be repeated. By default no monitor's mitigation is sent
@@ -36,10 +36,10 @@ pub struct Options {
     timeout: Option<Duration>,
 }
 
-pub(super) fn twin(session: &Session, options: &Options) -> Result<ExitCode, Failure> {
+pub(super) fn twin(session: &Session, args: &TwinArgs) -> Result<ExitCode, Failure> {
     let plan = &session.plan;
-    let withheld = chosen(plan, &options.without, |monitor| {
-        monitor.otherwise.mitigation.is_some() || options.without.contains(&monitor.name)
+    let withheld = chosen(plan, &args.without, |monitor| {
+        monitor.otherwise.mitigation.is_some() || args.without.contains(&monitor.name)
     })?;
     let sends_none = withheld.iter().map(|&id| plan.monitor(id)).find(|monitor| monitor.otherwise.mitigation.is_none());
     if let Some(monitor) = sends_none {
@@ -48,15 +48,15 @@ pub(super) fn twin(session: &Session, options: &Options) -> Result<ExitCode, Fai
     if withheld.is_empty() {
         return Err(Failure("no monitor of the space has a mitigation; `mitigate with` declares one".to_owned()));
     }
-    if let Some(file) = options.record.as_ref().filter(|file| file.exists()) {
+    if let Some(file) = args.record.as_ref().filter(|file| file.exists()) {
         return Err(Failure(format!("{} exists already, and is not overwritten", shown(file))));
     }
     let asked = Asked {
         run: "twin",
-        test: &options.test,
-        results: options.which.results.as_deref(),
-        record: options.record.is_some(),
-        timeout: options.timeout,
+        test: &args.test,
+        results: args.which.results.as_deref(),
+        record: args.record.is_some(),
+        timeout: args.timeout,
         withheld: withheld.clone(),
     };
     let Some(again) = run_again(session, asked)? else { return Ok(ExitCode::from(STOPPED)) };
@@ -71,14 +71,14 @@ pub(super) fn twin(session: &Session, options: &Options) -> Result<ExitCode, Fai
     if let Some(reason) = &again.trace_failure {
         return Err(Failure(format!("the trace of the twin could not be written: {reason}")));
     }
-    if let Some(file) = &options.record {
+    if let Some(file) = &args.record {
         let cannot = |error: std::io::Error| Failure(format!("cannot write the trace: {error}: {}", shown(file)));
         let mut to = std::fs::File::create_new(file).map_err(cannot)?;
         std::io::copy(&mut std::fs::File::open(&again.trace).map_err(cannot)?, &mut to).map_err(cannot)?;
         say(format_args!("recorded in {}", shown(file)));
     }
     let found: Twin = compare(repository.plan(), record, &again.observation, &withheld, *lock_stepped);
-    match options.which.format {
+    match args.which.format {
         Format::Text => print(&twin_text(&found, text_options()))?,
         Format::Json => print_json(&found)?,
     };
