@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use std::process::ExitCode;
 
 use kuka_cell_sim::{Cell, NoisyCell};
-use sesame_runtime::simlog_server::{Options, serve};
+use sesame_runtime::simlog_server::{ServerOptions, serve};
 use sesame_runtime::simulator::Simulator as _;
 
 const HELP: &str = "\
@@ -42,7 +42,7 @@ fn main() -> ExitCode {
         }
     };
     let token = std::env::var("SESAME_SIMLOG_TOKEN").ok();
-    let options = Options { token, seed, ..Options::new(address) };
+    let options = ServerOptions { token, seed, ..ServerOptions::new(address) };
     let ready = |address: SocketAddr| println!("the gearbox cell listens at {address}");
     let served = if noisy { serve(&options, ready, NoisyCell::start) } else { serve(&options, ready, Cell::start) };
     match served {

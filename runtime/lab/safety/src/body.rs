@@ -96,12 +96,12 @@ impl Shape {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Body {
     shape: Shape,
-    place: Place,
+    placement: Placement,
 }
 
 /// Where a body is.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Place {
+pub enum Placement {
     /// Always here.
     Fixed(Pose),
     /// With a recorded pose, as long as that is known.
@@ -133,7 +133,7 @@ impl Body {
             return Err(BodyError::Pose(pose));
         }
         let pose = Pose::from_parts(pose.translation, pose.rotation.normalize());
-        Ok(Body { shape, place: Place::Fixed(pose) })
+        Ok(Body { shape, placement: Placement::Fixed(pose) })
     }
 
     /// A body that does not move, with its edges along the axes.
@@ -146,7 +146,7 @@ impl Body {
         if shape.turns_visibly() && trace.orientations().is_none() {
             return Err(BodyError::NoOrientations);
         }
-        Ok(Body { shape, place: Place::Moving(trace) })
+        Ok(Body { shape, placement: Placement::Moving(trace) })
     }
 
     /// The body with this length more on every side, 0 or more.
@@ -160,15 +160,15 @@ impl Body {
     }
 
     /// Where it is.
-    pub fn place(&self) -> &Place {
-        &self.place
+    pub fn placement(&self) -> &Placement {
+        &self.placement
     }
 
     /// Its pose at a time; `None` where it is not known.
     pub fn at(&self, time: f64) -> Option<Pose> {
-        match &self.place {
-            Place::Fixed(pose) => Some(*pose),
-            Place::Moving(trace) => trace.at(time),
+        match &self.placement {
+            Placement::Fixed(pose) => Some(*pose),
+            Placement::Moving(trace) => trace.at(time),
         }
     }
 }

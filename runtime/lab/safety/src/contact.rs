@@ -27,7 +27,7 @@
 
 use parry3d_f64::math::{Pose, Vector};
 
-use crate::body::{Body, Place, Shape};
+use crate::body::{Body, Placement, Shape};
 use crate::distance::{Separation, separation};
 use crate::trace::{angle, between};
 
@@ -130,9 +130,9 @@ pub fn contacts(one: &Body, other: &Body, tolerance: f64) -> Result<Contacts, Co
 
 /// The time in which both bodies have a pose.
 fn known(one: &Body, other: &Body) -> Result<Interval, ContactError> {
-    let of = |body: &Body| match body.place() {
-        Place::Fixed(_) => None,
-        Place::Moving(trace) => Some(Interval { from: trace.start(), to: trace.end() }),
+    let of = |body: &Body| match body.placement() {
+        Placement::Fixed(_) => None,
+        Placement::Moving(trace) => Some(Interval { from: trace.start(), to: trace.end() }),
     };
     match (of(one), of(other)) {
         (None, None) => Err(ContactError::NothingMoves),
@@ -151,7 +151,7 @@ fn known(one: &Body, other: &Body) -> Result<Interval, ContactError> {
 fn common_times(one: &Body, other: &Body, known: Interval) -> Vec<f64> {
     let mut times = vec![known.from, known.to];
     for body in [one, other] {
-        if let Place::Moving(trace) = body.place() {
+        if let Placement::Moving(trace) = body.placement() {
             times.extend(trace.times().iter().filter(|&&time| known.from < time && time < known.to));
         }
     }

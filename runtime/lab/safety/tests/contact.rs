@@ -4,7 +4,7 @@
 
 use proptest::prelude::*;
 use sesame_safety::alignment::Alignment;
-use sesame_safety::body::{Body, Place, Shape};
+use sesame_safety::body::{Body, Placement, Shape};
 use sesame_safety::contact::{ContactError, Contacts, TOLERANCE, contacts};
 use sesame_safety::distance::separation;
 use sesame_safety::trace::Trace;
@@ -108,9 +108,9 @@ fn two_spheres_cross_and_meet_in_the_middle() {
 #[test]
 fn two_robots_that_cross_one_after_the_other_do_not_meet() {
     let one = flying(0.5, &[[-4.0, 0.0, 0.0], [0.0; 3], [4.0, 0.0, 0.0], [8.0, 0.0, 0.0]]);
-    let Place::Moving(recorded) = one.place() else { unreachable!() };
+    let Placement::Moving(recorded) = one.placement() else { unreachable!() };
     let late = flying(0.5, &[[0.0, -4.0, 0.0], [0.0; 3], [0.0, 4.0, 0.0]]);
-    let Place::Moving(other) = late.place() else { unreachable!() };
+    let Placement::Moving(other) = late.placement() else { unreachable!() };
     let with = |alignment: Alignment| {
         let aligned = alignment.align(recorded, other).unwrap();
         found(&one, &Body::moving(sphere(0.5), aligned).unwrap())
@@ -159,7 +159,7 @@ fn what_cannot_be_answered_is_an_error() {
     assert_eq!(contacts(&other, &other, TOLERANCE), Err(ContactError::NothingMoves));
     assert_eq!(contacts(&one, &other, 0.0), Err(ContactError::Tolerance(0.0)));
     assert!(matches!(contacts(&one, &other, f64::NAN), Err(ContactError::Tolerance(_))));
-    let Place::Moving(trace) = one.place() else { unreachable!() };
+    let Placement::Moving(trace) = one.placement() else { unreachable!() };
     let later = Body::moving(sphere(0.5), trace.shifted(5.0).unwrap()).unwrap();
     assert_eq!(
         contacts(&one, &later, TOLERANCE).unwrap_err().to_string(),
@@ -223,9 +223,9 @@ fn clearance(one: &Body, other: &Body, time: f64) -> f64 {
 }
 
 fn moved(body: &Body, by: Pose) -> Body {
-    match body.place() {
-        Place::Fixed(pose) => Body::fixed(*body.shape(), by * *pose).unwrap(),
-        Place::Moving(trace) => {
+    match body.placement() {
+        Placement::Fixed(pose) => Body::fixed(*body.shape(), by * *pose).unwrap(),
+        Placement::Moving(trace) => {
             let positions = trace.positions().iter().map(|&position| by * position).collect();
             let turned = trace.orientations().map(|all| all.iter().map(|&one| by.rotation * one).collect());
             let trace = Trace::new(trace.times().to_vec(), positions, turned).unwrap();
@@ -290,7 +290,7 @@ proptest! {
     #[test]
     fn samples_in_between_change_nothing((one, other) in any_pair(), share in 0.01..0.99f64) {
         let here = known(&one, &other, TOLERANCE)?;
-        let Place::Moving(trace) = one.place() else { unreachable!() };
+        let Placement::Moving(trace) = one.placement() else { unreachable!() };
         let mut times = trace.times().to_vec();
         times.push(trace.start() + (trace.end() - trace.start()) * share);
         times.sort_by(f64::total_cmp);

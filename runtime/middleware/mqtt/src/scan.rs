@@ -30,7 +30,7 @@ const READY_WITHIN: Duration = Duration::from_secs(10);
 
 /// What is listened to, and how the broker is reached.
 #[derive(Debug, Clone)]
-pub struct Options {
+pub struct ScanOptions {
     /// The address of the broker, `mqtt://…` or `mqtts://…`.
     pub url: String,
     /// The filters of topics, such as `#`.
@@ -95,7 +95,7 @@ impl From<TransportError> for ScanError {
 }
 
 /// Listens at a broker.
-pub fn scan(options: &Options) -> Result<Found, ScanError> {
+pub fn scan(options: &ScanOptions) -> Result<Found, ScanError> {
     let (queue, incoming) = sync_channel(WAITING);
     let account = account(options)?;
     let received = Received { broker: 0, queue };
@@ -130,7 +130,7 @@ pub fn scan(options: &Options) -> Result<Found, ScanError> {
     Ok(Found { facts, payloads: heard.payloads })
 }
 
-fn account(options: &Options) -> Result<Account, ScanError> {
+fn account(options: &ScanOptions) -> Result<Account, ScanError> {
     let address = Address::read(&options.url).map_err(ScanError::Settings)?;
     let pem = options.trust.as_ref().map(|path| trusted(path, &options.folder)).transpose()?;
     let tls = if address.tls { Some(tls::client(pem.as_deref()).map_err(ScanError::Settings)?) } else { None };
@@ -149,7 +149,11 @@ fn account(options: &Options) -> Result<Account, ScanError> {
 }
 
 /// What comes next, waited for until then; nothing more if the time is over.
-fn next(incoming: &Receiver<(usize, Passed)>, options: &Options, until: Instant) -> Result<Option<Passed>, ScanError> {
+fn next(
+    incoming: &Receiver<(usize, Passed)>,
+    options: &ScanOptions,
+    until: Instant,
+) -> Result<Option<Passed>, ScanError> {
     let url = || options.url.clone();
     match incoming.recv_timeout(until.saturating_duration_since(Instant::now())) {
         Ok((_, Passed::Refused(how))) => Err(ScanError::Refused { url: url(), how }),
@@ -250,7 +254,7 @@ mod tests {
     #[test]
     fn a_broker_that_is_not_there_is_an_error() {
         let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
-        let options = Options {
+        let options = ScanOptions {
             url: format!("mqtt://{free}"),
             filters: vec!["#".to_owned()],
             listening: Duration::from_secs(2),
@@ -261,7 +265,7 @@ mod tests {
         };
         let said = scan(&options).unwrap_err().to_string();
         assert!(said.starts_with(&format!("no broker answers at `mqtt://{free}`: ")), "{said}");
-        let said = scan(&Options { url: "tcp://a".to_owned(), ..options }).unwrap_err().to_string();
+        let said = scan(&ScanOptions { url: "tcp://a".to_owned(), ..options }).unwrap_err().to_string();
         assert_eq!(said, "`tcp://a` is not the address of a broker; write `mqtt://HOST:PORT`");
     }
 }

@@ -32,7 +32,7 @@ const MOST_LISTENED: usize = 1000;
 
 /// How a bridge is reached.
 #[derive(Debug, Clone)]
-pub struct Options {
+pub struct ScanOptions {
     /// Its address.
     pub url: String,
     /// Where the token is that it wants.
@@ -88,7 +88,7 @@ pub struct Scanner {
 
 impl Scanner {
     /// Connects to a bridge.
-    pub fn connect(options: &Options, dialect: Option<Dialect>) -> Result<Self, ScanError> {
+    pub fn connect(options: &ScanOptions, dialect: Option<Dialect>) -> Result<Self, ScanError> {
         let token = options.token.as_ref().map(|secret| Token::read(secret, &options.folder)).transpose()?;
         let address = Address {
             url: options.url.clone(),

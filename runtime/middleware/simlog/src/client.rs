@@ -25,7 +25,7 @@ use crate::proto::simulator3::{SimStatus, StepRequest as StepRequest3};
 use crate::proto::v2::{InjectRequest, PubRequest, RosMessage, StepRequest, StepSizeRequest, TopicDescriptor};
 use crate::proto::v3::{self, ReadRequest, SimlogMessage, Subscriber, SubscriptionRequest, TopicInfoRequest};
 
-pub use self::api::Options;
+pub use self::api::ClientOptions;
 pub use self::error::ClientError;
 pub use self::inbox::{Bounds, Heard};
 
@@ -80,7 +80,7 @@ impl<T> Answer<T> {
 
 impl Client {
     /// Connects to a simulator; tries again until the patience is over.
-    pub fn connect(options: &Options) -> Result<Self, ClientError> {
+    pub fn connect(options: &ClientOptions) -> Result<Self, ClientError> {
         let url = options.url.clone();
         let failed = |how: std::io::Error| ClientError::Url { url: url.clone(), reason: how.to_string() };
         let runtime = Builder::new_current_thread().enable_io().enable_time().build().map_err(failed)?;

@@ -7,17 +7,17 @@ use prost_types::{ListValue, Struct, Timestamp, Value as Dynamic};
 use sesame_relay::message::Mismatch;
 use sesame_relay::value::Value;
 
+use crate::expected_type::ExpectedType;
 use crate::json;
 use crate::proto::v3::{SimlogHeader, SimlogMessage, ValueType};
-use crate::shape::Shape;
 use crate::tree::Tree;
 
 /// The largest whole number up to which the numbers of the wire are exact.
 const EXACT: i128 = 1 << 53;
 
 /// The value of a message.
-pub(crate) fn read(shape: &Shape, message: &SimlogMessage) -> Result<Value, Mismatch> {
-    message.value.as_ref().map_or(Tree::Nothing, tree).read(shape)
+pub(crate) fn read(expected: &ExpectedType, message: &SimlogMessage) -> Result<Value, Mismatch> {
+    message.value.as_ref().map_or(Tree::Nothing, tree).read(expected)
 }
 
 /// What a message says, as JSON.

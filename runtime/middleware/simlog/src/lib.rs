@@ -15,6 +15,7 @@
 )]
 pub mod client;
 mod dynamic;
+mod expected_type;
 mod json;
 mod message;
 pub mod proto;
@@ -25,13 +26,12 @@ pub mod scan;
 #[cfg(feature = "server")]
 #[expect(clippy::disallowed_types, reason = "an adapter: it serves on a thread")]
 pub mod server;
-mod shape;
 #[cfg(feature = "client")]
 #[expect(clippy::disallowed_methods, reason = "an adapter: it waits for a simulator")]
 mod transport;
 mod tree;
 
+pub use expected_type::{ExpectedType, Named};
 pub use message::Message;
-pub use shape::{Named, Shape};
 #[cfg(feature = "client")]
 pub use transport::simlog;

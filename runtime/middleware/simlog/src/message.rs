@@ -5,9 +5,9 @@ use sesame_plan::SimlogVersion;
 use sesame_relay::message::Mismatch;
 use sesame_relay::value::Value;
 
+use crate::expected_type::ExpectedType;
 use crate::proto::v2::RosMessage;
 use crate::proto::v3::SimlogMessage;
-use crate::shape::Shape;
 use crate::{dynamic, ros};
 
 /// A message as it is on the wire.
@@ -21,10 +21,10 @@ pub enum Message {
 
 impl Message {
     /// Its value, read as this. The mismatch says which field is of another type.
-    pub fn read(&self, shape: &Shape) -> Result<Value, Mismatch> {
+    pub fn read(&self, expected: &ExpectedType) -> Result<Value, Mismatch> {
         match self {
-            Message::V2(message) => ros::read(shape, message),
-            Message::V3(message) => dynamic::read(shape, message),
+            Message::V2(message) => ros::read(expected, message),
+            Message::V3(message) => dynamic::read(expected, message),
         }
     }
 

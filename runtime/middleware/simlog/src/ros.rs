@@ -9,28 +9,28 @@ use std::borrow::Cow;
 use sesame_relay::message::Mismatch;
 use sesame_relay::value::Value;
 
+use crate::expected_type::ExpectedType;
 use crate::json;
 use crate::proto::v2::ros_message::Content;
 use crate::proto::v2::{
     Duration, Header, JointTrajectory, JointTrajectoryPoint, Point, PointStamped, Quaternion, RosMessage, SafetyZone,
     SafetyZoneCmd, Time,
 };
-use crate::shape::Shape;
 use crate::tree::Tree;
 
 const SECOND: u64 = 1_000_000_000;
 
 /// The value of a message.
-pub(crate) fn read(shape: &Shape, message: &RosMessage) -> Result<Value, Mismatch> {
+pub(crate) fn read(expected: &ExpectedType, message: &RosMessage) -> Result<Value, Mismatch> {
     match content(message) {
         Some(content) => {
             let tree = tree(content);
-            match (shape, tree.field("point")) {
-                (Shape::Point, Some(point)) => point.read(shape),
-                _ => tree.read(shape),
+            match (expected, tree.field("point")) {
+                (ExpectedType::Point, Some(point)) => point.read(expected),
+                _ => tree.read(expected),
             }
         }
-        None => text(shape, &message.value),
+        None => text(expected, &message.value),
     }
 }
 
@@ -123,18 +123,20 @@ fn content(message: &RosMessage) -> Option<&Content> {
 }
 
 /// What a text says.
-pub(crate) fn text(shape: &Shape, text: &str) -> Result<Value, Mismatch> {
+pub(crate) fn text(expected: &ExpectedType, text: &str) -> Result<Value, Mismatch> {
     let wrong = |expected| Mismatch { path: Vec::new(), expected, found: "text" };
     let word = text.trim();
-    match shape {
-        Shape::Text => Ok(Value::Text(text.into())),
-        Shape::Bool => word.parse().map(Value::Bool).map_err(|_| wrong("bool")),
-        Shape::Real => word.parse().map(Value::Real).map_err(|_| wrong("real")),
-        Shape::Int => match word.parse::<i64>() {
+    match expected {
+        ExpectedType::Text => Ok(Value::Text(text.into())),
+        ExpectedType::Bool => word.parse().map(Value::Bool).map_err(|_| wrong("bool")),
+        ExpectedType::Real => word.parse().map(Value::Real).map_err(|_| wrong("real")),
+        ExpectedType::Int => match word.parse::<i64>() {
             Ok(whole) => Ok(Value::Int(whole)),
-            Err(_) => Tree::Real(word.parse().map_err(|_| wrong("int"))?).read(shape),
+            Err(_) => Tree::Real(word.parse().map_err(|_| wrong("int"))?).read(expected),
         },
-        Shape::Point | Shape::List(_) | Shape::Record(_) => json::read(text).ok_or_else(|| wrong("JSON"))?.read(shape),
+        ExpectedType::Point | ExpectedType::List(_) | ExpectedType::Record(_) => {
+            json::read(text).ok_or_else(|| wrong("JSON"))?.read(expected)
+        }
     }
 }
 

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use sesame_plan::{SimlogVersion, WireNames};
 use sesame_scan::{Arrivals, Conventions, Facts, FoundTopic, Payloads, System};
 
-use crate::client::{Client, ClientError, Heard, Options};
+use crate::client::{Client, ClientError, ClientOptions, Heard};
 
 /// The most topics that are listened to.
 pub const MOST_TOPICS: usize = 1000;
@@ -48,7 +48,7 @@ pub struct Found {
 }
 
 /// Looks at topics of a simulator.
-pub fn scan(options: &Options, wanted: &Wanted) -> Result<Found, ClientError> {
+pub fn scan(options: &ClientOptions, wanted: &Wanted) -> Result<Found, ClientError> {
     let mut scan = Scan {
         client: Client::connect(options)?,
         begin: now(),
@@ -132,7 +132,7 @@ impl Scan {
         Ok(any)
     }
 
-    fn found(mut self, options: &Options, wanted: &Wanted, steps: u64) -> Found {
+    fn found(mut self, options: &ClientOptions, wanted: &Wanted, steps: u64) -> Found {
         for (at, topic) in self.topics.iter_mut().enumerate() {
             let arrivals = self.arrivals.get(&at).copied().unwrap_or_default();
             topic.messages = arrivals.messages();

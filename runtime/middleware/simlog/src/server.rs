@@ -33,7 +33,7 @@ const MESSAGE_LIMIT: usize = 4 << 20;
 
 /// Where and for whom a simulator is served.
 #[derive(Debug, Clone)]
-pub struct Options {
+pub struct ServerOptions {
     /// Where it listens. An address that is not of this machine alone needs a token.
     pub address: SocketAddr,
     /// What each call has to carry (`authorization: Bearer …`); `None` for anybody on this machine.
@@ -44,10 +44,10 @@ pub struct Options {
     pub seed: u64,
 }
 
-impl Options {
-    /// Those of an address: without a token, with the names of the original platform, and seed 1.
+impl ServerOptions {
+    /// The options for an address: without a token, with the names of the original platform, and seed 1.
     pub fn new(address: SocketAddr) -> Self {
-        Options { address, token: None, names: WireNames::default(), seed: 1 }
+        ServerOptions { address, token: None, names: WireNames::default(), seed: 1 }
     }
 }
 
@@ -55,7 +55,7 @@ impl Options {
 /// `start` makes the simulator of each run; most often it is [`Simulator::start`]. An error means that nobody can be
 /// served.
 pub fn serve<S: Simulator>(
-    options: &Options,
+    options: &ServerOptions,
     ready: impl FnOnce(SocketAddr),
     start: impl FnMut(&Setup, &mut Bus<'_>) -> Result<S, SimulatorError>,
 ) -> io::Result<()> {

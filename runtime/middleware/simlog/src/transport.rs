@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use sesame_base::time::SimTime;
-use sesame_lifecycle::launch::{Launched, Place};
+use sesame_lifecycle::launch::{LaunchContext, Launched};
 use sesame_plan::{CampaignPlan, Simlog};
 use sesame_relay::relay::{Delivery, Exchange};
 use sesame_relay::simulator::Progress;
@@ -33,7 +33,7 @@ use sesame_relay::wire::WireTable;
 use self::lines::Lines;
 use self::round::Round;
 use self::session::{Session, Start, fault};
-use crate::client::{Client, Options};
+use crate::client::{Client, ClientOptions};
 
 /// How long nothing may come in while something must.
 const SILENCE: Duration = Duration::from_secs(10);
@@ -73,9 +73,9 @@ fn transport(plan: &CampaignPlan, folder: &Path, in_runner: bool) -> System {
     let sesame_plan::Transport::Simlog(settings) = &plan.simulator.transport else {
         unreachable!("the generator connects each kind of simulator by its own transport")
     };
-    let place = Place { in_runner, ..Place::of_worker(folder.to_owned()) };
+    let context = LaunchContext { in_runner, ..LaunchContext::of_worker(folder.to_owned()) };
     System {
-        launched: Launched::new(plan, place),
+        launched: Launched::new(plan, context),
         promises: Promises::new(plan, &WireTable::new(plan)),
         plan: plan.clone(),
         settings: settings.clone(),
@@ -110,15 +110,15 @@ impl System {
         SimTime::from_nanos(i64::try_from(self.settings.step_ns).unwrap_or(i64::MAX))
     }
 
-    fn options(&self) -> Result<Options, TransportError> {
+    fn options(&self) -> Result<ClientOptions, TransportError> {
         let url = |url: &String| self.launched.fill(url);
         let ca = self.settings.ca.as_ref().map(|file| trusted(file, &self.folder)).transpose()?;
-        Ok(Options {
+        Ok(ClientOptions {
             topics_url: self.settings.topics_url.as_ref().map(url),
             ca,
             token: std::env::var(TOKEN).ok(),
             patience: SILENCE,
-            ..Options::new(&url(&self.settings.url), self.settings.protocol)
+            ..ClientOptions::new(&url(&self.settings.url), self.settings.protocol)
         })
     }
 

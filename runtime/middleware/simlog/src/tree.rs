@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use sesame_relay::message::Mismatch;
 use sesame_relay::value::Value;
 
-use crate::shape::Shape;
+use crate::expected_type::ExpectedType;
 
 /// The largest whole number up to which reals are exact.
 const EXACT: f64 = 9_007_199_254_740_992.0;
@@ -71,31 +71,31 @@ impl Tree {
         }
     }
 
-    /// The value of this shape.
-    pub(crate) fn read(&self, shape: &Shape) -> Result<Value, Mismatch> {
-        match shape {
-            Shape::Bool => match self {
+    /// The value as this type.
+    pub(crate) fn read(&self, expected: &ExpectedType) -> Result<Value, Mismatch> {
+        match expected {
+            ExpectedType::Bool => match self {
                 Tree::Bool(truth) => Ok(Value::Bool(*truth)),
                 _ => Err(self.mismatch("bool")),
             },
-            Shape::Int => {
+            ExpectedType::Int => {
                 let whole = self.whole()?;
                 let large = |_| Mismatch { path: Vec::new(), expected: "int", found: "a number that is too large" };
                 i64::try_from(whole).map(Value::Int).map_err(large)
             }
-            Shape::Real => self.real().map(Value::Real),
-            Shape::Text => match self {
+            ExpectedType::Real => self.real().map(Value::Real),
+            ExpectedType::Text => match self {
                 Tree::Text(text) => Ok(Value::Text(text.as_str().into())),
                 _ => Err(self.mismatch("text")),
             },
-            Shape::Point => self.point().map(Value::Point),
-            Shape::List(of) => {
+            ExpectedType::Point => self.point().map(Value::Point),
+            ExpectedType::List(of) => {
                 let Tree::List(items) = self else { return Err(self.mismatch("list")) };
                 let items = items.iter().enumerate();
                 let items = items.map(|(at, item)| item.read(of).map_err(|error| error.inside(&format!("[{at}]"))));
                 items.collect::<Result<_, _>>().map(Value::List)
             }
-            Shape::Record(fields) => {
+            ExpectedType::Record(fields) => {
                 let Tree::Fields(_) = self else { return Err(self.mismatch("message")) };
                 fields.read(|name| self.field(name)).map(Value::Record)
             }

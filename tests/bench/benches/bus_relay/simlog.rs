@@ -41,7 +41,7 @@ impl Simulator for Joint {
 /// Serves a simulator until the process ends.
 fn served() -> SocketAddr {
     let (sender, receiver) = mpsc::channel();
-    let options = server::Options::new(([127, 0, 0, 1], 0).into());
+    let options = server::ServerOptions::new(([127, 0, 0, 1], 0).into());
     std::thread::spawn(move || {
         server::serve(&options, |address| sender.send(address).expect("it is awaited"), Joint::start)
     });

@@ -72,7 +72,7 @@ fn serve(answers: Answers) -> SocketAddr {
 }
 
 fn scanner(address: SocketAddr) -> Scanner {
-    let options = Options { url: format!("ws://{address}"), token: None, trust: None, folder: PathBuf::new() };
+    let options = ScanOptions { url: format!("ws://{address}"), token: None, trust: None, folder: PathBuf::new() };
     Scanner::connect(&options, None).unwrap()
 }
 

@@ -21,7 +21,7 @@ const MESSAGE_LIMIT: usize = 4 << 20;
 
 /// Where a simulator is, and how it is spoken to.
 #[derive(Debug, Clone)]
-pub struct Options {
+pub struct ClientOptions {
     /// Its URL, `http://HOST:PORT` or `https://HOST:PORT`.
     pub url: String,
     /// The URL of its topics in version 3; `None` for the port after that of `url`.
@@ -38,10 +38,10 @@ pub struct Options {
     pub bounds: Bounds,
 }
 
-impl Options {
-    /// Those of a URL: without TLS and token, and with a patience of ten seconds.
+impl ClientOptions {
+    /// The options for a URL: without TLS and token, and with a patience of ten seconds.
     pub fn new(url: &str, version: SimlogVersion) -> Self {
-        Options {
+        ClientOptions {
             url: url.to_owned(),
             topics_url: None,
             version,
@@ -68,7 +68,7 @@ struct Endpoints {
 }
 
 impl Endpoints {
-    fn of(options: &Options) -> Result<Self, ClientError> {
+    fn of(options: &ClientOptions) -> Result<Self, ClientError> {
         let mut urls = vec![options.url.clone()];
         if options.version == SimlogVersion::V3 {
             urls.push(match &options.topics_url {
@@ -81,7 +81,7 @@ impl Endpoints {
 }
 
 /// Connects to all servers of a simulator, on the thread of this runtime.
-pub(super) fn connect(options: &Options, handle: &Handle) -> Result<Api, ClientError> {
+pub(super) fn connect(options: &ClientOptions, handle: &Handle) -> Result<Api, ClientError> {
     let Endpoints { urls, bearer } = Endpoints::of(options)?;
     let mut lines = Vec::new();
     for url in urls {

@@ -33,28 +33,28 @@ proptest! {
     #[test]
     fn what_is_written_is_read_back(value in values(), other in values()) {
         let written = write(&value, &message(None)).unwrap();
-        prop_assert_eq!(read(&Shape::of_value(&value), &written), Ok(value.clone()));
+        prop_assert_eq!(read(&ExpectedType::of_value(&value), &written), Ok(value.clone()));
         let over_other = write(&value, &write(&other, &message(None)).unwrap()).unwrap();
-        prop_assert_eq!(read(&Shape::of_value(&value), &over_other), Ok(value));
+        prop_assert_eq!(read(&ExpectedType::of_value(&value), &over_other), Ok(value));
     }
 }
 
 #[test]
 fn the_rest_of_a_message_stays() {
     let number = message(Some(Kind::NumberValue(1.5)));
-    assert_eq!(read(&Shape::Real, &number), Ok(Value::Real(1.5)));
+    assert_eq!(read(&ExpectedType::Real, &number), Ok(Value::Real(1.5)));
     let written = write(&Value::Real(f64::NAN), &number).unwrap();
     assert_eq!((&written.header, written.r#type), (&number.header, 2));
-    assert!(matches!(read(&Shape::Real, &written), Ok(Value::Real(x)) if x.is_nan()));
+    assert!(matches!(read(&ExpectedType::Real, &written), Ok(Value::Real(x)) if x.is_nan()));
     assert_eq!(stamp(&number), Some(2_000_000_005));
 }
 
 #[test]
 fn what_does_not_fit_is_said() {
     let said = |result: Result<Value, Mismatch>| result.unwrap_err().to_string();
-    assert_eq!(said(read(&Shape::Real, &message(None))), "expected real, found nothing");
+    assert_eq!(said(read(&ExpectedType::Real, &message(None))), "expected real, found nothing");
     let half = message(Some(Kind::NumberValue(0.5)));
-    assert_eq!(said(read(&Shape::Int, &half)), "expected int, found a number that is not whole");
+    assert_eq!(said(read(&ExpectedType::Int, &half)), "expected int, found a number that is not whole");
     let large = write(&Value::List(vec![Value::Int(i64::MAX)]), &message(None)).unwrap_err();
     assert_eq!(large.to_string(), "field `[0]`: expected an int of 53 bits, found a number that is too large");
     let odd = SimlogHeader { timestamp: Some(Timestamp { seconds: -1, nanos: 0 }), path: String::new() };

@@ -4,7 +4,7 @@ use sesame_relay::value::{Fields, Record};
 
 use super::*;
 
-const REAL: Shape = Shape::Real;
+const REAL: ExpectedType = ExpectedType::Real;
 
 fn record(fields: &[(&str, Value)]) -> Value {
     let names = Fields::new(fields.iter().map(|(name, _)| *name));
@@ -75,7 +75,7 @@ fn contents() -> impl Strategy<Value = Content> {
 }
 
 /// As a space would declare all of a content.
-fn all_of(tree: &Tree) -> Shape {
+fn all_of(tree: &Tree) -> ExpectedType {
     fn value(tree: &Tree) -> Value {
         match tree {
             Tree::Int(_) => Value::Int(0),
@@ -90,16 +90,16 @@ fn all_of(tree: &Tree) -> Shape {
             Tree::Nothing | Tree::Bool(_) => unreachable!("all parts are there, and none is a truth value"),
         }
     }
-    Shape::of_value(&value(tree))
+    ExpectedType::of_value(&value(tree))
 }
 
 proptest! {
     /// Whatever content there is, what is read of it and written into another one of its kind is the same content.
     #[test]
     fn what_is_read_is_written_back(content in contents(), other in contents()) {
-        let shape = all_of(&tree(&content));
+        let expected = all_of(&tree(&content));
         let message = holding(content);
-        let value = read(&shape, &message).unwrap();
+        let value = read(&expected, &message).unwrap();
         prop_assert_eq!(&write(&value, &message).unwrap(), &message);
         let other = holding(other);
         let kinds = [&message, &other].map(|message| message.content.as_ref().map(std::mem::discriminant));
@@ -126,7 +126,7 @@ proptest! {
         let nested = record(&[("list", Value::List(vec![Value::Real(x)])), ("text", Value::from(text.as_str()))]);
         for value in [Value::Real(x), Value::Int(n), Value::Bool(n > 0), Value::from(text.as_str()), nested] {
             let written = write(&value, &saying("")).unwrap();
-            prop_assert_eq!(read(&Shape::of_value(&value), &written).unwrap(), value);
+            prop_assert_eq!(read(&ExpectedType::of_value(&value), &written).unwrap(), value);
         }
     }
 
@@ -135,8 +135,8 @@ proptest! {
     fn any_text_is_read_or_refused(text in "\\PC{0,20}|[\\[\\]{}\":,0-9eEn.-]{0,20}") {
         let zone = record(&[("zone", Value::from("")), ("level", Value::Real(0.0))]);
         for like in [Value::Real(0.0), Value::Int(0), Value::Bool(true), Value::Point([0.0; 3]), zone] {
-            let shape = Shape::of_value(&like);
-            if let Ok(value) = read(&shape, &saying(&text)) {
+            let expected = ExpectedType::of_value(&like);
+            if let Ok(value) = read(&expected, &saying(&text)) {
                 prop_assert!(write(&value, &saying(&text)).is_ok());
             }
         }
@@ -154,7 +154,7 @@ fn a_part_of_a_message_is_enough() {
     };
     let declared = record(&[("level", Value::Real(0.0)), ("zone", Value::from(""))]);
     let message = holding(Content::SafetyZone(zone.clone()));
-    let value = read(&Shape::of_value(&declared), &message).unwrap();
+    let value = read(&ExpectedType::of_value(&declared), &message).unwrap();
     assert_eq!(value, record(&[("level", Value::Real(250.5)), ("zone", Value::from("Z1"))]));
     let changed = record(&[("level", Value::Real(0.1)), ("zone", Value::from("Z1"))]);
     let expected = holding(Content::SafetyZone(SafetyZone { level: 0.1, ..zone }));
@@ -167,14 +167,14 @@ fn a_point_is_a_point_wherever_it_is() {
     let moved = Value::Point([4.0, 5.0, 6.0]);
     let there = Point { x: 4.0, y: 5.0, z: 6.0 };
     let plain = holding(Content::Point(at));
-    assert_eq!(read(&Shape::Point, &plain), Ok(Value::Point([1.0, 2.0, 3.0])));
+    assert_eq!(read(&ExpectedType::Point, &plain), Ok(Value::Point([1.0, 2.0, 3.0])));
     assert_eq!(write(&moved, &plain), Ok(holding(Content::Point(there))));
     let stamped = |point| holding(Content::PointStamped(PointStamped { header: Some(stamped(3, 4)), point }));
-    assert_eq!(read(&Shape::Point, &stamped(Some(at))), Ok(Value::Point([1.0, 2.0, 3.0])));
+    assert_eq!(read(&ExpectedType::Point, &stamped(Some(at))), Ok(Value::Point([1.0, 2.0, 3.0])));
     assert_eq!(write(&moved, &stamped(Some(at))), Ok(stamped(Some(there))));
     assert_eq!(write(&moved, &stamped(None)), Ok(stamped(Some(there))));
     let declared = record(&[("header", record(&[("seq", Value::Int(0))])), ("point", Value::Point([0.0; 3]))]);
-    let read_back = read(&Shape::of_value(&declared), &stamped(Some(at))).unwrap();
+    let read_back = read(&ExpectedType::of_value(&declared), &stamped(Some(at))).unwrap();
     assert_eq!(read_back.number_at(&["point", "y"]), Some(2.0));
     assert_eq!(write(&read_back, &stamped(Some(at))), Ok(stamped(Some(at))));
 }
@@ -194,12 +194,12 @@ fn a_time_stamp_belongs_to_the_text_beside_it() {
 fn what_json_has_beyond_the_declaration_stays() {
     let zone = record(&[("level", Value::Real(0.0))]);
     let message = saying(r#"{"level": 3, "seq": 18446744073709551615, "tags": ["a", null]}"#);
-    let mut value = read(&Shape::of_value(&zone), &message).unwrap();
+    let mut value = read(&ExpectedType::of_value(&zone), &message).unwrap();
     assert_eq!(value, record(&[("level", Value::Real(3.0))]));
     *value.at_mut(&["level"]).unwrap() = Value::Real(f64::NAN);
     let written = write(&value, &message).unwrap();
     assert_eq!(written.value, r#"{"level":"NaN","seq":18446744073709551615,"tags":["a",null]}"#);
-    assert!(read(&Shape::of_value(&zone), &written).unwrap().number_at(&["level"]).unwrap().is_nan());
+    assert!(read(&ExpectedType::of_value(&zone), &written).unwrap().number_at(&["level"]).unwrap().is_nan());
 }
 
 #[test]
@@ -218,15 +218,15 @@ fn misfits_say_where_and_what() {
     let zone = holding(Content::SafetyZone(SafetyZone::default()));
     let seq = |seq| record(&[("header", record(&[("seq", seq)]))]);
     let said = [
-        read(&Shape::of_value(&header), &trajectory).map(drop),
-        read(&Shape::of_value(&names), &trajectory).map(drop),
-        read(&Shape::of_value(&lacking), &trajectory).map(drop),
+        read(&ExpectedType::of_value(&header), &trajectory).map(drop),
+        read(&ExpectedType::of_value(&names), &trajectory).map(drop),
+        read(&ExpectedType::of_value(&lacking), &trajectory).map(drop),
         read(&REAL, &trajectory).map(drop),
         read(&REAL, &saying("fast")).map(drop),
-        read(&Shape::Int, &saying("2.5")).map(drop),
-        read(&Shape::Bool, &saying("1")).map(drop),
-        read(&Shape::Point, &saying("[1, 2]")).map(drop),
-        read(&Shape::of_value(&header), &saying("{")).map(drop),
+        read(&ExpectedType::Int, &saying("2.5")).map(drop),
+        read(&ExpectedType::Bool, &saying("1")).map(drop),
+        read(&ExpectedType::Point, &saying("[1, 2]")).map(drop),
+        read(&ExpectedType::of_value(&header), &saying("{")).map(drop),
         write(&points(Value::Real(1e300)), &trajectory).map(drop),
         write(&points(Value::from("far")), &trajectory).map(drop),
         write(&seq(Value::Int(-1)), &zone).map(drop),

@@ -10,9 +10,9 @@ use sesame_relay::value::Value;
 use tokio::sync::{mpsc, oneshot};
 use tonic::Status;
 
+use crate::expected_type::ExpectedType;
 use crate::proto::v2::RosMessage;
 use crate::ros;
-use crate::shape::Shape;
 
 /// How many subscribers there may be.
 const SUBSCRIBERS: usize = 256;
@@ -186,7 +186,7 @@ impl<S: Simulator, F: FnMut(&Setup, &mut Bus<'_>) -> Result<S, SimulatorError>> 
             let problem = format!("`{name}`: nothing was published there yet, so nobody knows what its messages are");
             return Err(Status::failed_precondition(problem));
         };
-        let value = ros::read(&Shape::of_value(latest), data)
+        let value = ros::read(&ExpectedType::of_value(latest), data)
             .map_err(|mismatch| Status::invalid_argument(format!("a message on `{name}` does not fit: {mismatch}")))?;
         run.deliver(&topic, value);
         Ok(())

@@ -10,8 +10,8 @@ use sesame_relay::value::Value;
 use sesame_relay::wire::{Wire, WireTable};
 
 use crate::client::{Client, ClientError};
+use crate::expected_type::ExpectedType;
 use crate::message::Message;
-use crate::shape::Shape;
 
 /// How many messages of a wire are remembered as they came. One that is held back while more than these go by keeps its
 /// value, but what the space does not declare of it is that of a later one.
@@ -24,7 +24,7 @@ pub(super) struct Line {
     /// The name of its type, and the version of the protocol in which it is written.
     kind: String,
     version: SimlogVersion,
-    shape: Shape,
+    expected: ExpectedType,
     /// Under which name messages are published in place of those that come; `None` for a topic that is only heard.
     injected: Option<String>,
     /// The latest messages as they came, with their numbers.
@@ -61,9 +61,9 @@ impl Lines {
                 client.listen(&settings.names.heard(path), &kind)?;
                 None
             };
-            let shape = Shape::of_type(plan, &plan.topic(topic).ty);
+            let expected = ExpectedType::of_type(plan, &plan.topic(topic).ty);
             let (version, originals) = (settings.protocol, VecDeque::new());
-            lines.push(Line { wire, topic, kind, version, shape, injected, originals });
+            lines.push(Line { wire, topic, kind, version, expected, injected, originals });
         }
         let by_wire = lines.iter().enumerate().map(|(at, line)| (line.wire, at)).collect();
         Ok(Lines { lines, by_wire })
@@ -99,7 +99,7 @@ impl Lines {
 impl Line {
     /// Takes the message with this number: gives its value, and remembers it as it came.
     pub(super) fn take(&mut self, message: Message, index: u64) -> Result<Value, Mismatch> {
-        let value = message.read(&self.shape)?;
+        let value = message.read(&self.expected)?;
         if self.injected.is_some() {
             if self.originals.len() == REMEMBERED {
                 self.originals.pop_front();

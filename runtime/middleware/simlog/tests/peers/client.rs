@@ -5,19 +5,19 @@ use std::net::TcpListener;
 use std::time::Duration;
 
 use sesame_plan::SimlogVersion;
-use sesame_simlog::client::{Bounds, Client, ClientError, Options};
+use sesame_simlog::client::{Bounds, Client, ClientError, ClientOptions};
 
 use crate::peer::Peer;
 
-fn patient(url: &str, patience: u64) -> Options {
-    Options { patience: Duration::from_millis(patience), ..Options::new(url, SimlogVersion::V2) }
+fn patient(url: &str, patience: u64) -> ClientOptions {
+    ClientOptions { patience: Duration::from_millis(patience), ..ClientOptions::new(url, SimlogVersion::V2) }
 }
 
 #[test]
 fn what_is_not_taken_overflows() {
     let Some(peer) = Peer::start("simulator2.py", &["--eager"]) else { return };
     let bounds = Bounds { messages: 5, bytes: 1 << 20 };
-    let mut client = Client::connect(&Options { bounds, ..patient(&peer.url(), 120_000) }).expect("it listens");
+    let mut client = Client::connect(&ClientOptions { bounds, ..patient(&peer.url(), 120_000) }).expect("it listens");
     client.set_step(20).expect("it takes any");
     client.listen("point/in", "").expect("there is such a topic");
     assert_eq!(client.await_streams(Duration::from_secs(120)), Ok(true));

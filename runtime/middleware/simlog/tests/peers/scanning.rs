@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use sesame_plan::{SimlogVersion, WireNames};
 use sesame_scan::{FoundTopic, Guess, System};
-use sesame_simlog::client::Options;
+use sesame_simlog::client::ClientOptions;
 use sesame_simlog::scan::{Found, Wanted, scan};
 
 use crate::peer::Peer;
@@ -18,7 +18,7 @@ fn found(peer: &Peer, version: SimlogVersion, names: WireNames, topics: &[&str],
         // After steps it ends as soon as nothing more comes; without them it hears nothing.
         listening: Duration::from_millis(if steps > 0 { 60_000 } else { 500 }),
     };
-    scan(&Options::new(&peer.url(), version), &wanted).expect("the peer runs")
+    scan(&ClientOptions::new(&peer.url(), version), &wanted).expect("the peer runs")
 }
 
 /// Topics with their messages, and what these have in common or why nothing.

@@ -15,7 +15,7 @@ use sesame_relay::metric::MetricTable;
 use sesame_relay::simulator::{Bus, Port, Progress, Setup, Simulator, SimulatorError};
 use sesame_relay::value::Value;
 use sesame_relay::wire::WireTable;
-use sesame_simlog::client::{Client, Options};
+use sesame_simlog::client::{Client, ClientOptions};
 use sesame_simlog::server;
 
 use crate::recorder::{Change, Recorder, plan, run, transport};
@@ -54,7 +54,7 @@ impl Simulator for Cart {
     }
 }
 
-fn served(options: server::Options) -> SocketAddr {
+fn served(options: server::ServerOptions) -> SocketAddr {
     let (sender, receiver) = mpsc::channel();
     // It serves until the test's process ends.
     std::thread::spawn(move || {
@@ -63,8 +63,8 @@ fn served(options: server::Options) -> SocketAddr {
     receiver.recv_timeout(Duration::from_secs(120)).expect("it listens")
 }
 
-fn anywhere() -> server::Options {
-    server::Options::new(([127, 0, 0, 1], 0).into())
+fn anywhere() -> server::ServerOptions {
+    server::ServerOptions::new(([127, 0, 0, 1], 0).into())
 }
 
 const DOUBLED: Change = |path, value| match value {
@@ -127,11 +127,11 @@ fn operations_act_on_messages_of_the_protocol() {
 
 #[test]
 fn whoever_has_no_token_is_refused() {
-    let address = served(server::Options { token: Some("secret".to_owned()), ..anywhere() });
+    let address = served(server::ServerOptions { token: Some("secret".to_owned()), ..anywhere() });
     let asked = |token: Option<&str>| {
         let url = format!("http://{address}");
         let token = token.map(str::to_owned);
-        let mut client = Client::connect(&Options { token, ..Options::new(&url, SimlogVersion::V2) })?;
+        let mut client = Client::connect(&ClientOptions { token, ..ClientOptions::new(&url, SimlogVersion::V2) })?;
         client.set_step(20)
     };
     assert_eq!(asked(Some("secret")), Ok(()));
@@ -144,7 +144,7 @@ fn whoever_has_no_token_is_refused() {
 #[test]
 fn other_machines_need_a_token() {
     for token in [None, Some(String::new())] {
-        let options = server::Options { token, ..server::Options::new(([0, 0, 0, 0], 0).into()) };
+        let options = server::ServerOptions { token, ..server::ServerOptions::new(([0, 0, 0, 0], 0).into()) };
         let refused = server::serve(&options, |_| panic!("nobody may listen"), Cart::start).unwrap_err();
         assert!(refused.to_string().contains("needs a token"), "{refused}");
     }
@@ -153,7 +153,7 @@ fn other_machines_need_a_token() {
 #[test]
 fn what_cannot_be_done_is_said() {
     let url = format!("http://{}", served(anywhere()));
-    let mut client = Client::connect(&Options::new(&url, SimlogVersion::V2)).expect("it listens");
+    let mut client = Client::connect(&ClientOptions::new(&url, SimlogVersion::V2)).expect("it listens");
     let said = client.step().unwrap_err().to_string();
     assert!(said.contains("no run has begun"), "{said}");
     for (milliseconds, why) in

@@ -63,10 +63,10 @@ fn whoever_is_not_vouched_for_is_refused() {
     let file = |name: &str| theirs.path().join(name).display().to_string();
     let Some(peer) = Peer::start("simulator2.py", &["--tls", &file("key.pem"), &file("cert.pem")]) else { return };
     let ca = std::fs::read(ours.path().join("ca.pem")).expect("it was made");
-    let options = sesame_simlog::client::Options {
+    let options = sesame_simlog::client::ClientOptions {
         ca: Some(ca),
         patience: std::time::Duration::from_secs(5),
-        ..sesame_simlog::client::Options::new(&peer.url().replace("http://", "https://"), SimlogVersion::V2)
+        ..sesame_simlog::client::ClientOptions::new(&peer.url().replace("http://", "https://"), SimlogVersion::V2)
     };
     let refused = sesame_simlog::client::Client::connect(&options).unwrap_err().to_string();
     assert!(refused.contains("certificate"), "{refused}");
