@@ -20,7 +20,7 @@ enum Type {
     Message(usize),
 }
 
-struct Message {
+struct MessageType {
     name: String,
     fields: Vec<(String, Type)>,
 }
@@ -77,7 +77,7 @@ pub(super) struct Space {
     pub(super) draw: Draw,
     pub(super) files: Vec<String>,
     names: Names,
-    messages: Vec<Message>,
+    messages: Vec<MessageType>,
     topics: Vec<Topic>,
     metrics: Vec<Metric>,
     operations: Vec<Operation>,
@@ -158,7 +158,7 @@ impl Space {
                 .map(|(name, ty)| format!("{}    {name}: {}\n", docs(&mut self.draw), self.written_type(ty)))
                 .collect();
             members.push(format!("{}  message {name} {{\n{}  }}\n", docs(&mut self.draw), lines.concat()));
-            self.messages.push(Message { name, fields });
+            self.messages.push(MessageType { name, fields });
         }
         for at in 0..self.draw.between(1, 6) {
             let name = self.name("topic");
