@@ -132,7 +132,7 @@ pub enum RuntimeChoice {
 
 /// What a command line says of the surroundings.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Options {
+pub struct EnvironmentOptions {
     /// Where runners take the runtime from; if not said: `[runtime]` in `sesame.toml`, else the checkout that sesamec
     /// was built from, else the released version.
     pub runtime: Option<RuntimeChoice>,
@@ -206,7 +206,7 @@ pub fn environment(
     source: &Path,
     out: &Path,
     plans: &[RunnerPlan],
-    options: &Options,
+    options: &EnvironmentOptions,
 ) -> Result<Environment, Vec<Error>> {
     let runtime = options.runtime.as_ref();
     let home = home(source);
@@ -307,7 +307,7 @@ pub fn environment(
 }
 
 /// Whether the user chose the runtime of a space's runners, on the command line or in `sesame.toml`.
-pub fn runtime_is_chosen(source: &Path, options: &Options) -> Result<bool, Error> {
+pub fn runtime_is_chosen(source: &Path, options: &EnvironmentOptions) -> Result<bool, Error> {
     Ok(options.runtime.is_some() || settings(&home(source).join(SETTINGS))?.runtime.is_some())
 }
 

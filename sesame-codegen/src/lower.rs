@@ -268,7 +268,8 @@ pub(crate) mod tests {
         plan.validate().unwrap();
         let cut: Vec<bool> = plan.simulator.wiring.iter().map(|wiring| wiring.cut).collect();
         assert_eq!(cut, [false, true, true], "a level is only heard");
-        let remapped = |node| plan.remappings(plan::NodeId(node)).into_iter().map(|it| it.to).collect::<Vec<_>>();
+        let remapped =
+            |node| plan.remappings(plan::NodeId(node)).into_iter().map(|remapping| remapping.to).collect::<Vec<_>>();
         assert_eq!((remapped(0), remapped(1)), (Vec::new(), vec!["/stop/undisturbed".to_owned()]));
         assert!(plan.unclaimed().is_empty(), "{:?}", plan.unclaimed());
         assert_eq!(plan.state_on(plan::TopicId(2)), Some((&plan::Type::Bool, Some("data"))));
@@ -305,13 +306,13 @@ pub(crate) mod tests {
             plan::OperationKind::Kill { node: arm },
         ];
         assert_eq!(kinds, [&[set][..], &on_arm].concat());
-        assert!(plan.operations.iter().all(|it| it.topic.is_none() && it.places.is_empty()));
-        let domain = |low, high| plan::Domain::Number { low, high, shape: plan::Shape::Value, integer: false };
+        assert!(plan.operations.iter().all(|operation| operation.topic.is_none() && operation.places.is_empty()));
+        let domain = |low, high| plan::Domain::Number { low, high, shape: plan::ChoiceKind::Value, integer: false };
         let parameters: Vec<_> = plan
             .operations
             .iter()
-            .flat_map(|it| &it.parameters)
-            .map(|it| (it.name.as_str(), it.domain.clone()))
+            .flat_map(|operation| &operation.parameters)
+            .map(|parameter| (parameter.name.as_str(), parameter.domain.clone()))
             .collect();
         assert_eq!(parameters, [("value", domain(-1.0, 3.0)), ("share", domain(0.1, 0.5))]);
         let chosen: Vec<_> = plan.tests[0].test.operations.iter().flat_map(|used| &used.parameters).collect();

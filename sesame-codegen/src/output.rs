@@ -18,7 +18,7 @@ use similar::TextDiff;
 
 pub use self::fresh_folder::FreshFolder;
 use self::manifest::{Entry, Manifest};
-use self::place::{Found, Place};
+use self::place::{Found, OutputPath};
 use crate::files::{Owner, Tree};
 use crate::input::Unreadable;
 
@@ -258,7 +258,7 @@ pub fn apply(out: &Path, trees: &[Tree], mode: Mode) -> Result<Report, Error> {
 /// Writes a new project into a folder that must be empty or not there yet.
 pub fn create(folder: &Path, files: &std::collections::BTreeMap<String, String>) -> Result<(), Error> {
     is_empty_but_for(folder, "")?;
-    files.iter().try_for_each(|(path, contents)| Place { root: folder, below: path }.write(contents.as_bytes()))
+    files.iter().try_for_each(|(path, contents)| OutputPath { root: folder, below: path }.write(contents.as_bytes()))
 }
 
 /// Whether a folder is there, which then must hold nothing but, perhaps, something of this name.
@@ -296,8 +296,8 @@ enum Step {
 impl Step {
     fn take(&self, out: &Path) -> Result<(), Error> {
         match self {
-            Step::Write { path, contents } => Place { root: out, below: path }.write(contents),
-            Step::Remove { path } => Place { root: out, below: path }.remove(),
+            Step::Write { path, contents } => OutputPath { root: out, below: path }.write(contents),
+            Step::Remove { path } => OutputPath { root: out, below: path }.remove(),
         }
     }
 }
@@ -316,7 +316,7 @@ fn survey(
     let manifest_path = root.join(manifest::PATH);
     let manifest_shown = shown(manifest::PATH);
     // What is not UTF-8 was not generated, and is not JSON either.
-    let at_manifest = Place { root: out, below: &manifest_shown };
+    let at_manifest = OutputPath { root: out, below: &manifest_shown };
     let old_text = at_manifest.read()?.map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
     let old = old_text
         .as_deref()
@@ -340,7 +340,7 @@ fn survey(
 
     for (path, file) in &tree.files {
         let shown = shown(path);
-        let at = Place { root: out, below: &shown };
+        let at = OutputPath { root: out, below: &shown };
         let found = at.look()?;
         let mut changed = None;
         let change = match (file.owner, found) {
@@ -404,7 +404,7 @@ fn compare_hooks(
     for (path, hook) in &new.hooks {
         let Some(before) = old.hooks.get(path) else { continue };
         let shown = shown(path);
-        let at = Place { root: out, below: &shown };
+        let at = OutputPath { root: out, below: &shown };
         if before.inputs == hook.inputs || at.look()? == Found::Nothing {
             continue;
         }
@@ -434,13 +434,15 @@ fn leftovers(
             continue;
         }
         let shown = shown(path);
-        let place = Place { root: out, below: &shown };
+        let generated = OutputPath { root: out, below: &shown };
         // A manifest may name anything. What is not a file in this folder was not generated, and does not matter here.
-        if !matches!(place.look(), Ok(Found::File)) {
+        if !matches!(generated.look(), Ok(Found::File)) {
             continue;
         }
         match (entry.owner, &entry.hash) {
-            (Owner::Machine, Some(hash)) if place.read()?.is_some_and(|found| *hash == crate::emit::hash(&found)) => {
+            (Owner::Machine, Some(hash))
+                if generated.read()?.is_some_and(|found| *hash == crate::emit::hash(&found)) =>
+            {
                 steps.push(Step::Remove { path: shown.clone() });
                 let (owner, change) = (Owner::Machine, Change::Removed);
                 report.files.push(FileReport { path: shown, owner, change, diff: None });
@@ -459,7 +461,7 @@ fn leftovers(
     for folder in &old.runners {
         let gone = !new.runners.contains(folder);
         let manifest = format!("{folder}/{}", manifest::PATH);
-        if gone && is_inside(folder) && matches!((Place { root: out, below: &manifest }).look(), Ok(Found::File)) {
+        if gone && is_inside(folder) && matches!((OutputPath { root: out, below: &manifest }).look(), Ok(Found::File)) {
             report.orphans.push(Orphan::Runner { folder: folder.clone() });
             new.runners.push(folder.clone());
         }

@@ -143,7 +143,7 @@ impl<'a> Tree<'a> {
         let demand = &self.space.eddis[monitor].demands[at];
         let name = &demand.declaration.name;
         let other = &self.space.eddis[demand.eddi];
-        let demanded = other.guarantees.iter().position(|it| it.declaration.name == *name);
+        let demanded = other.guarantees.iter().position(|guarantee| guarantee.declaration.name == *name);
         let demanded = demanded.expect("a demand names a guarantee of the other monitor");
         let repeated = !self.seen.insert((demand.eddi, demanded));
         let strong = if repeated { 0 } else { demanded + 1 };

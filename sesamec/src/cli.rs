@@ -22,7 +22,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
-use sesame_codegen::environment::{Options, RuntimeChoice};
+use sesame_codegen::environment::{EnvironmentOptions, RuntimeChoice};
 use sesame_codegen::project;
 use sesame_runtime::cli::{Internal, Running, Showing};
 
@@ -214,7 +214,7 @@ pub fn run(
                 (false, true) => Purpose::DryRun,
                 (false, false) => Purpose::Write,
             };
-            let options = Options { self_contained, vendor, ..generation.options() };
+            let options = EnvironmentOptions { self_contained, vendor, ..generation.options() };
             match eddi {
                 Some(eddi) => monitor::generate(shell, language, &eddi, &generation, &options, purpose),
                 None => commands::generate(shell, language, &generation, &options, purpose),

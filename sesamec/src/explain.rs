@@ -76,7 +76,7 @@ fn grammar(plan: &CampaignPlan, space: &ConditionSpace) -> String {
         notes.push(format!("{} {}", metric.name, said.join(", ")));
     }
     for operation in plan.operations.iter().filter(|operation| !operation.constraints.is_empty()) {
-        let contained = operation.constraints.iter().map(|it| notation::constraint(it, &plan.metrics));
+        let contained = operation.constraints.iter().map(|comparison| notation::constraint(comparison, &plan.metrics));
         let contained = contained.collect::<Vec<_>>().join(", ");
         notes.push(format!("the start condition of {} contains {contained}", operation.name));
     }

@@ -25,7 +25,7 @@ pub(crate) struct Definition {
     pub file: PathBuf,
     /// How it is written.
     pub format: Format,
-    /// Of which ROS it is.
+    /// The ROS that it is for.
     pub dialect: Dialect,
     /// What it says.
     pub text: String,
@@ -76,7 +76,7 @@ fn parse(name: &str, definition: &Definition) -> Result<Vec<Interface>, String> 
     };
     let layout = |definition: sesame_interfaces::Definition| Interface {
         name: definition.name,
-        fields: definition.fields.into_iter().map(|it| InterfaceField { name: it.name, ty: it.ty }).collect(),
+        fields: definition.fields.into_iter().map(|field| InterfaceField { name: field.name, ty: field.ty }).collect(),
     };
     let definitions = definitions.map_err(|error| error.to_string())?;
     Ok(definitions.into_iter().map(layout).collect())
@@ -137,7 +137,7 @@ impl Files {
             let known = known(name).unwrap_or_default();
             let there = !known.is_empty();
             for interface in known {
-                if found.iter().all(|it| it.name != interface.name) {
+                if found.iter().all(|known| known.name != interface.name) {
                     found.push(interface);
                 }
             }

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use serde::Serialize;
 use sesame_dsl::diagnostic::shortened;
 use sesame_dsl::index::{Definition, DefinitionId, Index};
-use sesame_dsl::place::Place;
+use sesame_dsl::location::Location;
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::span::Span;
 
@@ -143,7 +143,7 @@ struct Explained<'a> {
     /// Its name.
     name: String,
     /// Where it is declared.
-    at: Place<'a>,
+    at: Location<'a>,
     /// Its doc comment.
     doc: &'a str,
     /// The declaration as written.
@@ -159,7 +159,7 @@ struct Explained<'a> {
 #[derive(Serialize)]
 struct Use<'a> {
     /// The place.
-    at: Place<'a>,
+    at: Location<'a>,
     /// The declaration that contains it.
     within: Within,
 }
@@ -180,7 +180,7 @@ pub(crate) fn json(
     id: DefinitionId,
     certificate: Option<&CertificatePart>,
 ) -> String {
-    let at = |span| Place::with_utf16(sources, span);
+    let at = |span| Location::with_utf16(sources, span);
     let definition = index.definition(id);
     let explained = Explained {
         kind: definition.kind.word(),

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 
 use sesame_codegen::emit::{Templates, emit};
-use sesame_codegen::environment::{Options, environment};
+use sesame_codegen::environment::{EnvironmentOptions, environment};
 use sesame_codegen::output::{Mode, apply};
 use sesame_codegen::plan::RunnerPlan;
 
@@ -35,7 +35,8 @@ fn generated(folder: &Path, plans: &[RunnerPlan]) {
     )
     .unwrap();
     let out = folder.join("runners");
-    let environment = environment(&folder.join("kuka_cell.sesame"), &out, plans, &Options::default()).unwrap();
+    let environment =
+        environment(&folder.join("kuka_cell.sesame"), &out, plans, &EnvironmentOptions::default()).unwrap();
     apply(&out, &emit(plans, &environment).unwrap(), Mode::Write).unwrap();
 }
 

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use proc_macro2::{TokenStream, TokenTree};
 use sesame_codegen::emit::emit;
-use sesame_codegen::environment::{Options, environment};
+use sesame_codegen::environment::{EnvironmentOptions, environment};
 use sesame_codegen::files::Tree;
 use sesame_codegen::output::{Mode, apply};
 use sesame_codegen::plan::RunnerPlan;
@@ -28,7 +28,7 @@ fn plans(seed: u64, model: &Model, folder: &Path) -> Vec<RunnerPlan> {
 }
 
 fn trees(seed: u64, folder: &Path, plans: &[RunnerPlan]) -> Vec<Tree> {
-    let options = Options::default();
+    let options = EnvironmentOptions::default();
     let environment = environment(&folder.join("random.sesame"), &folder.join("runners"), plans, &options)
         .unwrap_or_else(|errors| panic!("space {seed}: {errors:?}"));
     emit(plans, &environment).unwrap_or_else(|problems| panic!("space {seed}: {problems:?}"))

@@ -3,7 +3,7 @@
 use heck::ToSnakeCase;
 use sesame_plan::{CampaignPlan, MessageId, Topic, TopicId, Type};
 
-use super::messages::{self, Messages, Place};
+use super::messages::{self, Messages, TypePaths};
 use crate::names::{self, Scope};
 
 /// One handler of a hook.
@@ -65,7 +65,7 @@ pub(super) fn inputs(plan: &CampaignPlan, types: &Messages<'_>, inputs: &[TopicI
     let mut reached: Vec<MessageId> = Vec::new();
     let described = |ty: &Type| {
         let unit = messages::unit(ty).map(|unit| format!(" in {unit}")).unwrap_or_default();
-        types.owned(ty, Place::IMPORTED) + &unit
+        types.owned(ty, TypePaths::IMPORTED) + &unit
     };
     for handler in handlers(plan, inputs) {
         lines.push(format!("{}({}: {})", handler.method, handler.parameter, described(&handler.topic.ty)));

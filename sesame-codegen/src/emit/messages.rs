@@ -9,21 +9,21 @@ use crate::names::{self, Scope};
 
 /// How types are reached from where they are written.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Place {
+pub(super) struct TypePaths {
     /// What stands before `Text`.
     pub(super) text: &'static str,
     /// What stands before the struct of a message.
     pub(super) messages: &'static str,
 }
 
-impl Place {
+impl TypePaths {
     /// Everything is imported by name.
-    pub(super) const IMPORTED: Place = Place { text: "", messages: "" };
+    pub(super) const IMPORTED: TypePaths = TypePaths { text: "", messages: "" };
     /// `Text` and the module `messages` are imported.
-    pub(super) const BY_MODULE: Place = Place { text: "", messages: "messages::" };
+    pub(super) const BY_MODULE: TypePaths = TypePaths { text: "", messages: "messages::" };
     /// Nothing is imported.
-    pub(super) const WHOLE: Place =
-        Place { text: "::sesame_runtime::value::", messages: "crate::generated::messages::" };
+    pub(super) const WHOLE: TypePaths =
+        TypePaths { text: "::sesame_runtime::value::", messages: "crate::generated::messages::" };
 }
 
 /// How the message types of a space are called in Rust.
@@ -53,25 +53,25 @@ impl<'a> Messages<'a> {
     }
 
     /// A type as the field of a struct has it, as text: `Text` and the structs of messages by their mere names, or
-    /// with what `place` puts before them.
-    pub(super) fn owned(&self, ty: &Type, place: Place) -> String {
+    /// with what `type_paths` puts before them.
+    pub(super) fn owned(&self, ty: &Type, type_paths: TypePaths) -> String {
         match ty {
             Type::Bool => "bool".to_owned(),
             Type::Int { .. } => "i64".to_owned(),
             Type::Real { .. } => "f64".to_owned(),
-            Type::Text => format!("{}Text", place.text),
+            Type::Text => format!("{}Text", type_paths.text),
             Type::Point { .. } => "[f64; 3]".to_owned(),
-            Type::List { of } => format!("Vec<{}>", self.owned(of, place)),
-            Type::Message { id } => format!("{}{}", place.messages, names::written(self.struct_name(*id))),
+            Type::List { of } => format!("Vec<{}>", self.owned(of, type_paths)),
+            Type::Message { id } => format!("{}{}", type_paths.messages, names::written(self.struct_name(*id))),
         }
     }
 
     /// A type as a handler takes it: small ones by value, others by reference.
-    pub(super) fn borrowed(&self, ty: &Type, place: Place) -> String {
+    pub(super) fn borrowed(&self, ty: &Type, type_paths: TypePaths) -> String {
         match ty {
-            Type::Bool | Type::Int { .. } | Type::Real { .. } | Type::Point { .. } => self.owned(ty, place),
-            Type::Text | Type::Message { .. } => format!("&{}", self.owned(ty, place)),
-            Type::List { of } => format!("&[{}]", self.owned(of, place)),
+            Type::Bool | Type::Int { .. } | Type::Real { .. } | Type::Point { .. } => self.owned(ty, type_paths),
+            Type::Text | Type::Message { .. } => format!("&{}", self.owned(ty, type_paths)),
+            Type::List { of } => format!("&[{}]", self.owned(of, type_paths)),
         }
     }
 
@@ -113,7 +113,7 @@ impl<'a> Messages<'a> {
             let docs = rust::docs(message.doc.lines());
             let fields = self.fields(id).map(|(field, rust_name)| {
                 let docs = field_docs(field);
-                let (name, ty) = (names::ident(rust_name), tokens(&self.owned(&field.ty, Place::IMPORTED)));
+                let (name, ty) = (names::ident(rust_name), tokens(&self.owned(&field.ty, TypePaths::IMPORTED)));
                 quote! { #docs pub #name: #ty }
             });
             let reads = self.fields(id).map(|(field, rust_name)| {

@@ -6,7 +6,7 @@ use quote::{format_ident, quote};
 use sesame_plan::{Direction, Type};
 
 use super::handlers::{handlers, paths};
-use super::messages::{self, Messages, Place};
+use super::messages::{self, Messages, TypePaths};
 use super::registry::{self, Registered};
 use super::rust;
 use crate::names;
@@ -83,7 +83,7 @@ fn hook_trait(runner: &RunnerPlan, types: &Messages<'_>, hook: &HookPlan) -> Tok
         }
         let docs = rust::docs(doc);
         let (method, parameter) = (names::ident(&handler.method), names::ident(&handler.parameter));
-        let ty = messages::tokens(&types.borrowed(&handler.topic.ty, Place::BY_MODULE));
+        let ty = messages::tokens(&types.borrowed(&handler.topic.ty, TypePaths::BY_MODULE));
         quote! { #docs fn #method(&mut self, #parameter: #ty, ctx: &mut Context); }
     });
     quote! {
@@ -137,7 +137,7 @@ fn adapter(runner: &RunnerPlan, types: &Messages<'_>, hook: &HookPlan) -> TokenS
             Type::Bool | Type::Int { .. } | Type::Real { .. } | Type::Point { .. } => quote! { message },
             Type::Text | Type::List { .. } | Type::Message { .. } => quote! { &message },
         };
-        let ty = messages::tokens(&types.owned(&handler.topic.ty, Place::WHOLE));
+        let ty = messages::tokens(&types.owned(&handler.topic.ty, TypePaths::WHOLE));
         quote! {
             #input => match <#ty as ::sesame_runtime::message::FromValue>::from_value(value) {
                 ::core::result::Result::Ok(message) => #hook_trait::#method(&mut self.0, #argument, ctx),

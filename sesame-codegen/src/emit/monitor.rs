@@ -74,11 +74,13 @@ pub fn monitor(monitor: &MonitorPlan, environment: &Environment) -> Result<Tree,
         space: plan.space.clone(),
         source: rust::one_line(&plan.source),
         monitor: name.clone(),
-        doc: doc_lines(plan.monitors.iter().find(|it| it.name == *name).map_or("", |it| it.doc.as_str())),
+        doc: doc_lines(
+            plan.monitors.iter().find(|monitor| monitor.name == *name).map_or("", |monitor| monitor.doc.as_str()),
+        ),
         program,
         bus: plan.simulator.properties().bus.unwrap_or_default().to_owned(),
     };
-    let readme = environment.templates.render("runner/monitor_readme.md.tera", &readme).map_err(|it| vec![it])?;
+    let readme = environment.templates.render("runner/monitor_readme.md.tera", &readme).map_err(|error| vec![error])?;
     tree.add("README.md", Owner::Machine, readme);
     let system = Path::new(system_file).parent().unwrap_or(Path::new(""));
     let system = Path::new(&environment.space_folder).join(system);

@@ -7,7 +7,7 @@ use serde::Serialize;
 use sesame_plan::{Domain, Parameter, Topic, Type};
 
 use super::handlers::{self, Handler, handler, paths};
-use super::messages::{self, Messages, Place};
+use super::messages::{self, Messages, TypePaths};
 use super::problem::Problem;
 use super::registry::{self, Registered};
 use super::rust::{self, one_line};
@@ -143,7 +143,7 @@ fn hook_trait(runner: &RunnerPlan, types: &Messages<'_>, operation: &OperationPl
             doc.extend(messages::unit(&topic.ty).map(|unit| format!("In {unit}.")));
             let docs = rust::docs(doc);
             let parameter = names::ident(&parameter);
-            let ty = messages::tokens(&types.owned(&topic.ty, Place::WHOLE));
+            let ty = messages::tokens(&types.owned(&topic.ty, TypePaths::WHOLE));
             quote! {
                 #docs
                 fn #method(
@@ -221,7 +221,7 @@ fn adapter(runner: &RunnerPlan, types: &Messages<'_>, operation: &OperationPlan)
     let method = names::ident(&method);
     let called = match takes {
         Takes::Message(topic, _) => {
-            let ty = messages::tokens(&types.owned(&topic.ty, Place::WHOLE));
+            let ty = messages::tokens(&types.owned(&topic.ty, TypePaths::WHOLE));
             quote! {
                 fn on_message(
                     &mut self,
@@ -319,7 +319,7 @@ pub(super) fn stub(
             if messages::holds_text(&topic.ty) {
                 imports.push("sesame_runtime::value::Text".to_owned());
             }
-            let ty = types.owned(&topic.ty, if clash { Place::BY_MODULE } else { Place::IMPORTED });
+            let ty = types.owned(&topic.ty, if clash { TypePaths::BY_MODULE } else { TypePaths::IMPORTED });
             let message = StubMessage { name: names::written(&name), ty };
             let unit = messages::unit(&topic.ty).map(|unit| format!("; in {unit}")).unwrap_or_default();
             let when = format!("A message on `{}` (\"{}\"), to be changed{unit}.", topic.name, paths(topic));

@@ -7,7 +7,7 @@ use serde::Serialize;
 use sesame_plan::{Direction, Type};
 
 use super::handlers::{Handler, handlers, paths};
-use super::messages::{self, Messages, Place};
+use super::messages::{self, Messages, TypePaths};
 use super::metrics;
 use super::problem::Problem;
 use super::rust::one_line;
@@ -55,7 +55,7 @@ pub(super) fn stub(
         inputs.iter().filter_map(|ty| messages::named_message(ty)).map(|id| types.struct_name(id)).collect();
     // A message called like the hook itself is reached through its module.
     let clash = structs.iter().any(|&name| name == hook_type || name == hook_trait);
-    let place = if clash { Place::BY_MODULE } else { Place::IMPORTED };
+    let type_paths = if clash { TypePaths::BY_MODULE } else { TypePaths::IMPORTED };
 
     let mut imports = vec![format!("crate::generated::metrics::{}", names::written(&hook_trait))];
     match structs.into_iter().map(names::written).collect::<Vec<_>>().as_slice() {
@@ -80,19 +80,19 @@ pub(super) fn stub(
         imports,
         hook_type: names::written(&hook_type),
         hook_trait: names::written(&hook_trait),
-        handlers: handlers.iter().map(|handler| stub_handler(types, hook, handler, place)).collect(),
+        handlers: handlers.iter().map(|handler| stub_handler(types, hook, handler, type_paths)).collect(),
     };
     templates.render("runner/hook.rs.tera", &stub)
 }
 
-fn stub_handler(types: &Messages<'_>, hook: &HookPlan, handler: &Handler<'_>, place: Place) -> StubHandler {
+fn stub_handler(types: &Messages<'_>, hook: &HookPlan, handler: &Handler<'_>, type_paths: TypePaths) -> StubHandler {
     StubHandler {
         topic: handler.topic.name.clone(),
         paths: one_line(&paths(handler.topic)),
         unit: messages::unit(&handler.topic.ty).map(one_line),
         method: names::written(&handler.method),
         parameter: names::written(&handler.parameter),
-        ty: types.borrowed(&handler.topic.ty, place),
+        ty: types.borrowed(&handler.topic.ty, type_paths),
         example: example(types, hook, handler),
     }
 }

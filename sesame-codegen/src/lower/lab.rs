@@ -1,6 +1,6 @@
 //! Labs.
 
-use sesame_dsl::model::physical::{Fit, Form, Physical, Place, Shape};
+use sesame_dsl::model::physical::{Fit, Form, Physical, Shape, ShapePlace};
 use sesame_dsl::model::{self, Space};
 use sesame_plan as plan;
 
@@ -48,8 +48,8 @@ fn shape(shape: &Shape) -> plan::LabShape {
             Form::Box(edges) => plan::ShapeForm::Box { edges },
         },
         place: match &shape.place {
-            Place::Pose(pose) => plan::ShapePlace::Pose { pose: pose.clone() },
-            Place::Point(centre) => plan::ShapePlace::Fixed { centre: *centre },
+            ShapePlace::Pose(pose) => plan::ShapePlace::Pose { pose: pose.clone() },
+            ShapePlace::Point(centre) => plan::ShapePlace::Fixed { centre: *centre },
         },
         expand: shape.expand,
     }

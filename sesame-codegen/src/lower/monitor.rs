@@ -122,7 +122,8 @@ mod tests {
         let plan = lowered(CELL);
         let [transport, conveyor] = plan.monitors.as_slice() else { panic!("{:?}", plan.monitors) };
         assert_eq!(transport.publishes, Some(TopicId(2)));
-        let integrity: Vec<_> = transport.guarantees.iter().map(|it| (it.name.as_str(), it.integrity)).collect();
+        let integrity: Vec<_> =
+            transport.guarantees.iter().map(|guarantee| (guarantee.name.as_str(), guarantee.integrity)).collect();
         assert_eq!(integrity, [("fast", 3), ("slow", 2)]);
         let demand = &transport.demands[0];
         assert_eq!((demand.monitor, demand.guarantee), (MonitorId(1), 0), "the strongest guarantee comes first");
@@ -159,10 +160,10 @@ mod tests {
         let text =
             text.replace("objectives fastest", "objectives fastest  observes missed, alarms, lead, slow_for, rolling");
         let plan = lowered(&text);
-        let lines = plan.monitors[..4].iter().map(|it| serde_json::to_string(it).unwrap());
-        let scores = plan.metrics.iter().map(|it| {
-            let source = serde_json::to_string(&it.source).unwrap();
-            format!("{} {:?} {:?} {source}", it.name, it.unit, it.trend)
+        let lines = plan.monitors[..4].iter().map(|monitor| serde_json::to_string(monitor).unwrap());
+        let scores = plan.metrics.iter().map(|metric| {
+            let source = serde_json::to_string(&metric.source).unwrap();
+            format!("{} {:?} {:?} {source}", metric.name, metric.unit, metric.trend)
         });
         insta::assert_snapshot!(lines.chain(scores).collect::<Vec<_>>().join("\n"));
     }

@@ -24,11 +24,11 @@ impl Selection {
         };
         operations.sort();
         operations.dedup();
-        let begins = |it: &model::TestOperation| match &it.activation {
+        let begins = |operation: &model::TestOperation| match &operation.activation {
             model::Activation::Window(window) => window.low,
             model::Activation::Offline => 0.0,
             model::Activation::Condition { .. } => {
-                space.operations[it.operation].within.map_or(0.0, |within| within.low)
+                space.operations[operation.operation].within.map_or(0.0, |within| within.low)
             }
         };
         let fits = |test: &model::Test| {

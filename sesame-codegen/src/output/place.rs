@@ -25,16 +25,16 @@ pub(super) enum Found {
     Other,
 }
 
-/// A place below a folder.
+/// A path below a folder.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Place<'a> {
+pub(super) struct OutputPath<'a> {
     /// The folder.
     pub(super) root: &'a Path,
     /// The way from there, with `/` between its parts and without `..`.
     pub(super) below: &'a str,
 }
 
-impl Place<'_> {
+impl OutputPath<'_> {
     /// As a path of the system.
     pub(super) fn path(self) -> PathBuf {
         self.root.join(self.below)

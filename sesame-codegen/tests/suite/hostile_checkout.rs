@@ -48,15 +48,15 @@ fn snapshot(folder: &Path, except: &Path) -> BTreeMap<PathBuf, (Vec<u8>, i64, i6
 #[derive(Debug, Clone)]
 enum Trap {
     /// A link in the place of something that is generated, or beside it.
-    Link { at: prop::sample::Index, kind: Place, to: &'static str },
+    Link { at: prop::sample::Index, kind: TrapSite, to: &'static str },
     /// A folder or a file in such a place.
-    Other { at: prop::sample::Index, kind: Place, folder: bool },
+    Other { at: prop::sample::Index, kind: TrapSite, folder: bool },
     /// What a manifest claims to have generated.
     Claim { of: prop::sample::Index, path: &'static str, right: bool, runner: bool },
 }
 
 #[derive(Debug, Clone, Copy)]
-enum Place {
+enum TrapSite {
     /// A generated file.
     File,
     /// The folder of one.
@@ -96,7 +96,7 @@ const CLAIMS: &[&str] = &[
 const SHA_OF_MINE: &str = "3fd30542fe3f61b14bd4a4b2dc0b6fb30fa6f63ebce52dd1778aaa8c4dc02cff";
 
 fn trap() -> impl Strategy<Value = Trap> {
-    let kinds = prop::sample::select(&[Place::File, Place::Folder, Place::Temporary, Place::Temporary]);
+    let kinds = prop::sample::select(&[TrapSite::File, TrapSite::Folder, TrapSite::Temporary, TrapSite::Temporary]);
     prop_oneof![
         5 => (any::<prop::sample::Index>(), kinds.clone(), prop::sample::select(TARGETS))
             .prop_map(|(at, kind, to)| Trap::Link { at, kind, to }),
@@ -137,9 +137,9 @@ fn set(trap: &Trap, all: &Path, out: &Path, generated: &[String]) {
     let place = |at: &prop::sample::Index, kind| {
         let file = out.join(at.get(generated));
         match kind {
-            Place::File => file,
-            Place::Folder => file.parent().filter(|&folder| folder != out).unwrap_or(&file).to_owned(),
-            Place::Temporary => {
+            TrapSite::File => file,
+            TrapSite::Folder => file.parent().filter(|&folder| folder != out).unwrap_or(&file).to_owned(),
+            TrapSite::Temporary => {
                 let name = file.file_name().unwrap().to_str().unwrap();
                 file.with_file_name(format!("{name}.sesame-new-{}", std::process::id()))
             }

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use sesame_codegen::emit::{Environment, HooksFolder, Problem, Templates, emit};
-use sesame_codegen::environment::{Error, Options, RuntimeChoice, environment};
+use sesame_codegen::environment::{EnvironmentOptions, Error, RuntimeChoice, environment};
 use sesame_codegen::output::{Change, Mode, Orphan, apply};
 
 use crate::plans::{small, with_program};
@@ -163,7 +163,7 @@ fn vendored(folder: &Path, more: &[(&str, &str)]) -> Result<Environment, Vec<Err
     );
     write(folder, more);
     let runtime = RuntimeChoice::Folder(folder.join("checkout/runtime"));
-    let options = Options { runtime: Some(runtime), vendor: true, ..Options::default() };
+    let options = EnvironmentOptions { runtime: Some(runtime), vendor: true, ..EnvironmentOptions::default() };
     let project = folder.join("project");
     environment(&project.join("kuka_cell.sesame"), &project.join("runners"), &[small("a")], &options)
 }
@@ -238,7 +238,11 @@ fn crates_that_cannot_be_vendored_say_why() {
 #[test]
 fn a_runtime_that_is_in_no_folder_cannot_be_vendored() {
     let folder = tempfile::tempdir().unwrap();
-    let options = Options { runtime: Some(RuntimeChoice::Version("0.1.0".into())), vendor: true, ..Options::default() };
+    let options = EnvironmentOptions {
+        runtime: Some(RuntimeChoice::Version("0.1.0".into())),
+        vendor: true,
+        ..EnvironmentOptions::default()
+    };
     let space = folder.path().join("kuka_cell.sesame");
     let errors = environment(&space, &folder.path().join("runners"), &[with_program("a")], &options).unwrap_err();
     assert!(matches!(errors[..], [Error::RuntimeHasNoFolder]), "{errors:?}");
@@ -257,10 +261,10 @@ fn the_settings_name_a_folder_of_templates_and_the_command_line_another() {
         ],
     );
     let stub = |templates: Option<&str>| {
-        let options = Options {
+        let options = EnvironmentOptions {
             runtime: Some(RuntimeChoice::Version("0.1.0".into())),
             templates: templates.map(|name| folder.path().join(name)),
-            ..Options::default()
+            ..EnvironmentOptions::default()
         };
         let space = folder.path().join("kuka_cell.sesame");
         let found = environment(&space, &folder.path().join("runners"), &[with_program("a")], &options)?;

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use sesame_codegen::environment::{Error, Options, RuntimeChoice, checkout_runtime, environment};
+use sesame_codegen::environment::{EnvironmentOptions, Error, RuntimeChoice, checkout_runtime, environment};
 use sesame_codegen::plan::RunnerPlan;
 
 use crate::plans::{small, with_program};
@@ -23,7 +23,7 @@ fn dependencies(folder: &Path, plan: RunnerPlan, runtime: Option<&str>) -> Resul
         &folder.join("kuka_cell.sesame"),
         &folder.join("runners"),
         &[plan],
-        &Options { runtime, ..Options::default() },
+        &EnvironmentOptions { runtime, ..EnvironmentOptions::default() },
     );
     let lines = |(name, value): (&String, &toml::Value)| format!("{name} = {value}");
     let mentioned = |error: &Error| error.to_string().replace(&folder.display().to_string(), "PROJECT");
@@ -70,7 +70,9 @@ fn a_checkout_build_uses_the_runtime_of_its_checkout_and_its_locked_versions() {
     let folder = tempfile::tempdir().unwrap();
     project(folder.path(), "");
     let out = folder.path().join("runners");
-    let found = environment(&folder.path().join("kuka_cell.sesame"), &out, &[small("c")], &Options::default()).unwrap();
+    let found =
+        environment(&folder.path().join("kuka_cell.sesame"), &out, &[small("c")], &EnvironmentOptions::default())
+            .unwrap();
     let path = found.dependencies["sesame-runtime"]["path"].as_str().unwrap();
     fs::create_dir_all(out.join("c")).unwrap();
     assert_eq!(
@@ -87,7 +89,9 @@ fn a_sibling_runners_lock_file_comes_first() {
     let out = folder.path().join("runners");
     fs::create_dir_all(out.join("b")).unwrap();
     fs::write(out.join("b/Cargo.lock"), "of b").unwrap();
-    let found = environment(&folder.path().join("kuka_cell.sesame"), &out, &[small("c")], &Options::default()).unwrap();
+    let found =
+        environment(&folder.path().join("kuka_cell.sesame"), &out, &[small("c")], &EnvironmentOptions::default())
+            .unwrap();
     assert_eq!(found.lock.as_deref(), Some("of b"));
 }
 
@@ -114,7 +118,7 @@ fn a_program_needs_no_crate_and_its_folder_is_known_as_seen_from_the_runner() {
     let found = |out: &str| {
         let space = folder.path().join("kuka_cell.sesame");
         let plan = RunnerPlan { system_file: "shared/cell.sesame".to_owned(), ..with_program("c") };
-        let found = environment(&space, &folder.path().join(out), &[plan], &Options::default()).unwrap();
+        let found = environment(&space, &folder.path().join(out), &[plan], &EnvironmentOptions::default()).unwrap();
         (found.space_folder, found.simulator_folder)
     };
     fs::create_dir(folder.path().join("shared")).unwrap();
@@ -157,7 +161,7 @@ fn a_runtime_is_a_folder_or_a_version() {
 fn runners_in_the_checkout_of_their_runtime_share_its_target_folder_and_others_have_their_own() {
     let target = |out: &Path, runtime: &Path| {
         let runtime = RuntimeChoice::parse(&format!("path:{}", runtime.display())).unwrap();
-        let options = Options { runtime: Some(runtime), ..Options::default() };
+        let options = EnvironmentOptions { runtime: Some(runtime), ..EnvironmentOptions::default() };
         environment(&out.with_file_name("kuka_cell.sesame"), out, &[small("c")], &options).unwrap().target
     };
     let folder = tempfile::tempdir().unwrap();

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::bail;
-use sesame_codegen::environment::{self, Options, RuntimeChoice};
+use sesame_codegen::environment::{self, EnvironmentOptions, RuntimeChoice};
 use sesame_codegen::names;
 
 use super::owner;
@@ -102,7 +102,11 @@ impl Generation {
         Generation { file, campaign, out, force: false, runtime: None, templates: None, diagnostics }
     }
 
-    pub(super) fn options(&self) -> Options {
-        Options { runtime: self.runtime.clone(), templates: self.templates.clone(), ..Options::default() }
+    pub(super) fn options(&self) -> EnvironmentOptions {
+        EnvironmentOptions {
+            runtime: self.runtime.clone(),
+            templates: self.templates.clone(),
+            ..EnvironmentOptions::default()
+        }
     }
 }

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context as _, bail};
 use sesame_runtime::cli::RUNNER;
 
-use super::progress::{Crates, Message, Metadata};
+use super::progress::{CargoMessage, Crates, Metadata};
 use super::shell::Shell;
 
 /// How often the line of a terminal is written again.
@@ -24,7 +24,7 @@ const SHORT: Duration = Duration::from_secs(1);
 /// What becomes known while cargo builds.
 enum Event {
     /// Cargo says something.
-    Said(Message),
+    Said(CargoMessage),
     /// Which crates there are.
     Crates(Metadata),
     /// What cargo says can no longer be read: it has ended, or for this reason.

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, anyhow, bail};
 use sesame_codegen::emit::Templates;
-use sesame_codegen::environment::{self, Options, RuntimeChoice, environment};
+use sesame_codegen::environment::{self, EnvironmentOptions, RuntimeChoice, environment};
 use sesame_codegen::files::{Owner, Tree};
 use sesame_codegen::input;
 use sesame_codegen::output::{self, Change, Mode, Orphan, Report};
@@ -113,7 +113,7 @@ pub(super) fn generate(
     shell: Shell,
     language: &Language,
     generation: &Generation,
-    options: &Options,
+    options: &EnvironmentOptions,
     purpose: Purpose,
 ) -> anyhow::Result<ExitCode> {
     let checked = check(shell, language, &generation.file, generation.diagnostics.format)?;
@@ -290,7 +290,7 @@ pub(super) fn choose(checked: &Checked, file: &Path, name: Option<&str>) -> anyh
 pub(super) fn write(
     shell: Shell,
     generation: &Generation,
-    options: &Options,
+    options: &EnvironmentOptions,
     checked: &Checked,
     chosen: &[usize],
     mode: Mode,

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use anyhow::bail;
-use sesame_codegen::environment::{Options, environment};
+use sesame_codegen::environment::{EnvironmentOptions, environment};
 use sesame_codegen::plan::MonitorPlan;
 use sesame_codegen::{emit, names, output};
 
@@ -18,7 +18,7 @@ pub(super) fn generate(
     language: &Language,
     eddi: &str,
     generation: &Generation,
-    options: &Options,
+    options: &EnvironmentOptions,
     purpose: Purpose,
 ) -> anyhow::Result<ExitCode> {
     let checked = check(shell, language, &generation.file, generation.diagnostics.format)?;

@@ -16,7 +16,7 @@ const COLUMNS: usize = 68;
 
 /// What `cargo build --message-format=json-render-diagnostics` writes about one target.
 #[derive(Debug, Deserialize)]
-pub(super) struct Message {
+pub(super) struct CargoMessage {
     pub(super) reason: String,
     package_id: Option<String>,
     target: Option<Target>,
@@ -43,12 +43,12 @@ struct Package {
 
 #[derive(Debug, Deserialize)]
 struct Resolve {
-    nodes: Vec<Node>,
+    nodes: Vec<ResolvedPackage>,
     root: Option<String>,
 }
 
 #[derive(Debug, Deserialize)]
-struct Node {
+struct ResolvedPackage {
     id: String,
     deps: Vec<Dependency>,
 }
@@ -70,7 +70,8 @@ impl Metadata {
     fn needed(self) -> BTreeMap<String, String> {
         let mut names: BTreeMap<String, String> =
             self.packages.into_iter().map(|package| (package.id, package.name)).collect();
-        let nodes: BTreeMap<&str, &Node> = self.resolve.nodes.iter().map(|node| (node.id.as_str(), node)).collect();
+        let nodes: BTreeMap<&str, &ResolvedPackage> =
+            self.resolve.nodes.iter().map(|node| (node.id.as_str(), node)).collect();
         let mut needed: BTreeSet<&str> = BTreeSet::new();
         let mut open: Vec<&str> = self.resolve.root.as_deref().into_iter().collect();
         while let Some(id) = open.pop() {
@@ -96,7 +97,7 @@ pub(super) struct Crates {
 
 impl Crates {
     /// Counts what a message says. A package is done with its library or program, not with its build script.
-    pub(super) fn hear(&mut self, message: &Message) {
+    pub(super) fn hear(&mut self, message: &CargoMessage) {
         let built =
             message.target.as_ref().is_some_and(|target| !target.kind.iter().any(|kind| kind == "custom-build"));
         if let ("compiler-artifact", true, Some(id)) = (message.reason.as_str(), built, &message.package_id) {
@@ -143,7 +144,7 @@ fn fitting(line: String) -> String {
 mod tests {
     use super::*;
 
-    fn artifact(id: &str, kind: &str) -> Message {
+    fn artifact(id: &str, kind: &str) -> CargoMessage {
         let text = format!(
             r#"{{"reason":"compiler-artifact","package_id":"{id}","target":{{"kind":["{kind}"]}},"fresh":true}}"#
         );

@@ -266,7 +266,9 @@ pub(super) fn results(shell: Shell, asked: Results) -> anyhow::Result<ExitCode> 
                 (Some(grid), _) => grid,
                 (None, Some(mut goal)) => {
                     goal.axes.retain(|axis| dims.is_empty() || dims.contains(&axis.dimension));
-                    if let Some(missing) = dims.iter().find(|&&it| goal.axes.iter().all(|axis| axis.dimension != it)) {
+                    if let Some(missing) =
+                        dims.iter().find(|&&dimension| goal.axes.iter().all(|axis| axis.dimension != dimension))
+                    {
                         bail!(
                             "the campaign's cells have no dimension {}; give all cells with `--grid`",
                             missing.name()

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use sesame_notation::Unit;
 use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace};
-use sesame_plan::{CampaignPlan, Confirmation, Copies, Dimension, Shape};
+use sesame_plan::{CampaignPlan, ChoiceKind, Confirmation, Copies, Dimension};
 use sesame_search::coverage::{Feasible, Grid};
 use sesame_search::space::ParameterSpace;
 use sesame_search::space::TestSpace;
@@ -112,7 +112,7 @@ fn confirming(confirmation: Confirmation, tests: u32, objectives: usize) -> Stri
 /// How many tests can be expected to enter a front as they come, of so many whose values of so many objectives are
 /// independent of each other and of the other tests'.
 ///
-/// Of n such tests with m objectives, E(n, m) are expected to be on the front: E(n, 1) = 1, and E(n, m) is the sum of
+/// E(n, m) of n such tests with m objectives are expected to be on the front: E(n, 1) = 1, and E(n, m) is the sum of
 /// E(i, m − 1) / i over i up to n (Bentley et al. 1978). The nth is as likely on it as each other, so E(n, m) / n is
 /// the probability that it enters, and the sum of these is E(n, m + 1).
 fn entering(tests: u32, objectives: usize) -> f64 {
@@ -134,8 +134,8 @@ fn numbers(operation: &OperationSpace) -> usize {
         ActivationSpace::Time(_) | ActivationSpace::Condition { .. } => 2,
     };
     let parameters = operation.parameters.iter().map(|parameter| match parameter {
-        ParameterSpace::Number(_, Shape::Range) => 2,
-        ParameterSpace::Number(_, Shape::Value) | ParameterSpace::Items(_) => 1,
+        ParameterSpace::Number(_, ChoiceKind::Range) => 2,
+        ParameterSpace::Number(_, ChoiceKind::Value) | ParameterSpace::Items(_) => 1,
         ParameterSpace::Point(_) => 3,
     });
     activation + parameters.sum::<usize>()
@@ -175,8 +175,8 @@ fn size(operation: &OperationSpace) -> f64 {
                 (false, _) => STEPS,
             };
             match shape {
-                Shape::Value => steps.log10(),
-                Shape::Range => pair(steps),
+                ChoiceKind::Value => steps.log10(),
+                ChoiceKind::Range => pair(steps),
             }
         }
         ParameterSpace::Point(axes) => axes.iter().filter(|axis| axis.low < axis.high).count() as f64 * STEPS.log10(),
@@ -217,7 +217,7 @@ fn total(logarithms: &[f64]) -> f64 {
     if greatest == f64::NEG_INFINITY {
         return greatest;
     }
-    greatest + logarithms.iter().map(|it| 10f64.powf(it - greatest)).sum::<f64>().log10()
+    greatest + logarithms.iter().map(|logarithm| 10f64.powf(logarithm - greatest)).sum::<f64>().log10()
 }
 
 /// A number given by its logarithm: whole as far as people count, then as a power of ten.
@@ -280,18 +280,20 @@ mod tests {
 
     #[test]
     fn ways_to_choose_are_multisets() {
-        // Of two kinds 2, 3, 4, 5 and 6 multisets of 1 to 5.
-        let ways: Vec<f64> = chosen(&[0.0, 0.0], &[9, 9], 5).iter().map(|it| 10f64.powf(*it).round()).collect();
+        // Two kinds have 2, 3, 4, 5 and 6 multisets of 1 to 5.
+        let ways: Vec<f64> =
+            chosen(&[0.0, 0.0], &[9, 9], 5).iter().map(|logarithm| 10f64.powf(*logarithm).round()).collect();
         assert_eq!(ways, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
         assert_eq!(power(total(&chosen(&[0.0, 0.0], &[9, 9], 5)[1..])), "20");
         // Ten and a hundred variants: two of them are 100, 1000 or 10000.
         assert!((10f64.powf(chosen(&[1.0, 2.0], &[9, 9], 2)[2]) - 11_100.0).abs() < 1e-6);
         // Each at most once: both or one of them, or none.
-        let once: Vec<f64> = chosen(&[0.0, 0.0], &[1, 1], 3).iter().map(|it| 10f64.powf(*it).round()).collect();
+        let once: Vec<f64> =
+            chosen(&[0.0, 0.0], &[1, 1], 3).iter().map(|logarithm| 10f64.powf(*logarithm).round()).collect();
         assert_eq!(once, [1.0, 2.0, 1.0, 0.0]);
     }
 
-    /// Of n tests the nth is the best so far with a probability of 1/n; with two objectives, by hand: 1, 3/4 and 11/18.
+    /// The nth of n tests is the best so far with a probability of 1/n; with two objectives, by hand: 1, 3/4 and 11/18.
     #[test]
     fn tests_that_enter_a_front_are_as_many_as_there_are_records() {
         assert!((entering(4, 1) - (1.0 + 1.0 / 2.0 + 1.0 / 3.0 + 1.0 / 4.0)).abs() < 1e-12);

@@ -1,4 +1,4 @@
-//! Of what a space is made, besides what was found.
+//! What a space is made of, besides what was found.
 
 use std::collections::BTreeSet;
 

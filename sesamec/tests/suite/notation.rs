@@ -16,9 +16,9 @@ use sesame_plan::condition::{
     Comparison, Condition, ConditionEnd, ConditionSpace, Constraint, Integers, Operand, Variable,
 };
 use sesame_plan::{
-    Activation, ActivationMode, Bound, Campaign, CampaignPlan, Choice, Confirmation, Copies, Count, CoverageGoal,
-    Dimension, Domain, Expectation, GridAxis, KnownTest, Lengths, Metric, MetricId, MetricSource, Operation,
-    OperationId, OperationKind, Parameter, Recorded, Score, Search, Shape, Span, Statistic, StopRule, Test,
+    Activation, ActivationMode, Bound, Campaign, CampaignPlan, Choice, ChoiceKind, Confirmation, Copies, Count,
+    CoverageGoal, Dimension, Domain, Expectation, GridAxis, KnownTest, Lengths, Metric, MetricId, MetricSource,
+    Operation, OperationId, OperationKind, Parameter, Recorded, Score, Search, Span, Statistic, StopRule, Test,
     TestOperation,
 };
 use sesamec::explain;
@@ -96,7 +96,8 @@ fn plan(text: &str) -> CampaignPlan {
     let file = sources.add("everything.sesame", text);
     let analysis = sesame_dsl::analyse(&sources, file);
     let Some(space) = analysis.model else {
-        let errors = analysis.diagnostics.into_iter().filter(|it| it.severity() == Severity::Error).take(5);
+        let errors =
+            analysis.diagnostics.into_iter().filter(|diagnostic| diagnostic.severity() == Severity::Error).take(5);
         panic!("{}", human(&errors.collect::<Vec<_>>(), &sources, false));
     };
     let campaign = space.campaign("look").expect("there is a campaign");
@@ -193,7 +194,8 @@ fn domain(kind: &OperationKind, parameter: &Parameter) -> BoxedStrategy<Domain> 
         }
         Domain::Point { .. } => {
             let axes = [(); 3].map(|()| ordered(number()));
-            axes.prop_map(|axes| Domain::Point { low: axes.map(|it| it.0), high: axes.map(|it| it.1) }).boxed()
+            axes.prop_map(|axes| Domain::Point { low: axes.map(|range| range.0), high: axes.map(|range| range.1) })
+                .boxed()
         }
         Domain::Texts { .. } => {
             let texts = prop::collection::btree_set(text(), 1..4);
@@ -252,8 +254,8 @@ fn choice(domain: &Domain) -> BoxedStrategy<Choice> {
             };
             let ends = ordered(share()).prop_map(move |(a, b)| (between(a), between(b)));
             ends.prop_map(move |(a, b)| match shape {
-                Shape::Value => Choice::Value { value: a },
-                Shape::Range => Choice::Range { low: a.min(b), high: a.max(b) },
+                ChoiceKind::Value => Choice::Value { value: a },
+                ChoiceKind::Range => Choice::Range { low: a.min(b), high: a.max(b) },
             })
             .boxed()
         }
@@ -322,7 +324,7 @@ fn used(id: OperationId, of: &Operation, metrics: &[Metric]) -> BoxedStrategy<Te
         prop_oneof![
             1 => ordered(share()).prop_map(move |(a, b)| Activation::Time { start: at(a), end: at(b) }).prop_filter(
                 "a window that is not empty",
-                |it| matches!(it, Activation::Time { start, end } if start < end)
+                |activation| matches!(activation, Activation::Time { start, end } if start < end)
             ),
             by_conditions => (condition(metrics), condition(metrics), times.clone())
                 .prop_map(|(start, end, times)| Activation::Condition { start, end, times }),
@@ -363,7 +365,8 @@ fn tests(operations: &[Operation], metrics: &[Metric]) -> impl Strategy<Value = 
 
 /// How conditions grow: over the first metrics, each with a range or without one.
 fn condition_space(metrics: &[Metric]) -> impl Strategy<Value = ConditionSpace> + use<> {
-    let metrics: Vec<(Option<String>, bool)> = metrics.iter().map(|it| (it.unit.clone(), is_truth(it))).collect();
+    let metrics: Vec<(Option<String>, bool)> =
+        metrics.iter().map(|metric| (metric.unit.clone(), is_truth(metric))).collect();
     let ranges = prop::collection::vec(prop::option::of((-1e9..-1e3f64, 1e3..1e9f64)), 2..4);
     let end = prop_oneof![
         Just(ConditionEnd::Condition),
@@ -456,7 +459,7 @@ pub(crate) fn plans(like: &CampaignPlan) -> impl Strategy<Value = Shown> + use<>
                 campaign.count = Count { min: 1, max: u32::try_from(operations.len()).expect("there are a few") };
             }
             let by_condition = matches!(campaign.activation, ActivationMode::Condition { .. });
-            let operations = operations.iter().map(|it| operation(it, campaign.end_after, by_condition));
+            let operations = operations.iter().map(|drawn| operation(drawn, campaign.end_after, by_condition));
             let like = like.clone();
             operations.collect::<Vec<_>>().prop_map(move |operations| CampaignPlan {
                 operations,
@@ -622,7 +625,7 @@ fn what_operations_on_nodes_do_is_written_and_read_back() {
 #[test]
 fn each_kind_of_operation_reads_back_in_every_unit() {
     let (system, like) = everything();
-    let kinds: BTreeSet<&str> = like.operations.iter().map(|it| it.kind.words()).collect();
+    let kinds: BTreeSet<&str> = like.operations.iter().map(|operation| operation.kind.words()).collect();
     assert!(kinds.len() > 20, "{kinds:?}");
     reads_back(&system, &like).unwrap();
 }

@@ -152,7 +152,8 @@ fn an_operation_whose_time_does_not_count_is_untimed() {
     let imported =
         imported(&with(&[("xmi:id=\"_o1\" name=\"lose\"", "xmi:id=\"_o1\" includeInTiming=\"false\" name=\"lose\"")]));
     let plan = plan(&imported, "first_campaign");
-    let timed: Vec<(&str, bool)> = plan.operations.iter().map(|it| (it.name.as_str(), it.timed)).collect();
+    let timed: Vec<(&str, bool)> =
+        plan.operations.iter().map(|operation| (operation.name.as_str(), operation.timed)).collect();
     assert_eq!(timed, [("push", true), ("lose", false), ("steer_x", true), ("steer_z", true)]);
     assert!(!said(&imported).contains("includeInTiming"));
 }
@@ -286,8 +287,11 @@ fn a_search_that_only_observes_now_keeps_its_objectives_in_results() {
     let mut imported = nothing_to_say();
     assert!(imported.text().contains("passive    1 times"), "{}", imported.text());
     let (_folder, repository) = recorded(&mut imported, 0);
-    let objectives: Vec<&str> =
-        repository.plan().objectives().map(|it| repository.plan().metric(it.metric).name.as_str()).collect();
+    let objectives: Vec<&str> = repository
+        .plan()
+        .objectives()
+        .map(|objective| repository.plan().metric(objective.metric).name.as_str())
+        .collect();
     assert_eq!(objectives, ["hits"], "`near` is not optimised");
     let front = analysis::front(&repository, &Selection::default()).unwrap().csv();
     assert_eq!(front.lines().collect::<Vec<_>>(), ["test,hits,same_as", "T1,3,"]);

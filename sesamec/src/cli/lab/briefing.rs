@@ -270,7 +270,7 @@ fn measured_speeds(facts: &Facts<'_>) -> Vec<RobotSpeed> {
     speeds.collect()
 }
 
-/// Of each pair of shapes that move with poses of their own: whether they are coupled, and what that means for robots
+/// For each pair of shapes that move with poses of their own: whether they are coupled, and what that means for robots
 /// that are run one at a time.
 fn coupling(facts: &Facts<'_>) -> Vec<(bool, String)> {
     let shapes = facts.lab.map_or(&[][..], |lab| &lab.shapes);

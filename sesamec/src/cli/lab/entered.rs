@@ -155,7 +155,7 @@ pub(super) fn add(shell: Shell, asked: &Add) -> anyhow::Result<()> {
     };
     let folder = asked.output.clone().map_or_else(|| beside(campaign.folder(), &name), Ok)?;
     let earlier = if folder.join(DATABASE).exists() { Some(Repository::open(&folder)?) } else { None };
-    let before = earlier.as_ref().map_or_else(|| Ok(Vec::new()), |it| recorded(it, &campaign, &name))?;
+    let before = earlier.as_ref().map_or_else(|| Ok(Vec::new()), |earlier| recorded(earlier, &campaign, &name))?;
 
     let mut taken = Taken::new(&campaign, &name, &provenance, &folder, &before);
     for file in &asked.files {
@@ -257,9 +257,9 @@ fn task(
     before: &[EnteredRun],
     runs: &[Entered],
 ) -> anyhow::Result<LabTask> {
-    let earlier = earlier.and_then(|it| it.task().in_lab());
+    let earlier = earlier.and_then(|earlier| earlier.task().in_lab());
     let tests = earlier.map_or(&[][..], |task| &task.tests);
-    let mut tests: BTreeMap<u32, LabTest> = tests.iter().map(|it| (it.number, it.clone())).collect();
+    let mut tests: BTreeMap<u32, LabTest> = tests.iter().map(|test| (test.number, test.clone())).collect();
     let mut times: BTreeMap<u32, u32> = BTreeMap::new();
     for of in before.iter().map(|run| run.of).chain(runs.iter().map(|run| run.of)) {
         *times.entry(of).or_default() += 1;

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 
 use sesame_plan::{CampaignPlan, LabShape, NodeId, ShapeForm, ShapePlace, TopicId};
 use sesame_safety::Vector;
-use sesame_safety::body::{Body, BodyError, Place, Shape, ShapeError};
+use sesame_safety::body::{Body, BodyError, Placement, Shape, ShapeError};
 use sesame_safety::contact::{ContactError, Contacts, TOLERANCE, contacts};
 use sesame_safety::coupling::{Coupling, Missing, Tolerance, by_messages, by_motion};
 use sesame_safety::trace::{Trace, TraceError};
@@ -31,9 +31,9 @@ pub(super) struct Recorded {
 impl Recorded {
     /// Its motion; `None` for a shape that does not move.
     pub(super) fn trace(&self) -> Option<&Trace> {
-        match self.body.place() {
-            Place::Moving(trace) => Some(trace),
-            Place::Fixed(_) => None,
+        match self.body.placement() {
+            Placement::Moving(trace) => Some(trace),
+            Placement::Fixed(_) => None,
         }
     }
 }
@@ -142,9 +142,9 @@ fn meeting(one: &Recorded, other: &Recorded) -> Result<Meeting, ReplayError> {
     let margins_touch = if one.margin == 0.0 && other.margin == 0.0 {
         found.first()
     } else {
-        let expanded = |it: &Recorded| {
-            let body = it.body.clone().expanded(it.margin);
-            body.map_err(|error| ReplayError::Shape { name: it.name.clone(), error: error.into() })
+        let expanded = |recorded: &Recorded| {
+            let body = recorded.body.clone().expanded(recorded.margin);
+            body.map_err(|error| ReplayError::Shape { name: recorded.name.clone(), error: error.into() })
         };
         contacts(&expanded(one)?, &expanded(other)?, TOLERANCE).map_err(wrong)?.first()
     };
@@ -234,7 +234,7 @@ fn step(trace: &Trace) -> f64 {
     trace.times().windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max)
 }
 
-/// Of two judgements the one that forbids more.
+/// The judgement of two that forbids more.
 fn worse(one: Coupling, other: Coupling) -> Coupling {
     let rank = |coupling: &Coupling| match coupling {
         Coupling::Coupled(_) => 0,

@@ -212,7 +212,7 @@ fn robots_recorded_one_at_a_time_touch_when_they_do_together() {
         assert_eq!(meeting.coupling, Some(Coupling::Independent(Evidence::Messages)), "{seed}");
         agrees(meeting, seen, seed);
         // The margin of 100 mm is touched no later.
-        assert!(meeting.contacts.first().is_none_or(|first| meeting.margins_touch.is_some_and(|it| it <= first)));
+        assert!(meeting.contacts.first().is_none_or(|first| meeting.margins_touch.is_some_and(|touch| touch <= first)));
 
         let together = shapes(&plan, &[&both], &["one", "two"], &[]);
         let compared = found(&plan, &alone, Some(&together), ALIKE).unwrap();

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use anyhow::{anyhow, bail};
-use sesame_mqtt::scan::{Found, Options};
+use sesame_mqtt::scan::{Found, ScanOptions};
 use sesame_notation::quoted;
 use sesame_scan::{Conventions, System};
 
@@ -30,7 +30,7 @@ pub(super) fn scan(shell: Shell, language: &Language, arguments: &Mqtt) -> anyho
     let (url, seconds) = (&arguments.url, arguments.seconds);
     check_settings(language, System::Mqtt { url: url.clone() }, &settings).map_err(|problem| anyhow!(problem))?;
     shell.doing("Listening", format!("to {} at {url} for {seconds} s", arguments.topics.join(", ")));
-    let Found { mut facts, payloads } = sesame_mqtt::scan::scan(&Options {
+    let Found { mut facts, payloads } = sesame_mqtt::scan::scan(&ScanOptions {
         url: url.clone(),
         filters: arguments.topics.clone(),
         listening: Duration::from_secs_f64(seconds),

@@ -8,7 +8,7 @@ use anyhow::{Context as _, anyhow, bail};
 use sesame_dsl::interfaces::full_name;
 use sesame_notation::quoted;
 use sesame_plan::Dialect;
-use sesame_rosbridge::scan::{Options, Scanner, Wanted};
+use sesame_rosbridge::scan::{ScanOptions, Scanner, Wanted};
 use sesame_scan::System;
 
 use super::arguments::{RosDialect, Rosbridge};
@@ -35,7 +35,7 @@ pub(super) fn scan(shell: Shell, language: &Language, arguments: &Rosbridge) -> 
     let (url, seconds) = (&arguments.url, arguments.seconds);
     let system = System::Rosbridge { url: url.clone(), dialect: dialect.unwrap_or_default(), rosapi: false };
     check_settings(language, system, &settings).map_err(|problem| anyhow!(problem))?;
-    let options = Options { url: url.clone(), token, trust: arguments.trust.clone(), folder: PathBuf::new() };
+    let options = ScanOptions { url: url.clone(), token, trust: arguments.trust.clone(), folder: PathBuf::new() };
     let mut scanner =
         Scanner::connect(&options, dialect).context("there is no bridge to look at; start it, or name another one")?;
     shell.doing("Asking", format!("the bridge at {url} who is there"));

@@ -10,7 +10,7 @@ use sesame_codegen::input;
 use sesame_notation::quoted;
 use sesame_plan::{SimlogVersion, WireNames};
 use sesame_scan::System;
-use sesame_simlog::client::Options;
+use sesame_simlog::client::ClientOptions;
 use sesame_simlog::scan::{Found, MOST_TOPICS, Wanted};
 
 use super::arguments::Simlog;
@@ -51,7 +51,8 @@ pub(super) fn scan(shell: Shell, language: &Language, arguments: &Simlog) -> any
     check_settings(language, system, &settings).map_err(|problem| anyhow!(problem))?;
     let ca = arguments.trust.as_ref().map(|file| certificates(file)).transpose()?;
     let token = std::env::var(TOKEN).ok().filter(|token| !token.is_empty());
-    let options = Options { topics_url: arguments.topics_at.clone(), ca, token, ..Options::new(url, version) };
+    let options =
+        ClientOptions { topics_url: arguments.topics_at.clone(), ca, token, ..ClientOptions::new(url, version) };
     let listening = Duration::from_secs_f64(seconds);
     shell.doing(
         "Listening",

@@ -93,9 +93,10 @@ impl<'c> Taken<'c> {
                      `\"{tests}\": \"{digest}\"` in JSON"
                 )
             }),
-            Some(At { it, .. }) if it == digest => {}
+            Some(At { value, .. }) if value == digest => {}
             Some(At { at, .. }) => mistakes.say(*at, || {
-                let of = sheet.head.get(campaign).map_or_else(String::new, |it| format!(" ({})", quoted(&it.it)));
+                let of =
+                    sheet.head.get(campaign).map_or_else(String::new, |named| format!(" ({})", quoted(&named.value)));
                 format!(
                     "the form is for tests of another run{of}, not for those of {}; give the results that it was \
                      printed for",
@@ -103,9 +104,9 @@ impl<'c> Taken<'c> {
                 )
             }),
         }
-        if let Some(At { at, it }) = sheet.head.get(lab).filter(|it| it.it != self.lab) {
+        if let Some(At { at, value }) = sheet.head.get(lab).filter(|named| named.value != self.lab) {
             mistakes.say(*at, || {
-                format!("the form is for lab {}, not for `{}`; give the lab with `--lab`", quoted(it), self.lab)
+                format!("the form is for lab {}, not for `{}`; give the lab with `--lab`", quoted(value), self.lab)
             });
         }
     }
@@ -114,15 +115,15 @@ impl<'c> Taken<'c> {
     fn provenance(&self, sheet: &Sheet, mistakes: &mut Mistakes<'_>) -> Provenance {
         let mut texts = self.provenance.texts().map(|text| text.map(str::to_owned));
         for (name, text) in Provenance::NAMES.into_iter().zip(&mut texts) {
-            let Some(At { at, it }) = sheet.head.get(name) else { continue };
-            if it.chars().any(char::is_control) {
+            let Some(At { at, value }) = sheet.head.get(name) else { continue };
+            if value.chars().any(char::is_control) {
                 mistakes.say(*at, || format!("`{name}` contains control characters; write one line of text"));
             }
             match text {
-                Some(text) if text != it => mistakes.say(*at, || {
-                    format!("`{name}` is {} here, and `--{name}` says {}; leave out one", quoted(it), quoted(text))
+                Some(text) if text != value => mistakes.say(*at, || {
+                    format!("`{name}` is {} here, and `--{name}` says {}; leave out one", quoted(value), quoted(text))
                 }),
-                _ => *text = Some(it.clone()),
+                _ => *text = Some(value.clone()),
             }
         }
         Provenance::from(texts)
@@ -154,7 +155,7 @@ impl<'c> Taken<'c> {
     }
 
     fn test(&self, test: &At<String>, mistakes: &mut Mistakes<'_>) -> Option<u32> {
-        let number = match self.campaign.named(&test.it) {
+        let number = match self.campaign.named(&test.value) {
             Ok(number) => number,
             Err(wrong) => {
                 mistakes.say(test.at, || wrong);
@@ -172,14 +173,14 @@ impl<'c> Taken<'c> {
     }
 
     fn outcome(&self, word: &At<String>, mistakes: &mut Mistakes<'_>) -> Option<Outcome> {
-        let outcome = entered_outcome(&word.it, self.campaign.plan());
+        let outcome = entered_outcome(&word.value, self.campaign.plan());
         if outcome.is_none() {
             mistakes.say(word.at, || {
                 let words = ENTERED_OUTCOMES.map(|word| format!("`{word}`")).join(", ");
-                match (word.it.as_str(), most_similar(&word.it, ENTERED_OUTCOMES)) {
+                match (word.value.as_str(), most_similar(&word.value, ENTERED_OUTCOMES)) {
                     ("", _) => format!("the outcome is missing; write one of {words}"),
-                    (it, Some(meant)) => format!("{} is not an outcome; did you mean `{meant}`?", quoted(it)),
-                    (it, None) => format!("{} is not an outcome; write one of {words}", quoted(it)),
+                    (unknown, Some(meant)) => format!("{} is not an outcome; did you mean `{meant}`?", quoted(unknown)),
+                    (unknown, None) => format!("{} is not an outcome; write one of {words}", quoted(unknown)),
                 }
             });
         }
@@ -195,8 +196,8 @@ impl<'c> Taken<'c> {
     ) -> Option<Vec<Option<f64>>> {
         let whole = outcome.is_some_and(Outcome::is_whole);
         let mut taken = Some(Vec::with_capacity(values.len()));
-        for (At { at, it }, metric) in values.into_iter().zip(&self.campaign.plan().metrics) {
-            let value = match it {
+        for (At { at, value: given }, metric) in values.into_iter().zip(&self.campaign.plan().metrics) {
+            let value = match given {
                 Given::Value(value) => Some(Some(value)),
                 Given::Unmeasured => Some(None),
                 Given::Empty if !whole => Some(None),
@@ -222,7 +223,7 @@ impl<'c> Taken<'c> {
 
 /// Whether a file is one of JSON: by its name, or else by its first sign.
 fn is_json(file: &Path, text: &str) -> bool {
-    match file.extension().and_then(|it| it.to_str()) {
+    match file.extension().and_then(|extension| extension.to_str()) {
         Some(ending) if ending.eq_ignore_ascii_case("json") => true,
         Some(ending) if ending.eq_ignore_ascii_case("csv") => false,
         _ => text.trim_start().starts_with(['{', '[']),
@@ -231,9 +232,9 @@ fn is_json(file: &Path, text: &str) -> bool {
 
 /// Which run of its test a run is.
 fn number_of(run: &At<String>, mistakes: &mut Mistakes<'_>) -> Option<u32> {
-    let number = run.it.parse::<u32>().ok().filter(|&number| number > 0);
+    let number = run.value.parse::<u32>().ok().filter(|&number| number > 0);
     if number.is_none() {
-        let what = || format!("{} is not the number of a run; number the runs of a test 1, 2, …", quoted(&run.it));
+        let what = || format!("{} is not the number of a run; number the runs of a test 1, 2, …", quoted(&run.value));
         mistakes.say(run.at, what);
     }
     number

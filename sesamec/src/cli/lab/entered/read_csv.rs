@@ -46,8 +46,8 @@ fn rows(text: &str, sheet: &mut Sheet, mistakes: &mut Mistakes<'_>) -> Vec<Cells
         let (cells, end) = cells(text, at, mistakes);
         at = end;
         match cells.0.first() {
-            Some(first) if first.it.starts_with('#') => comment(first.at, &first.it, sheet, mistakes),
-            _ if cells.0.iter().all(|cell| cell.it.is_empty()) => {}
+            Some(first) if first.value.starts_with('#') => comment(first.at, &first.value, sheet, mistakes),
+            _ if cells.0.iter().all(|cell| cell.value.is_empty()) => {}
             _ => rows.push(cells),
         }
     }
@@ -90,7 +90,7 @@ fn cells(text: &str, begin: usize, mistakes: &mut Mistakes<'_>) -> (Cells, usize
         }
         let end = until(at, b",\r\n");
         cell.push_str(&text[at..end]);
-        found.push(At { at: place, it: cell.trim().to_owned() });
+        found.push(At { at: place, value: cell.trim().to_owned() });
         at = (end + 1).min(text.len());
         if bytes.get(end) != Some(&b',') {
             return (Cells(found), at);
@@ -106,7 +106,7 @@ fn comment(at: usize, text: &str, sheet: &mut Sheet, mistakes: &mut Mistakes<'_>
         if value.is_empty() {
             return;
         }
-        if sheet.head.insert(name, At { at, it: value.to_owned() }).is_some() {
+        if sheet.head.insert(name, At { at, value: value.to_owned() }).is_some() {
             mistakes.say(at, || format!("`# {name}:` is there twice; remove one"));
         }
     } else if let Some(meant) = most_similar(name, HEAD) {
@@ -117,11 +117,11 @@ fn comment(at: usize, text: &str, sheet: &mut Sheet, mistakes: &mut Mistakes<'_>
 /// The columns of the metrics; `None` if the header is none.
 fn columns(Cells(cells): &Cells, plan: &CampaignPlan, mistakes: &mut Mistakes<'_>) -> Option<Vec<Column>> {
     let first = &cells[0];
-    if cells.len() == 1 && (first.it.contains(';') || first.it.contains('\t')) {
+    if cells.len() == 1 && (first.value.contains(';') || first.value.contains('\t')) {
         mistakes.say(first.at, || "the columns are not separated by commas; save the file with commas".to_owned());
         return None;
     }
-    if !cells.iter().map(|cell| cell.it.as_str()).take(FIRST_COLUMNS.len()).eq(FIRST_COLUMNS) {
+    if !cells.iter().map(|cell| cell.value.as_str()).take(FIRST_COLUMNS.len()).eq(FIRST_COLUMNS) {
         mistakes.say(first.at, || {
             format!(
                 "the first columns are not `{}`; begin with the header that `lab form` prints",
@@ -133,9 +133,9 @@ fn columns(Cells(cells): &Cells, plan: &CampaignPlan, mistakes: &mut Mistakes<'_
     let mut there = vec![false; plan.metrics.len()];
     let mut columns = Vec::new();
     for cell in &cells[FIRST_COLUMNS.len()..] {
-        let (name, unit) = match cell.it.strip_suffix(']').and_then(|head| head.rsplit_once('[')) {
+        let (name, unit) = match cell.value.strip_suffix(']').and_then(|head| head.rsplit_once('[')) {
             Some((name, unit)) => (name.trim(), Some(unit.trim())),
-            None => (cell.it.as_str(), None),
+            None => (cell.value.as_str(), None),
         };
         let found = metric(plan, name).and_then(|at| {
             let metric = &plan.metrics[at];
@@ -179,14 +179,14 @@ fn row(
     let mut cells = cells.into_iter();
     let [test, run, outcome] = [cells.next()?, cells.next()?, cells.next()?];
     let values = (count == width).then(|| {
-        let mut values = vec![At { at: begin, it: Given::Mistaken }; plan.metrics.len()];
+        let mut values = vec![At { at: begin, value: Given::Mistaken }; plan.metrics.len()];
         for (cell, column) in cells.zip(columns) {
             let Some((metric, conversion)) = column else { continue };
-            let it = given(&cell.it, conversion).unwrap_or_else(|wrong| {
+            let value = given(&cell.value, conversion).unwrap_or_else(|wrong| {
                 mistakes.say(cell.at, || wrong);
                 Given::Mistaken
             });
-            values[*metric] = At { at: cell.at, it };
+            values[*metric] = At { at: cell.at, value };
         }
         values
     });
@@ -221,11 +221,11 @@ mod tests {
             let expected: Vec<Vec<String>> =
                 table.iter().map(trimmed).filter(|row| row.iter().any(|cell| !cell.is_empty())).collect();
             let found: Vec<Vec<String>> =
-                read.iter().map(|row| row.0.iter().map(|cell| cell.it.clone()).collect()).collect();
+                read.iter().map(|row| row.0.iter().map(|cell| cell.value.clone()).collect()).collect();
             prop_assert_eq!(found, expected);
             for cell in read.iter().flat_map(|row| &row.0) {
                 let written = text[cell.at..].trim_start().replace("\"\"", "\"");
-                prop_assert!(written.starts_with(&cell.it), "{:?} at {} of {:?}", cell.it, cell.at, text);
+                prop_assert!(written.starts_with(&cell.value), "{:?} at {} of {:?}", cell.value, cell.at, text);
             }
         }
     }

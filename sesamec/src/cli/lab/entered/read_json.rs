@@ -66,7 +66,7 @@ pub(super) fn read(text: &str, plan: &CampaignPlan, mistakes: &mut Mistakes<'_>)
     let [head @ .., runs] = reader.members(whole, "the form", names, &["runs"]);
     for (name, text) in HEAD.into_iter().zip(head) {
         let text = text.and_then(|text| reader.text(text, name));
-        sheet.head.extend(text.filter(|text| !text.it.is_empty()).map(|text| (name, text)));
+        sheet.head.extend(text.filter(|text| !text.value.is_empty()).map(|text| (name, text)));
     }
     let Some(runs) = runs else { return Some(sheet) };
     match serde_json::from_str::<Vec<&RawValue>>(runs.get()) {
@@ -125,16 +125,16 @@ impl<'t> Reader<'_, 't, '_> {
             self.say(value, || format!("`{what}` is {}; write a text", kind(value)));
             return None;
         };
-        Some(At { at: self.at(value), it: text.unwrap_or_default().trim().to_owned() })
+        Some(At { at: self.at(value), value: text.unwrap_or_default().trim().to_owned() })
     }
 
     fn run(&mut self, value: &'t RawValue) -> Option<Row> {
         let names = ["test", "run", "outcome", "values"];
         let [test, run, outcome, values] = self.members(value, "this run", names, &names);
         let values = values.and_then(|values| self.values(values));
-        let test = test.and_then(|it| self.text(it, "test"));
-        let run = run.map(|it| At { at: self.at(it), it: it.get().to_owned() });
-        let outcome = outcome.and_then(|it| self.text(it, "outcome"));
+        let test = test.and_then(|test| self.text(test, "test"));
+        let run = run.map(|run| At { at: self.at(run), value: run.get().to_owned() });
+        let outcome = outcome.and_then(|outcome| self.text(outcome, "outcome"));
         Some(Row { test: test?, run: run?, outcome: outcome?, values })
     }
 
@@ -144,7 +144,7 @@ impl<'t> Reader<'_, 't, '_> {
             self.say(value, || format!("`values` is {}; write an object with a member for each metric", kind(value)));
             return None;
         };
-        let mut values = vec![At { at: self.at(value), it: Given::Empty }; self.plan.metrics.len()];
+        let mut values = vec![At { at: self.at(value), value: Given::Empty }; self.plan.metrics.len()];
         let mut there = vec![false; values.len()];
         for (name, member) in members {
             let at = match metric(self.plan, &name) {
@@ -158,8 +158,8 @@ impl<'t> Reader<'_, 't, '_> {
                     continue;
                 }
             };
-            let it = self.value(at, member);
-            values[at] = At { at: self.at(member), it };
+            let value = self.value(at, member);
+            values[at] = At { at: self.at(member), value };
         }
         Some(values)
     }
@@ -172,7 +172,7 @@ impl<'t> Reader<'_, 't, '_> {
             let Some(number) = number else { return Given::Mistaken };
             let unit = match unit.map(|unit| self.text(unit, "unit")) {
                 Some(None) => return Given::Mistaken,
-                unit => unit.flatten().filter(|unit| !unit.it.is_empty()),
+                unit => unit.flatten().filter(|unit| !unit.value.is_empty()),
             };
             (number, unit)
         } else {
@@ -199,7 +199,7 @@ impl<'t> Reader<'_, 't, '_> {
             None => "a number alone".to_owned(),
         };
         let place = unit.as_ref().map_or_else(|| self.at(number), |unit| unit.at);
-        let conversion = match conversion(metric, unit.as_ref().map(|unit| unit.it.as_str()), &write) {
+        let conversion = match conversion(metric, unit.as_ref().map(|unit| unit.value.as_str()), &write) {
             Ok(conversion) => conversion,
             Err(wrong) => {
                 self.mistakes.say(place, || wrong);

@@ -22,7 +22,7 @@ pub(super) const UNMEASURED: &str = "unmeasured";
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct At<T> {
     pub(super) at: usize,
-    pub(super) it: T,
+    pub(super) value: T,
 }
 
 /// What a file says.
@@ -48,7 +48,8 @@ impl Row {
     /// Whether nothing is filled in: the run was not made.
     pub(super) fn is_blank(&self) -> bool {
         let values = self.values.as_ref();
-        self.outcome.it.is_empty() && values.is_some_and(|values| values.iter().all(|value| value.it == Given::Empty))
+        self.outcome.value.is_empty()
+            && values.is_some_and(|values| values.iter().all(|value| value.value == Given::Empty))
     }
 }
 

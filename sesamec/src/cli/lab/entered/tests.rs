@@ -151,7 +151,7 @@ fn runs_are_recorded_appended_and_compared_with_the_campaign() {
     bench.write("monday.csv", text);
     bench.lab(&["add", "@42", "@monday.csv", "--hardware", "cell 2"]).unwrap();
     let recorded = bench.recorded();
-    assert_eq!(recorded.iter().map(|it| it.run).collect::<Vec<_>>(), [1, 1], "a blank row is not a run");
+    assert_eq!(recorded.iter().map(|run| run.run).collect::<Vec<_>>(), [1, 1], "a blank row is not a run");
     assert_eq!(recorded[0].provenance.texts(), [Some("Ada, Ben"), Some("cell 2"), None, None]);
 
     // Tests that are run again in simulation leave forms and the folder valid.
@@ -325,7 +325,7 @@ fn values_in_other_units_are_converted_and_what_spreadsheets_do_is_understood() 
     bench.write("form.csv", format!("\u{feff}{text}"));
     bench.lab(&["add", "@42", "@form.csv"]).unwrap();
     let lab = Repository::open(&bench.path("42-hall")).unwrap();
-    let values: Vec<Option<f64>> = lab.test(1).unwrap().observation.metrics.iter().map(|it| it.value).collect();
+    let values: Vec<Option<f64>> = lab.test(1).unwrap().observation.metrics.iter().map(|metric| metric.value).collect();
     assert_eq!(values, [Some(3.0), Some(5.0), Some(10.0), None, Some(200.0)]);
     assert_eq!(bench.recorded()[0].provenance.operator.as_deref(), Some("Ada, Ben"));
 }
@@ -347,7 +347,7 @@ fn a_lab_is_named_if_there_are_several_and_may_be_made_up_if_there_is_none() {
 
 /// A value as somebody might enter it.
 fn value() -> impl Strategy<Value = Option<f64>> {
-    prop_oneof![4 => any::<f64>().prop_filter("finite", |it| it.is_finite()).prop_map(Some), 1 => Just(None)]
+    prop_oneof![4 => any::<f64>().prop_filter("finite", |number| number.is_finite()).prop_map(Some), 1 => Just(None)]
 }
 
 proptest! {
@@ -383,7 +383,7 @@ proptest! {
             let form = bench.form(&[&tests[0], &tests[1], "-n", &times]);
             let form = form.replace("# operator:", &format!("# operator: {operator}"));
             let mut rows = runs.iter().map(|(values, outcome)| {
-                let values = values.iter().map(|it| it.map_or("unmeasured".to_owned(), |it| it.to_string()));
+                let values = values.iter().map(|value| value.map_or("unmeasured".to_owned(), |number| number.to_string()));
                 format!("{},{}", word(*outcome), values.collect::<Vec<_>>().join(","))
             });
             let fill = |line: &str| match line.strip_suffix(",,,,,,") {
@@ -427,7 +427,7 @@ proptest! {
                 break;
             }
             let at = at.index(bytes.len());
-            let rest = |of: &[u8]| of[at..].iter().position(|it| b",\n".contains(it)).map_or(of.len(), |n| at + n);
+            let rest = |of: &[u8]| of[at..].iter().position(|byte| b",\n".contains(byte)).map_or(of.len(), |n| at + n);
             let end = rest(&bytes);
             match what {
                 0 => drop(bytes.drain(at..end)),
