@@ -1,15 +1,32 @@
-//! Interfaces of ROS: where their layouts come from, their names, and those that need no file.
+//! Definitions of messages in files: where they come from; and the names of interfaces of ROS, with those that need no
+//! file.
 //!
 //! This crate reads no files, so whoever calls it hands over [`Interfaces`].
 
 use sesame_plan::{Dialect, Interface, InterfaceField, Primitive, WireType};
 
-/// Where the layouts of ROS interfaces come from.
+/// Where definitions of messages come from: the layouts of ROS interfaces, and what a dialect of `MAVLink` has.
 pub trait Interfaces {
     /// The layout of an interface such as `sensor_msgs/msg/JointState`, or `std_srvs/srv/SetBool_Request` and
     /// `std_srvs/srv/SetBool_Response` for the two directions of a service: last in a list in which each comes after
     /// those that it contains. `None` if no folder has it; an error is a clause such as "it cannot be read".
     fn find(&self, folders: Folders<'_>, name: &str) -> Result<Option<Vec<Interface>>, String>;
+
+    /// The messages that these files define, and those that they include. The files are relative to the folder of the
+    /// `.sesame` file `beside`. `None` where no files are read, so that nothing is known of any message.
+    fn dialect(&self, files: &[String], beside: &str) -> Result<Option<Vec<Interface>>, Vec<UnusableFile>> {
+        let _ = (files, beside);
+        Ok(None)
+    }
+}
+
+/// A file of a dialect that cannot be used, or includes one that cannot.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct UnusableFile {
+    /// Its position among the files that were asked for.
+    pub named: usize,
+    /// Why, in a clause such as "it is not XML".
+    pub why: String,
 }
 
 /// Folders that hold packages.

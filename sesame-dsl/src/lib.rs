@@ -53,12 +53,13 @@ impl Analysis {
 /// Analyses the file `root` of `sources` with all it imports, which [`load_imports`] has added: syntax, names, types
 /// and units, ranges, campaigns, and what deserves a warning.
 ///
-/// All mistakes of all these kinds come out of one call. Of the types of ROS only those are known that need no files.
+/// All mistakes of all these kinds come out of one call. Of the types of ROS only those are known that need no files,
+/// and nothing is known of the messages that other files define.
 pub fn analyse(sources: &SourceMap, root: FileId) -> Analysis {
     analyse_with(sources, root, &NoInterfaces)
 }
 
-/// [`analyse`] with layouts of ROS interfaces from elsewhere.
+/// [`analyse`] with definitions of messages from elsewhere.
 pub fn analyse_with(sources: &SourceMap, root: FileId, interfaces: &dyn Interfaces) -> Analysis {
     let (mut diagnostics, mut undecided) = (Vec::new(), Vec::new());
     let merged = import::merge(sources, root, &mut diagnostics);
@@ -74,7 +75,8 @@ pub fn diagnose(sources: &SourceMap, root: FileId) -> Vec<Diagnostic> {
     diagnose_with(sources, root, &NoInterfaces)
 }
 
-fn diagnose_with(sources: &SourceMap, root: FileId, interfaces: &dyn Interfaces) -> Vec<Diagnostic> {
+/// [`diagnose`] with layouts from elsewhere.
+pub fn diagnose_with(sources: &SourceMap, root: FileId, interfaces: &dyn Interfaces) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
     let merged = import::merge(sources, root, &mut diagnostics);
     resolved(sources, root, merged, interfaces, &mut diagnostics, None);

@@ -2,7 +2,7 @@
 //!
 //! 1. [`collect`] collects names, and reports duplicates and missing declarations
 //! 2. [`system`] resolves message types (ordered so that each follows those it contains), topics, nodes, the simulator;
-//!    [`ros2`], [`ros_types`] and [`services`] those of ROS, [`bus`] addresses
+//!    [`ros2`], [`ros_types`] and [`services`] those of ROS, [`bus`] addresses, [`mavlink`] what its files define
 //! 3. [`eddi`] resolves runtime monitors, with their [`evidence`]
 //! 4. [`metrics`] resolves metrics and requirements; [`formula`] resolves formulas, with [`function`], [`geometry`],
 //!    [`region`] and [`members`]; [`score`] what is said of monitors
@@ -41,6 +41,7 @@ mod inherit;
 mod known;
 mod lengths;
 mod lifecycle;
+mod mavlink;
 mod members;
 mod message_types;
 mod metrics;

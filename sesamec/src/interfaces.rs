@@ -1,5 +1,5 @@
-//! Definitions of ROS messages and services in folders: which file defines what, read when it is asked for, and in the
-//! order in which one contains another.
+//! Definitions of messages in files. Of ROS messages and services in folders: which file defines what, read when it is
+//! asked for, and in the order in which one contains another. Of `MAVLink` the files of a dialect, read once.
 //!
 //! A folder holds packages, as `share` of a distribution and the folder of a workspace's sources do:
 //! `PACKAGE/msg/NAME.msg`, `PACKAGE/srv/NAME.srv`, or `.idl` in their place. Nothing else in it is looked at.
@@ -9,7 +9,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use sesame_codegen::input::{self, Unreadable};
-use sesame_dsl::interfaces::{Folders, Interfaces, known};
+use sesame_dsl::interfaces::{Folders, Interfaces, UnusableFile, known};
+use sesame_interfaces::mavlink::{self, Definitions};
 use sesame_plan::{Dialect, Interface, InterfaceField, WireType};
 
 /// The most files that are read for one space.
@@ -49,11 +50,16 @@ pub(crate) type Parse = fn(name: &str, definition: &Definition) -> Result<Vec<In
 /// The layouts of a definition; `None` where no folder has one.
 type Read = Result<Option<Vec<Interface>>, String>;
 
+/// The messages of a dialect.
+type Dialects = Result<Vec<Interface>, Vec<UnusableFile>>;
+
 /// Layouts from files.
 pub(crate) struct Files {
     parse: Parse,
     /// By the name of the message or service.
     read: RefCell<BTreeMap<String, Read>>,
+    /// By the files, and the file to which they are relative.
+    dialects: RefCell<BTreeMap<(Vec<String>, String), Dialects>>,
 }
 
 impl Default for Files {
@@ -85,7 +91,7 @@ fn parse(name: &str, definition: &Definition) -> Result<Vec<Interface>, String> 
 impl Files {
     /// No file is read yet.
     pub(crate) fn new(parse: Parse) -> Self {
-        Files { parse, read: RefCell::new(BTreeMap::new()) }
+        Files { parse, read: RefCell::default(), dialects: RefCell::default() }
     }
 
     /// The layout of an interface itself.
@@ -162,6 +168,22 @@ impl Interfaces for Files {
         let there = self.add(folders, name, &mut Vec::new(), &mut found)?;
         Ok(there.then_some(found))
     }
+
+    fn dialect(&self, files: &[String], beside: &str) -> Result<Option<Vec<Interface>>, Vec<UnusableFile>> {
+        let mut dialects = self.dialects.borrow_mut();
+        let read = dialects.entry((files.to_vec(), beside.to_owned()));
+        read.or_insert_with(|| dialect(files, beside)).clone().map(Some)
+    }
+}
+
+fn dialect(files: &[String], beside: &str) -> Dialects {
+    let folder = Path::new(beside).parent().unwrap_or(Path::new(""));
+    let contents = |path: &Path| input::text(path).map_err(|unreadable| unreadable.to_string());
+    let definitions = Definitions::read(files, folder, &contents).map_err(|unusable| {
+        let of = |it: mavlink::Unusable| UnusableFile { named: it.named, why: it.why() };
+        unusable.into_iter().map(of).collect::<Vec<_>>()
+    })?;
+    Ok(definitions.iter().map(mavlink::Definition::interface).collect())
 }
 
 /// The message or service whose definition has an interface.
@@ -263,6 +285,32 @@ mod tests {
         assert_eq!(found(&files, "a/msg/Other").unwrap(), None);
         assert_eq!(found(&files, "a/../b/msg/Leaf").unwrap(), None);
         assert_eq!(found(&files, "c/msg/Broken").unwrap_err(), "/first/c/msg/Broken.msg: its line 1 is not a field");
+    }
+
+    #[test]
+    fn a_dialect_is_relative_to_the_space_and_read_with_the_files_that_it_includes() {
+        let folder = tempfile::tempdir().unwrap();
+        let message = r#"<message id="1" name="LEVEL"><field type="float[3]" name="level"/></message>"#;
+        fs::write(folder.path().join("level.xml"), format!("<mavlink><messages>{message}</messages></mavlink>"))
+            .unwrap();
+        let own = "<mavlink><include>level.xml</include></mavlink>";
+        fs::write(folder.path().join("own.xml"), own).unwrap();
+        fs::write(folder.path().join("bad.xml"), own.replace("level", "none")).unwrap();
+        let space = folder.path().join("cell.sesame");
+        let files = Files::default();
+        let read = |names: &[&str]| {
+            let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
+            files.dialect(&names, space.to_str().unwrap())
+        };
+        let found = read(&["own.xml"]).unwrap().unwrap();
+        let number = WireType::Primitive { primitive: sesame_plan::Primitive::Float32 };
+        let level =
+            InterfaceField { name: "level".to_owned(), ty: WireType::Array { of: Box::new(number), length: 3 } };
+        assert_eq!(found, [Interface { name: "LEVEL".to_owned(), fields: vec![level] }]);
+        let unusable = read(&["own.xml", ".", "bad.xml"]).unwrap_err();
+        assert_eq!((unusable[0].named, unusable[0].why.as_str()), (1, "it is a folder, not a regular file"));
+        assert_eq!(unusable[1].named, 2);
+        assert!(unusable[1].why.ends_with("none.xml`, and there is no such file"), "{unusable:?}");
     }
 
     #[test]

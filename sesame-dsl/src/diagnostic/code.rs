@@ -74,7 +74,7 @@ codes! {
     CIRCLE = "E0213": "Files, campaigns or monitors depend on themselves.",
     WHICH_NODES = "E0214": "An operation cannot be limited to these nodes.",
     LARGE_MESSAGE = "E0215": "A message has more values than a runner supports.",
-    NO_LAYOUT = "E0216": "The layout of a ROS message cannot be found, or is not what the space says.",
+    NO_LAYOUT = "E0216": "The definition of a message cannot be found or used, or is not what the space says.",
     NOT_ROS = "E0217": "Something of ROS is used with another simulator, or is missing with one of ROS 2.",
     PLACEHOLDER = "E0218": "An argument of a launched program has a placeholder that nothing replaces.",
     NOTHING_TO_LAUNCH = "E0219": "A command is launched for a simulator that is part of the runner.",

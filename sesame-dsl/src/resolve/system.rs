@@ -29,6 +29,7 @@ impl<'a> Resolver<'a> {
         let simulator = self.simulators().next().and_then(|simulator| self.simulator(simulator));
         self.messages();
         self.topics();
+        self.defined_messages();
         self.services();
         self.nodes();
         simulator

@@ -2,8 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use sesame_dsl::interfaces::{Folders, Interfaces, UnusableFile};
 use sesame_dsl::source::SourceMap;
-use sesame_dsl::{Analysis, analyse};
+use sesame_dsl::{Analysis, analyse_with};
+use sesame_interfaces::mavlink::{Definition, Definitions};
+use sesame_plan::Interface;
 
 /// The files of a folder of the corpus: names without `.sesame`, and texts.
 #[expect(clippy::disallowed_methods, reason = "the crate is pure; its tests read their corpus")]
@@ -25,6 +28,28 @@ pub(crate) fn corpus(folder: &str) -> Vec<(String, String)> {
 pub(crate) fn analyse_text(name: &str, text: &str) -> (SourceMap, Analysis) {
     let mut sources = SourceMap::new();
     let file = sources.add(format!("{name}.sesame"), text);
-    let analysis = analyse(&sources, file);
+    let analysis = analyse_with(&sources, file, &Dialects);
     (sources, analysis)
+}
+
+/// The files in `dialects/`, which spaces of the corpus name as those beside them. Others are not read.
+pub(crate) struct Dialects;
+
+impl Interfaces for Dialects {
+    fn find(&self, _: Folders<'_>, _: &str) -> Result<Option<Vec<Interface>>, String> {
+        Ok(None)
+    }
+
+    #[expect(clippy::disallowed_methods, reason = "the crate is pure; its tests read their corpus")]
+    fn dialect(&self, files: &[String], _: &str) -> Result<Option<Vec<Interface>>, Vec<UnusableFile>> {
+        if files.iter().any(|file| !file.starts_with("../dialects/")) {
+            return Ok(None);
+        }
+        let contents = |path: &Path| std::fs::read_to_string(path).map_err(|_| "there is no such file".to_owned());
+        let definitions = Definitions::read(files, Path::new("tests/bad"), &contents).map_err(|unusable| {
+            let why = unusable.into_iter().map(|it| UnusableFile { named: it.named, why: it.why() });
+            why.collect::<Vec<_>>()
+        })?;
+        Ok(Some(definitions.iter().map(Definition::interface).collect()))
+    }
 }

@@ -7,12 +7,12 @@ use proptest::prelude::*;
 use proptest::sample::Index;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::{RngSeed, TestRunner};
-use sesame_dsl::diagnose;
+use sesame_dsl::diagnose_with;
 use sesame_dsl::diagnostic::{Applicability, Code, Diagnostic, Severity, Suggestion};
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::span::Span;
 
-use crate::files::{analyse_text, corpus};
+use crate::files::{Dialects, analyse_text, corpus};
 
 /// Spaces of the examples, in order, which mutations begin with.
 pub(crate) const EXAMPLES: [&str; 3] = [
@@ -33,7 +33,7 @@ pub(crate) fn diagnostics_after(text: &str) -> Vec<Diagnostic> {
     }
     let mut sources = SourceMap::new();
     let file = sources.add("space.sesame", text);
-    diagnose(&sources, file)
+    diagnose_with(&sources, file, &Dialects)
 }
 
 /// A text with a suggestion applied.

@@ -1,4 +1,5 @@
-//! Interfaces of ROS: the text of `.msg`, `.srv` and `.idl` files as layouts of messages.
+//! Definitions of messages: the text of `.msg`, `.srv` and `.idl` files of ROS as layouts, and that of the files of
+//! [`mavlink`].
 //!
 //! Pure: it reads no files. A caller gives the text of each file to [`msg`], [`srv`] or [`idl`], collects what comes
 //! out in a [`Catalogue`], and asks it for the layout of an interface with everything that it contains. Files of ROS 1
@@ -6,6 +7,7 @@
 
 mod catalogue;
 mod idl;
+pub mod mavlink;
 mod msg;
 pub mod ros1;
 

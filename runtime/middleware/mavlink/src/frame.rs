@@ -6,14 +6,10 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use sesame_plan::{CampaignPlan, Primitive, Type};
+use sesame_interfaces::mavlink::{Crc, Definition, Field, FieldKind};
+use sesame_plan::{CampaignPlan, Primitive, Type, mavlink};
 use sesame_relay::value::{Fields, Record, Value};
 use sesame_relay::wire::{bits_of, value_of};
-
-use crate::definitions::{Definition, Field, FieldKind};
-
-/// The longest payload, in bytes.
-pub(crate) const LONGEST_PAYLOAD: usize = 255;
 
 /// The first byte of a frame of each version, and the length of its header in bytes.
 const VERSION_1: (u8, usize) = (0xFE, 6);
@@ -25,56 +21,6 @@ const SIGNATURE: usize = 13;
 
 /// The length of a checksum in bytes.
 const CHECKSUM: usize = 2;
-
-/// The checksum of `MAVLink`, CRC-16/MCRF4XX.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Crc(u16);
-
-impl Default for Crc {
-    fn default() -> Self {
-        Crc(u16::MAX)
-    }
-}
-
-/// For each byte the remainder of its division by the polynomial, lowest bit first.
-const REMAINDERS: [u16; 256] = {
-    let mut remainders = [0; 256];
-    let mut byte: u16 = 0;
-    while byte < 256 {
-        let (mut remainder, mut bit) = (byte, 0);
-        while bit < 8 {
-            remainder = if remainder & 1 == 1 { (remainder >> 1) ^ 0x8408 } else { remainder >> 1 };
-            bit += 1;
-        }
-        remainders[byte as usize] = remainder;
-        byte += 1;
-    }
-    remainders
-};
-
-impl Crc {
-    /// Adds these bytes.
-    pub(crate) fn add(&mut self, bytes: &[u8]) {
-        for &byte in bytes {
-            let [low, high] = self.0.to_le_bytes();
-            self.0 = REMAINDERS[usize::from(low ^ byte)] ^ u16::from(high);
-        }
-    }
-
-    /// Its two bytes, combined into one.
-    pub(crate) fn folded(self) -> u8 {
-        let [low, high] = self.0.to_le_bytes();
-        low ^ high
-    }
-
-    /// The checksum of a frame: of its bytes without the first one, and of the extra byte of its definition.
-    fn of_frame(bytes: &[u8], extra: u8) -> [u8; CHECKSUM] {
-        let mut crc = Crc::default();
-        crc.add(bytes);
-        crc.add(&[extra]);
-        crc.0.to_le_bytes()
-    }
-}
 
 /// A frame in a datagram.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -192,7 +138,12 @@ impl Layout {
             if fits(field, &declared.ty) {
                 Ok((at, declared.ty.clone()))
             } else {
-                Err(format!("field `{}` of `{}` is {}", field.name, definition.name, wanted(field)))
+                Err(format!(
+                    "field `{}` of `{}` is {}",
+                    field.name,
+                    definition.name,
+                    mavlink::types_in_words(&field.wire_type())
+                ))
             }
         });
         Ok(Layout {
@@ -224,7 +175,7 @@ impl Layout {
         }
         let mut payload = frame.bytes[frame.payload()].to_vec();
         payload.resize(payload.len().max(*whole), 0);
-        let value = |(at, ty): &(usize, Type)| self.definition.fields[*at].value(&payload, ty);
+        let value = |(at, ty): &(usize, Type)| value_in(&self.definition.fields[*at], &payload, ty);
         let values = self.declared.iter().map(value).collect::<Result<_, _>>()?;
         Ok(Value::Record(Record::decoded(&self.names, values, origin)))
     }
@@ -238,7 +189,7 @@ impl Layout {
         }
         for ((at, _), (before, now)) in self.declared.iter().zip(before.iter().zip(now)) {
             if !before.is_same(now) {
-                self.definition.fields[*at].put(&mut payload, Some(before), now);
+                put(&self.definition.fields[*at], &mut payload, Some(before), now);
             }
         }
         frame.with_payload(&payload, self.definition.crc_extra)
@@ -248,7 +199,7 @@ impl Layout {
     pub(crate) fn make(&self, sender: Sender, values: &[Value]) -> Vec<u8> {
         let mut payload = vec![0; self.definition.whole];
         for ((at, _), value) in self.declared.iter().zip(values) {
-            self.definition.fields[*at].put(&mut payload, None, value);
+            put(&self.definition.fields[*at], &mut payload, None, value);
         }
         let Sender { system, component, sequence } = sender;
         let [low, middle, high, _] = self.definition.id.to_le_bytes();
@@ -259,97 +210,84 @@ impl Layout {
     }
 }
 
-/// Whether values of a declared type can be those of a field.
+/// Whether a field can be declared with this type.
 fn fits(field: &Field, ty: &Type) -> bool {
-    match (field.kind, field.elements, ty) {
-        (FieldKind::Char, _, Type::Text) => true,
-        (FieldKind::Number(_), Some(_), Type::List { of }) => fits(&Field { elements: None, ..field.clone() }, of),
-        (FieldKind::Number(Primitive::Float32 | Primitive::Float64), None, ty) => matches!(ty, Type::Real { .. }),
-        (FieldKind::Number(_), None, ty) => matches!(ty, Type::Bool | Type::Int { .. } | Type::Real { .. }),
-        _ => false,
-    }
-}
-
-/// The types that a field can be declared with, in words.
-fn wanted(field: &Field) -> String {
-    let one = match field.kind {
-        FieldKind::Char => return "`text`".to_owned(),
-        FieldKind::Number(Primitive::Float32 | Primitive::Float64) => "`real`",
-        FieldKind::Number(_) => "`int`, `real` or `bool`",
+    let word = |ty: &Type| match ty {
+        Type::Bool => "bool",
+        Type::Int { .. } => "int",
+        Type::Real { .. } => "real",
+        Type::Text => "text",
+        Type::Point { .. } | Type::List { .. } | Type::Message { .. } => "",
     };
-    match field.elements {
-        Some(elements) => format!("a `list of` {one}, of {elements} elements"),
-        None => one.to_owned(),
+    let (list, one) = if let Type::List { of } = ty { (true, &**of) } else { (false, ty) };
+    mavlink::can_be_declared(&field.wire_type(), list, word(one))
+}
+
+/// The bytes of a field in a payload; fewer if the payload ends before.
+fn bytes_of<'p>(field: &Field, payload: &'p [u8]) -> &'p [u8] {
+    let end = (field.offset + field.kind.size() * field.elements.unwrap_or(1)).min(payload.len());
+    &payload[field.offset.min(end)..end]
+}
+
+/// The value of a field in a whole payload.
+fn value_in(field: &Field, payload: &[u8], ty: &Type) -> Result<Value, String> {
+    let bytes = bytes_of(field, payload);
+    match (field.kind, ty) {
+        (FieldKind::Number(primitive), Type::List { of }) => {
+            let each = bytes.chunks_exact(field.kind.size());
+            each.map(|bytes| number(field, primitive, bytes, of)).collect::<Result<_, _>>().map(Value::List)
+        }
+        (FieldKind::Number(primitive), ty) => number(field, primitive, bytes, ty),
+        (FieldKind::Char, _) => {
+            let text = bytes.split(|&byte| byte == 0).next().unwrap_or_default();
+            Ok(Value::from(&*String::from_utf8_lossy(text)))
+        }
     }
 }
 
-impl Field {
-    /// Its bytes in a payload; fewer if the payload ends before.
-    fn bytes<'p>(&self, payload: &'p [u8]) -> &'p [u8] {
-        let end = (self.offset + self.kind.size() * self.elements.unwrap_or(1)).min(payload.len());
-        &payload[self.offset.min(end)..end]
-    }
+fn number(field: &Field, primitive: Primitive, bytes: &[u8], ty: &Type) -> Result<Value, String> {
+    let mut wide = [0; 8];
+    wide[..bytes.len()].copy_from_slice(bytes);
+    let value = value_of(primitive, u64::from_le_bytes(wide));
+    let value = value.ok_or_else(|| format!("field `{}` holds a number of 2⁶³ or more", field.name))?;
+    Ok(match (ty, value) {
+        (Type::Bool, Value::Int(number)) => Value::Bool(number != 0),
+        (Type::Real { .. }, Value::Int(number)) => Value::Real(number as f64),
+        (_, value) => value,
+    })
+}
 
-    /// Its value in a whole payload.
-    fn value(&self, payload: &[u8], ty: &Type) -> Result<Value, String> {
-        let bytes = self.bytes(payload);
-        match (self.kind, ty) {
-            (FieldKind::Number(primitive), Type::List { of }) => {
-                let each = bytes.chunks_exact(self.kind.size());
-                each.map(|bytes| self.number(primitive, bytes, of)).collect::<Result<_, _>>().map(Value::List)
+/// Puts the value of a field into a payload. Numbers are clamped to the range of the field, and a text that is too long
+/// is cut between two characters. Elements of a list that equal those of `before` keep their bytes. A field that the
+/// payload does not have, as an extension in version 1, is left out.
+fn put(field: &Field, payload: &mut [u8], before: Option<&Value>, now: &Value) {
+    let size = field.kind.size();
+    let end = (field.offset + size * field.elements.unwrap_or(1)).min(payload.len());
+    let own = &mut payload[field.offset.min(end)..end];
+    match (field.kind, now) {
+        (FieldKind::Char, Value::Text(text)) => {
+            let mut length = text.len().min(own.len());
+            while !text.is_char_boundary(length) {
+                length -= 1;
             }
-            (FieldKind::Number(primitive), ty) => self.number(primitive, bytes, ty),
-            (FieldKind::Char, _) => {
-                let text = bytes.split(|&byte| byte == 0).next().unwrap_or_default();
-                Ok(Value::from(&*String::from_utf8_lossy(text)))
-            }
+            own.fill(0);
+            own[..length].copy_from_slice(&text.as_bytes()[..length]);
         }
-    }
-
-    fn number(&self, primitive: Primitive, bytes: &[u8], ty: &Type) -> Result<Value, String> {
-        let mut wide = [0; 8];
-        wide[..bytes.len()].copy_from_slice(bytes);
-        let value = value_of(primitive, u64::from_le_bytes(wide));
-        let value = value.ok_or_else(|| format!("field `{}` holds a number of 2⁶³ or more", self.name))?;
-        Ok(match (ty, value) {
-            (Type::Bool, Value::Int(number)) => Value::Bool(number != 0),
-            (Type::Real { .. }, Value::Int(number)) => Value::Real(number as f64),
-            (_, value) => value,
-        })
-    }
-
-    /// Puts a value into a payload. Numbers are clamped to the range of the field, and a text that is too long is cut
-    /// between two characters. Elements of a list that equal those of `before` keep their bytes. A field that the
-    /// payload does not have, as an extension in version 1, is left out.
-    fn put(&self, payload: &mut [u8], before: Option<&Value>, now: &Value) {
-        let size = self.kind.size();
-        let end = (self.offset + size * self.elements.unwrap_or(1)).min(payload.len());
-        let own = &mut payload[self.offset.min(end)..end];
-        match (self.kind, now) {
-            (FieldKind::Char, Value::Text(text)) => {
-                let mut length = text.len().min(own.len());
-                while !text.is_char_boundary(length) {
-                    length -= 1;
-                }
-                own.fill(0);
-                own[..length].copy_from_slice(&text.as_bytes()[..length]);
-            }
-            (FieldKind::Number(primitive), Value::List(items)) => {
-                let was = match before {
-                    Some(Value::List(was)) => was.as_slice(),
-                    _ => &[],
-                };
-                for (at, (bytes, item)) in own.chunks_exact_mut(size).zip(items).enumerate() {
-                    if !was.get(at).is_some_and(|was| was.is_same(item)) {
-                        bytes.copy_from_slice(&bits_of(primitive, Some(item)).to_le_bytes()[..size]);
-                    }
+        (FieldKind::Number(primitive), Value::List(items)) => {
+            let was = match before {
+                Some(Value::List(was)) => was.as_slice(),
+                _ => &[],
+            };
+            for (at, (bytes, item)) in own.chunks_exact_mut(size).zip(items).enumerate() {
+                if !was.get(at).is_some_and(|was| was.is_same(item)) {
+                    bytes.copy_from_slice(&bits_of(primitive, Some(item)).to_le_bytes()[..size]);
                 }
             }
-            (FieldKind::Number(primitive), value) if own.len() == size => {
-                own.copy_from_slice(&bits_of(primitive, Some(value)).to_le_bytes()[..size]);
-            }
-            _ => {}
         }
+        (FieldKind::Number(primitive), value) if own.len() == size => {
+            own.copy_from_slice(&bits_of(primitive, Some(value)).to_le_bytes()[..size]);
+        }
+        _ => {}
     }
 }
 

@@ -10,14 +10,16 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use sesame_interfaces::mavlink::Definitions;
 use sesame_lifecycle::launch::LaunchContext;
+use sesame_plan::mavlink::TopicName;
 use sesame_plan::{CampaignPlan, NodeId};
 use sesame_relay::transport::bus::{Bus, Event, Settings, on_bus};
 use sesame_relay::transport::{Connect, Transport, TransportError};
 use sesame_relay::value::Value;
 use sesame_relay::wire::Line;
 
-use crate::definitions::Definitions;
+use crate::definitions;
 use crate::frame::{Frame, Layout, Sender};
 
 /// How many datagrams may wait for the relay. When the queue is full, sockets are not read, and the operating system
@@ -249,16 +251,17 @@ impl Network {
     fn start(&mut self, lines: &[Line]) -> Result<(), TransportError> {
         let definitions = match self.definitions.take() {
             Some(definitions) => definitions,
-            None => Definitions::read(&self.files, &self.folder).map_err(TransportError::Wiring)?,
+            None => definitions::read(&self.files, &self.folder).map_err(TransportError::Wiring)?,
         };
         let definitions = self.definitions.insert(definitions);
         self.topics.clear();
         self.lines.clear();
         for (at, line) in lines.iter().enumerate() {
             let wrong = |problem: String| TransportError::Wiring(format!("topic `{}`: {problem}", line.path));
-            let (sender, name) = read_path(&line.path).map_err(wrong)?;
-            let definition = definitions.named(name);
-            let definition = definition.ok_or_else(|| wrong(format!("the definitions have no message `{name}`")))?;
+            let TopicName { system, component, message } = TopicName::read(&line.path).map_err(wrong)?;
+            let definition = definitions.named(message);
+            let definition = definition.ok_or_else(|| wrong(format!("the definitions have no message `{message}`")))?;
+            let sender = (system, component);
             let layout = Layout::new(&self.plan, &self.plan.topic(line.topic).ty, definition).map_err(wrong)?;
             self.lines.insert((sender, layout.id()), at);
             self.topics.push(Topic { line: line.clone(), layout, sender });
@@ -436,20 +439,6 @@ impl Network {
         let number = *next;
         *next = number.wrapping_add(1);
         number
-    }
-}
-
-/// The sender and the message in the name of a topic: `NAME`, `SYSTEM/NAME` or `SYSTEM/COMPONENT/NAME`.
-fn read_path(path: &str) -> Result<(SaidSender, &str), String> {
-    let parts: Vec<&str> = path.split('/').collect();
-    let number = |text: &str| {
-        text.parse::<u8>().map_err(|_| format!("`{text}` is not the number of a system or component, from 0 to 255"))
-    };
-    match parts[..] {
-        [name] => Ok(((None, None), name)),
-        [system, name] => Ok(((Some(number(system)?), None), name)),
-        [system, component, name] => Ok(((Some(number(system)?), Some(number(component)?)), name)),
-        _ => Err("expected `MESSAGE`, `SYSTEM/MESSAGE` or `SYSTEM/COMPONENT/MESSAGE`".to_owned()),
     }
 }
 

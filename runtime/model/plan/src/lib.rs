@@ -21,6 +21,7 @@ mod formula;
 mod id;
 mod lab;
 mod lifecycle;
+pub mod mavlink;
 mod meaning;
 mod metric;
 mod model;

@@ -318,6 +318,8 @@ pub struct SimulatorProperties {
     /// Whether a topic that is cut has a second name, on which its publishers are: `TOPIC/undisturbed`. Where it has
     /// none, the runner is between the addresses of nodes, or brings the messages itself.
     pub renames: bool,
+    /// Whether the name of a topic says which of the messages it carries that the user's files define.
+    pub named_messages: bool,
     /// Whether the runner reaches its nodes themselves: it sets their parameters, pauses, slows and kills them, and
     /// asks them for a step.
     pub reaches_nodes: bool,
@@ -400,6 +402,7 @@ impl SimulatorKind {
                 bus: Some("between vehicles and their ground station"),
                 proxies: true,
                 one_client: true,
+                named_messages: true,
                 ..properties("mavlink")
             },
         }
@@ -420,6 +423,7 @@ const fn properties(keyword: &'static str) -> SimulatorProperties {
         brokers: false,
         proxies: false,
         renames: false,
+        named_messages: false,
         reaches_nodes: false,
     }
 }

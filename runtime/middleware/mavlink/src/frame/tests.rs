@@ -1,9 +1,9 @@
 use proptest::prelude::*;
+use sesame_interfaces::mavlink::{Definitions, LONGEST_PAYLOAD};
 use sesame_plan::testing::{field, message, minimal};
 use sesame_plan::{CampaignPlan, MessageId, Type};
 
 use super::*;
-use crate::definitions::Definitions;
 
 // Frames that pymavlink 2.4.50 makes of the definitions beside these tests, from system 7 and component 3.
 const HEARTBEAT: [u8; 21] = [253, 9, 0, 0, 41, 7, 3, 0, 0, 0, 64, 226, 1, 0, 2, 3, 81, 4, 3, 184, 80];
@@ -28,7 +28,7 @@ const NOTHING: [u8; 13] = [253, 1, 0, 0, 0, 7, 3, 81, 195, 0, 0, 225, 200];
 
 fn small() -> Definitions {
     let mut definitions = Definitions::default();
-    definitions.add(include_str!("../../tests/small.xml")).unwrap();
+    definitions.add(include_str!("../../../interfaces/tests/small.xml")).unwrap();
     definitions
 }
 

@@ -15,7 +15,7 @@ const HEARTBEAT: [u8; 21] = [253, 9, 0, 0, 41, 7, 3, 0, 0, 0, 64, 226, 1, 0, 2, 
 /// How long anything may take; only a hang takes so long.
 const LIMIT: Duration = Duration::from_secs(60);
 
-const SMALL: &str = include_str!("../../tests/small.xml");
+const SMALL: &str = include_str!("../../../interfaces/tests/small.xml");
 
 /// A plan with a drone at a proxy and a station, whose heartbeats are cut.
 fn plan(station: SocketAddr, paths: &[&str]) -> CampaignPlan {
