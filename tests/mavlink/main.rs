@@ -8,3 +8,4 @@
 mod example;
 mod peers;
 mod relaying;
+mod scanning;

@@ -2,11 +2,14 @@
 
     python peer.py ground ADDRESS
     python peer.py vehicle ADDRESS COUNT
+    python peer.py drone ADDRESS SYSTEM
 
 A vehicle sends heartbeats until it reads a line; then so many positions, among other datagrams. The ground station
-answers each position with an order.
+answers each position with an order. A drone sends numbered positions and, less often, other messages until it is
+ended; the second one has a gimbal.
 """
 
+import itertools
 import json
 import os
 import sys
@@ -98,5 +101,31 @@ def vehicle(address: str, count: int) -> None:
         receive(link)
 
 
+def drone(address: str, system: int) -> None:
+    link = connect(f"udpout:{address}", system, 1)
+    gimbal = ml.MAVLink(None, srcSystem=system, srcComponent=154)
+    heartbeat = link.mav.heartbeat_encode(ml.MAV_TYPE_QUADROTOR, ml.MAV_AUTOPILOT_PX4, 81, 7, ml.MAV_STATE_ACTIVE, 3)
+    begin = time.monotonic()
+    say(ready=True)
+    for number in itertools.count():
+        position = link.mav.global_position_int_encode(number, 473977418, 85455939, 1000 * number, 0, system, -2, 3, 0)
+        say(number=number)
+        link.write(next_frame(link, position))
+        if number % 10 == 0:
+            link.write(next_frame(link, heartbeat))
+            link.write(next_frame(link, link.mav.statustext_encode(ml.MAV_SEVERITY_INFO, b"all is // well")))
+            if system == 2:
+                link.write(heartbeat.pack(gimbal))
+                # One that nobody knows, and one of another definition.
+                link.write(bytes([0xFD, 1, 0, 0, 0, system, 1, 0x40, 0xE2, 0x0F, 5, 6, 7]))
+                link.write(bytes([0xFD, 1, 0, 0, 0, system, 1, 1, 0, 0, 5, 6, 7]))
+        time.sleep(max(0.0, begin + 0.05 * (number + 1) - time.monotonic()))
+
+
 if __name__ == "__main__":
-    {"ground": ground, "vehicle": lambda address, count: vehicle(address, int(count))}[sys.argv[1]](*sys.argv[2:])
+    parts = {
+        "ground": ground,
+        "vehicle": lambda address, count: vehicle(address, int(count)),
+        "drone": lambda address, system: drone(address, int(system)),
+    }
+    parts[sys.argv[1]](*sys.argv[2:])

@@ -78,6 +78,12 @@ impl Peer {
         of_type.filter_map(|((_, values), number)| Some((values[field].as_f64()?, number.as_u64()?))).collect()
     }
 
+    /// When a drone sent each of its positions, in seconds.
+    pub(crate) fn numbers(&mut self) -> Vec<f64> {
+        let numbered = self.lines().iter().filter(|line| line["number"].is_u64());
+        numbered.map(|line| line["at"].as_f64().expect("it says when")).collect()
+    }
+
     /// How many messages of a type it heard.
     pub(crate) fn count(&mut self, ty: &str) -> usize {
         let types = self.lines().iter().flat_map(|line| line["types"].as_array().cloned().unwrap_or_default());

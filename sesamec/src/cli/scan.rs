@@ -1,10 +1,19 @@
 //! `sesamec scan`: a space of what is running.
 
 mod arguments;
-#[cfg(any(feature = "mqtt", feature = "ros1", feature = "ros2", feature = "rosbridge", feature = "simlog"))]
+#[cfg(any(
+    feature = "mavlink",
+    feature = "mqtt",
+    feature = "ros1",
+    feature = "ros2",
+    feature = "rosbridge",
+    feature = "simlog"
+))]
 mod common;
 #[cfg(any(feature = "ros1", feature = "ros2", feature = "rosbridge"))]
 mod definitions;
+#[cfg(feature = "mavlink")]
+mod mavlink;
 #[cfg(feature = "mqtt")]
 mod mqtt;
 #[cfg(feature = "ros1")]
@@ -20,7 +29,7 @@ mod simlog;
 
 use std::process::ExitCode;
 
-use self::arguments::{Mqtt, Ros1, Ros2, Rosbridge, Simlog};
+use self::arguments::{Mavlink, Mqtt, Ros1, Ros2, Rosbridge, Simlog};
 use super::shell::Shell;
 use crate::frontend::Language;
 
@@ -42,11 +51,21 @@ pub(super) enum Scan {
     /// Listen to topics of a simulator that speaks SimlogAPI, and print a space with them and their messages.
     #[command(after_help = arguments::SIMLOG)]
     Simlog(Simlog),
+    /// Listen to vehicles that speak MAVLink, and print a space with them and their messages.
+    #[command(after_help = arguments::MAVLINK)]
+    Mavlink(Mavlink),
 }
 
 /// `sesamec scan`
 #[cfg_attr(
-    not(any(feature = "mqtt", feature = "ros1", feature = "ros2", feature = "rosbridge", feature = "simlog")),
+    not(any(
+        feature = "mavlink",
+        feature = "mqtt",
+        feature = "ros1",
+        feature = "ros2",
+        feature = "rosbridge",
+        feature = "simlog"
+    )),
     expect(unused_variables, reason = "without any middleware there is nothing to scan")
 )]
 pub(super) fn scan(shell: Shell, language: &Language, scan: &Scan) -> anyhow::Result<ExitCode> {
@@ -71,11 +90,22 @@ pub(super) fn scan(shell: Shell, language: &Language, scan: &Scan) -> anyhow::Re
         Scan::Simlog(arguments) => simlog::scan(shell, language, arguments),
         #[cfg(not(feature = "simlog"))]
         Scan::Simlog(_) => without("SimlogAPI", "simlog"),
+        #[cfg(feature = "mavlink")]
+        Scan::Mavlink(arguments) => mavlink::scan(shell, language, arguments),
+        #[cfg(not(feature = "mavlink"))]
+        Scan::Mavlink(_) => without("MAVLink", "mavlink"),
     }
 }
 
 /// Why a middleware cannot be looked at, and what to do.
-#[cfg(not(all(feature = "mqtt", feature = "ros1", feature = "ros2", feature = "rosbridge", feature = "simlog")))]
+#[cfg(not(all(
+    feature = "mavlink",
+    feature = "mqtt",
+    feature = "ros1",
+    feature = "ros2",
+    feature = "rosbridge",
+    feature = "simlog"
+)))]
 fn without(what: &str, feature: &str) -> anyhow::Result<ExitCode> {
     anyhow::bail!(
         "this sesamec was built without {what}; in a checkout of Sesame, `cargo install --path sesamec --features \

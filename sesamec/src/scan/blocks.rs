@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use sesame_dsl::interfaces::in_words;
+use sesame_dsl::units::Unit;
 use sesame_notation::quoted;
 use sesame_plan::{InterfaceField, Primitive, WireType};
-use sesame_scan::{System, TypeSource};
+use sesame_scan::{FoundField, System, TypeSource};
 
 use super::comments::on_one_line;
 use super::types::Types;
@@ -22,7 +23,13 @@ const MOST_LEFT_OUT: usize = 20;
 pub(super) fn messages(system: &System, types: &Types, names: &BTreeMap<&str, String>, order: &[&str]) -> String {
     let is_ros = system.is_ros();
     let mut text = String::new();
-    if !is_ros && !order.is_empty() {
+    let of_dialect = order.iter().any(|ty| types.source(ty) == TypeSource::Dialect);
+    if of_dialect {
+        text.push_str(
+            "// decide: units that the language does not have, in comments; and `bool` where a number is a truth value.\n\
+             // What follows `//` and the unit came in the first message.\n",
+        );
+    } else if !is_ros && !order.is_empty() {
         text.push_str(
             "// decide: units, such as `real[m]`; and `real` in the place of `int` where fractions may come, too: only\n\
              // whole numbers came there\n",
@@ -55,7 +62,9 @@ pub(super) fn messages(system: &System, types: &Types, names: &BTreeMap<&str, St
         }
         _ = writeln!(text, "{head} {{");
         for field in types.fields(ty) {
-            _ = writeln!(text, "{}: {}", field.name, in_language(is_ros, types, names, field));
+            let said = in_language(is_ros, types, names, field);
+            let detail = types.detail(ty, &field.name);
+            _ = writeln!(text, "{}: {}", field.name, detail.map_or(said.clone(), |detail| with_detail(&said, detail)));
         }
         let left_out = types.left_out(ty);
         for out in left_out.iter().take(MOST_LEFT_OUT) {
@@ -69,9 +78,21 @@ pub(super) fn messages(system: &System, types: &Types, names: &BTreeMap<&str, St
     text
 }
 
+/// A type with its unit, if the language has it, and with the rest in a comment.
+fn with_detail(ty: &str, detail: &FoundField) -> String {
+    let has_unit = ty.ends_with("int") || ty.ends_with("real");
+    let (known, unknown) = match &detail.unit {
+        Some(unit) if has_unit && Unit::parse(unit).is_ok() => (format!("[{unit}]"), None),
+        unit => (String::new(), unit.as_ref()),
+    };
+    let comment: Vec<String> = unknown.into_iter().chain(&detail.sample).map(|text| on_one_line(text)).collect();
+    let comment = if comment.is_empty() { String::new() } else { format!("  // {}", comment.join(": ")) };
+    format!("{ty}{known}{comment}")
+}
+
 /// Whether the space says the fields of a type.
 fn has_block(types: &Types, ty: &str) -> bool {
-    matches!(types.source(ty), TypeSource::Node | TypeSource::Payloads)
+    matches!(types.source(ty), TypeSource::Node | TypeSource::Payloads | TypeSource::Dialect)
 }
 
 /// The fields of a type in a few words.

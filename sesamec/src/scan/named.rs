@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use heck::ToUpperCamelCase as _;
 use sesame_legacy::Names;
 use sesame_notation::quoted;
 use sesame_scan::{Facts, FoundNode, FoundService, FoundTopic};
@@ -9,6 +10,7 @@ use sesame_scan::{Facts, FoundNode, FoundService, FoundTopic};
 use super::comments::LeftOut;
 use super::expressible::is_ros_name;
 use super::groups::{Line, fold};
+use super::simulator::words_of_topic;
 
 /// All names.
 pub(super) struct Named<'a> {
@@ -30,12 +32,17 @@ pub(super) fn name_all<'a>(
     left_out: &mut LeftOut,
 ) -> Named<'a> {
     let mut names = Names::default();
-    let last = |path: &str| path.rsplit('/').next().unwrap_or_default().to_owned();
-    let topics: Vec<_> = fold(topics).into_iter().map(|line| (names.take(&line.name, "topic"), line)).collect();
+    let system = &facts.system;
+    let last = |path: &str| {
+        let last = path.rsplit('/').next().unwrap_or_default();
+        if system.is_ros() { last.to_owned() } else { last.to_upper_camel_case() }
+    };
+    let topics = fold(topics).into_iter();
+    let topics: Vec<_> = topics.map(|line| (names.take(&words_of_topic(system, &line.name), "topic"), line)).collect();
     let services: Vec<_> = services.iter().map(|service| (service_name(&mut names, &service.path), *service)).collect();
     let mut nodes = Vec::new();
     for node in &facts.nodes {
-        if is_ros_name(&node.name) {
+        if !system.is_ros() || is_ros_name(&node.name) {
             nodes.push((names.take(&node.name, "node"), node));
         } else {
             left_out.decide(&format!("node {} has no name of ROS", quoted(&node.name)));

@@ -4,11 +4,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use sesame_notation::quoted;
+use sesame_scan::System;
 
 use super::named::Named;
 
 /// A block for each node: what it publishes and what it subscribes to, services included.
-pub(super) fn nodes(named: &Named<'_>) -> String {
+pub(super) fn nodes(system: &System, named: &Named<'_>) -> String {
     let mut publishes = BTreeMap::<&str, BTreeSet<String>>::new();
     let mut subscribes = BTreeMap::<&str, BTreeSet<String>>::new();
     for (name, line) in &named.topics {
@@ -40,7 +41,9 @@ pub(super) fn nodes(named: &Named<'_>) -> String {
         if node.answers == Some(false) {
             text.push_str("// decide: it does not answer; it may have ended without a word\n");
         }
-        _ = writeln!(text, "node {name} {} {{", quoted(&node.name));
+        // Only nodes of ROS have names of their own.
+        let own = if system.is_ros() { format!("{} ", quoted(&node.name)) } else { String::new() };
+        _ = writeln!(text, "node {name} {own}{{");
         for (word, of) in [("publishes", &publishes), ("subscribes", &subscribes)] {
             if let Some(topics) = of.get(node.name.as_str()) {
                 let topics: Vec<&str> = topics.iter().map(String::as_str).collect();

@@ -6,7 +6,10 @@ use proptest::prelude::*;
 use serde_json::Value as Json;
 use sesame_dsl::interfaces::{Folders, Interfaces, wire_type};
 use sesame_plan::{Dialect, Interface, InterfaceField};
-use sesame_scan::{Conventions, Facts, FoundAction, FoundNode, FoundService, FoundTopic, Payloads, System};
+use sesame_scan::{
+    Conventions, Facts, FoundAction, FoundField, FoundNode, FoundService, FoundTopic, FoundType, Payloads, System,
+    TypeSource,
+};
 
 use super::{FILE, Origin, Types, by_payloads, check_settings, checked_space, types_by_payloads};
 use crate::frontend::{Look, SESAME};
@@ -299,6 +302,64 @@ fn a_simulator_has_the_topics_that_were_named() {
     let mut facts = Facts { seconds: 0.75, topics, ..Facts::of(system) };
     let types = by_payloads(&mut facts, &payloads, Conventions::Simlog2);
     insta::assert_snapshot!(checked(&facts, types, &["prefix \"SIM://\""]));
+}
+
+#[test]
+fn vehicles_have_proxies_and_the_messages_of_their_dialect() {
+    let system = |port: &str| System::Mavlink {
+        url: format!("udp://127.0.0.1{port}"),
+        definitions: vec!["../runtime/middleware/interfaces/tests/small.xml".to_owned()],
+    };
+    let field = |name: &str, ty: &str, unit: Option<&str>, sample: &str| FoundField {
+        name: name.to_owned(),
+        ty: ty.to_owned(),
+        unit: unit.map(str::to_owned),
+        sample: Some(sample.to_owned()),
+    };
+    let dialect = |name: &str, fields: Vec<FoundField>| FoundType {
+        name: name.to_owned(),
+        source: TypeSource::Dialect,
+        fields,
+        left_out: Vec::new(),
+        problem: None,
+    };
+    let everything = vec![
+        field("wide", "float64", Some("m/s"), "0.5"),
+        field("whole", "int32", Some("degE7"), "473977418"),
+        field("row", "int16[3]", Some("mm"), "[1, 2, 3]"),
+        field("name", "string", Some("m"), "\"a\n} // \u{1b}[2J\""),
+        FoundField { sample: None, ..field("time", "uint64", Some("us"), "") },
+    ];
+    let types = vec![dialect("HEARTBEAT", vec![field("type", "uint8", None, "2")]), dialect("EVERYTHING", everything)];
+    let heard = |path: &str, ty: &str, publishers: &[&str]| FoundTopic {
+        reliable: None,
+        transient_local: None,
+        ..topic(path, ty, publishers, &["station"])
+    };
+    let problem = Some("the files define no message with this number".to_owned());
+    let topics = vec![
+        heard("1/HEARTBEAT", "HEARTBEAT", &["vehicle_1"]),
+        heard("2/1/HEARTBEAT", "HEARTBEAT", &["vehicles_2_3"]),
+        heard("2/154/HEARTBEAT", "HEARTBEAT", &["vehicles_2_3"]),
+        heard("3/EVERYTHING", "EVERYTHING", &["vehicles_2_3"]),
+        FoundTopic { ty: None, problem, ..heard("3/#7", "", &["vehicles_2_3"]) },
+    ];
+    let node = |name: &str, publishes: &[&str]| FoundNode {
+        name: name.to_owned(),
+        count: 1,
+        publishes: publishes.iter().map(|path| (*path).to_owned()).collect(),
+        ..FoundNode::default()
+    };
+    let nodes =
+        vec![node("vehicle_1", &["1/HEARTBEAT"]), node("vehicles_2_3", &["3/EVERYTHING"]), node("station", &[])];
+    let facts = Facts { seconds: 5.0, nodes, topics, types, ..Facts::of(system(":14550")) };
+    insta::assert_snapshot!(checked(&facts, Types::of_found(&facts.types), &[]));
+    // Without any, the space still passes its check.
+    let nothing = checked(&Facts::of(system("")), Types::default(), &[]);
+    assert!(
+        nothing.contains("proxy vehicle \"udp://127.0.0.1:14551\"") && nothing.contains("node vehicle {"),
+        "{nothing}"
+    );
 }
 
 #[test]

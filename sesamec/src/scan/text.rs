@@ -36,13 +36,14 @@ pub(super) fn space(facts: &Facts, types: &Types, origin: Origin<'_>) -> String 
         text.push_str("// decide: there is more than a scan keeps; the rest is missing here\n");
     }
     _ = writeln!(text, "space {}\n\nsystem {{", simulator::space_name(system));
-    text.push_str(&simulator::block(&named.simulator, facts, origin, clock));
+    text.push_str(&simulator::block(&named.simulator, facts, origin, clock, &named.nodes));
     let sections = [
         blocks::messages(system, types, &named.messages, &needed),
         topic_lines(system, types, &named),
         service_lines(system, &named),
         left_out.text(),
-        nodes(&named),
+        nodes(system, &named),
+        if simulator::lacks_a_node(facts) { format!("node {} {{ }}\n", simulator::UNHEARD) } else { String::new() },
     ];
     for section in sections.iter().filter(|section| !section.is_empty()) {
         _ = write!(text, "\n{section}");

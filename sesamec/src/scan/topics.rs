@@ -22,7 +22,7 @@ pub(super) fn topic_lines(system: &System, types: &Types, named: &Named<'_>) -> 
 fn topic_comment(system: &System, topics: &[&FoundTopic]) -> String {
     let first = topics[0];
     let mut words = Vec::new();
-    if knows_nodes(system) {
+    if knows_nodes(system) && system.is_ros() {
         words.push(counted(first.publishers.len() as u64, "publisher"));
         words.push(counted(first.subscribers.len() as u64, "subscriber"));
     }

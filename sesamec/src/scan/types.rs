@@ -31,17 +31,19 @@ struct Type {
     fields: Vec<InterfaceField>,
     left_out: Vec<LeftOut>,
     problem: Option<String>,
+    /// The unit of each field, and a value that came, as far as they are known.
+    details: BTreeMap<String, FoundField>,
 }
 
 impl Type {
     /// One with a layout.
     fn of(source: TypeSource, fields: Vec<InterfaceField>) -> Self {
-        Type { source, fields, left_out: Vec::new(), problem: None }
+        Type { source, fields, left_out: Vec::new(), problem: None, details: BTreeMap::new() }
     }
 
     /// One without.
     fn unknown(problem: Option<String>) -> Self {
-        Type { source: TypeSource::Unknown, fields: Vec::new(), left_out: Vec::new(), problem }
+        Type { problem, ..Type::of(TypeSource::Unknown, Vec::new()) }
     }
 }
 
@@ -53,6 +55,25 @@ impl Types {
             types.look_up(ty, files, folders);
         }
         types
+    }
+
+    /// Types whose layouts are among the facts already.
+    pub fn of_found(found: &[FoundType]) -> Self {
+        let mut types = Types::default();
+        for FoundType { name, source, fields, .. } in found {
+            let field = |field: &FoundField| {
+                Some(InterfaceField { name: field.name.clone(), ty: interfaces::wire_type(&field.ty)? })
+            };
+            let details = fields.iter().map(|field| (field.name.clone(), field.clone())).collect();
+            let ty = Type { details, ..Type::of(*source, fields.iter().filter_map(field).collect()) };
+            types.by_name.insert(name.clone(), ty);
+        }
+        types
+    }
+
+    /// The unit of a field and a value that came, if they are known.
+    pub(super) fn detail(&self, name: &str, field: &str) -> Option<&FoundField> {
+        self.by_name.get(name)?.details.get(field)
     }
 
     /// Adds a type of ROS that needs no folder.
@@ -221,7 +242,8 @@ impl Types {
         if name == POINT {
             return Some("point");
         }
-        let ty = self.by_name.get(name).filter(|ty| ty.source != TypeSource::Node)?;
+        let has_block = |ty: &&Type| matches!(ty.source, TypeSource::Node | TypeSource::Dialect);
+        let ty = self.by_name.get(name).filter(|ty| !has_block(ty))?;
         let layout = Interface { name: name.to_owned(), fields: ty.fields.clone() };
         interfaces::is_point(&layout).then_some("point")
     }
@@ -256,12 +278,14 @@ impl Types {
 
     /// All of them as facts.
     pub fn facts(&self) -> Vec<FoundType> {
-        let field =
-            |field: &InterfaceField| FoundField { name: field.name.clone(), ty: interfaces::in_words(&field.ty) };
+        let field = |ty: &Type, field: &InterfaceField| {
+            let detail = ty.details.get(&field.name).cloned().unwrap_or_default();
+            FoundField { name: field.name.clone(), ty: interfaces::in_words(&field.ty), ..detail }
+        };
         let of = |(name, ty): (&String, &Type)| FoundType {
             name: name.clone(),
             source: ty.source,
-            fields: self.fields(name).map(field).collect(),
+            fields: self.fields(name).map(|it| field(ty, it)).collect(),
             left_out: ty.left_out.clone(),
             problem: ty.problem.clone(),
         };

@@ -14,12 +14,13 @@ fn text(bytes: &[u8]) -> &str {
 }
 
 /// What each middleware is told that it needs, besides options.
-const MIDDLEWARES: [(&str, bool, &[&str]); 5] = [
+const MIDDLEWARES: [(&str, bool, &[&str]); 6] = [
     ("ros2", cfg!(feature = "ros2"), &[]),
     ("ros1", cfg!(feature = "ros1"), &[]),
     ("rosbridge", cfg!(feature = "rosbridge"), &["ws://127.0.0.1:1"]),
     ("mqtt", cfg!(feature = "mqtt"), &["mqtt://127.0.0.1:1"]),
     ("simlog", cfg!(feature = "simlog"), &["http://127.0.0.1:1"]),
+    ("mavlink", cfg!(feature = "mavlink"), &["udp://127.0.0.1:1", "--types", "common.xml"]),
 ];
 
 #[test]
@@ -58,6 +59,12 @@ fn an_address_that_no_space_could_have_is_refused_before_anything_is_connected()
         refused(&["simlog", "http://127.0.0.1:1"], "name each with `--topic NAME`");
         refused(&["simlog", "tcp://127.0.0.1:1", "--topic", "a"], "expected an address that begins with `http://`");
         refused(&["simlog", "http://127.0.0.1:1", "--topics-from", "nowhere"], "the topics in nowhere cannot be read");
+    }
+    if cfg!(feature = "mavlink") {
+        let missing = "the definitions in `none.xml` cannot be used: there is no such file";
+        refused(&["mavlink", "udp://127.0.0.1:1", "--types", "none.xml"], missing);
+        let tcp = "`tcp://127.0.0.1:1` is not the address of a simulator of this kind";
+        refused(&["mavlink", "tcp://127.0.0.1:1", "--types", "none.xml"], tcp);
     }
     if cfg!(feature = "ros1") {
         refused(&["ros1", "--master", "localhost"], "expected an address that begins with `http://`");

@@ -54,6 +54,8 @@ pub struct Field {
     pub elements: Option<usize>,
     /// Where it begins in a payload.
     pub offset: usize,
+    /// Its unit, as the file has it, such as `m/s`.
+    pub unit: Option<String>,
 }
 
 /// What a field, or an element of an array, is.
@@ -125,7 +127,7 @@ impl Definition {
             // A sender puts the version of the protocol here.
             let word = if word == "uint8_t_mavlink_version" { "uint8_t" } else { word };
             let kind = FieldKind::named(word).ok_or_else(|| format!("field `{name}` has the unknown type `{ty}`"))?;
-            Ok((word.to_owned(), Field { name: name.to_owned(), kind, elements, offset: 0 }))
+            Ok((word.to_owned(), Field { name: name.to_owned(), kind, elements, offset: 0, unit: None }))
         };
         let mut base = written.iter().map(read).collect::<Result<Vec<(String, Field)>, String>>()?;
         // Large fields come first, which aligns all of them; fields of equal size keep their order.
@@ -323,16 +325,23 @@ fn definition(message: Node<'_, '_>) -> Result<Definition, String> {
         return Err(format!("message `{name}` has no name, or no number below {BEYOND_IDS}"));
     };
     let mut fields = [Vec::new(), Vec::new()];
+    let mut units = BTreeMap::new();
     let mut extended = false;
     for child in message.children() {
         extended |= child.has_tag_name("extensions");
         if child.has_tag_name("field") {
             let attribute = |name| child.attribute(name).unwrap_or_default();
             fields[usize::from(extended)].push((attribute("type"), attribute("name")));
+            units.extend(child.attribute("units").map(|unit| (attribute("name"), unit.to_owned())));
         }
     }
     let [base, extensions] = fields;
-    Definition::new(id, name, &base, &extensions).map_err(|problem| format!("message `{name}`: {problem}"))
+    let definition = Definition::new(id, name, &base, &extensions);
+    let mut definition = definition.map_err(|problem| format!("message `{name}`: {problem}"))?;
+    for field in &mut definition.fields {
+        field.unit = units.remove(field.name.as_str());
+    }
+    Ok(definition)
 }
 
 #[cfg(test)]

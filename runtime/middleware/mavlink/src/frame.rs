@@ -161,20 +161,7 @@ impl Layout {
     /// Reads a frame. The message remembers `origin` as what it was read from. An error says why the frame cannot be
     /// read.
     pub(crate) fn read(&self, frame: &Frame<'_>, origin: Arc<[u8]>) -> Result<Value, String> {
-        let Definition { name, base, whole, .. } = &self.definition;
-        if frame.is_of_later_version() {
-            return Err("its flags ask for something that is not known here".to_owned());
-        }
-        if !frame.is_intact(&self.definition) {
-            return Err(format!(
-                "its checksum is not that of a `{name}` as it is defined here; the sender may have another definition"
-            ));
-        }
-        if frame.is_version_1() && frame.length != *base {
-            return Err(format!("a `{name}` of version 1 has {base} bytes, and this one has {}", frame.length));
-        }
-        let mut payload = frame.bytes[frame.payload()].to_vec();
-        payload.resize(payload.len().max(*whole), 0);
+        let payload = whole_payload(frame, &self.definition)?;
         let value = |(at, ty): &(usize, Type)| value_in(&self.definition.fields[*at], &payload, ty);
         let values = self.declared.iter().map(value).collect::<Result<_, _>>()?;
         Ok(Value::Record(Record::decoded(&self.names, values, origin)))
@@ -208,6 +195,45 @@ impl Layout {
         let frame = Frame { bytes: &header, system, component, id, flags: 0, header: header_length, length: 0 };
         frame.with_payload(&payload, self.definition.crc_extra)
     }
+}
+
+/// The payload of a frame with all fields of its definition. An error says why the frame cannot be read.
+fn whole_payload(frame: &Frame<'_>, definition: &Definition) -> Result<Vec<u8>, String> {
+    let Definition { name, base, whole, .. } = definition;
+    if frame.is_of_later_version() {
+        return Err("its flags ask for something that is not known here".to_owned());
+    }
+    if !frame.is_intact(definition) {
+        return Err(format!(
+            "its checksum is not that of a `{name}` as it is defined here; the sender may have another definition"
+        ));
+    }
+    if frame.is_version_1() && frame.length != *base {
+        return Err(format!("a `{name}` of version 1 has {base} bytes, and this one has {}", frame.length));
+    }
+    let mut payload = frame.bytes[frame.payload()].to_vec();
+    payload.resize(payload.len().max(*whole), 0);
+    Ok(payload)
+}
+
+/// All values of a frame, by the fields of its definition; `None` for a number that the language does not have. An
+/// error says why the frame cannot be read.
+pub(crate) fn values(frame: &Frame<'_>, definition: &Definition) -> Result<Vec<Option<Value>>, String> {
+    let payload = whole_payload(frame, definition)?;
+    let value = |field: &Field| {
+        let one = match field.kind {
+            FieldKind::Char => Type::Text,
+            FieldKind::Number(Primitive::Float32 | Primitive::Float64) => Type::Real { unit: None },
+            FieldKind::Number(_) => Type::Int { unit: None },
+        };
+        let ty = if field.elements.is_some() && field.kind != FieldKind::Char {
+            Type::List { of: Box::new(one) }
+        } else {
+            one
+        };
+        value_in(field, &payload, &ty).ok()
+    };
+    Ok(definition.fields.iter().map(value).collect())
 }
 
 /// Whether a field can be declared with this type.

@@ -11,5 +11,7 @@ mod definitions;
 mod frame;
 #[expect(clippy::disallowed_methods, clippy::disallowed_types, reason = "an adapter: it has sockets, and waits")]
 mod network;
+#[expect(clippy::disallowed_methods, clippy::disallowed_types, reason = "an adapter: it listens at a socket")]
+pub mod scan;
 
 pub use network::mavlink;

@@ -27,7 +27,7 @@ use crate::frame::{Frame, Layout, Sender};
 const WAITING: usize = 1000;
 
 /// The largest datagram, in bytes.
-const LARGEST_DATAGRAM: usize = 65_535;
+pub(crate) const LARGEST_DATAGRAM: usize = 65_535;
 
 /// The largest number of senders at all proxies together.
 const MOST_LINKS: usize = 64;
@@ -443,7 +443,7 @@ impl Network {
 }
 
 /// The socket address that `udp://HOST:PORT` stands for.
-fn read_url(url: &str) -> Result<SocketAddr, TransportError> {
+pub(crate) fn read_url(url: &str) -> Result<SocketAddr, TransportError> {
     let wrong = |problem: String| TransportError::Wiring(format!("`{url}` is not an address of UDP: {problem}"));
     let rest = url.strip_prefix("udp://").ok_or_else(|| wrong("write `udp://HOST:PORT`".to_owned()))?;
     let rest = rest.trim_end_matches('/');

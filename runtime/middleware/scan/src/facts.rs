@@ -79,6 +79,13 @@ pub enum System {
         /// How many steps it took for the scan.
         steps: u64,
     },
+    /// Vehicles that speak `MAVLink`.
+    Mavlink {
+        /// The address to which they send.
+        url: String,
+        /// The files that define their messages.
+        definitions: Vec<String>,
+    },
 }
 
 impl System {
@@ -90,6 +97,7 @@ impl System {
             System::Rosbridge { .. } => SimulatorKind::Rosbridge,
             System::Mqtt { .. } => SimulatorKind::Mqtt,
             System::Simlog { .. } => SimulatorKind::Simlog,
+            System::Mavlink { .. } => SimulatorKind::Mavlink,
         }
     }
 
@@ -224,18 +232,26 @@ pub enum TypeSource {
     Node,
     /// It is what the payloads that came have in common.
     Payloads,
+    /// A file of a dialect of `MAVLink` defines it.
+    Dialect,
     /// Nowhere.
     Unknown,
 }
 
 /// A field of a type.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub struct FoundField {
     /// Its name.
     pub name: String,
     /// Its type, as in a `.msg` file.
     #[serde(rename = "type")]
     pub ty: String,
+    /// Its unit, as its definition has it, in `MAVLink`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unit: Option<String>,
+    /// A value that came, in words, in `MAVLink`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sample: Option<String>,
 }
 
 /// A field that a space cannot declare.

@@ -25,6 +25,10 @@ pub(super) const SIMLOG: &str = "For example: sesamec scan simlog http://localho
      the scan sees only what it publishes by itself. The variable SESAME_SIMLOG_TOKEN has the token, if the simulator \
      needs one.";
 
+pub(super) const MAVLINK: &str = "For example: sesamec scan mavlink udp://127.0.0.1:14550 --types common.xml > flight.sesame\n\n\
+     The scan listens in the place of the ground station and sends nothing: it sees vehicles that send to this address \
+     by themselves, and no orders.";
+
 /// How nodes of ROS 2 are listened to.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct Ros2 {
@@ -176,6 +180,23 @@ pub(in crate::cli) struct Simlog {
     /// A file with certificates of authorities, in PEM, for an `https://` address.
     #[arg(long, value_name = "FILE")]
     pub(super) trust: Option<String>,
+    /// A space, or what was found as one JSON object.
+    #[arg(long, value_enum, default_value_t)]
+    pub(super) format: ExplainFormat,
+}
+
+/// How vehicles are listened to.
+#[derive(Debug, clap::Args)]
+pub(in crate::cli) struct Mavlink {
+    /// The address to which the vehicles send, `udp://HOST:PORT` of this machine; the usual port is 14550.
+    #[arg(value_name = "URL")]
+    pub(super) url: String,
+    /// A file of the dialect, such as `common.xml`, with those that it includes; may be repeated.
+    #[arg(long, value_name = "FILE", required = true)]
+    pub(super) types: Vec<String>,
+    /// How long to listen, in seconds of wall time: 2 to 3600.
+    #[arg(long, default_value_t = 5.0, value_name = "S", value_parser = seconds)]
+    pub(super) seconds: f64,
     /// A space, or what was found as one JSON object.
     #[arg(long, value_enum, default_value_t)]
     pub(super) format: ExplainFormat,

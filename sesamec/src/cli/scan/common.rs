@@ -43,6 +43,8 @@ pub(super) fn tell(shell: Shell, facts: &Facts, nothing: &str) {
         "Found",
         if facts.system.is_ros() {
             format!("{nodes} nodes, {topics} topics, {services} services")
+        } else if nodes > 0 {
+            format!("{nodes} nodes, {topics} topics")
         } else {
             format!("{topics} topics")
         },
