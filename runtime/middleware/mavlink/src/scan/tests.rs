@@ -115,7 +115,7 @@ fn an_address_that_is_taken_is_said() {
     let taken = UdpSocket::bind("127.0.0.1:0").unwrap();
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("small.xml"), include_str!("../../../interfaces/tests/small.xml")).unwrap();
-    let options = Options {
+    let options = ScanOptions {
         url: format!("udp://{}", taken.local_addr().unwrap()),
         definitions: vec!["small.xml".to_owned()],
         folder: folder.path().to_owned(),
@@ -125,6 +125,6 @@ fn an_address_that_is_taken_is_said() {
     assert!(said.starts_with(&format!("nothing can listen at `{}`: ", options.url)), "{said}");
     drop(taken);
     assert_eq!(scan(&options).unwrap().topics, []);
-    let said = scan(&Options { definitions: vec!["none.xml".to_owned()], ..options }).unwrap_err().to_string();
+    let said = scan(&ScanOptions { definitions: vec!["none.xml".to_owned()], ..options }).unwrap_err().to_string();
     assert!(said.contains("none.xml` cannot be used"), "{said}");
 }
