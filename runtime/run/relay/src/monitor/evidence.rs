@@ -28,8 +28,9 @@ impl<'p> EvidenceState<'p> {
         }
     }
 
-    /// Takes a message on the `member`th path of a topic. Returns what the condition comes to now; evidence with several
-    /// sources comes to nothing before the end of the instant. The error is a missing field; such a message is not heard.
+    /// Takes a message on the `member`th path of a topic. Returns what the condition comes to now; evidence with
+    /// several sources comes to nothing before the end of the instant. The error is a missing field; such a message is
+    /// not heard.
     pub(super) fn hear(
         &mut self,
         wire: Wire,
