@@ -69,18 +69,23 @@ fn mean(numbers: impl Iterator<Item = f64>) -> Option<f64> {
     (count > 0).then(|| sum / f64::from(count))
 }
 
-/// How strong an operation is, in the name and the unit of its parameter: `skew above 0.2 s`, or of a parameter that is
-/// a sub-range how wide that is. `None` for an operation that has several parameters, or none of numbers.
-fn strength(plan: &CampaignPlan, id: OperationId, share: f64, way: &str) -> Option<String> {
+/// How strong an operation is, in the name and the unit of its parameter: `skew above 0.2 s`; for a sub-range, how wide it
+/// is. What is no single number has no unit of its own: then, in the mean over all numbers that a test chooses, how far
+/// each goes from the least to the greatest that is permitted.
+fn strength(plan: &CampaignPlan, id: OperationId, share: f64, way: &str) -> String {
     let operation = plan.operation(id);
-    let [parameter] = &operation.parameters[..] else { return None };
-    let Domain::Number { low, high, shape, .. } = parameter.domain else { return None };
-    let (factor, unit) = number::scale(&operation.kind, parameter, high);
-    let written = |value: f64| number::with_unit(number::number(value * factor), unit);
-    Some(match shape {
-        ChoiceKind::Value => format!("{} {way} {}", parameter.name, written(low + share * (high - low))),
-        ChoiceKind::Range => format!("{} {way} {} wide", parameter.name, written(share * (high - low))),
-    })
+    if let [parameter] = &operation.parameters[..]
+        && let Domain::Number { low, high, shape, .. } = parameter.domain
+    {
+        let (factor, unit) = number::scale(&operation.kind, parameter, high);
+        let written = |value: f64| number::with_unit(number::number(value * factor), unit);
+        return match shape {
+            ChoiceKind::Value => format!("{} {way} {}", parameter.name, written(low + share * (high - low))),
+            ChoiceKind::Range => format!("{} {way} {} wide", parameter.name, written(share * (high - low))),
+        };
+    }
+    let names: Vec<&str> = operation.parameters.iter().map(|parameter| parameter.name.as_str()).collect();
+    format!("{} {way} {} % of what is permitted, in the mean", names.join(", "), number::number(100.0 * share))
 }
 
 impl Feature {
@@ -118,10 +123,7 @@ impl Feature {
                 &format!("lasts {} {at} s", if at_most { "at most" } else { "over" }),
                 missing,
             ),
-            Feature::Share(id) => {
-                let what = strength(plan, id, question.threshold, way);
-                self.of_operation(plan, id, &what.unwrap_or_else(|| format!("has parameters {way} {at}")), missing)
-            }
+            Feature::Share(id) => self.of_operation(plan, id, &strength(plan, id, question.threshold, way), missing),
         }
     }
 
@@ -132,5 +134,31 @@ impl Feature {
             (true, Feature::Share(_)) => format!("{name} {what} or there is none"),
             (true, _) => format!("{name} {what} or never"),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use sesame_plan::testing::{operation_with, parameter, plan, range, value};
+    use sesame_plan::{OperationKind, Parameter};
+
+    use super::*;
+
+    #[test]
+    fn how_strong_an_operation_is_is_said_in_the_names_and_units_of_its_parameters() {
+        let said = |kind, parameters: Vec<Parameter>| {
+            let plan = plan(vec![operation_with("o", 0, kind, parameters)]);
+            let question = Question { column: 0, threshold: 0.25, at_most: true };
+            [true, false].map(|holds| Feature::Share(OperationId(0)).words(&plan, question, holds, false))
+        };
+        let seconds = |parameter: Parameter| Parameter { unit: Some("s".to_owned()), ..parameter };
+        let skew = said(OperationKind::ClockSkew, vec![seconds(value("skew", 0.0, 0.8))]);
+        assert_eq!(skew, ["o skew at most 0.2 s", "o skew above 0.2 s"]);
+        let wide = said(OperationKind::Bias, vec![seconds(range("offset", -0.4, 0.4))]);
+        assert_eq!(wide, ["o offset at most 0.2 s wide", "o offset above 0.2 s wide"]);
+        let several = said(OperationKind::BurstLoss, vec![value("enter", 0.0, 0.1), value("leave", 0.2, 0.8)]);
+        assert_eq!(several[1], "o enter, leave above 25 % of what is permitted, in the mean");
+        let point = parameter("bias", Domain::Point { low: [0.0; 3], high: [1.0; 3] });
+        assert_eq!(said(OperationKind::Bias, vec![point])[1], "o bias above 25 % of what is permitted, in the mean");
     }
 }
