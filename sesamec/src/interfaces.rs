@@ -1,5 +1,5 @@
-//! Definitions of messages in files. Of ROS messages and services in folders: which file defines what, read when it is
-//! asked for, and in the order in which one contains another. Of `MAVLink` the files of a dialect, read once.
+//! Definitions of messages in files. For ROS, these are messages and services in folders: each file is read when it is
+//! asked for, in the order in which one contains another. For `MAVLink`, these are the files of a dialect, read once.
 //!
 //! A folder holds packages, as `share` of a distribution and the folder of a workspace's sources do:
 //! `PACKAGE/msg/NAME.msg`, `PACKAGE/srv/NAME.srv`, or `.idl` in their place. Nothing else in it is looked at.

@@ -17,7 +17,7 @@ fn found(folder: &Path, url: &str, format: &str) -> String {
     for seconds in ["2", "4", "8", "16", "32", "64"] {
         let arguments = ["scan", "mavlink", url, "--types", "common.xml", "--seconds", seconds, "--format", format];
         let found = in_folder(folder, &arguments).expect(0).out;
-        if ["1/STATUSTEXT", "2/STATUSTEXT", "154", "2/SYS_STATUS"].iter().all(|it| found.contains(it)) {
+        if ["1/STATUSTEXT", "2/STATUSTEXT", "154", "2/SYS_STATUS"].iter().all(|text| found.contains(text)) {
             return found;
         }
     }
@@ -67,7 +67,7 @@ fn what_two_drones_send_is_a_space_and_its_numbers_are_those_that_were_sent() {
     for arguments in [&["check", "flight.sesame"][..], &["fmt", "--check", "flight.sesame"]] {
         in_folder(&folder, arguments).expect(0);
     }
-    // A space that is told more says where it is wrong.
+    // A campaign below it passes the check, and a misspelt message does not.
     let campaign = "operation lift on global_position_int_1.alt from vehicle_1 = bias [-5m, 5m]\n\
                     metric highest maximise default 0m = max(global_position_int_2.alt)\n\
                     campaign c { objectives highest  operations lift 1 per test  search random { evaluations 2 }  \
@@ -84,7 +84,7 @@ fn what_two_drones_send_is_a_space_and_its_numbers_are_those_that_were_sent() {
     assert_eq!(facts["system"]["kind"], "mavlink");
     let of = |list: &str, key: &str, name: &str| {
         let all = facts[list].as_array().expect("it is a list");
-        all.iter().find(|it| it[key] == name).unwrap_or_else(|| panic!("{name} in {facts:#}")).clone()
+        all.iter().find(|item| item[key] == name).unwrap_or_else(|| panic!("{name} in {facts:#}")).clone()
     };
     // The number of the first position that came, from whichever drone, and how many the first drone sent since then.
     let position = of("topics", "path", "1/GLOBAL_POSITION_INT");

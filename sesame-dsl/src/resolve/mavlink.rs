@@ -98,7 +98,7 @@ impl<'a> Resolver<'a> {
         }
     }
 
-    /// A topic with messages that no file defines.
+    /// Reports a topic with messages that no file defines.
     fn not_defined(&mut self, topic: &ast::Topic, name: &str, defined: &BTreeMap<String, Interface>) {
         let title = format!("the definitions have no message `{name}`");
         let mut diagnostic = Diagnostic::new(Code::NO_LAYOUT, topic.path.span, title)
@@ -117,7 +117,7 @@ impl<'a> Resolver<'a> {
         self.report(diagnostic);
     }
 
-    /// A topic whose values are no messages.
+    /// Reports a topic whose values are not messages.
     fn not_a_message(&mut self, topic: &ast::Topic, ty: &Type, defined: &Interface) {
         let title = format!("topic `{}` does not carry a message", topic.head.name.text);
         let mut diagnostic = Diagnostic::new(Code::WRONG_TYPE, topic.ty.span, title).label(format!(

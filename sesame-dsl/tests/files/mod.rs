@@ -47,7 +47,7 @@ impl Interfaces for Dialects {
         }
         let contents = |path: &Path| std::fs::read_to_string(path).map_err(|_| "there is no such file".to_owned());
         let definitions = Definitions::read(files, Path::new("tests/bad"), &contents).map_err(|unusable| {
-            let why = unusable.into_iter().map(|it| UnusableFile { named: it.named, why: it.why() });
+            let why = unusable.into_iter().map(|file| UnusableFile { named: file.named, why: file.why() });
             why.collect::<Vec<_>>()
         })?;
         Ok(Some(definitions.iter().map(Definition::interface).collect()))

@@ -285,7 +285,7 @@ impl Types {
         let of = |(name, ty): (&String, &Type)| FoundType {
             name: name.clone(),
             source: ty.source,
-            fields: self.fields(name).map(|it| field(ty, it)).collect(),
+            fields: self.fields(name).map(|found| field(ty, found)).collect(),
             left_out: ty.left_out.clone(),
             problem: ty.problem.clone(),
         };

@@ -1,7 +1,7 @@
 //! Messages of `MAVLink`: the layouts of payloads, read from the XML files of a dialect.
 //!
-//! Users name these files, so they can use any dialect. Whoever calls gives the text of each file, and bounds its size.
-//! The number of files is bounded here, and a payload is no longer than a frame can hold.
+//! Users name these files, so they can use any dialect. The caller provides the text of each file and
+//! bounds its size. The number of files is bounded here, and a payload is no longer than a frame can hold.
 
 mod checksum;
 

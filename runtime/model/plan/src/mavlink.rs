@@ -80,7 +80,7 @@ mod tests {
 
     #[test]
     fn a_name_says_who_sends_what() {
-        let read = |name| TopicName::read(name).map(|it| (it.system, it.component, it.message));
+        let read = |name| TopicName::read(name).map(|topic| (topic.system, topic.component, topic.message));
         assert_eq!(read("HEARTBEAT"), Ok((None, None, "HEARTBEAT")));
         assert_eq!(read("7/HEARTBEAT"), Ok((Some(7), None, "HEARTBEAT")));
         assert_eq!(read("255/154/HEARTBEAT"), Ok((Some(255), Some(154), "HEARTBEAT")));

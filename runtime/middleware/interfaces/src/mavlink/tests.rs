@@ -81,7 +81,8 @@ fn each_file_with_a_mistake_is_named_once() {
     let includes = "<mavlink><include>./none.xml</include><include>worse.xml</include></mavlink>";
     let files = [("small.xml", SMALL), ("includes.xml", includes)];
     let unusable = read(&["missing.xml", "small.xml", "includes.xml"], &files).unwrap_err();
-    let said = unusable.iter().map(|it| (it.named, it.included, it.path.to_str().unwrap(), it.problem.as_str()));
+    let said =
+        unusable.iter().map(|file| (file.named, file.included, file.path.to_str().unwrap(), file.problem.as_str()));
     let problem = "there is no such file";
     let expected = [(0, false, "dialects/missing.xml", problem), (2, true, "dialects/worse.xml", problem)];
     assert_eq!(said.collect::<Vec<_>>(), expected);

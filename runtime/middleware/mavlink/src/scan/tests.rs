@@ -47,7 +47,8 @@ fn messages_have_their_sender_their_rate_and_what_was_in_the_first() {
     );
     let [ty] = &facts.types[..] else { panic!("{:?}", facts.types) };
     assert_eq!((ty.source, &ty.left_out), (TypeSource::Dialect, &Vec::<LeftOut>::new()));
-    let fields: Vec<_> = ty.fields.iter().map(|it| (&*it.name, &*it.ty, it.sample.as_deref().unwrap())).collect();
+    let fields: Vec<_> =
+        ty.fields.iter().map(|field| (&*field.name, &*field.ty, field.sample.as_deref().unwrap())).collect();
     let expected = [
         ("custom_mode", "uint32", "123456"),
         ("type", "uint8", "2"),

@@ -29,7 +29,7 @@ pub enum Tree {
         /// The name of the type or variant; empty for an object in JSON, whose type is known by its place.
         kind: String,
         /// What is printed before the fields: the type, until a test finds better words; for an object its `kind`,
-        /// which is no field then.
+        /// which is then not a field.
         head: String,
         /// Names and values, in order.
         fields: Vec<(String, Tree)>,

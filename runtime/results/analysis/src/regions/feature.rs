@@ -69,9 +69,9 @@ fn mean(numbers: impl Iterator<Item = f64>) -> Option<f64> {
     (count > 0).then(|| sum / f64::from(count))
 }
 
-/// How strong an operation is, in the name and the unit of its parameter: `skew above 0.2 s`; for a sub-range, how wide it
-/// is. What is no single number has no unit of its own: then, in the mean over all numbers that a test chooses, how far
-/// each goes from the least to the greatest that is permitted.
+/// How strong an operation is, in the name and the unit of its parameter: `skew above 0.2 s`; for a sub-range, how
+/// wide it is. Several numbers have no unit in common: for these it is the mean of how far each goes from the least to
+/// the greatest that is permitted.
 fn strength(plan: &CampaignPlan, id: OperationId, share: f64, way: &str) -> String {
     let operation = plan.operation(id);
     if let [parameter] = &operation.parameters[..]
