@@ -1,21 +1,24 @@
 #!/usr/bin/env python3
-"""Runs every campaign of both examples with two versions of Sesame and compares what they recorded.
+"""Runs every campaign of the examples with two versions of Sesame and compares what they recorded.
 
-    tests/same_results.py BEFORE [AFTER]
+    tests/same_results.py BEFORE [AFTER] [EXAMPLE ...]
 
-BEFORE and AFTER are git revisions; AFTER is the current commit if omitted. `coverage_experiment` runs with the seeds 1 to
-10, every other campaign with its own seed. The exit code is 0 if the results are equal, 1 otherwise.
+BEFORE and AFTER are git revisions; AFTER is the current commit if omitted. Without an EXAMPLE, all run whose system is
+stepped, since only these give equal results twice. `coverage_experiment` runs with the seeds 1 to 10, every other
+campaign with its own seed. The exit code is 0 if the results are equal, 1 otherwise.
 
 What is compared: every row of every table, column by column, with the words of an earlier results schema translated
 (RENAMED_COLUMNS, RENAMED_VALUES). What is not: columns that hold versions, wall times, hosts, or the plan as JSON
 (IGNORED), and the sentences of warnings. Columns that only one version has are listed. Both digests are printed too: they
 are equal if the schema and the words are.
 
-Needs Python 3.9, git and cargo. Everything it makes lies in target/same_results.
+Needs Python 3.11, for which there are wheels of ROS 2, git, cargo and a C compiler. Everything it makes lies in
+target/same_results.
 """
 
 import hashlib
 import pathlib
+import re
 import sqlite3
 import subprocess
 import sys
@@ -23,7 +26,16 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "target" / "same_results"
 
-EXAMPLES = ["kuka_cell", "two_robots"]
+# The spaces of each example; an example over ROS 2 needs an environment for its nodes.
+SPACES = {
+    "kuka_cell": ["kuka_cell.sesame"],
+    "two_robots": ["two_robots.sesame"],
+    "a50_cell": ["a50_cell.sesame"],
+    "transport": ["transport.sesame", "mended.sesame"],
+    "fleet": ["fleet.sesame"],
+    "iiwa_cell": ["iiwa_cell.sesame"],
+}
+ROS2 = ["fleet", "iiwa_cell"]
 SEEDS = {"coverage_experiment": range(1, 11)}
 
 # Earlier name -> name today.
@@ -55,33 +67,38 @@ def call(*command, folder=ROOT):
     subprocess.run([str(word) for word in command], cwd=folder, check=True, stdin=subprocess.DEVNULL)
 
 
-def campaigns(folder, example):
-    """The campaigns of an example, as `sesamec generate` makes a runner of each."""
-    call("target/debug/sesamec", "generate", f"examples/{example}/{example}.sesame", folder=folder)
-    runners = folder / "examples" / example / "runners"
-    return sorted(runner.parent for runner in runners.glob("*/Cargo.toml"))
+def campaigns(space):
+    """The campaigns of a space, in their order."""
+    return re.findall(r"^campaign +(\w+)", space.read_text(), re.MULTILINE)
 
 
-def results_of(revision):
-    """Checks a revision out, builds it, and runs everything; returns the results files by campaign and seed."""
+def results_of(revision, examples):
+    """Checks a revision out, builds it, and runs everything; returns the results by campaign and seed."""
     commit = subprocess.run(
         ["git", "rev-parse", "--verify", revision + "^{commit}"], cwd=ROOT, check=True, capture_output=True, text=True
     ).stdout.strip()
     folder = FOLDER / commit
     if not folder.exists():
         call("git", "worktree", "add", "--detach", folder, commit)
+    over_ros2 = any(example in ROS2 for example in examples)
     # Of `sesamec`, whatever its crate is called in that revision.
-    call("cargo", "build", "--quiet", "--locked", folder=folder)
+    features = ["--features", "ros2"] if over_ros2 else []
+    call("cargo", "build", "--quiet", "--locked", "--bin", "sesamec", *features, folder=folder)
+    sesamec = folder / "target" / "debug" / "sesamec"
     results = {}
-    for example in EXAMPLES:
-        for runner in campaigns(folder, example):
-            for seed in SEEDS.get(runner.name, [None]):
-                place = f"same_{seed if seed is not None else 'own'}"
-                if not list((runner / "results" / place).rglob("results.sqlite")):
-                    seeds = [] if seed is None else ["--seed", seed]
-                    options = ["--results", runner / "results" / place, "--fail-on", "nothing"]
-                    call("cargo", "run", "--quiet", "--", "run", *seeds, *options, folder=runner)
-                results[example, runner.name, seed] = (runner, runner / "results" / place)
+    for example in examples:
+        if example in ROS2:
+            call(sys.executable, "examples/set_up.py", f"examples/{example}", folder=folder)
+        for name in SPACES[example]:
+            space = folder / "examples" / example / name
+            for campaign in campaigns(space):
+                for seed in SEEDS.get(campaign, [None]):
+                    place = FOLDER / "results" / commit / space.stem / campaign / str(seed or "own")
+                    if not list(place.rglob("results.sqlite")):
+                        options = ["--results", place, "--fail-on", "nothing"]
+                        seeds = [] if seed is None else ["--seed", seed]
+                        call(sesamec, "run", space, "--campaign", campaign, "--", *options, *seeds, folder=folder)
+                    results[example, space.stem, campaign, seed] = place
     return results
 
 
@@ -119,18 +136,22 @@ def content(folder):
     return made
 
 
-def digest(runner, folder):
-    place = next(folder.rglob("results.sqlite")).parent
-    words = ["cargo", "run", "--quiet", "--", "digest", "--results", str(place)]
-    return subprocess.run(words, cwd=runner, check=True, capture_output=True, text=True).stdout.strip()
+def digest(folder):
+    """The digest, as the page of a run shows it."""
+    page = next(folder.rglob("report.html")).read_text()
+    return re.search(r"<dt>Digest</dt>\s*<dd[^>]*>([0-9a-f]+)", page).group(1)
 
 
 def main():
-    if len(sys.argv) not in (2, 3) or sys.argv[1] in ("-h", "--help"):
+    if len(sys.argv) < 2 or sys.argv[1] in ("-h", "--help"):
         print(__doc__)
         return 0 if len(sys.argv) == 2 else 2
-    before = results_of(sys.argv[1])
-    after = results_of(sys.argv[2] if len(sys.argv) == 3 else "HEAD")
+    revisions = [word for word in sys.argv[1:] if word not in SPACES]
+    examples = [word for word in sys.argv[1:] if word in SPACES] or list(SPACES)
+    if len(revisions) not in (1, 2):
+        raise SystemExit(f"error: expected one or two revisions, found {len(revisions)}: {' '.join(revisions)}")
+    before = results_of(revisions[0], examples)
+    after = results_of(revisions[1] if len(revisions) == 2 else "HEAD", examples)
     differing = 0
     one_sided = set()
     for key in sorted(before.keys() | after.keys(), key=str):
@@ -139,7 +160,7 @@ def main():
             print(f"{named}: only {'before' if key in before else 'after'}")
             differing += 1
             continue
-        old, new = content(before[key][1]), content(after[key][1])
+        old, new = content(before[key]), content(after[key])
         found = []
         for table in sorted(old.keys() | new.keys()):
             for column in sorted(old.get(table, {}).keys() | new.get(table, {}).keys()):
@@ -149,7 +170,7 @@ def main():
                 elif sides[0] != sides[1]:
                     found.append(f"{table}.{column}")
         differing += bool(found)
-        digests = digest(*before[key]), digest(*after[key])
+        digests = digest(before[key]), digest(after[key])
         same = "equal digests" if digests[0] == digests[1] else f"digests {digests[0][:12]} and {digests[1][:12]}"
         print(f"{named}: {'DIFFERS in ' + ', '.join(found) if found else 'equal'}, {same}", flush=True)
     for line in sorted(one_sided):

@@ -14,6 +14,7 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory as _, FromArgMatches as _, Parser};
 
+use sesame_base::gathered::gathered;
 use sesame_base::visible::{visible, visible_lines};
 use sesame_plan::{CampaignPlan, Endpoint, Monitor, is_shared};
 use sesame_relay::metric::MetricTable;
@@ -185,8 +186,8 @@ fn on_recording(plan: &CampaignPlan, recording: &std::path::Path, mut shown: Sho
         }
     };
     let fed = feed_telling(recording, plan, &wires, &table, Some(&mut tell))?;
-    for warning in &fed.warnings {
-        say(format_args!("warning: {}", visible(warning)));
+    for warning in gathered(&fed.warnings) {
+        say(format_args!("warning: {}", visible(&warning)));
     }
     failure.map_or(Ok(ExitCode::SUCCESS), Err)
 }

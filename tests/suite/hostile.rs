@@ -385,7 +385,7 @@ fn an_answer_too_many_is_blamed_on_its_own_test_with_any_number_of_workers() {
 }
 
 #[test]
-fn a_simulator_has_a_second_to_end_by_itself_at_the_end_of_a_campaign_and_after_a_timeout() {
+fn a_simulator_has_time_to_end_by_itself_at_the_end_of_a_campaign_and_after_a_timeout() {
     if !shown_here() {
         return;
     }

@@ -61,7 +61,7 @@ pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: &Address) -> io::
     unreachable!("jobs come until the process is ended")
 }
 
-/// How long it may take to end what the plan launches in addition to its simulator.
+/// How long it may take to end the programs that the plan starts.
 fn end_limit(plan: &CampaignPlan) -> Duration {
     #[cfg(feature = "process")]
     return sesame_lifecycle::launch::end_limit(plan);

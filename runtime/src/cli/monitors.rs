@@ -11,6 +11,7 @@ use clap::Args;
 use crate::cli::failure::Failure;
 use crate::cli::session::Session;
 use crate::cli::terminal::Format;
+use sesame_base::gathered::gathered;
 
 #[cfg(feature = "mcap")]
 pub(super) use compared::compared;
@@ -65,14 +66,14 @@ pub(super) fn monitors(session: &Session, args: &MonitorsArgs) -> Result<ExitCod
     let files = [&args.first, &args.second].map(|named| recording(session, args, named));
     let [first, second] = files;
     let found = compared(plan, [&first?, &second?], &chosen, args.within)?;
-    for warning in &found.warnings {
+    for warning in gathered(&found.warnings) {
         say(format_args!("warning: {warning}"));
     }
     match args.format {
         Format::Text => print(&monitors_text(&found, text_options()))?,
         Format::Json => print_json(&found)?,
     };
-    for objection in found.objections() {
+    for objection in gathered(found.objections()) {
         say(format_args!("not as required: {}", sesame_base::visible::visible_lines(&objection)));
     }
     Ok(ExitCode::from(if found.same { 0 } else { NOT_AS_REQUIRED }))

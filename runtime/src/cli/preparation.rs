@@ -10,6 +10,7 @@ use std::sync::atomic::AtomicBool;
 use clap::Args;
 use serde::Serialize;
 
+use sesame_base::gathered::gathered;
 use sesame_plan::{CampaignPlan, Lab, Task};
 use sesame_record as record;
 use sesame_record::{DATABASE, Recorder, Repository};
@@ -222,8 +223,8 @@ impl Found {
                 print_json(&Concluded { results: folder, report: &page, passed, preparation })?;
             }
         }
-        for objection in &objections {
-            say(format_args!("not as required: {}", sesame_base::visible::visible_lines(objection)));
+        for objection in gathered(&objections) {
+            say(format_args!("not as required: {}", sesame_base::visible::visible_lines(&objection)));
         }
         Ok(match (broken, objections.is_empty()) {
             (true, _) => ExitCode::FAILURE,

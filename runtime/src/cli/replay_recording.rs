@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 
 #[cfg(feature = "mcap")]
+use sesame_base::gathered::gathered;
 use sesame_plan::CampaignPlan;
 
 use crate::cli::failure::Failure;
@@ -55,7 +56,7 @@ pub(super) fn replay_recording(session: &Session, args: &ReplayRecordingArgs) ->
     let fed = panic::catch_unwind(fed)
         .map_err(|_| Failure(format!("a hook cannot take this recording: {}", panic_capture::take())))??;
     let replay = compared(plan, args, fed);
-    for warning in &replay.warnings {
+    for warning in gathered(&replay.warnings) {
         say(format_args!("warning: {warning}"));
     }
     match args.format {

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use sesame_base::gathered::gathered;
 use sesame_base::observation::{Observation, Outcome};
 use sesame_plan::{MonitorId, Recorded};
 use sesame_record::{Repository, TestRecord};
@@ -75,7 +76,7 @@ pub(super) fn run_again(session: &Session, asked: Asked<'_>) -> Result<Option<Ag
         say(format_args!("stopped; a {} leaves nothing behind", asked.run));
         return Ok(None);
     };
-    for note in notes {
+    for note in gathered(notes) {
         say(format_args!("{note}"));
     }
     // As it was judged when it was recorded: a reference run is compared with an earlier one only.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use sesame_base::gathered::gathered;
 use sesame_base::observation::Outcome;
 use sesame_base::time::SimTime;
 use sesame_base::visible::visible;
@@ -48,8 +49,8 @@ pub(super) fn run(plan: &CampaignPlan, connect: &Connect, shown: &mut Shown<'_>)
     if let Some(failure) = told.failure {
         return Err(failure);
     }
-    for warning in &ended.warnings {
-        say(format_args!("warning: {}", visible(warning)));
+    for warning in gathered(&ended.warnings) {
+        say(format_args!("warning: {}", visible(&warning)));
     }
     match ended.outcome {
         Outcome::Completed | Outcome::NoEffect | Outcome::Unknown => Ok(ExitCode::SUCCESS),
@@ -94,7 +95,7 @@ struct UntilStopped {
 impl UntilStopped {
     fn note(&mut self) {
         self.noted = Instant::now();
-        for note in self.transport.incidents().notes {
+        for note in gathered(self.transport.incidents().notes) {
             say(format_args!("note: {}", visible(&note)));
         }
     }

@@ -17,7 +17,7 @@ use clap::Subcommand;
 
 use super::shell::Shell;
 use crate::frontend::Language;
-pub(super) use brief::{Conditions, sheet};
+pub(super) use brief::{Conditions, sheets};
 
 /// What is done for a lab.
 #[derive(Debug, Subcommand)]

@@ -18,7 +18,7 @@ use sesame_report::write_aside;
 use sesame_safety::briefing::html::section;
 
 use super::gap::Sides;
-use super::lab::{Conditions, sheet};
+use super::lab::{Conditions, sheets};
 use super::select::named_lab;
 use super::shell::Shell;
 
@@ -77,10 +77,10 @@ pub(super) fn write(shell: Shell, asked: &Asked) -> anyhow::Result<ExitCode> {
             super::shell::command()
         ));
     }
-    let mut sheets = Vec::new();
-    for test in best.tests.iter().chain(ran).collect::<BTreeSet<_>>() {
-        sheets.push(section(&sheet(shell, &asked.conditions, campaign, Some(lab), &format!("T{test}"))?));
-    }
+    let tests: BTreeSet<u32> = best.tests.iter().chain(ran).copied().collect();
+    let names: Vec<String> = tests.iter().map(|test| format!("T{test}")).collect();
+    let sheets = sheets(shell, &asked.conditions, campaign, Some(lab), &names)?;
+    let sheets: Vec<String> = sheets.iter().map(section).collect();
     let study = Study {
         campaign,
         lab,

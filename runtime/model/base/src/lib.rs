@@ -8,6 +8,7 @@
 pub mod activation;
 pub mod condition;
 pub mod differences;
+pub mod gathered;
 pub mod hazard;
 pub mod latency;
 pub mod observation;

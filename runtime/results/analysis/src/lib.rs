@@ -46,7 +46,8 @@ pub use distances::{FrontDistance, GivenFront, GivenFrontError, distance_table, 
 pub use extents::extents;
 pub use indicators::{Indicator, IndicatorAnalysis, indicators};
 pub use rank_sum::{RankSum, rank_sum};
-pub use sesame_base::test_number::{TestNumber, first_of};
+pub use sesame_base::gathered::{first_of, gathered};
+pub use sesame_base::test_number::TestNumber;
 pub use sesame_optimise::igd::Scaling;
 pub use sesame_present::table::{Datum, Table, TextOptions};
 

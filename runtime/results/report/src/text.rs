@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use sesame_analysis::confirmed::ConfirmedTest;
+use sesame_base::gathered::gathered;
 use sesame_base::visible::{visible, visible_lines};
 use sesame_present::number::{join_words, plural};
 use sesame_present::table::{Table, TextOptions, wrap};
@@ -79,8 +80,8 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
     if let Some(sentence) = once_sentence(summary) {
         paragraph(&mut text, &sentence, options);
     }
-    for warning in &summary.warnings {
-        paragraph(&mut text, &format!("warning: {}", visible(warning)), options);
+    for warning in gathered(&summary.warnings) {
+        paragraph(&mut text, &format!("warning: {}", visible(&warning)), options);
     }
     text
 }
@@ -187,8 +188,8 @@ pub fn test_text(test: &TestReport, options: TextOptions) -> String {
     if let Some(confirmed) = &test.confirmed {
         section(&mut text, "Run again", &tables::findings(confirmed), options);
     }
-    for warning in &test.warnings {
-        paragraph(&mut text, &format!("warning: {}", visible(warning)), options);
+    for warning in gathered(&test.warnings) {
+        paragraph(&mut text, &format!("warning: {}", visible(&warning)), options);
     }
     for line in test.notes.iter().flat_map(|note| note.lines()) {
         paragraph(&mut text, &visible(line), options);

@@ -27,7 +27,7 @@ use rustix::process::{
 };
 
 use crate::descendants;
-use crate::limits::{BACKGROUND_END_LIMIT, END_LIMIT, NOT_FOUND, reason};
+use crate::limits::{END_LIMIT, NOT_FOUND, reason};
 
 /// How often a keeper checks that its worker is alive: the program itself may hold its input open.
 const CHECK: Timespec = Timespec { tv_sec: 0, tv_nsec: 250_000_000 };
@@ -153,8 +153,7 @@ fn end_after_input(worker: u32, child: Pid, background: bool, shared: &(Mutex<St
         kill_process_group(child, Signal::TERM).ok();
         kill_process_group(child, Signal::CONT).ok();
     }
-    let limit = if background { BACKGROUND_END_LIMIT } else { END_LIMIT };
-    let waited = changed.wait_timeout_while(running, limit, |stage| *stage == Stage::Running);
+    let waited = changed.wait_timeout_while(running, END_LIMIT, |stage| *stage == Stage::Running);
     let (mut stage, _) = waited.unwrap_or_else(PoisonError::into_inner);
     if *stage == Stage::Running {
         *stage = Stage::Stopped;

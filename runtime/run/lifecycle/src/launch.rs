@@ -24,7 +24,7 @@ use self::part::{Problem, Started};
 use self::placeholders::{Own, asks_for_port};
 use self::port::Port;
 use self::terminate::Terminate;
-use crate::limits::BACKGROUND_END_LIMIT;
+use crate::limits::END_LIMIT;
 use crate::program::{Alarm, Program};
 
 pub use self::terminate::terminate_all;
@@ -137,13 +137,14 @@ impl LaunchContext {
     }
 }
 
-/// How long the end of everything that a plan launches may take.
+/// How long the end of all programs that a plan starts may take.
 pub fn end_limit(plan: &CampaignPlan) -> Duration {
     let lifecycle = &plan.simulator.lifecycle;
-    if lifecycle.launch.is_none() && plan.nodes.iter().all(|node| node.launch.is_none()) {
+    let launches = lifecycle.launch.is_some() || plan.nodes.iter().any(|node| node.launch.is_some());
+    if !launches && plan.simulator.program().is_none() {
         return Duration::ZERO;
     }
-    BACKGROUND_END_LIMIT + if lifecycle.terminate.is_some() { terminate::LIMIT } else { Duration::ZERO }
+    END_LIMIT + if lifecycle.terminate.is_some() { terminate::LIMIT } else { Duration::ZERO }
 }
 
 /// The programs that a plan launches. Dropping it ends them.

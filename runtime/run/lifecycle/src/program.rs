@@ -16,7 +16,7 @@ use std::time::Duration;
 
 #[cfg(target_os = "linux")]
 use crate::keeper::Report;
-use crate::limits::{BACKGROUND_END_LIMIT, END_LIMIT, NOT_FOUND, reason};
+use crate::limits::{END_LIMIT, NOT_FOUND, reason};
 use crate::output::{OutputTail, Watch};
 use crate::process_group;
 
@@ -368,12 +368,11 @@ impl Handle {
     }
 
     fn limit(&self) -> Duration {
-        let own = if self.alarm.is_some() { BACKGROUND_END_LIMIT } else { END_LIMIT };
         #[cfg(target_os = "linux")]
         if self.kept {
-            return own + KEEPER_LIMIT;
+            return END_LIMIT + KEEPER_LIMIT;
         }
-        own
+        END_LIMIT
     }
 
     /// Ends the process and everything it started, at once.

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, ensure};
 use clap::{Args, ValueEnum};
 
+use sesame_analysis::{TestNumber, first_of, gathered};
 use sesame_plan::{CampaignPlan, Lab, ShapePlace};
 use sesame_record::Repository;
 use sesame_report::show;
@@ -99,10 +100,7 @@ pub(super) fn brief(shell: Shell, asked: &Brief) -> anyhow::Result<()> {
     if let Some(approach) = asked.conditions.approach(0.0) {
         separation_distance(&approach)?;
     }
-    let mut sheets = Vec::new();
-    for name in &asked.tests {
-        sheets.push(sheet(shell, &asked.conditions, &repository, lab, name)?);
-    }
+    let sheets = sheets(shell, &asked.conditions, &repository, lab, &asked.tests)?;
     let written = match asked.format {
         Format::Text => sheets.iter().map(text::text).collect::<Vec<_>>().join("\n\n"),
         Format::Html => {
@@ -145,13 +143,61 @@ impl Conditions {
     }
 }
 
-/// The sheet of a test.
-pub(in crate::cli) fn sheet(
+/// The sheets of tests. What lacks for several of them is gathered.
+pub(in crate::cli) fn sheets(
     shell: Shell,
     asked: &Conditions,
     repository: &Repository,
     lab: Option<&Lab>,
+    names: &[String],
+) -> anyhow::Result<Vec<Briefing>> {
+    let mut lacking = Lacking::default();
+    let sheets = names.iter().map(|name| sheet(asked, repository, lab, name, &mut lacking)).collect();
+    lacking.say(shell);
+    sheets
+}
+
+/// What traces would show, and do not.
+#[derive(Debug, Default)]
+struct Lacking {
+    /// Tests without a trace.
+    traces: Vec<TestNumber>,
+    /// Shapes that are in no trace, a sentence for each test.
+    shapes: Vec<String>,
+}
+
+impl Lacking {
+    fn say(&self, shell: Shell) {
+        for shape in gathered(&self.shapes) {
+            shell.warning(shape);
+        }
+        if !self.traces.is_empty() {
+            shell.note(format!(
+                "{}, so contacts are not computed; {}",
+                no_trace(&self.traces),
+                how_to_record(self.traces[0])
+            ));
+        }
+    }
+}
+
+/// Which tests have no trace.
+pub(super) fn no_trace(tests: &[TestNumber]) -> String {
+    format!("{} {} no trace", first_of(tests), if tests.len() == 1 { "has" } else { "have" })
+}
+
+/// How the trace of a test is recorded afterwards.
+pub(super) fn how_to_record(test: TestNumber) -> String {
+    format!("`{} replay FILE {test} --record`, with the `.sesame` file, records one", shell::command())
+}
+
+/// The sheet of a test.
+fn sheet(
+    asked: &Conditions,
+    repository: &Repository,
+    lab: Option<&Lab>,
     name: &str,
+    lacking: &mut Lacking,
 ) -> anyhow::Result<Briefing> {
     let plan = repository.plan();
     let report = show(repository, name)?;
@@ -159,14 +205,9 @@ pub(in crate::cli) fn sheet(
     let ran = report.duplicate_of.unwrap_or(report.test);
     let judge = repository.judge()?;
     let traced = match (&report.trace, lab) {
-        (Some(file), Some(lab)) => traced(shell, plan, lab, file)?,
+        (Some(file), Some(lab)) => traced(plan, lab, file, lacking)?,
         (None, Some(lab)) if !lab.shapes.is_empty() => {
-            shell.note(format!(
-                "{} has no trace, so contacts are not computed; this records it:\n    {} replay FILE {} --record",
-                report.test,
-                shell::command(),
-                report.test
-            ));
+            lacking.traces.push(report.test);
             Traced::default()
         }
         _ => Traced::default(),
@@ -181,8 +222,8 @@ pub(in crate::cli) fn sheet(
     Ok(sheet)
 }
 
-/// What the trace of a test shows of the lab's shapes. What it does not show is said aside.
-fn traced(shell: Shell, plan: &CampaignPlan, lab: &Lab, file: &Path) -> anyhow::Result<Traced> {
+/// What the trace of a test shows of the lab's shapes.
+fn traced(plan: &CampaignPlan, lab: &Lab, file: &Path, lacking: &mut Lacking) -> anyhow::Result<Traced> {
     if lab.shapes.is_empty() {
         return Ok(Traced::default());
     }
@@ -192,7 +233,7 @@ fn traced(shell: Shell, plan: &CampaignPlan, lab: &Lab, file: &Path) -> anyhow::
         match recorded(plan, shape, (0, &signals, 0.0)) {
             Ok(shape) => shapes.push(shape),
             Err(error @ ReplayError::Shape { .. }) if matches!(shape.place, ShapePlace::Pose { .. }) => {
-                shell.warning(format!("{error}: {}", file.display()));
+                lacking.shapes.push(format!("{error}: `{}`", file.display()));
             }
             Err(error) => return Err(error.into()),
         }
@@ -250,8 +291,8 @@ mod tests {
         let repository = sample::campaign_with_fronts(folder.path(), plan, 45);
         let asked = asked(arguments);
         let lab = plan.labs.first();
-        let sheet = |name: &String| sheet(Shell::silent(), &asked.conditions, &repository, lab, name).unwrap();
-        asked.tests.iter().map(sheet).map(|sheet| text::text(&sheet)).collect()
+        let sheets = super::sheets(Shell::silent(), &asked.conditions, &repository, lab, &asked.tests).unwrap();
+        sheets.iter().map(text::text).collect()
     }
 
     #[test]
@@ -276,6 +317,17 @@ mod tests {
         let solid = sheet.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(solid.contains("WARNING: The lab excludes this test: it has collision_occurrence"), "{sheet}");
         assert!(solid.contains("was not computed: it is not known how robots stop."), "{sheet}");
+    }
+
+    #[test]
+    fn tests_without_a_trace_are_said_once() {
+        let tests: Vec<TestNumber> = [3, 7, 9, 12, 13].map(TestNumber).to_vec();
+        assert_eq!(no_trace(&tests[..1]), "T3 has no trace");
+        assert_eq!(no_trace(&tests), "T3, T7, T9 and 2 more have no trace");
+        assert_eq!(
+            how_to_record(tests[0]),
+            format!("`{} replay FILE T3 --record`, with the `.sesame` file, records one", shell::command())
+        );
     }
 
     #[test]

@@ -9,10 +9,11 @@ use std::path::PathBuf;
 use anyhow::{bail, ensure};
 use clap::Args;
 
-use sesame_analysis::{Datum, Table};
+use sesame_analysis::{Datum, Table, TestNumber};
 use sesame_record::{Repository, trace_file};
 use sesame_safety::interlock::{Equivalence, Judgement, Response};
 
+use super::brief::{how_to_record, no_trace};
 use super::contacts::{moving_shapes, signals};
 use super::replay::{Meeting, meetings, recorded};
 use crate::cli::results::{Format, Output, print};
@@ -58,16 +59,12 @@ pub(super) fn print_interlocks(shell: Shell, asked: &Asked) -> anyhow::Result<()
         asked.tests.iter().map(|name| repository.find(name)).collect::<Result<Vec<_>, _>>()?
     };
     let mut found: Vec<(String, Meeting)> = Vec::new();
+    let mut untraced = Vec::new();
     for test in tests {
         let name = format!("T{test}");
         let file = trace_file(repository.folder(), test);
         if !file.is_file() {
-            if !asked.tests.is_empty() {
-                shell.warning(format!(
-                    "{name} has no trace; `{} replay FILE {name} --record` records it",
-                    shell::command()
-                ));
-            }
+            untraced.push(TestNumber(test));
             continue;
         }
         let signals = signals(plan, &file)?;
@@ -75,6 +72,11 @@ pub(super) fn print_interlocks(shell: Shell, asked: &Asked) -> anyhow::Result<()
         let meetings = meetings(&shapes.collect::<Result<Vec<_>, _>>()?)?.into_iter();
         let guarded = meetings.filter(|meeting| expanded(&meeting.one) || expanded(&meeting.other));
         found.extend(guarded.map(|meeting| (name.clone(), meeting)));
+    }
+    if !asked.tests.is_empty()
+        && let Some(&first) = untraced.first()
+    {
+        shell.warning(format!("{}; {}", no_trace(&untraced), how_to_record(first)));
     }
     ensure!(
         !found.is_empty(),

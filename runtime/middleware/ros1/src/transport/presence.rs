@@ -65,7 +65,7 @@ fn sinks(bus: &Ros1Bus, node: &Node, wired: &Wired, missing: &mut Vec<String>) {
         let there = node.with_publication(at, |publication| publication.connected().count());
         if there < expected.len() {
             let all = expected.join(", ");
-            missing.push(format!("{there} of {} subscribe to `{}`: {all}", expected.len(), sink.path));
+            missing.push(format!("{there} of {} subscribe to `{}`: `{all}`", expected.len(), sink.path));
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use sesame_base::gathered::gathered;
 use sesame_lifecycle::launch::{LaunchError, Launched, Probe};
 use sesame_plan::CampaignPlan;
 use sesame_relay::transport::TransportError;
@@ -140,13 +141,13 @@ impl Session {
                     if let Some(not_cut) = self.named(Session::not_cut)? {
                         return Err(TransportError::Wiring(not_cut));
                     }
-                    let missing =
-                        if missing.is_empty() { "its nodes keep changing".to_owned() } else { missing.join("; ") };
+                    let lacks = missing.is_empty().then(|| "its nodes keep changing".to_owned());
                     let wrong = self.named(|session, name| session.wrong_types(false, name))?;
-                    let why: Vec<String> = std::iter::once(missing).chain(wrong).chain(self.notes.drain(..)).collect();
+                    let why: Vec<String> =
+                        missing.into_iter().chain(lacks).chain(wrong).chain(self.notes.drain(..)).collect();
                     return Err(TransportError::from(LaunchError::Failed {
                         what: "the system".to_owned(),
-                        problem: format!("is not complete after {} s: {}", within.as_secs(), why.join("; ")),
+                        problem: format!("is not complete after {} s: {}", within.as_secs(), gathered(&why).join("; ")),
                         last_lines: String::new(),
                     }));
                 }

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
 use rustdds::GUID;
+use sesame_base::gathered::gathered;
 use sesame_lifecycle::launch::LaunchError;
 use sesame_plan::{CampaignPlan, NodeId, TopicId};
 use sesame_relay::transport::TransportError;
@@ -122,7 +123,7 @@ impl Session {
         (!wrong.is_empty()).then(|| {
             TransportError::from(LaunchError::Failed {
                 what: "the system".to_owned(),
-                problem: format!("cannot become complete: {}", wrong.join("; ")),
+                problem: format!("cannot become complete: {}", gathered(&wrong).join("; ")),
                 last_lines: String::new(),
             })
         })
@@ -157,7 +158,7 @@ impl Session {
                 let there = subscribers.iter().filter(|endpoint| endpoint.topic == dds_topic).count();
                 if there < expected.len() {
                     missing.push(format!(
-                        "{there} of {} subscribe to `{}`: {}",
+                        "{there} of {} subscribe to `{}`: `{}`",
                         expected.len(),
                         sink.path,
                         expected.join(", ")
@@ -245,8 +246,7 @@ impl Session {
                 if there.len() > most {
                     let mut names: Vec<String> = there.iter().map(|present| name(present.guid)).collect();
                     names.sort_unstable();
-                    let names: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
-                    crowded.push(format!("{} publish on `{}`: {}", names.len(), source.path, names.join(", ")));
+                    crowded.push(format!("{} publish on `{}`: `{}`", names.len(), source.path, names.join(", ")));
                 }
             }
         }

@@ -1,5 +1,6 @@
 //! The head of the page: what was run, and how.
 
+use sesame_base::gathered::gathered;
 use sesame_plan::{Search, Task};
 use sesame_present::markup::Markup;
 use sesame_present::number::{self, plural};
@@ -85,7 +86,7 @@ pub(super) fn header(
         body.close();
     }
     body.close();
-    for warning in &summary.warnings {
+    for warning in gathered(&summary.warnings) {
         body.open("p", &[("class", "warning")]);
         body.prose(&format!("Warning: {warning}"));
         body.close();

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use sesame_base::gathered::gathered;
 use sesame_present::markup::Markup;
 use sesame_record::{MetricValue, RecordError, Repository, Verdict, trace_file};
 
@@ -107,7 +108,7 @@ fn figures(body: &mut Markup, report: &TestReport, command: &str) {
             body.element("p", &[("class", "quiet")], &format!("And {more} more; the test in JSON has all."));
         }
     }
-    for warning in &report.warnings {
+    for warning in gathered(&report.warnings) {
         body.open("p", &[("class", "warning")]);
         body.prose(&format!("Warning: {warning}"));
         body.close();

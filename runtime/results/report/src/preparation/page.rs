@@ -1,5 +1,6 @@
 //! The page of preparatory testing: one file that needs nothing but itself.
 
+use sesame_base::gathered::gathered;
 use sesame_plan::CampaignPlan;
 use sesame_present::markup::{Markup, fill};
 use sesame_present::number::plural;
@@ -12,7 +13,7 @@ use crate::preparation::known::KnownTesting;
 use crate::preparation::mitm::MitmTesting;
 use crate::preparation::monitors::{MonitorTest, MonitorTesting};
 use crate::preparation::null::NullTesting;
-use crate::preparation::text::{about_latency, about_stages};
+use crate::preparation::text::{about_latency, about_stages, unequal_runs};
 use crate::preparation::{Preparation, tables};
 use crate::study::figure;
 use crate::study::provenance::provenance;
@@ -64,15 +65,15 @@ fn header(body: &mut Markup, plan: &CampaignPlan, preparation: &Preparation) {
     body.element("p", &[("class", "headline")], &headline);
     if !objections.is_empty() {
         body.open("ul", &[("id", "objections")]);
-        for objection in objections {
+        for objection in gathered(objections) {
             body.open("li", &[]);
-            body.prose(objection);
+            body.prose(&objection);
             body.close();
         }
         body.close();
     }
-    for left_out in &preparation.left_out {
-        said(body, left_out);
+    for left_out in gathered(&preparation.left_out) {
+        said(body, &left_out);
     }
     body.close();
 }
@@ -110,11 +111,8 @@ fn mitm(body: &mut Markup, testing: &MitmTesting) {
         said(body, sentence);
     }
     part(body, "Stages", &tables::stages(testing));
-    for stage in &testing.stages {
-        if let Some(difference) = &stage.difference {
-            let relayed = plural(stage.relayed, "topic", "topics");
-            said(body, &format!("With {relayed} relayed, runs differ: {difference}."));
-        }
+    for difference in gathered(unequal_runs(testing)) {
+        said(body, &difference);
     }
     part(body, "Added by the relay", &tables::added(testing));
     part(body, "Drift of metrics", &tables::drifts(testing));

@@ -5,7 +5,7 @@ use sesame_present::table::{Column, Datum, Table};
 use sesame_record::Verdict;
 
 use crate::preparation::known::{ExpectationSides, KnownTesting};
-use crate::preparation::mitm::{MitmTesting, milliseconds};
+use crate::preparation::mitm::{Drift, MitmTesting, milliseconds};
 use crate::preparation::sides::{MetricSides, RequirementSides, Values, VerdictCounts};
 
 fn values(values: Option<&Values>, unit: Option<&str>) -> Datum {
@@ -148,22 +148,24 @@ pub(super) fn stages(mitm: &MitmTesting) -> Table {
     table
 }
 
-/// Each metric in each stage, compared with the runs in which nothing was relayed.
+/// Each metric in each stage, compared with the runs in which nothing was relayed. Stages in a row in which a metric
+/// has equal values share a row.
 pub(super) fn drifts(mitm: &MitmTesting) -> Table {
     let columns = [Column::heading("metric"), Column::number("relayed")];
     let numbers = ["values", "drift", "spread without relay"].map(Column::number);
     let mut table = Table::with(columns.into_iter().chain(numbers));
     let metrics = mitm.stages.first().map_or(0, |stage| stage.metrics.len());
     for at in 0..metrics {
-        for stage in &mitm.stages {
-            let Some(drift) = stage.metrics.get(at) else { continue };
+        let stages: Vec<(usize, &Drift)> =
+            mitm.stages.iter().filter_map(|stage| Some((stage.relayed, stage.metrics.get(at)?))).collect();
+        for equal in stages.chunk_by(|(_, one), (_, next)| one.values == next.values) {
+            let (Some((from, _)), Some((to, drift))) = (equal.first(), equal.last()) else { continue };
             let unit = drift.unit.as_deref();
-            let first = stage.relayed == 0;
             table.row([
                 Datum::text(&drift.metric),
-                Datum::count(stage.relayed),
+                if from == to { Datum::count(*to) } else { Datum::text(format!("{from} to {to}")) },
                 values(drift.values.as_ref(), unit),
-                if first { Datum::Missing } else { amount(drift.drift, unit) },
+                if *to == 0 { Datum::Missing } else { amount(drift.drift, unit) },
                 amount(drift.spread_before, unit),
             ]);
         }

@@ -146,6 +146,21 @@ fn a_budget_is_judged_by_one_message_in_a_hundred_and_with_few_messages_by_every
 }
 
 #[test]
+fn stages_in_which_a_metric_is_equal_share_a_row() {
+    let shown = |found: &MitmTesting| {
+        let table = tables::drifts(found).text(OPTIONS);
+        let rows = table.lines().map(|line| line.split_whitespace().collect::<Vec<_>>().join(" "));
+        rows.filter(|row| row.starts_with("cycle_time")).collect::<Vec<_>>()
+    };
+    assert_eq!(
+        shown(&stages(None, [&[60.0, 62.0], &[60.0, 62.0]], &[])),
+        ["cycle_time 0 to 1 61 ± 1.414 s 0 s 1.414 s"]
+    );
+    let moved = stages(None, [&[60.0, 62.0], &[64.0, 64.0]], &[]);
+    assert_eq!(shown(&moved), ["cycle_time 0 61 ± 1.414 s – 1.414 s", "cycle_time 1 64 ± 0 s 3 s 1.414 s"]);
+}
+
+#[test]
 fn drift_determinism_and_requirements_that_only_the_relay_violates_are_found() {
     let found = stages(None, [&[60.0, 62.0], &[64.0, 64.0]], &[]);
     let drift = &found.stages[1].metrics[3];

@@ -1,5 +1,6 @@
 //! Preparatory testing as text for a terminal.
 
+use sesame_base::gathered::gathered;
 use sesame_present::number::plural;
 use sesame_present::table::{Table, TextOptions, wrap};
 
@@ -30,11 +31,8 @@ pub fn text(preparation: &Preparation, options: TextOptions) -> String {
         section(&mut text, "Stages", &tables::stages(mitm), options);
         section(&mut text, "Added by the relay", &tables::added(mitm), options);
         section(&mut text, "Drift of metrics", &tables::drifts(mitm), options);
-        for stage in &mitm.stages {
-            if let Some(difference) = &stage.difference {
-                let relayed = plural(stage.relayed, "topic", "topics");
-                sentence(&mut text, &format!("with {relayed} relayed, runs differ: {}", visible(difference)), options);
-            }
+        for difference in gathered(unequal_runs(mitm)) {
+            sentence(&mut text, &visible(&difference), options);
         }
     }
     if let Some(known) = known {
@@ -55,8 +53,8 @@ pub fn text(preparation: &Preparation, options: TextOptions) -> String {
         }
     }
     text.push('\n');
-    for left_out in left_out {
-        sentence(&mut text, &visible(left_out), options);
+    for left_out in gathered(left_out) {
+        sentence(&mut text, &visible(&left_out), options);
     }
     for (step, passed) in preparation.steps() {
         sentence(&mut text, &format!("{step} {}", if passed { "passed" } else { "failed" }), options);
@@ -85,6 +83,15 @@ pub(super) fn about_stages(mitm: &MitmTesting) -> Option<&'static str> {
     const ALIKE: &str = "This simulator has no way for its messages but the runner, so a stage only says which topics are \
                          measured; of ROS 2 nodes, topics that are not relayed go past the relay.";
     (!mitm.bypass).then_some(ALIKE)
+}
+
+/// The stages whose runs are not equal, a sentence each.
+pub(super) fn unequal_runs(mitm: &MitmTesting) -> Vec<String> {
+    let unequal = mitm.stages.iter().filter_map(|stage| {
+        let relayed = plural(stage.relayed, "topic", "topics");
+        Some(format!("With {relayed} relayed, runs differ: {}.", stage.difference.as_ref()?))
+    });
+    unequal.collect()
 }
 
 fn heading(text: &mut String, title: &str, options: TextOptions) {

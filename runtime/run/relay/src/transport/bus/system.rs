@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::mem;
 use std::time::{Duration, Instant};
 
+use sesame_base::gathered::gathered;
 use sesame_base::time::SimTime;
 use sesame_plan::{CampaignPlan, Channel, TopicId, is_shared};
 
@@ -213,7 +214,11 @@ impl System {
             if Instant::now() >= limit && !missing.is_empty() {
                 return Err(TransportError::from(LaunchError::Failed {
                     what: "the system".to_owned(),
-                    problem: format!("is not complete after {} s: {}", COMPLETE_WITHIN.as_secs(), missing.join("; ")),
+                    problem: format!(
+                        "is not complete after {} s: {}",
+                        COMPLETE_WITHIN.as_secs(),
+                        gathered(&missing).join("; ")
+                    ),
                     last_lines: String::new(),
                 }));
             }
