@@ -61,11 +61,7 @@ pub(super) struct FormulaNode {
 
 #[derive(Debug, Clone)]
 enum Operator {
-    Predicate {
-        signal: usize,
-        comparison: Comparison,
-        constant: f64,
-    },
+    Predicate(Predicate),
     Not {
         of: Box<FormulaNode>,
         input: VecDeque<Piece>,
@@ -83,6 +79,20 @@ enum Operator {
         kept: Option<VecDeque<Piece>>,
     },
     Until(Box<Until>),
+}
+
+/// How far a signal is on the right side of a constant.
+#[derive(Debug, Clone, Copy)]
+struct Predicate {
+    signal: usize,
+    comparison: Comparison,
+    constant: f64,
+}
+
+impl Predicate {
+    fn margin(&self, values: &[f64]) -> f64 {
+        margin(values[self.signal], self.comparison, self.constant)
+    }
 }
 
 /// `left until right` is computed as two parts that both hold: `left` holds up to the beginning of the window, and from
@@ -116,7 +126,7 @@ impl FormulaNode {
                 let count = used.len();
                 let index = signal as usize;
                 *used.get_mut(index).ok_or(FormulaError::Signal { signal, count })? = true;
-                Operator::Predicate { signal: index, comparison, constant }
+                Operator::Predicate(Predicate { signal: index, comparison, constant })
             }
             Formula::Not { of } => return Ok(FormulaNode::new(of, asked, used)?.negated()),
             Formula::And { left, right } => {
@@ -177,18 +187,16 @@ impl FormulaNode {
             return;
         }
         match &mut self.operator {
-            &mut Operator::Predicate { signal, comparison, constant } => {
+            Operator::Predicate(predicate) => {
                 if stretch.end > self.told {
-                    let known = || margin(values[signal], comparison, constant);
-                    put(out, stretch.end, stretch.unknown.map_or_else(known, |unknown| unknown.extreme));
+                    let known = predicate.margin(values);
+                    put(out, stretch.end, stretch.unknown.map_or(known, |unknown| unknown.extreme));
                 }
             }
             Operator::Not { of, input } => {
                 let unknown = stretch.unknown.map(|unknown| Unknown { extreme: -unknown.extreme, ..*unknown });
-                of.extend(Stretch { unknown: unknown.as_ref(), ..stretch }, values, input);
-                while let Some(piece) = input.pop_front() {
-                    put(out, piece.end, -piece.value);
-                }
+                let stretch = Stretch { unknown: unknown.as_ref(), ..stretch };
+                of.each(stretch, values, input, |piece| put(out, piece.end, -piece.value));
             }
             Operator::And { left, right, input } => {
                 left.extend(stretch, values, &mut input.left);
@@ -199,15 +207,14 @@ impl FormulaNode {
                 }
             }
             Operator::Always { of, input, minimum, kept } => {
-                of.extend(stretch, values, input);
                 let finishes = stretch.cuts() || stretch.last && !minimum.is_bounded();
                 let mut minima = |out: &mut VecDeque<Piece>| {
-                    while let Some(piece) = input.pop_front() {
+                    of.each(stretch, values, input, |piece| {
                         if let Some(kept) = kept {
                             put(kept, piece.end, piece.value);
                         }
                         minimum.push(piece, out);
-                    }
+                    });
                     if finishes {
                         minimum.finish(of.told, out);
                     }
@@ -231,10 +238,41 @@ impl FormulaNode {
         }
     }
 
+    /// As [`FormulaNode::extend`], with each piece handed to `take`. The queue is empty before and afterwards; what is
+    /// known of each stretch at once needs none.
+    fn each(&mut self, stretch: Stretch<'_>, values: &[f64], queue: &mut VecDeque<Piece>, mut take: impl FnMut(Piece)) {
+        if let Some(value) = self.at_once(stretch, values) {
+            if self.told < self.asked.end && stretch.end > self.told {
+                self.told = stretch.end;
+                take(Piece { end: stretch.end, value });
+            }
+            return;
+        }
+        self.extend(stretch, values, queue);
+        while let Some(piece) = queue.pop_front() {
+            take(piece);
+        }
+    }
+
+    /// The robustness of a predicate, negated or not, on a stretch; `None` for what depends on other stretches, too.
+    #[inline] // Once per sample: a call costs as much as the work.
+    fn at_once(&self, stretch: Stretch<'_>, values: &[f64]) -> Option<f64> {
+        let known = match &self.operator {
+            Operator::Predicate(predicate) => predicate.margin(values),
+            Operator::Not { of, .. } => match &of.operator {
+                Operator::Predicate(predicate) => -predicate.margin(values),
+                _ => return None,
+            },
+            _ => return None,
+        };
+        // What is unknown of a predicate is as much so of its negation.
+        Some(stretch.unknown.map_or(known, |unknown| unknown.extreme))
+    }
+
     /// Up to where it has a robustness, excluded, on a trace that ends here.
     fn defined(&self, end: i64, whole: bool) -> i64 {
         match &self.operator {
-            Operator::Predicate { .. } => end,
+            Operator::Predicate(_) => end,
             Operator::Not { of, .. } => of.defined(end, whole),
             Operator::And { left, right, .. } => left.defined(end, whole).min(right.defined(end, whole)),
             Operator::Always { of, minimum, .. } => of.defined(end, whole).saturating_sub(minimum.reaches_ahead(whole)),
@@ -251,7 +289,7 @@ impl FormulaNode {
                 left.keep_signal();
                 right.keep_signal();
             }
-            Operator::Predicate { .. } | Operator::Until(_) => {}
+            Operator::Predicate(_) | Operator::Until(_) => {}
         }
     }
 
@@ -268,7 +306,7 @@ impl FormulaNode {
                 Some((start, pieces.into_iter().map(|piece| Piece { value: -piece.value, ..piece }).collect()))
             }
             Operator::And { left, right, .. } => Some(least(left.signal()?, right.signal()?)),
-            Operator::Predicate { .. } | Operator::Until(_) => None,
+            Operator::Predicate(_) | Operator::Until(_) => None,
         }
     }
 
@@ -277,7 +315,7 @@ impl FormulaNode {
     pub(super) fn held(&self) -> usize {
         let pair = |pair: &Pair| pair.left.len() + pair.right.len();
         match &self.operator {
-            Operator::Predicate { .. } => 0,
+            Operator::Predicate(_) => 0,
             Operator::Not { of, input } => of.held() + input.len(),
             Operator::And { left, right, input } => left.held() + right.held() + pair(input),
             Operator::Always { of, input, minimum, kept: _ } => of.held() + input.len() + minimum.held(),
@@ -293,13 +331,12 @@ impl FormulaNode {
 impl Until {
     /// `told` is the time up to which its robustness is known.
     fn extend(&mut self, stretch: Stretch<'_>, values: &[f64], told: i64, out: &mut VecDeque<Piece>) {
-        self.left.extend(stretch, values, &mut self.lead);
-        while let Some(piece) = self.lead.pop_front() {
+        self.left.each(stretch, values, &mut self.lead, |piece| {
             self.before.push(piece, &mut self.parts.left);
             if self.within.asks(piece.end) {
                 put(&mut self.input.left, piece.end, piece.value);
             }
-        }
+        });
         self.right.extend(stretch, values, &mut self.input.right);
         // The robustness of a window that begins at once needs no shift.
         let ahead = if self.delay == 0 { &mut self.parts.right } else { &mut self.ahead };
