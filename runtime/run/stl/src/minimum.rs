@@ -55,7 +55,8 @@ impl SlidingMinimum {
     }
 
     /// Tells the minimum for the times before `end`, the windows of which are known.
-    #[inline] // Once per sample: a call costs as much as the work.
+    #[expect(clippy::inline_always, reason = "once per sample, and the call costs as much as the work")]
+    #[inline(always)]
     fn tell(&mut self, end: i64, out: &mut VecDeque<Piece>) {
         let end = end.min(self.asked.end);
         while self.asked.start < end {

@@ -255,7 +255,8 @@ impl FormulaNode {
     }
 
     /// The robustness of a predicate, negated or not, on a stretch; `None` for what depends on other stretches, too.
-    #[inline] // Once per sample: a call costs as much as the work.
+    #[expect(clippy::inline_always, reason = "once per sample, and the call costs as much as the work")]
+    #[inline(always)]
     fn at_once(&self, stretch: Stretch<'_>, values: &[f64]) -> Option<f64> {
         let known = match &self.operator {
             Operator::Predicate(predicate) => predicate.margin(values),
