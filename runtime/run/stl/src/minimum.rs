@@ -3,13 +3,15 @@
 
 use std::collections::VecDeque;
 
-use crate::piece::{Piece, Span, Window, put};
+use crate::piece::{Piece, Span, Window, put, signed};
 
 /// The minimum of a signal over a window, at each time of a span. Constant time per piece, amortised: a piece enters
 /// and leaves the deque once.
 #[derive(Debug, Clone)]
 pub(super) struct SlidingMinimum {
     window: Window,
+    /// Whether the negative of the minimum is told.
+    pub(super) negated: bool,
     /// The next time to be told, and the end of all that is asked.
     asked: Span,
     /// Values in strictly rising order: each is the least from the end of the one before it on.
@@ -18,7 +20,7 @@ pub(super) struct SlidingMinimum {
 
 impl SlidingMinimum {
     pub(super) fn new(window: Window, asked: Span) -> Self {
-        SlidingMinimum { window, asked, rising: VecDeque::new() }
+        SlidingMinimum { window, negated: false, asked, rising: VecDeque::new() }
     }
 
     /// Takes the next piece of the signal, and tells what follows for the minimum.
@@ -68,7 +70,7 @@ impl SlidingMinimum {
                 Some(first) => Piece { end: end.min(first.end - self.window.from), value: first.value },
                 None => Piece { end, value: f64::INFINITY },
             };
-            put(out, least.end, least.value);
+            put(out, least.end, signed(least.value, self.negated));
             self.asked.start = least.end;
         }
     }

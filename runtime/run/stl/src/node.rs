@@ -10,7 +10,7 @@ use sesame_plan::stl::{Formula, Interval};
 
 use crate::FormulaError;
 use crate::minimum::SlidingMinimum;
-use crate::piece::{Pair, Piece, Span, Window, put};
+use crate::piece::{Pair, Piece, Span, Window, put, signed};
 use crate::until::SlidingUntil;
 
 /// The next part of the trace, in which no signal changes.
@@ -62,22 +62,9 @@ pub(super) struct FormulaNode {
 #[derive(Debug, Clone)]
 enum Operator {
     Predicate(Predicate),
-    Not {
-        of: Box<FormulaNode>,
-        input: VecDeque<Piece>,
-    },
-    And {
-        left: Box<FormulaNode>,
-        right: Box<FormulaNode>,
-        input: Pair,
-    },
-    /// `kept` has all that came from `of`, of an operator whose signal is asked for.
-    Always {
-        of: Box<FormulaNode>,
-        input: VecDeque<Piece>,
-        minimum: SlidingMinimum,
-        kept: Option<VecDeque<Piece>>,
-    },
+    Not { of: Box<FormulaNode>, input: VecDeque<Piece> },
+    And { left: Box<FormulaNode>, right: Box<FormulaNode>, input: Pair },
+    Always(Box<Always>),
     Until(Box<Until>),
 }
 
@@ -93,6 +80,20 @@ impl Predicate {
     fn margin(&self, values: &[f64]) -> f64 {
         margin(values[self.signal], self.comparison, self.constant)
     }
+}
+
+/// The least of a formula in a window, or its negative: `eventually` is `not always not`, with both negations done on the
+/// way.
+#[derive(Debug, Clone)]
+struct Always {
+    /// The formula, or its negation.
+    of: FormulaNode,
+    negated: bool,
+    /// What came from `of`.
+    input: VecDeque<Piece>,
+    minimum: SlidingMinimum,
+    /// All values of the formula, where the signal is asked for.
+    kept: Option<VecDeque<Piece>>,
 }
 
 /// `left until right` is computed as two parts that both hold: `left` holds up to the beginning of the window, and from
@@ -177,6 +178,10 @@ impl FormulaNode {
     fn negated(self) -> Self {
         match self.operator {
             Operator::Not { of, .. } => *of,
+            Operator::Always(mut always) => {
+                always.minimum.negated ^= true;
+                FormulaNode { operator: Operator::Always(always), ..self }
+            }
             _ => FormulaNode::from_operator(self.asked, Operator::Not { of: Box::new(self), input: VecDeque::new() }),
         }
     }
@@ -206,31 +211,7 @@ impl FormulaNode {
                     put(out, end, [left, right].into_iter().find(undecided).unwrap_or(left.min(right)));
                 }
             }
-            Operator::Always { of, input, minimum, kept } => {
-                let finishes = stretch.cuts() || stretch.last && !minimum.is_bounded();
-                let mut minima = |out: &mut VecDeque<Piece>| {
-                    of.each(stretch, values, input, |piece| {
-                        if let Some(kept) = kept {
-                            put(kept, piece.end, piece.value);
-                        }
-                        minimum.push(piece, out);
-                    });
-                    if finishes {
-                        minimum.finish(of.told, out);
-                    }
-                };
-                match stretch.unknown {
-                    // For every sample: it says directly what it says.
-                    None => minima(out),
-                    Some(unknown) => {
-                        let mut all = VecDeque::new();
-                        minima(&mut all);
-                        let ahead = minimum.reaches_ahead(stretch.whole);
-                        let defined = of.defined(unknown.known, stretch.whole).saturating_sub(ahead);
-                        put_decided(unknown, defined, self.told, all, out);
-                    }
-                }
-            }
+            Operator::Always(always) => always.extend(stretch, values, self.told, out),
             Operator::Until(until) => until.extend(stretch, values, self.told, out),
         }
         if let Some(last) = out.back() {
@@ -276,7 +257,7 @@ impl FormulaNode {
             Operator::Predicate(_) => end,
             Operator::Not { of, .. } => of.defined(end, whole),
             Operator::And { left, right, .. } => left.defined(end, whole).min(right.defined(end, whole)),
-            Operator::Always { of, minimum, .. } => of.defined(end, whole).saturating_sub(minimum.reaches_ahead(whole)),
+            Operator::Always(always) => always.defined(end, whole),
             Operator::Until(until) => until.defined(end, whole),
         }
     }
@@ -284,7 +265,7 @@ impl FormulaNode {
     /// From now on keeps what its outermost `always` go over: the signal of a formula that has a quantifier.
     pub(super) fn keep_signal(&mut self) {
         match &mut self.operator {
-            Operator::Always { kept, .. } => *kept = Some(VecDeque::new()),
+            Operator::Always(always) => always.kept = Some(VecDeque::new()),
             Operator::Not { of, .. } => of.keep_signal(),
             Operator::And { left, right, .. } => {
                 left.keep_signal();
@@ -297,9 +278,12 @@ impl FormulaNode {
     /// The signal that was kept, and where it begins; of several `always` the least at each time.
     pub(super) fn signal(self) -> Option<(i64, VecDeque<Piece>)> {
         match self.operator {
-            Operator::Always { of, kept, .. } => {
-                let Span { start, end } = of.asked;
-                let kept = kept?.into_iter().map(|piece| Piece { end: piece.end.min(end), ..piece });
+            Operator::Always(always) => {
+                let Span { start, end } = always.of.asked;
+                let (kept, negated) = (always.kept?, always.minimum.negated);
+                let kept = kept
+                    .into_iter()
+                    .map(|piece| Piece { end: piece.end.min(end), value: signed(piece.value, negated) });
                 Some((start, kept.filter(|piece| piece.end > start).collect()))
             }
             Operator::Not { of, .. } => {
@@ -319,13 +303,58 @@ impl FormulaNode {
             Operator::Predicate(_) => 0,
             Operator::Not { of, input } => of.held() + input.len(),
             Operator::And { left, right, input } => left.held() + right.held() + pair(input),
-            Operator::Always { of, input, minimum, kept: _ } => of.held() + input.len() + minimum.held(),
+            Operator::Always(always) => always.of.held() + always.input.len() + always.minimum.held(),
             Operator::Until(until) => {
                 let Until { left, right, lead, input, before, within, ahead, parts, .. } = &**until;
                 let queues = lead.len() + pair(input) + before.held() + within.held() + ahead.len() + pair(parts);
                 left.held() + right.held() + queues
             }
         }
+    }
+}
+
+impl Always {
+    /// `told` is the time up to which its robustness is known.
+    fn extend(&mut self, stretch: Stretch<'_>, values: &[f64], told: i64, out: &mut VecDeque<Piece>) {
+        match stretch.unknown {
+            // For every sample: it says directly what it says.
+            None => self.minima(stretch, values, out),
+            Some(unknown) => self.put_decided(unknown, stretch, values, told, out),
+        }
+    }
+
+    fn minima(&mut self, stretch: Stretch<'_>, values: &[f64], out: &mut VecDeque<Piece>) {
+        let Always { of, negated, input, minimum, kept } = self;
+        of.each(stretch, values, input, |piece| {
+            let piece = Piece { value: signed(piece.value, *negated), ..piece };
+            if let Some(kept) = kept {
+                put(kept, piece.end, piece.value);
+            }
+            minimum.push(piece, out);
+        });
+        if stretch.cuts() || stretch.last && !minimum.is_bounded() {
+            minimum.finish(of.told, out);
+        }
+    }
+
+    #[cold]
+    fn put_decided(
+        &mut self,
+        unknown: &Unknown,
+        stretch: Stretch<'_>,
+        values: &[f64],
+        told: i64,
+        out: &mut VecDeque<Piece>,
+    ) {
+        let inside = Unknown { extreme: signed(unknown.extreme, self.negated != self.minimum.negated), ..*unknown };
+        let mut all = VecDeque::new();
+        self.minima(Stretch { unknown: Some(&inside), ..stretch }, values, &mut all);
+        put_decided(unknown, self.defined(unknown.known, stretch.whole), told, all, out);
+    }
+
+    /// As [`FormulaNode::defined`].
+    fn defined(&self, end: i64, whole: bool) -> i64 {
+        self.of.defined(end, whole).saturating_sub(self.minimum.reaches_ahead(whole))
     }
 }
 
@@ -393,12 +422,12 @@ fn and(left: FormulaNode, right: FormulaNode) -> Operator {
 }
 
 fn always(window: Window, asked: Span, of: FormulaNode) -> Operator {
-    Operator::Always {
-        of: Box::new(of),
-        input: VecDeque::new(),
-        minimum: SlidingMinimum::new(window, asked),
-        kept: None,
-    }
+    let minimum = SlidingMinimum::new(window, asked);
+    let (of, negated) = match of.operator {
+        Operator::Not { of, .. } => (*of, true),
+        _ => (of, false),
+    };
+    Operator::Always(Box::new(Always { of, negated, input: VecDeque::new(), minimum, kept: None }))
 }
 
 fn window(interval: Interval) -> Result<Window, FormulaError> {

@@ -22,6 +22,11 @@ pub(super) fn put(pieces: &mut VecDeque<Piece>, end: i64, value: f64) {
     }
 }
 
+/// A value or, if negated, its negative.
+pub(super) fn signed(value: f64, negated: bool) -> f64 {
+    if negated { -value } else { value }
+}
+
 /// Times from `start` up to but not including `end`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Span {
