@@ -103,7 +103,7 @@ fn a_system_that_never_becomes_complete_says_what_is_missing() {
         kind: POINT,
         peers: &[],
         expected: &["launch_failed: the launch failed: the system is not complete after 30 s: nobody \
-                   publishes on `/peer/undisturbed`; 0 of 1 subscribe to `/peer`: listener"],
+                   publishes on `/peer/undisturbed`; 0 of 1 subscribe to `/peer`: `listener`"],
     };
     check(&[nobody]);
 }

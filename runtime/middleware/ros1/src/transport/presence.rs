@@ -54,18 +54,18 @@ fn sinks(bus: &Ros1Bus, node: &Node, wired: &Wired, missing: &mut Vec<String>) {
     let topic = wired.line.topic;
     let subscribers = (0u32..).map(NodeId).zip(&bus.plan.nodes).filter(|(_, node)| node.subscribes.contains(&topic));
     for (sink, &at) in wired.line.sinks.iter().zip(&wired.sinks) {
-        let expected: Vec<&str> = subscribers
+        let expected: Vec<String> = subscribers
             .clone()
             .filter(|(id, _)| match sink.subscriber {
                 Some(subscriber) => subscriber == *id,
                 None => !wired.line.sinks.iter().any(|sink| sink.subscriber == Some(*id)),
             })
-            .map(|(_, node)| node.name.as_str())
+            .map(|(_, node)| format!("`{}`", node.name))
             .collect();
         let there = node.with_publication(at, |publication| publication.connected().count());
         if there < expected.len() {
             let all = expected.join(", ");
-            missing.push(format!("{there} of {} subscribe to `{}`: `{all}`", expected.len(), sink.path));
+            missing.push(format!("{there} of {} subscribe to `{}`: {all}", expected.len(), sink.path));
         }
     }
 }

@@ -114,7 +114,7 @@ fn a_system_that_is_not_complete_is_said_to_be() {
     assert_eq!(
         error,
         "the launch failed: the system is not complete after 30 s: nobody publishes on `/peer/undisturbed`; 0 of 1 subscribe to `/peer`: \
-         subscriber; topic `/peer` is not cut: `/publisher` publishes on it directly; start it with \
+         `subscriber`; topic `/peer` is not cut: `/publisher` publishes on it directly; start it with \
          `/peer:=/peer/undisturbed` (`sesamec explain wiring` lists all remappings)"
     );
 }

@@ -146,19 +146,19 @@ impl Session {
             let topic = line.topic;
             let declared = (0u32..).map(NodeId).zip(&plan.nodes).filter(|(_, node)| node.subscribes.contains(&topic));
             for sink in &line.sinks {
-                let expected: Vec<&str> = declared
+                let expected: Vec<String> = declared
                     .clone()
                     .filter(|(id, _)| match sink.subscriber {
                         Some(subscriber) => subscriber == *id,
                         None => !line.sinks.iter().any(|sink| sink.subscriber == Some(*id)),
                     })
-                    .map(|(_, node)| node.name.as_str())
+                    .map(|(_, node)| format!("`{}`", node.name))
                     .collect();
                 let dds_topic = names::topic(&sink.path);
                 let there = subscribers.iter().filter(|endpoint| endpoint.topic == dds_topic).count();
                 if there < expected.len() {
                     missing.push(format!(
-                        "{there} of {} subscribe to `{}`: `{}`",
+                        "{there} of {} subscribe to `{}`: {}",
                         expected.len(),
                         sink.path,
                         expected.join(", ")
@@ -246,7 +246,8 @@ impl Session {
                 if there.len() > most {
                     let mut names: Vec<String> = there.iter().map(|present| name(present.guid)).collect();
                     names.sort_unstable();
-                    crowded.push(format!("{} publish on `{}`: `{}`", names.len(), source.path, names.join(", ")));
+                    let names: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+                    crowded.push(format!("{} publish on `{}`: {}", names.len(), source.path, names.join(", ")));
                 }
             }
         }
