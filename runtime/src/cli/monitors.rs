@@ -11,7 +11,6 @@ use clap::Args;
 use crate::cli::failure::Failure;
 use crate::cli::session::Session;
 use crate::cli::terminal::Format;
-use sesame_base::gathered::gathered;
 
 #[cfg(feature = "mcap")]
 pub(super) use compared::compared;
@@ -56,6 +55,7 @@ pub(super) fn monitors(session: &Session, args: &MonitorsArgs) -> Result<ExitCod
 
 #[cfg(feature = "mcap")]
 pub(super) fn monitors(session: &Session, args: &MonitorsArgs) -> Result<ExitCode, Failure> {
+    use sesame_base::gathered::gathered;
     use sesame_report::monitors_text;
 
     use crate::cli::failure::NOT_AS_REQUIRED;

@@ -6,7 +6,6 @@ use std::process::ExitCode;
 use clap::Args;
 
 #[cfg(feature = "mcap")]
-use sesame_base::gathered::gathered;
 use sesame_plan::CampaignPlan;
 
 use crate::cli::failure::Failure;
@@ -38,6 +37,7 @@ pub(super) fn replay_recording(session: &Session, args: &ReplayRecordingArgs) ->
 pub(super) fn replay_recording(session: &Session, args: &ReplayRecordingArgs) -> Result<ExitCode, Failure> {
     use std::panic::{self, AssertUnwindSafe};
 
+    use sesame_base::gathered::gathered;
     use sesame_relay::metric::MetricTable;
     use sesame_relay::wire::WireTable;
     use sesame_relay::{panic_capture, trace};
