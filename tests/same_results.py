@@ -5,7 +5,7 @@
 
 BEFORE and AFTER are git revisions; AFTER is the current commit if omitted. Without an EXAMPLE, all run whose system is
 stepped, since only these give equal results twice. `coverage_experiment` runs with the seeds 1 to 10, every other
-campaign with its own seed. The exit code is 0 if the results are equal, 1 otherwise.
+campaign with its own seed; searches over ROS 2 make 20 tests. The exit code is 0 if the results are equal, 1 otherwise.
 
 What is compared: every row of every table, column by column, with the words of an earlier results schema translated
 (RENAMED_COLUMNS, RENAMED_VALUES). What is not: columns that hold versions, wall times, hosts, or the plan as JSON
@@ -17,6 +17,7 @@ target/same_results.
 """
 
 import hashlib
+import os
 import pathlib
 import re
 import sqlite3
@@ -28,7 +29,7 @@ FOLDER = ROOT / "target" / "same_results"
 
 # The spaces of each example; an example over ROS 2 needs an environment for its nodes.
 SPACES = {
-    "kuka_cell": ["kuka_cell.sesame"],
+    "kuka_cell": ["kuka_cell.sesame", "study.sesame"],
     "two_robots": ["two_robots.sesame"],
     "a50_cell": ["a50_cell.sesame"],
     "transport": ["transport.sesame", "mended.sesame"],
@@ -36,6 +37,8 @@ SPACES = {
     "iiwa_cell": ["iiwa_cell.sesame"],
 }
 ROS2 = ["fleet", "iiwa_cell"]
+# How many tests a search of these makes at most: each takes seconds.
+ROS2_TESTS = 20
 SEEDS = {"coverage_experiment": range(1, 11)}
 
 # Earlier name -> name today.
@@ -62,14 +65,16 @@ IGNORED = {
 }
 
 
-def call(*command, folder=ROOT):
+def call(*command, folder=ROOT, path=os.environ["PATH"]):
     print("   ", " ".join(str(word) for word in command), flush=True)
-    subprocess.run([str(word) for word in command], cwd=folder, check=True, stdin=subprocess.DEVNULL)
+    words, environment = [str(word) for word in command], {**os.environ, "PATH": path}
+    subprocess.run(words, cwd=folder, check=True, stdin=subprocess.DEVNULL, env=environment)
 
 
 def campaigns(space):
-    """The campaigns of a space, in their order."""
-    return re.findall(r"^campaign +(\w+)", space.read_text(), re.MULTILINE)
+    """The campaigns of a space, in their order, and whether each searches."""
+    blocks = re.findall(r"^campaign +(\w+)(.*?)(?=^campaign |\Z)", space.read_text(), re.MULTILINE | re.DOTALL)
+    return [(name, not re.search(r"\b(repeat|passive)\b", block)) for name, block in blocks]
 
 
 def results_of(revision, examples):
@@ -84,6 +89,9 @@ def results_of(revision, examples):
     # Of `sesamec`, whatever its crate is called in that revision.
     features = ["--features", "ros2"] if over_ros2 else []
     call("cargo", "build", "--quiet", "--locked", "--bin", "sesamec", *features, folder=folder)
+    # The simulator of the study, which is found on PATH.
+    call("cargo", "build", "--quiet", "--locked", "--package", "kuka_cell_lab", folder=folder)
+    path = f"{folder / 'target' / 'debug'}{os.pathsep}{os.environ['PATH']}"
     sesamec = folder / "target" / "debug" / "sesamec"
     results = {}
     for example in examples:
@@ -91,13 +99,14 @@ def results_of(revision, examples):
             call(sys.executable, "examples/set_up.py", f"examples/{example}", folder=folder)
         for name in SPACES[example]:
             space = folder / "examples" / example / name
-            for campaign in campaigns(space):
+            for campaign, searches in campaigns(space):
                 for seed in SEEDS.get(campaign, [None]):
                     place = FOLDER / "results" / commit / space.stem / campaign / str(seed or "own")
                     if not list(place.rglob("results.sqlite")):
                         options = ["--results", place, "--fail-on", "nothing"]
-                        seeds = [] if seed is None else ["--seed", seed]
-                        call(sesamec, "run", space, "--campaign", campaign, "--", *options, *seeds, folder=folder)
+                        options += [] if seed is None else ["--seed", seed]
+                        options += ["--evaluations", ROS2_TESTS] if searches and example in ROS2 else []
+                        call(sesamec, "run", space, "--campaign", campaign, "--", *options, folder=folder, path=path)
                     results[example, space.stem, campaign, seed] = place
     return results
 
