@@ -154,10 +154,10 @@ fn stages_in_which_a_metric_is_equal_share_a_row() {
     };
     assert_eq!(
         shown(&stages(None, [&[60.0, 62.0], &[60.0, 62.0]], &[])),
-        ["cycle_time 0 to 1 61 ± 1.414 s 0 s 1.414 s"]
+        ["cycle_time 0 to 1 61.00 ± 1.41 s 0 s 1.414 s"]
     );
     let moved = stages(None, [&[60.0, 62.0], &[64.0, 64.0]], &[]);
-    assert_eq!(shown(&moved), ["cycle_time 0 61 ± 1.414 s – 1.414 s", "cycle_time 1 64 ± 0 s 3 s 1.414 s"]);
+    assert_eq!(shown(&moved), ["cycle_time 0 61.00 ± 1.41 s – 1.414 s", "cycle_time 1 64 s 3 s 1.414 s"]);
 }
 
 #[test]
