@@ -82,7 +82,7 @@ impl Predicate {
     }
 }
 
-/// The least of a formula in a window, or its negative: `eventually` is `not always not`, with both negations done on the
+/// The least of a formula in a window, or its negative: `eventually` is `not always not`, and does both negations on the
 /// way.
 #[derive(Debug, Clone)]
 struct Always {
