@@ -82,8 +82,8 @@ impl Predicate {
     }
 }
 
-/// The least of a formula in a window, or its negative: `eventually` is `not always not`, and does both negations on the
-/// way.
+/// The least of a formula in a window, or its negative: `eventually` is `not always not`, and does both negations on
+/// the way.
 #[derive(Debug, Clone)]
 struct Always {
     /// The formula, or its negation.
