@@ -26,7 +26,7 @@ fn ran(python: &Path, domain: &Domain, plan: CampaignPlan) -> (System, u64) {
     let subscriber = Peer::start(python, domain, "subscriber.py", &arguments);
     let mut system = System::new(plan);
     // What is not relayed comes to the subscriber earlier than it is seen.
-    let all_came = |seen| subscriber.has_ended() && seen >= COUNT;
+    let all_came = |seen| subscriber.is_done() && seen >= COUNT;
     let exchanged = system.exchange_until(&Test::default(), &Exchange::new(&publisher, &[&subscriber]), all_came);
     assert_eq!(subscriber.expect()["count"], COUNT);
     (system, exchanged.finished.messages)

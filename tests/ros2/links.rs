@@ -60,7 +60,7 @@ fn of_two_publishers_one_can_be_cut_off_while_the_other_is_heard() {
     // The mute one has said all when the last of it is acknowledged.
     let (to, beside) = ([&hearing], [&mute]);
     let exchange = Exchange { beside: &beside, ..Exchange::new(&loud, &to) };
-    let exchanged = system.exchange_until(&test, &exchange, |_| hearing.has_ended() && mute.told("count") == 200);
+    let exchanged = system.exchange_until(&test, &exchange, |_| hearing.is_done() && mute.told("count") == 200);
     mute.expect();
     let sent = loud.expect();
     assert_eq!((exchanged.finished.operations[0].counters.dropped, system.notes()), (200, Vec::new()));

@@ -4,10 +4,12 @@
 
 use std::ffi::OsStr;
 use std::io::{BufRead as _, BufReader, Write as _};
+use std::os::unix::process::ExitStatusExt as _;
 use std::path::Path;
-use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
+use std::process::{Child, ChildStdout, Command, Stdio};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -17,6 +19,9 @@ pub(crate) use sesame_patience::LIMIT;
 use sesame_tests::workspace;
 
 use crate::environment::Domain;
+
+/// How long a peer that has said its result may take to leave.
+const TO_LEAVE: Duration = Duration::from_secs(20);
 
 /// Cyclone on this machine only: on the loopback interface, where it finds others without multicast.
 const CYCLONE: &str = "<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"lo\"/></Interfaces></General>\
@@ -137,37 +142,58 @@ impl Peer {
         self.await_said("up");
     }
 
-    /// Whether it has ended by itself.
-    pub(crate) fn has_ended(&self) -> bool {
+    /// Whether it has done its part: it has said its result, or has ended by itself.
+    pub(crate) fn is_done(&self) -> bool {
+        self.code().is_some() || self.has_ended()
+    }
+
+    /// The exit code that it said together with its result.
+    fn code(&self) -> Option<i32> {
+        let said = lock(&self.said.lines).latest("code")?;
+        said.as_i64().and_then(|code| i32::try_from(code).ok())
+    }
+
+    fn has_ended(&self) -> bool {
         lock(&self.child).try_wait().expect("a child can be asked").is_some()
     }
 
-    /// Closes its input, which those that stay wait for, and waits for its end.
+    /// Closes its input, which those that stay wait for, and waits for its end: its exit code, and what it said. One
+    /// that has said its result and then hangs is ended: Fast DDS may block while it takes a node down.
     #[track_caller]
-    fn wait(&mut self) -> (ExitStatus, Vec<String>) {
+    fn wait(&mut self) -> (Option<i32>, Vec<String>) {
         drop(lock(&self.child).stdin.take());
-        let ended = sesame_patience::comes(|| self.has_ended());
+        let mut done = None;
+        let ended = sesame_patience::comes(|| {
+            let since = self.code().map(|_| *done.get_or_insert_with(Instant::now));
+            self.has_ended() || since.is_some_and(|since| since.elapsed() > TO_LEAVE)
+        });
         assert!(ended, "{} does not end, and said {:?}", self.name, lock(&self.said.lines).all);
+        if !self.has_ended() {
+            eprintln!("{} has said its result, and does not leave", self.name);
+            let _ = lock(&self.child).kill();
+        }
         if let Some(listening) = self.listening.take() {
             let _ = listening.join();
         }
+        let said = self.code();
         let status = lock(&self.child).wait().expect("a child can be awaited");
-        (status, std::mem::take(&mut lock(&self.said.lines).all))
+        let code = if status.signal() == Some(Signal::SIGKILL as i32) { said } else { status.code() };
+        (code, std::mem::take(&mut lock(&self.said.lines).all))
     }
 
     /// Waits for its end: all that it said.
     pub(crate) fn text(mut self) -> String {
-        let (status, said) = self.wait();
-        assert!(status.success(), "{}: {status}", self.name);
+        let (code, said) = self.wait();
+        assert_eq!(code, Some(0), "{}", self.name);
         said.join("\n")
     }
 
     /// Waits for its end: its exit code, and the JSON that it said last.
     pub(crate) fn end(mut self) -> (Option<i32>, Value) {
-        let (status, said) = self.wait();
+        let (code, said) = self.wait();
         let last = said.last().map_or("", String::as_str);
-        let last = serde_json::from_str(last).unwrap_or_else(|_| panic!("{}: {status}: {said:?}", self.name));
-        (status.code(), last)
+        let last = serde_json::from_str(last).unwrap_or_else(|_| panic!("{}: {code:?}: {said:?}", self.name));
+        (code, last)
     }
 
     /// Waits for its end, which is a good one.

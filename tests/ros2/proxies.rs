@@ -67,7 +67,7 @@ fn through(hall: &Hall, publisher: Peer, subscriber: Peer, mut meanwhile: impl F
     let exchange = Exchange { batch: Some(BATCH), ..Exchange::new(&publisher, &to) };
     system.exchange_until(&Test::default(), &exchange, |_| {
         meanwhile();
-        subscriber.has_ended()
+        subscriber.is_done()
     });
     [publisher.expect(), subscriber.expect()]
 }
@@ -117,7 +117,7 @@ fn after_a_bridge_restarts_clients_of_proxies_go_on() {
             *server.borrow_mut() = Some(hall.server());
             heard_before = Some(subscriber.told("count"));
         }
-        subscriber.has_ended()
+        subscriber.is_done()
     });
     assert!(heard_before.is_some_and(|count| count < 600), "the server was restarted before all had come");
     assert_eq!(subscriber.expect()["count"], 600);

@@ -99,7 +99,7 @@ impl<'a> Exchange<'a> {
 
     /// Whether all subscribers have heard enough.
     fn have_ended(&self) -> bool {
-        self.to.iter().all(|peer| peer.has_ended())
+        self.to.iter().all(|peer| peer.is_done())
     }
 }
 

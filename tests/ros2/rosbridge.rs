@@ -140,7 +140,7 @@ fn what_a_monitor_says_reaches_nodes_behind_a_bridge() {
         publisher.await_match();
         publisher.go();
     };
-    system.relay_until(&Test::default(), ready, |_| subscriber.has_ended());
+    system.relay_until(&Test::default(), ready, |_| subscriber.is_done());
     assert_eq!(subscriber.end().1["count"], 2, "`rests` at time zero, and `moves`: {:?}", system.all_notes());
     assert_eq!(system.all_notes(), [""; 0]);
 }
@@ -165,7 +165,7 @@ fn after_a_bridge_restarts_every_topic_is_back() {
             *server.borrow_mut() = Some(Server::start(&pythons, &domain, &port));
             heard_before = Some(subscriber.told("count"));
         }
-        subscriber.has_ended()
+        subscriber.is_done()
     });
     assert!(heard_before.is_some_and(|count| count < 400), "the server was restarted before all had come");
     assert_eq!(subscriber.end().1["count"], 400);

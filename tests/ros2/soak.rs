@@ -41,7 +41,7 @@ fn soaked(count: u64) -> Option<Vec<u64>> {
         if subscriber.told("count") >= count / 10 + count * 9 / 10 / PARTS * memories.len() as u64 {
             memories.push(memory());
         }
-        subscriber.has_ended()
+        subscriber.is_done()
     });
     println!("{} relayed in {:.0} s, {memories:?} kB", relayed.messages(), begin.elapsed().as_secs_f64());
     let sent = publisher.expect();

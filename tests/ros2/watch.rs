@@ -39,7 +39,7 @@ fn who_comes_and_goes_during_a_run_is_noted_by_node_and_topic() {
     let done = |notes: &[String]| {
         let is_noted = |at: usize| notes.iter().any(|note| note == NOTED[at]);
         assert!(begin.elapsed() < 2 * LIMIT, "not all is noted: {notes:?}");
-        let leaves = first.borrow_mut().take_if(|first| first.told("count") == 200 && subscriber.has_ended());
+        let leaves = first.borrow_mut().take_if(|first| first.told("count") == 200 && subscriber.is_done());
         leaves.map(Peer::expect);
         if again.borrow().is_none() && is_noted(1) && is_noted(3) {
             again.replace(Some(publisher()));

@@ -307,7 +307,7 @@ def publish(options: argparse.Namespace, peer: Ros | Cyclone) -> int:
             time.sleep(1 / options.rate)
     for writer in writers:
         peer.await_acks(writer, options.timeout)
-    say(count=options.count * len(writers), digests=[digest.hexdigest() for digest in digests])
+    say(count=options.count * len(writers), digests=[digest.hexdigest() for digest in digests], code=0)
     sys.stdin.read()
     return 0
 
@@ -347,8 +347,9 @@ def subscribe(options: argparse.Namespace, peer: Ros | Cyclone) -> int:
             is_matched = True
             say(matched=True)
         peer.spin()
-    say(count=count, digests=[digest.hexdigest() for digest in digests])
-    return 0 if count >= wanted else 2
+    code = 0 if count >= wanted else 2
+    say(count=count, digests=[digest.hexdigest() for digest in digests], code=code)
+    return code
 
 
 def main() -> None:

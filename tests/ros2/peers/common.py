@@ -4,6 +4,9 @@ Peers say what has happened as lines of JSON, which a test waits for: `up` when 
 there, `matched` when somebody is at the other end. Somebody who is matched on one side may need a while to be matched
 on the other, so a publisher that is told `probe` sends a message that belongs to nothing, and a subscriber says `heard`
 with its number. When all have heard the latest one, nothing that is sent from then on is lost.
+
+Whoever is done says its result with its exit `code` before it leaves: a middleware may hang while it takes a node down,
+which is nothing that a test of what was exchanged is about.
 """
 
 import argparse

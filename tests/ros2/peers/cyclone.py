@@ -51,7 +51,7 @@ def publish(options: argparse.Namespace, writer: DataWriter) -> int:
         if options.rate:
             time.sleep(1 / options.rate)
     writer.wait_for_acks(duration(seconds=options.timeout))
-    say(count=options.count, content=content.hexdigest())
+    say(count=options.count, content=content.hexdigest(), code=0)
     sys.stdin.read()
     return 0
 
@@ -74,8 +74,9 @@ def subscribe(options: argparse.Namespace, reader: DataReader) -> int:
             content.update(read)
             count += 1
         time.sleep(0.001)
-    say(count=count, content=content.hexdigest())
-    return 0 if count >= options.count else 2
+    code = 0 if count >= options.count else 2
+    say(count=count, content=content.hexdigest(), code=code)
+    return code
 
 
 def main() -> None:

@@ -65,7 +65,7 @@ def main() -> None:
                 due += 1 / options.rate
                 time.sleep(max(0.0, due - time.monotonic()))
     publisher.wait_for_all_acked(Duration(seconds=options.timeout))
-    common.say(count=sent, digest=digest.hexdigest(), content=content.hexdigest())
+    common.say(count=sent, digest=digest.hexdigest(), content=content.hexdigest(), code=0)
     if options.hold:
         sys.stdin.read()
     node.destroy_node()

@@ -80,10 +80,11 @@ def main() -> None:
     result = {"count": len(sizes), "bytes": sum(sizes), "digest": digest.hexdigest()}
     if options.content:
         result["content"] = content.hexdigest()
-    common.say(**result)
+    code = 0 if told.is_set() or len(sizes) >= options.count else 2
+    common.say(**result, code=code)
     node.destroy_node()
     rclpy.try_shutdown()
-    sys.exit(0 if told.is_set() or len(sizes) >= options.count else 2)
+    sys.exit(code)
 
 
 if __name__ == "__main__":
