@@ -99,6 +99,7 @@ fn check(plan: &CampaignPlan, tests: &[(Test, f64)]) {
             unheard: Vec::new(),
             unreached: Vec::new(),
             traffic: Vec::new(),
+            course: None,
             metrics: vec![metric(*value); plan.metrics.len()],
             monitors: Vec::new(),
             messages: 0,

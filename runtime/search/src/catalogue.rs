@@ -16,6 +16,7 @@ use crate::evolve::predict::PredictingVariation;
 use crate::evolve::variation::{self, TestVariation};
 use crate::falsification::Falsification;
 use crate::fixed_tests::FixedTests;
+use crate::interleaved::Interleaved;
 use crate::sample::grid::FullFactorial;
 use crate::sample::latin_hypercube::LatinHypercube;
 use crate::sample::random::Random;
@@ -72,6 +73,9 @@ pub fn strategy(plan: &CampaignPlan, seed: u64) -> Result<Box<dyn Strategy>, Sea
             let requirements = plan.requirements.len();
             let settings = falsify::Settings { requirements, evaluations, batch: population, seed };
             Box::new(Falsification::new(plan, space, settings))
+        }
+        plan::Strategy::Interleaved { keep_causes } => {
+            Box::new(Interleaved::new(plan, space, evaluations, !keep_causes, seed))
         }
         plan::Strategy::Random => Box::new(SampledSearch::new(Random::new(space, seed), evaluations)),
     })

@@ -58,8 +58,7 @@ impl Falsification {
             let search = Falsifier::new(UnitBox::new(vectors.variables(), settings.seed), settings);
             Inner::Vectors { search: Box::new(search), vectors, asked: Vec::new() }
         } else {
-            let spread = Sobol::new(test_space.clone(), settings.seed);
-            let search = Falsifier::new(TestDomain { test_space, spread }, settings);
+            let search = Falsifier::new(TestDomain::new(test_space, settings.seed), settings);
             Inner::Tests { search: Box::new(search), asked: Vec::new() }
         };
         Falsification { plan: plan.clone(), search, generation: 0, number: 0 }
@@ -116,15 +115,15 @@ impl Strategy for Falsification {
 
 /// The tests of a campaign by time.
 #[derive(Debug, Clone)]
-struct TestDomain {
+pub(crate) struct TestDomain {
     test_space: TestSpace,
     spread: Sobol,
 }
 
 /// A test among the others.
 #[derive(Debug, Clone)]
-struct EmbeddedTest {
-    test: Test,
+pub(crate) struct EmbeddedTest {
+    pub(crate) test: Test,
     /// For each operation: its kind's place in the campaign, and its coordinates in shares of what is permitted.
     operations: Vec<(usize, Vec<f64>)>,
     /// Per kind, the square of its sum of bumps.
@@ -132,11 +131,18 @@ struct EmbeddedTest {
     /// The caller's number, once it was evaluated.
     number: Option<u32>,
     /// The numbers of the tests that it was made from: none, one or two.
-    parents: Vec<u32>,
+    pub(crate) parents: Vec<u32>,
 }
 
 impl TestDomain {
-    fn embedded(&self, test: Test, parents: Vec<u32>) -> EmbeddedTest {
+    /// The tests of a test space.
+    pub(crate) fn new(test_space: TestSpace, seed: u64) -> Self {
+        let spread = Sobol::new(test_space.clone(), seed);
+        TestDomain { test_space, spread }
+    }
+
+    /// A test of the test space among the others.
+    pub(crate) fn embedded(&self, test: Test, parents: Vec<u32>) -> EmbeddedTest {
         let kinds = self.test_space.operations();
         let mut operations = Vec::with_capacity(test.operations.len());
         for operation in &test.operations {
@@ -284,7 +290,7 @@ mod tests {
         #[test]
         fn tests_are_permitted_and_separations_are_squared_distances(plan in any_timed_plan(), seed: u64) {
             let test_space = TestSpace::from_plan(&plan).unwrap();
-            let mut domain = TestDomain { spread: Sobol::new(test_space.clone(), seed), test_space };
+            let mut domain = TestDomain::new(test_space, seed);
             let mut stream = Stream::derive(seed, "test", &[]);
             let mut places = vec![domain.quasi_random(0), domain.quasi_random(1), domain.random(&mut stream)];
             for step in [0.01, 0.1, 0.5] {

@@ -16,6 +16,7 @@ mod evolve;
 mod falsification;
 mod fixed_tests;
 pub mod indicators;
+mod interleaved;
 mod margin;
 mod neighbours;
 mod objective;

@@ -306,7 +306,12 @@ impl<'a> Resolver<'a> {
             None => 0,
             Some(own) => self.own_setting(campaign, search, own, evaluations.zip(found))?,
         };
-        let (template, strategy) = (template?, kind.with_own(value));
+        let keeps = self.single(&search.keep_causes, "keep causes").is_some();
+        let strategy = match kind.with_own(value) {
+            Strategy::Interleaved { .. } => Strategy::Interleaved { keep_causes: keeps },
+            other => other,
+        };
+        let template = template?;
         self.room_for_operations(campaign, search, &template, strategy, end_after.unwrap_or(f64::INFINITY))?;
         Some(Search::Strategy { template, strategy, evaluations: found? })
     }
@@ -355,14 +360,23 @@ impl<'a> Resolver<'a> {
     fn foreign_setting(&mut self, search: &'a ast::Search, kind: StrategyKind) -> bool {
         let StrategyProperties { own, averaging, noun, .. } = kind.properties();
         let foreign = |setting: &&(Span, (Setting, Count))| own.is_none_or(|own| own.setting != setting.1.0);
-        let Some((span, (setting, _))) = search.own.iter().find(foreign) else { return false };
+        let of_others = search.own.iter().filter(foreign).map(|(span, (setting, _))| (*span, setting.keyword()));
+        let causes = search.keep_causes.iter().filter(|_| kind != StrategyKind::Interleaved);
+        let Some((span, setting)) = of_others.chain(causes.map(|(span, ())| (*span, "keep causes"))).next() else {
+            return false;
+        };
         let neighbours = (averaging == Averaging::Possible).then_some("neighbours");
-        let known: Vec<&str> =
-            own.map(|own| own.setting.keyword()).into_iter().chain(["evaluations", "seed"]).chain(neighbours).collect();
-        let diagnostic =
-            Diagnostic::new(Code::UNKNOWN_NAME, *span, format!("{noun} has no setting `{}`", setting.keyword()))
-                .label("remove this")
-                .note(format!("its settings are {}", list(&known)));
+        let causes = (kind == StrategyKind::Interleaved).then_some("keep causes");
+        let known: Vec<&str> = own
+            .map(|own| own.setting.keyword())
+            .into_iter()
+            .chain(["evaluations", "seed"])
+            .chain(neighbours)
+            .chain(causes)
+            .collect();
+        let diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, span, format!("{noun} has no setting `{setting}`"))
+            .label("remove this")
+            .note(format!("its settings are {}", list(&known)));
         self.report(diagnostic);
         true
     }

@@ -101,8 +101,8 @@ pub(super) fn declares(word: &str) -> bool {
 }
 
 /// The settings of a search: those of single strategies, then those of all.
-const SEARCH_SETTINGS: [Member; Setting::ALL.len() + 3] = {
-    let mut members = [const { Member::new(Rule::setting_neighbours, "neighbours") }; Setting::ALL.len() + 3];
+const SEARCH_SETTINGS: [Member; Setting::ALL.len() + 4] = {
+    let mut members = [const { Member::new(Rule::setting_neighbours, "neighbours") }; Setting::ALL.len() + 4];
     let mut at = 0;
     while at < Setting::ALL.len() {
         members[at] = Member::new(Rule::strategy_setting, Setting::ALL[at].keyword());
@@ -110,6 +110,7 @@ const SEARCH_SETTINGS: [Member; Setting::ALL.len() + 3] = {
     }
     members[at] = Member::new(Rule::setting_evaluations, "evaluations");
     members[at + 1] = Member::new(Rule::setting_seed, "seed");
+    members[at + 2] = Member::new(Rule::setting_causes, "keep");
     members
 };
 

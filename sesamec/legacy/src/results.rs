@@ -141,6 +141,7 @@ impl Importer<'_> {
                 unheard: Vec::new(),
                 unreached: Vec::new(),
                 traffic: Vec::new(),
+                course: None,
                 metrics,
                 monitors: Vec::new(),
                 messages: 0,

@@ -54,6 +54,7 @@ fn record(permitted: &TestSpace, metrics: usize, number: u32) -> TestRecord {
             unheard: Vec::new(),
             unreached: Vec::new(),
             traffic: Vec::new(),
+            course: None,
             metrics,
             monitors: Vec::new(),
             messages: 10_000,

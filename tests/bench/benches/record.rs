@@ -25,6 +25,7 @@ fn test(number: u32, points: u32) -> TestRecord {
             unheard: Vec::new(),
             unreached: Vec::new(),
             traffic: Vec::new(),
+            course: None,
             metrics: vec![metric.clone(), metric],
             monitors: Vec::new(),
             messages: 10_000,

@@ -86,6 +86,7 @@ fn observe(plan: &CampaignPlan, number: u32, operations: &[sesame_plan::TestOper
         unheard: Vec::new(),
         unreached: Vec::new(),
         traffic: Vec::new(),
+        course: None,
         metrics: vec![
             MetricObservation::whole(Some(touched), true, Vec::new()),
             MetricObservation::whole(Some(-level), true, series),

@@ -1,5 +1,6 @@
 //! What was observed in one run of a test: what a worker reports and the results repository keeps.
 
+mod course;
 mod monitor;
 mod traffic;
 
@@ -9,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use sesame_plan::{RequirementId, Span, Trend};
 
+pub use course::{Course, Happening, Heard, RARE, Signal, SignalEvent};
 pub use monitor::{CHANGES_KEPT, ChangeCause, EvidenceChange, MonitorDecision, MonitorHazard, MonitorObservation};
 pub use traffic::{Traffic, Unreached};
 
@@ -136,6 +138,10 @@ pub struct Observation {
     /// explains what came of the run, and is not part of the digest.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub traffic: Vec<Traffic>,
+    /// Of a run without operations: when messages came and when something happened in them. It says where windows of
+    /// operations are worth a test, and is not part of the digest.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub course: Option<Course>,
     /// Per metric of the plan, in its order; empty after a crash of the worker.
     pub metrics: Vec<MetricObservation>,
     /// Per monitor of the plan, in its order; empty after a crash of the worker.
@@ -340,6 +346,7 @@ impl Observation {
             unheard: Vec::new(),
             unreached: Vec::new(),
             traffic: Vec::new(),
+            course: None,
             metrics: Vec::new(),
             monitors: Vec::new(),
             messages: 0,
@@ -367,6 +374,7 @@ impl Observation {
             unheard: self.unheard.clone(),
             unreached: self.unreached.clone(),
             traffic: Vec::new(),
+            course: None,
             metrics: self.metrics.iter().map(metric).collect(),
             monitors: Vec::new(),
             messages: self.messages,

@@ -97,6 +97,12 @@ pub enum Strategy {
         /// Tests at a time, after the first ones; at least 1.
         population: u32,
     },
+    /// Combinatorial interaction testing with aligned windows, attribution of violations, and goal-directed search.
+    Interleaved {
+        /// Whether it goes on to draw operations that are known to violate a requirement alone.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        keep_causes: bool,
+    },
 }
 
 impl Strategy {
@@ -111,6 +117,7 @@ impl Strategy {
             Strategy::Sobol => StrategyKind::Sobol,
             Strategy::Grid { .. } => StrategyKind::Grid,
             Strategy::Falsification { .. } => StrategyKind::Falsification,
+            Strategy::Interleaved { .. } => StrategyKind::Interleaved,
         }
     }
 
@@ -122,7 +129,7 @@ impl Strategy {
             | Strategy::MapElites { population }
             | Strategy::Falsification { population } => Some(population),
             Strategy::Grid { levels } => Some(levels),
-            Strategy::Random | Strategy::LatinHypercube | Strategy::Sobol => None,
+            Strategy::Random | Strategy::LatinHypercube | Strategy::Sobol | Strategy::Interleaved { .. } => None,
         }
     }
 
@@ -169,12 +176,16 @@ impl Strategy {
             Strategy::Falsification { population } if population > 1 => {
                 format!("{title}, {population} tests at a time")
             }
+            Strategy::Interleaved { keep_causes: true } => format!("{title}, known causes are kept"),
             _ => title.to_owned(),
         }
     }
 
     /// Its settings as a `search` block of the language has them, without those that every strategy has.
     pub fn settings(self) -> String {
+        if matches!(self, Strategy::Interleaved { keep_causes: true }) {
+            return "keep causes  ".to_owned();
+        }
         let own = self.kind().properties().own.zip(self.own());
         own.map_or_else(String::new, |(own, value)| format!("{} {value}  ", own.setting.keyword()))
     }
@@ -199,6 +210,8 @@ pub enum StrategyKind {
     Grid,
     /// See [`Strategy::Falsification`].
     Falsification,
+    /// See [`Strategy::Interleaved`].
+    Interleaved,
 }
 
 /// A setting that only some strategies have. Its value is a whole number.
@@ -313,7 +326,7 @@ pub struct StrategyProperties {
 
 impl StrategyKind {
     /// All of them.
-    pub const ALL: [StrategyKind; 8] = [
+    pub const ALL: [StrategyKind; 9] = [
         StrategyKind::Nsga2,
         StrategyKind::Nsga3,
         StrategyKind::MapElites,
@@ -322,6 +335,7 @@ impl StrategyKind {
         StrategyKind::Sobol,
         StrategyKind::Grid,
         StrategyKind::Falsification,
+        StrategyKind::Interleaved,
     ];
 
     /// The strategy with this word.
@@ -340,6 +354,7 @@ impl StrategyKind {
             StrategyKind::Sobol => Strategy::Sobol,
             StrategyKind::Grid => Strategy::Grid { levels: value },
             StrategyKind::Falsification => Strategy::Falsification { population: value },
+            StrategyKind::Interleaved => Strategy::Interleaved { keep_causes: false },
         }
     }
 
@@ -384,6 +399,11 @@ impl StrategyKind {
                 by_time_only: true,
                 needs_requirements: true,
                 ..properties("falsification", "falsification", "a falsification")
+            },
+            StrategyKind::Interleaved => StrategyProperties {
+                averaging: Averaging::ByItself,
+                needs_requirements: true,
+                ..properties("interleaved", "interleaved", "an interleaved search")
             },
         }
     }

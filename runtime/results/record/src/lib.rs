@@ -12,6 +12,7 @@
 
 mod added_latency;
 mod columns;
+mod course;
 mod cursor;
 mod difference;
 mod digest;

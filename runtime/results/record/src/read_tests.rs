@@ -135,6 +135,7 @@ impl Repository {
         )?;
         let mut unreached = self.unreached(&numbers)?;
         let mut traffic = self.traffic(&numbers)?;
+        let mut courses = self.courses(&numbers)?;
         let rows = self.rows(numbers.clone())?;
         let mut effects = self.effects(&numbers, &rows)?;
         let mut records = Vec::with_capacity(rows.len());
@@ -187,6 +188,7 @@ impl Repository {
                     unheard: unheard.remove(&number).unwrap_or_default(),
                     unreached: unreached.remove(&number).unwrap_or_default(),
                     traffic: traffic.remove(&number).unwrap_or_default(),
+                    course: courses.remove(&number),
                     outcome: row.outcome,
                     end: row.end,
                     metrics,

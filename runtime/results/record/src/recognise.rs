@@ -15,7 +15,7 @@ use sesame_plan::CampaignPlan;
 
 use crate::schema::{DDL, ROBUSTNESS, TRAFFIC, TRAFFIC_SINCE, has_robustness, wide_views};
 use crate::{
-    RecordError, lab_runs, left_out_operations, lost_requirements, monitors, original_extents, relay_latencies,
+    RecordError, course, lab_runs, left_out_operations, lost_requirements, monitors, original_extents, relay_latencies,
     series_views, split_operations,
 };
 
@@ -79,7 +79,8 @@ pub(super) fn tables(connection: &Connection, path: &Path, schema: i64) -> Resul
     let of_monitors = monitors::OBJECTS.map(|name| (name, monitors::DDL));
     let hazards = if schema >= TRAFFIC_SINCE { monitors::HAZARDS } else { monitors::HAZARDS_7 };
     let of_hazards = monitors::HAZARD_OBJECTS.map(|name| (name, hazards));
-    for (name, ddl) in at_will.into_iter().chain(of_monitors).chain(of_hazards) {
+    let of_course = course::TABLES.map(|name| (name, course::DDL));
+    for (name, ddl) in at_will.into_iter().chain(of_monitors).chain(of_hazards).chain(of_course) {
         if found.contains_key(name) {
             let mut ours = sound(made_by(&["CREATE TABLE tests (number INTEGER PRIMARY KEY)", ddl]));
             ours.retain(|ours, _| ours == name);

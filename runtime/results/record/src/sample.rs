@@ -238,6 +238,7 @@ pub fn observe(plan: &CampaignPlan, test: &Test, seed: u64) -> Observation {
         unheard: Vec::new(),
         unreached: Vec::new(),
         traffic: Vec::new(),
+        course: None,
         metrics: vec![
             shown(collisions, Some(0.0)),
             MetricObservation::whole(Some(fuzzing), true, vec![]),
@@ -334,6 +335,7 @@ pub fn records(plan: &CampaignPlan, searched: u32) -> Vec<TestRecord> {
                     unheard: vec![],
                     unreached: Vec::new(),
                     traffic: Vec::new(),
+                    course: None,
                     metrics: vec![],
                     monitors: Vec::new(),
                     messages: 0,

@@ -10,7 +10,7 @@ use sesame_plan::{Activation, CampaignPlan, Choice};
 
 use crate::columns::index;
 use crate::series::{self, Pieces};
-use crate::{Event, Origin, TestRecord, lost_requirements, monitors, traffic};
+use crate::{Event, Origin, TestRecord, course, lost_requirements, monitors, traffic};
 
 /// What SQLite could not return as it was written: numbers that are not finite, counts beyond 63 bits.
 pub(super) fn unrecordable(record: &TestRecord) -> Option<String> {
@@ -21,6 +21,7 @@ pub(super) fn unrecordable(record: &TestRecord) -> Option<String> {
         unheard: _,
         unreached,
         traffic,
+        course,
         metrics,
         monitors,
         messages,
@@ -84,7 +85,11 @@ pub(super) fn unrecordable(record: &TestRecord) -> Option<String> {
     let traffic =
         traffic.iter().flat_map(|heard| [heard.first, heard.last, heard.gap.start, heard.gap.end, heard.median_gap]);
     let nearest = unreached.iter().filter_map(|unreached| unreached.nearest);
-    numbers.extend(traffic.chain(nearest).map(|time| ("the time of a message", time)));
+    let stretches = course.iter().flat_map(|course| course.heard.iter().flat_map(|heard| &heard.stretches));
+    let heard = stretches.flat_map(|span| [span.start, span.end]);
+    numbers.extend(traffic.chain(nearest).chain(heard).map(|time| ("the time of a message", time)));
+    let happened = course.iter().flat_map(|course| course.signals.iter().flat_map(|signal| &signal.events));
+    numbers.extend(happened.map(|event| ("the time of what happened in a message", event.at)));
     if let Some((what, number)) = numbers.into_iter().find(|(_, number)| !number.is_finite()) {
         return Some(format!("{what} is {number}"));
     }
@@ -202,6 +207,9 @@ pub(super) fn write_test(
         lost_requirements::write(transaction, *number, &observation.metrics)?;
         monitors::write(transaction, plan, *number, &observation.monitors)?;
         traffic::write(transaction, plan, *number, observation)?;
+        if let Some(course) = &observation.course {
+            course::write(transaction, plan, *number, course)?;
+        }
     }
     for (position, text) in observation.warnings.iter().enumerate() {
         transaction

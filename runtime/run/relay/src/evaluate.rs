@@ -100,6 +100,7 @@ pub fn evaluate_tapped(
         unheard: if ended { finished.unheard } else { Vec::new() },
         unreached: if ended { finished.unreached } else { Vec::new() },
         traffic: finished.traffic,
+        course: finished.course,
         metrics: finished.metrics,
         monitors: finished.monitors,
         messages: finished.messages,

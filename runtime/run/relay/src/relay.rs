@@ -15,6 +15,7 @@
 //! other wires are counted separately.
 
 mod compensation;
+mod course;
 mod crossings;
 mod exchange;
 mod finished;
@@ -75,6 +76,8 @@ pub struct Relay<'a> {
     /// Per wire: messages published so far.
     published: Vec<u64>,
     traffic: traffic::Recorder,
+    /// In a run without operations: what happens in it.
+    course: Option<Box<course::Recorder>>,
     queue: ReleaseQueue,
     metrics: Metrics<'a>,
     /// `None` for a plan without monitors.
@@ -204,6 +207,7 @@ impl<'a> Relay<'a> {
             pipelines,
             published: vec![0; wires.len()],
             traffic: traffic::Recorder::new(plan, wires, test),
+            course: test.operations.is_empty().then(|| Box::new(course::Recorder::new(wires))),
             queue: ReleaseQueue::new(test.operations.len(), wires.len_with_links()),
             monitors,
             publishing: Publishing::default(),

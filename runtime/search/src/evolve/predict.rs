@@ -15,7 +15,7 @@ use sesame_base::activation::Activity;
 use sesame_base::observation::Observation;
 use sesame_base::time::SimTime;
 use sesame_optimise::nsga2::{Child, Variation};
-use sesame_plan::{ActivationMode, CampaignPlan, MetricId, Span, Test, TestOperation};
+use sesame_plan::{Activation, ActivationMode, CampaignPlan, MetricId, OperationId, Span, Test};
 use sesame_rng::Stream;
 
 use crate::evolve::cells::Cells;
@@ -62,17 +62,23 @@ impl VariableTrajectories {
         let operations = test.operations.iter();
         let disturbances: Vec<_> = operations
             .map(|operation| {
-                disturbance(plan, operation.operation, &operation.parameters, self.intervals(plan, operation))
+                let intervals = self.intervals_of(plan, operation.operation, &operation.activation);
+                disturbance(plan, operation.operation, &operation.parameters, intervals)
             })
             .collect();
         Point::from_disturbances(&disturbances, Convention::Ours)
     }
 
     /// When an operation would be active, in seconds.
-    fn intervals(&self, plan: &CampaignPlan, operation: &TestOperation) -> Vec<Span> {
-        let within = plan.operation(operation.operation).within;
+    pub(crate) fn intervals_of(
+        &self,
+        plan: &CampaignPlan,
+        operation: OperationId,
+        activation: &Activation,
+    ) -> Vec<Span> {
+        let within = plan.operation(operation).within;
         let end = within.end.min(plan.campaign.end_after);
-        let mut activity = Activity::new(&operation.activation, Span { start: within.start, end });
+        let mut activity = Activity::new(activation, Span { start: within.start, end });
         let value_in = |values: &[Option<f64>], metric| {
             self.variables.iter().position(|variable| *variable == metric).and_then(|at| values[at])
         };

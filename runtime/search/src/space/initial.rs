@@ -91,7 +91,7 @@ pub(crate) fn fresh_operation(kind: &OperationSpace, stream: &mut Stream) -> Tes
 }
 
 /// A fresh window, or fresh conditions; of an offline operation there is nothing to choose.
-fn fresh_activation(activation: &ActivationSpace, stream: &mut Stream) -> Activation {
+pub(crate) fn fresh_activation(activation: &ActivationSpace, stream: &mut Stream) -> Activation {
     match activation {
         ActivationSpace::Offline => Activation::Offline,
         ActivationSpace::Time(window) => {

@@ -97,6 +97,7 @@ pub(crate) struct Search {
     pub(crate) evaluations: Vec<(Span, Count)>,
     pub(crate) seed: Vec<(Span, Count)>,
     pub(crate) neighbours: Vec<(Span, Count)>,
+    pub(crate) keep_causes: Vec<(Span, ())>,
     pub(crate) has_errors: bool,
 }
 

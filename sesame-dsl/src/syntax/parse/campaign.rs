@@ -104,16 +104,22 @@ impl Reader<'_> {
             evaluations: vec![],
             seed: vec![],
             neighbours: vec![],
+            keep_causes: vec![],
             has_errors: false,
         };
         if let Some(strategy) = child(pair, Rule::unsupported_strategy) {
             self.unsupported(&strategy);
             return search;
         }
-        search.strategy = pair.clone().into_inner().find_map(|word| StrategyKind::from_keyword(word.as_str()));
+        let written = pair.clone().into_inner().find_map(|word| StrategyKind::from_keyword(word.as_str()));
+        search.strategy = written.or(Some(StrategyKind::Interleaved));
         let settings = expect_child(pair, Rule::search_settings);
         search.has_errors = self.members(&settings, |reader, setting| {
             let span = reader.keyword_span(&setting);
+            if setting.as_rule() == Rule::setting_causes {
+                search.keep_causes.push((span, ()));
+                return;
+            }
             let value = (span, reader.count(&expect_child(&setting, Rule::number)));
             match setting.as_rule() {
                 Rule::strategy_setting => {

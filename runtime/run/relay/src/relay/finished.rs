@@ -1,6 +1,6 @@
 //! The end of a run, and what is left of it.
 
-use sesame_base::observation::{MetricObservation, MonitorObservation, OperationEffect, Traffic, Unreached};
+use sesame_base::observation::{Course, MetricObservation, MonitorObservation, OperationEffect, Traffic, Unreached};
 use sesame_base::time::SimTime;
 use sesame_plan::Span;
 
@@ -17,6 +17,8 @@ pub struct Finished {
     pub unreached: Vec<Unreached>,
     /// What nodes published on each wire that spoke.
     pub traffic: Vec<Traffic>,
+    /// In a run without operations: when messages came, and what happened in them.
+    pub course: Option<Course>,
     /// Per metric of the plan.
     pub metrics: Vec<MetricObservation>,
     /// Per monitor of the plan.
@@ -81,6 +83,17 @@ impl Relay<'_> {
         let unheard = self.acted_on.iter().filter(|wire| !self.heard[wire.index()]);
         let unheard = unheard.map(|&wire| self.wires.path(wire).to_owned()).collect();
         let (unreached, traffic) = (self.traffic.unreached(), self.traffic.traffic());
-        Finished { operations, unheard, unreached, traffic, metrics, monitors, warnings, messages: self.messages }
+        let course = self.course.map(|course| course.course(end));
+        Finished {
+            operations,
+            unheard,
+            unreached,
+            traffic,
+            course,
+            metrics,
+            monitors,
+            warnings,
+            messages: self.messages,
+        }
     }
 }

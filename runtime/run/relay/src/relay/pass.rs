@@ -31,6 +31,9 @@ impl Relay<'_> {
         if !by_monitor {
             self.traffic.heard(now, wire);
         }
+        if let Some(course) = &mut self.course {
+            course.published(now, wire, &value);
+        }
         for tap in &mut self.taps {
             tap.published(now, wire, index, &value);
         }

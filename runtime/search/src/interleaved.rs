@@ -1,0 +1,368 @@
+//! The interleaved search: combinatorial interaction testing with windows aligned to what happens in the undisturbed
+//! system, attribution of each violation to its smallest set of operations, and goal-directed search between them.
+//!
+//! What is dangerous lies at the ends of ranges and at events, and uniform draws seldom do. So each operation is tried
+//! alone first, as strong and as long as it may be ([opening]); then each two together ([pairs]), over the whole run and
+//! over parts of it. Meanwhile and afterwards tests come from windows that are [aligned] with the moments of the
+//! reference run ([moments]), from the [near misses](near_misses) so far, and from uniform draws.
+//!
+//! A test that violates a requirement is reduced to the operations that are to blame ([causes]); each question is a test
+//! of the campaign. Operations that are known to be dangerous alone are drawn seldom from then on, so that one loud
+//! cause does not hide the others.
+//!
+//! Everything is decided per generation of a constant size, by a stream per generation, so the tests are the same for
+//! any number of workers, and a search is resumed by telling it what was recorded.
+
+mod aligned;
+mod causes;
+mod moments;
+mod near_misses;
+mod opening;
+mod pairs;
+mod setting;
+mod strongest;
+#[cfg(test)]
+mod tests;
+mod tried;
+
+use std::collections::{BTreeSet, VecDeque};
+
+use sesame_base::observation::Observation;
+use sesame_plan::{Activation, CampaignPlan, Test};
+use sesame_rng::Stream;
+
+use causes::{Attribution, Cause, Causes, Next};
+use moments::Moments;
+use near_misses::Ran;
+use pairs::Pairs;
+use setting::Setting;
+use tried::Tried;
+
+use crate::evolve::predict::VariableTrajectories;
+use crate::falsification::TestDomain;
+use crate::margin::{confirmed_margins, margins};
+use crate::space::initial::fresh_test;
+use crate::space::test_space::TestSpace;
+use crate::{Candidate, Evaluated, Strategy};
+
+/// Tests of a generation: a constant, so that the number of workers decides nothing.
+const GENERATION: usize = 8;
+/// How many of them may be questions of attributions.
+const QUESTIONS: usize = GENERATION * 3 / 4;
+
+/// The shares of the sources of tests once the opening is over and each two operations were tried together; the rest is
+/// aligned.
+const PAIRWISE: f64 = 0.15;
+const UNIFORM: f64 = 0.20;
+const NEAR_MISSES: f64 = 0.25;
+
+/// How often an operation is drawn that is a cause of every requirement alone, or of one.
+const DRAWN_IF_ALWAYS_A_CAUSE: f64 = 0.1;
+const DRAWN_IF_A_CAUSE: f64 = 0.4;
+
+/// How often a uniform test is drawn again that a known cause explains, or that meets no message.
+const TRIES: usize = 8;
+
+/// An interleaved search by ask and tell.
+pub(crate) struct Interleaved {
+    setting: Setting,
+    /// Where the surrogate of near misses searches; none where conditions switch operations.
+    domain: Option<TestDomain>,
+    seed: u64,
+    /// Whether known causes are avoided.
+    avoids_causes: bool,
+    /// The requirements that the undisturbed system keeps: their positions, and the scale of their margins.
+    requirements: Vec<(usize, f64)>,
+    /// Of these the margins of the undisturbed system in their scale.
+    undisturbed: Vec<f64>,
+    left_out: Vec<String>,
+    opening: VecDeque<(usize, Test)>,
+    pairs: Pairs,
+    tried: Tried,
+    causes: Causes,
+    attributions: Vec<Attribution>,
+    ran: Vec<Ran>,
+    asked: Vec<Asked>,
+    generation: u32,
+    left: u32,
+}
+
+/// A test that was asked for, and what for.
+struct Asked {
+    test: Test,
+    /// The attribution that it answers, by position, and the operations of the attribution's test that it holds.
+    question: Option<(usize, BTreeSet<usize>)>,
+}
+
+impl Interleaved {
+    /// A search before its first test.
+    pub(crate) fn new(plan: &CampaignPlan, space: TestSpace, evaluations: u32, avoids_causes: bool, seed: u64) -> Self {
+        let nothing = Observation::without_run(sesame_base::observation::Outcome::Completed);
+        let moments = Moments::from_reference(plan, &space, &nothing);
+        let domain = space.conditions().is_none().then(|| TestDomain::new(space.clone(), seed));
+        let mut search = Interleaved {
+            setting: Setting::new(plan, space, moments, None),
+            domain,
+            seed,
+            avoids_causes,
+            requirements: (0..plan.requirements.len()).map(|requirement| (requirement, 1.0)).collect(),
+            undisturbed: vec![f64::INFINITY; plan.requirements.len()],
+            left_out: Vec::new(),
+            opening: VecDeque::new(),
+            pairs: Pairs::default(),
+            tried: Tried::default(),
+            causes: Causes::default(),
+            attributions: Vec::new(),
+            ran: Vec::new(),
+            asked: Vec::new(),
+            generation: 0,
+            left: evaluations,
+        };
+        search.open();
+        search
+    }
+
+    fn open(&mut self) {
+        let mut stream = Stream::derive(self.seed, "interleaved opening", &[]);
+        self.opening = opening::opening(&self.setting, &mut stream).into();
+    }
+
+    /// Whether an operation alone is a cause of every requirement.
+    fn is_always_a_cause(&self, kind: usize) -> bool {
+        self.avoids_causes
+            && !self.requirements.is_empty()
+            && (0..self.requirements.len()).all(|requirement| self.causes.is_alone(requirement, kind))
+    }
+
+    /// Whether a known cause of a requirement is among the operations of a test.
+    fn explains(&self, requirement: usize, test: &Test) -> bool {
+        self.causes.explain(requirement, &self.setting.held(test))
+    }
+
+    /// Whether known causes explain a violation of every requirement by a test, so that it would show nothing new.
+    fn is_explained(&self, test: &Test) -> bool {
+        self.avoids_causes
+            && !self.requirements.is_empty()
+            && (0..self.requirements.len()).all(|requirement| self.explains(requirement, test))
+    }
+
+    /// The operations to draw from: those known to be dangerous alone only seldom.
+    fn pool(&self, stream: &mut Stream) -> Vec<usize> {
+        let usable = self.setting.usable();
+        let drawn = |&kind: &usize, stream: &mut Stream| {
+            let is_alone = |requirement| self.causes.is_alone(requirement, kind);
+            let share = if !self.avoids_causes {
+                1.0
+            } else if self.is_always_a_cause(kind) {
+                DRAWN_IF_ALWAYS_A_CAUSE
+            } else if (0..self.requirements.len()).any(is_alone) {
+                DRAWN_IF_A_CAUSE
+            } else {
+                1.0
+            };
+            stream.chance(share * self.setting.kind(kind).inclusion.clamp(f64::MIN_POSITIVE, 1.0))
+        };
+        let pool: Vec<usize> = usable.iter().copied().filter(|kind| drawn(kind, stream)).collect();
+        if pool.is_empty() { usable } else { pool }
+    }
+
+    /// The next test that answers no question, with the tests it was made from.
+    fn choose(&mut self, stream: &mut Stream) -> (Test, Vec<u32>) {
+        while let Some((kind, test)) = self.opening.pop_front() {
+            if !self.is_always_a_cause(kind) {
+                return (test, Vec::new());
+            }
+        }
+        let paired: Vec<usize> =
+            self.setting.usable().into_iter().filter(|&kind| !self.is_always_a_cause(kind)).collect();
+        let is_known = |first: usize, second: usize| {
+            let both = BTreeSet::from([first, second]);
+            self.avoids_causes
+                && !self.requirements.is_empty()
+                && (0..self.requirements.len()).all(|requirement| self.causes.explain(requirement, &both))
+        };
+        let share = stream.unit();
+        let source = if !self.pairs.first_level_is_complete(&self.setting, &paired, &is_known) { 0.0 } else { share };
+        let mut pairs = std::mem::take(&mut self.pairs);
+        let found = if source < PAIRWISE {
+            pairs.next(&self.setting, &paired, &is_known, stream).map(|test| (test, Vec::new()))
+        } else if source < PAIRWISE + UNIFORM {
+            self.uniform(stream).map(|test| (test, Vec::new()))
+        } else if source < PAIRWISE + UNIFORM + NEAR_MISSES {
+            let pool = self.pool(stream);
+            let explained = |requirement: usize, test: &Test| self.explains(requirement, test);
+            let domain = self.domain.as_ref();
+            near_misses::step(&self.setting, domain, &self.ran, &self.undisturbed, explained, &pool, stream)
+        } else {
+            None
+        };
+        self.pairs = pairs;
+        found.unwrap_or_else(|| {
+            let pool = |stream: &mut Stream| self.pool(stream);
+            (aligned::aligned(&self.setting, &self.tried, pool, stream), Vec::new())
+        })
+    }
+
+    /// A test that is uniform over what is permitted, but for windows without messages, if several tries find one that
+    /// could show something new.
+    fn uniform(&self, stream: &mut Stream) -> Option<Test> {
+        for _ in 0..TRIES {
+            let mut test = fresh_test(&self.setting.space, stream);
+            for (kind, used) in self.setting.kinds_of(&test).into_iter().zip(&mut test.operations) {
+                if let (Activation::Time { start, end }, Some(range)) =
+                    (&mut used.activation, self.setting.window(kind))
+                    && !self.setting.moments.is_heard(kind, *start, *end)
+                {
+                    (*start, *end) = aligned::heard_window(&self.setting, kind, range, stream);
+                }
+            }
+            self.setting.space.settle(&mut test, stream);
+            if self.setting.reaches(&test) && !self.is_explained(&test) {
+                return Some(test);
+            }
+        }
+        None
+    }
+
+    /// Takes what one test came to.
+    fn learn(&mut self, asked: Asked, result: &Evaluated) {
+        let plan = &self.setting.plan;
+        let all = match plan.campaign.confirm {
+            Some(confirmation) if !result.fresh_runs.is_empty() => {
+                confirmed_margins(plan, confirmation.by, &result.fresh_runs)
+            }
+            _ => margins(plan, &result.run),
+        };
+        let of = |&(requirement, scale): &(usize, f64)| {
+            (all[requirement].value.map(|value| value / scale), all[requirement].violated)
+        };
+        let (margins, violated): (Vec<Option<f64>>, Vec<bool>) = self.requirements.iter().map(of).unzip();
+        self.tried.add(&self.setting, &asked.test);
+        let effects = &result.run.operations;
+        let had_effect = effects.is_empty() || effects.iter().any(|effect| effect.counters.any_effect());
+        let kinds = self.setting.kinds_of(&asked.test);
+        let held: BTreeSet<usize> = kinds.iter().copied().collect();
+        if let [kind] = held.iter().copied().collect::<Vec<_>>()[..] {
+            for requirement in (0..violated.len()).filter(|&requirement| violated[requirement]) {
+                self.causes.add(Cause { requirement, kinds: [kind].into() });
+            }
+        }
+        let about = asked.question.as_ref().map(|(at, _)| self.attributions[*at].requirement);
+        if let Some((at, positions)) = asked.question {
+            let requirement = self.attributions[at].requirement;
+            self.attributions[at].answer(positions, violated[requirement]);
+        }
+        for requirement in (0..violated.len()).filter(|&requirement| violated[requirement]) {
+            if about == Some(requirement) || self.causes.explain(requirement, &held) {
+                continue;
+            }
+            let is_asked = |attribution: &Attribution| {
+                attribution.requirement == requirement && attribution.all_kinds().is_subset(&held)
+            };
+            if self.attributions.iter().any(is_asked) {
+                continue;
+            }
+            // What had no effect is not to blame. What acts before the start or after the end cannot be counted.
+            let is_to_blame = |at: &usize| {
+                asked.test.operations[*at].activation == Activation::Offline
+                    || effects.get(*at).is_none_or(|effect| effect.counters.any_effect())
+            };
+            let blamed: Vec<usize> = (0..kinds.len()).filter(is_to_blame).collect();
+            let blamed = if blamed.len() < self.setting.space.fewest() { (0..kinds.len()).collect() } else { blamed };
+            let test = Test { operations: blamed.iter().map(|&at| asked.test.operations[at].clone()).collect() };
+            let kinds = blamed.iter().map(|&at| kinds[at]).collect();
+            let fewest = self.setting.space.fewest();
+            self.attributions.push(Attribution::new(test, kinds, requirement, result.number, fewest));
+        }
+        self.ran.push(Ran { number: result.number, test: asked.test, margins, violated, had_effect });
+    }
+
+    /// Ends the attributions that have no more questions, and returns those of the others.
+    fn questions(&mut self) -> Vec<(usize, BTreeSet<usize>)> {
+        let mut questions = Vec::new();
+        let mut open = Vec::new();
+        for attribution in std::mem::take(&mut self.attributions) {
+            match attribution.next(&self.causes) {
+                Next::Ask(positions) => {
+                    questions.push((open.len(), positions));
+                    open.push(attribution);
+                }
+                Next::Done(found) => {
+                    if let Some(kinds) = found {
+                        self.causes.add(Cause { requirement: attribution.requirement, kinds });
+                    }
+                }
+            }
+        }
+        self.attributions = open;
+        questions
+    }
+}
+
+impl Strategy for Interleaved {
+    fn begin(&mut self, reference: &Observation) {
+        let plan = &self.setting.plan;
+        let moments = Moments::from_reference(plan, &self.setting.space, reference);
+        let trajectories = VariableTrajectories::from_observation(plan, reference);
+        (self.requirements, self.undisturbed) = (Vec::new(), Vec::new());
+        for (requirement, margin) in margins(plan, reference).into_iter().enumerate() {
+            if margin.violated {
+                let name = &plan.requirements[requirement].name;
+                self.left_out.push(format!(
+                    "requirement `{name}` is violated without any operation, so the search looks for no causes of it"
+                ));
+                continue;
+            }
+            let scale = margin.value.filter(|value| value.is_finite() && *value > 1e-9).unwrap_or(1.0);
+            self.requirements.push((requirement, scale));
+            self.undisturbed.push(margin.value.map_or(f64::INFINITY, |value| value / scale));
+        }
+        self.setting = Setting::new(&plan.clone(), self.setting.space.clone(), moments, trajectories);
+        self.open();
+    }
+
+    fn reads_series(&self) -> bool {
+        // The values of the variables of conditions in the reference run.
+        self.setting.space.conditions().is_some()
+    }
+
+    fn ask(&mut self) -> Vec<Candidate> {
+        assert!(self.asked.is_empty(), "a generation is told before the next is asked");
+        let size = GENERATION.min(self.left as usize);
+        let generation = self.generation;
+        let mut stream = Stream::derive(self.seed, "interleaved", &[u64::from(generation)]);
+        let mut candidates = Vec::with_capacity(size);
+        let candidate =
+            |test: Test, parents| Candidate { test, parents, generation, known: None, simulator_seed: None };
+        for (at, positions) in self.questions().into_iter().take(QUESTIONS.min(size)) {
+            let attribution = &self.attributions[at];
+            let test = attribution.subset(&positions);
+            candidates.push(candidate(test.clone(), vec![attribution.number]));
+            self.asked.push(Asked { test, question: Some((at, positions)) });
+        }
+        while candidates.len() < size {
+            let (test, parents) = self.choose(&mut stream);
+            // The tests of one generation see each other, too.
+            self.tried.add(&self.setting, &test);
+            candidates.push(candidate(test.clone(), parents));
+            self.asked.push(Asked { test, question: None });
+        }
+        self.generation += 1;
+        #[expect(clippy::cast_possible_truncation, reason = "at most as many as a generation has")]
+        let asked = size as u32;
+        self.left -= asked;
+        candidates
+    }
+
+    fn tell(&mut self, results: &[Evaluated]) {
+        let asked = std::mem::take(&mut self.asked);
+        assert!(asked.len() == results.len(), "exactly the generation asked last is told");
+        for (asked, result) in asked.into_iter().zip(results) {
+            self.learn(asked, result);
+        }
+    }
+
+    fn given_up(&self) -> Vec<String> {
+        self.left_out.clone()
+    }
+}

@@ -1,0 +1,173 @@
+//! What the reference run says about when a disturbance is worth a test: moments at which something happens, and when
+//! the topic of an operation has messages at all.
+
+use sesame_base::observation::{Course, Observation, RARE};
+use sesame_base::silence::wires;
+use sesame_plan::{CampaignPlan, OperationId, Span, TopicId};
+use sesame_rng::Stream;
+
+use crate::space::test_space::TestSpace;
+
+/// Events that are no further apart than this share of the run are one moment.
+const ONE_MOMENT: f64 = 0.015;
+/// How many moments are kept, the weightiest ones.
+const KEPT: usize = 24;
+/// How many even moments stand in for those of a run of which nothing is known.
+const EVEN: u32 = 8;
+
+/// A time at which something happens in the undisturbed system.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Moment {
+    /// When, in seconds.
+    pub(super) at: f64,
+    /// How much happens then: the sum, over the signals in which something does, of one over the root of how often
+    /// something happens in the signal.
+    pub(super) weight: f64,
+}
+
+/// The moments of a run, and what is heard in it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Moments {
+    /// When a run ends, in seconds.
+    pub(super) end: f64,
+    /// The shortest time in which anything can happen, in seconds: a step of the simulator, or the shortest time that is
+    /// usual between two messages of a topic that operations disturb.
+    pub(super) grain: f64,
+    /// In order of time, at least one.
+    pub(super) moments: Vec<Moment>,
+    /// Per operation of the test space: when there are messages that it could disturb.
+    pub(super) heard: Vec<Heard>,
+}
+
+/// When there are messages that an operation could disturb.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Heard {
+    /// Stretches with messages, in order; `None` where nothing is known, or the operation needs no messages.
+    stretches: Option<Vec<Span>>,
+    /// The times of its messages if there are few, in order; else empty.
+    pub(super) rare: Vec<f64>,
+    /// The usual time between two messages, in seconds, if it is known.
+    pub(super) period: Option<f64>,
+}
+
+impl Moments {
+    /// Those of a reference run.
+    pub(super) fn from_reference(plan: &CampaignPlan, space: &TestSpace, reference: &Observation) -> Self {
+        let end = plan.campaign.end_after;
+        let heard: Vec<Heard> =
+            space.operations().iter().map(|kind| Heard::of(plan, kind.operation, reference)).collect();
+        let step = plan.simulator.step_ns().map(|ns| ns as f64 * 1e-9);
+        let periods = heard.iter().filter_map(|heard| heard.period).filter(|period| *period > 0.0);
+        let grain = step.or_else(|| periods.reduce(f64::min)).unwrap_or(end * 1e-3);
+        let grain = grain.clamp(end * 1e-5, end * 0.02);
+        let course = reference.course.as_ref();
+        let moments = course.map_or_else(Vec::new, |course| moments(course, end, grain));
+        let even = || (0..EVEN).map(|at| Moment { at: end * (f64::from(at) + 0.5) / f64::from(EVEN), weight: 1.0 });
+        let moments = if moments.is_empty() { even().collect() } else { moments };
+        Moments { end, grain, moments, heard }
+    }
+
+    /// Whether an operation meets a message in a window of the undisturbed run.
+    pub(super) fn is_heard(&self, kind: usize, start: f64, end: f64) -> bool {
+        self.heard[kind].is_heard(start, end)
+    }
+
+    /// A moment, likelier the weightier it is.
+    pub(super) fn draw(&self, stream: &mut Stream) -> f64 {
+        let at = weighted(self.moments.iter().map(|moment| libm::sqrt(moment.weight)), stream);
+        self.moments[at].at
+    }
+
+    /// How much happens in a stretch of time.
+    pub(super) fn weight_in(&self, start: f64, end: f64) -> f64 {
+        self.moments.iter().filter(|moment| start <= moment.at && moment.at < end).map(|moment| moment.weight).sum()
+    }
+
+    /// The run in at most so many parts in which about equally much happens.
+    pub(super) fn parts(&self, count: usize) -> Vec<Span> {
+        let all: f64 = self.moments.iter().map(|moment| moment.weight).sum();
+        let mut cuts = vec![0.0];
+        let mut sum = 0.0;
+        for moment in &self.moments {
+            sum += moment.weight;
+            if sum >= all * cuts.len() as f64 / count as f64 && cuts.len() < count && moment.at > self.grain {
+                cuts.push(moment.at - self.grain / 2.0);
+            }
+        }
+        cuts.push(self.end);
+        let parts = cuts.windows(2).map(|ends| Span { start: ends[0], end: ends[1] });
+        parts.filter(|part| part.length() > self.grain).collect()
+    }
+}
+
+impl Heard {
+    fn of(plan: &CampaignPlan, operation: OperationId, reference: &Observation) -> Heard {
+        let (Some(topic), Some(course)) = (plan.operation(operation).topic, &reference.course) else {
+            return Heard::default();
+        };
+        let wires = wires_of(plan, topic);
+        let on_topic = course.heard.iter().filter(|heard| wires.contains(&heard.wire));
+        let mut stretches: Vec<Span> = on_topic.flat_map(|heard| heard.stretches.iter().copied()).collect();
+        stretches.sort_by(|a, b| a.start.total_cmp(&b.start));
+        let traffic = reference.traffic.iter().filter(|traffic| wires.contains(&traffic.wire));
+        let messages: u64 = traffic.clone().map(|traffic| traffic.messages).sum();
+        let rare = if messages <= RARE as u64 { stretches.iter().map(|span| span.start).collect() } else { Vec::new() };
+        let period = traffic.map(|traffic| traffic.median_gap).filter(|gap| *gap > 0.0).reduce(f64::min);
+        Heard { stretches: Some(stretches), rare, period }
+    }
+
+    fn is_heard(&self, start: f64, end: f64) -> bool {
+        let Some(stretches) = &self.stretches else { return true };
+        // Stretches of several wires may overlap, so their ends need not be in order; they nearly are.
+        stretches.iter().take_while(|span| span.start < end).any(|span| span.end >= start)
+    }
+}
+
+/// The positions of the wires of a topic.
+fn wires_of(plan: &CampaignPlan, topic: TopicId) -> Vec<u32> {
+    let wires = (0..).zip(wires(plan));
+    wires.filter(|(_, (of, _))| *of == topic).map(|(wire, _)| wire).collect()
+}
+
+/// The moments of a course, in order of time.
+fn moments(course: &Course, end: f64, grain: f64) -> Vec<Moment> {
+    let mut events: Vec<(f64, f64, usize)> = Vec::new();
+    for (of, signal) in course.signals.iter().enumerate() {
+        let weight = 1.0 / libm::sqrt(signal.events.len().max(1) as f64);
+        let within = signal.events.iter().map(|event| event.at).filter(|at| grain < *at && *at < end);
+        events.extend(within.map(|at| (at, weight, of)));
+    }
+    events.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
+    let mut found = Vec::new();
+    let mut rest = events.as_slice();
+    while let Some(&(first, ..)) = rest.first() {
+        let (together, later) = rest.split_at(rest.partition_point(|event| event.0 - first <= ONE_MOMENT * end));
+        let at = together.iter().map(|event| event.0).sum::<f64>() / together.len() as f64;
+        let mut signals: Vec<(usize, f64)> = together.iter().map(|&(_, weight, of)| (of, weight)).collect();
+        signals.sort_by_key(|signal| signal.0);
+        signals.dedup_by_key(|signal| signal.0);
+        found.push(Moment { at, weight: signals.iter().map(|signal| signal.1).sum() });
+        rest = later;
+    }
+    found.sort_by(|a, b| b.weight.total_cmp(&a.weight).then(a.at.total_cmp(&b.at)));
+    found.truncate(KEPT);
+    found.sort_by(|a, b| a.at.total_cmp(&b.at));
+    found
+}
+
+/// A position, each as likely as its weight says; weights are not negative and one is above zero.
+pub(super) fn weighted(weights: impl Iterator<Item = f64> + Clone, stream: &mut Stream) -> usize {
+    let mut left = stream.unit() * weights.clone().sum::<f64>();
+    let mut last = 0;
+    for (at, weight) in weights.enumerate() {
+        if weight <= 0.0 {
+            continue;
+        }
+        last = at;
+        left -= weight;
+        if left < 0.0 {
+            break;
+        }
+    }
+    last
+}

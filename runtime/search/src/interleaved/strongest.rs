@@ -1,0 +1,137 @@
+//! The strongest choices of an operation: the ends of its ranges that are farthest from where it disturbs nothing.
+
+use sesame_plan::{CampaignPlan, Choice, ChoiceKind};
+use sesame_rng::Stream;
+
+use crate::space::parameter_space::ParameterSpace;
+use crate::space::range::Range;
+use crate::space::test_space::OperationSpace;
+
+/// Of how many texts or files each counts as a strongest choice.
+const ITEMS: usize = 4;
+
+/// The ways in which one operation is strongest.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Strongest {
+    /// Per parameter its strongest choices, at least one.
+    parameters: Vec<Vec<Choice>>,
+    /// How many ways the search tries one by one: corners of a box are too many.
+    pub(super) ways: usize,
+}
+
+impl Strongest {
+    pub(super) fn of(plan: &CampaignPlan, kind: &OperationSpace) -> Strongest {
+        let operation = plan.operation(kind.operation);
+        let named = operation.parameters.iter().zip(&kind.parameters);
+        let parameters: Vec<Vec<Choice>> =
+            named.map(|(named, space)| choices(space, operation.kind.neutral_value(&named.name))).collect();
+        let count = |(choices, space): (&Vec<Choice>, &ParameterSpace)| match space {
+            ParameterSpace::Point(_) => 1,
+            ParameterSpace::Number(..) | ParameterSpace::Items(_) => choices.len(),
+        };
+        let ways = parameters.iter().zip(&kind.parameters).map(count).max().unwrap_or(1);
+        Strongest { parameters, ways }
+    }
+
+    /// A way of a number below [`Strongest::ways`]; where there are more, as for corners of a box, one of these.
+    pub(super) fn way(&self, way: usize, stream: &mut Stream) -> Vec<Choice> {
+        let choose = |choices: &Vec<Choice>| {
+            let at = if choices.len() > self.ways { stream.below(choices.len()) } else { way % choices.len() };
+            choices[at].clone()
+        };
+        self.parameters.iter().map(choose).collect()
+    }
+
+    /// Any way.
+    pub(super) fn any(&self, stream: &mut Stream) -> Vec<Choice> {
+        let way = stream.below(self.ways);
+        self.way(way, stream)
+    }
+
+    /// One of the strongest choices of a parameter.
+    pub(super) fn choice(&self, parameter: usize, stream: &mut Stream) -> Choice {
+        let choices = &self.parameters[parameter];
+        choices[stream.below(choices.len())].clone()
+    }
+
+    /// Which of its strongest choices the first parameter has, if all parameters have one.
+    pub(super) fn which(&self, chosen: &[Choice]) -> Option<usize> {
+        let mut places = self
+            .parameters
+            .iter()
+            .zip(chosen)
+            .map(|(choices, chosen)| choices.iter().position(|choice| choice == chosen));
+        let first = places.next().unwrap_or(Some(0))?;
+        places.all(|place| place.is_some()).then_some(first)
+    }
+}
+
+fn choices(space: &ParameterSpace, neutral: Option<f64>) -> Vec<Choice> {
+    match space {
+        ParameterSpace::Number(range, ChoiceKind::Value) => {
+            ends(*range, neutral).into_iter().map(|value| Choice::Value { value }).collect()
+        }
+        ParameterSpace::Number(range, ChoiceKind::Range) => {
+            let mut choices: Vec<Choice> =
+                ends(*range, neutral).into_iter().map(|end| Choice::Range { low: end, high: end }).collect();
+            if !range.is_fixed() {
+                choices.push(Choice::Range { low: range.low, high: range.high });
+            }
+            choices
+        }
+        ParameterSpace::Point(axes) => {
+            let ends = axes.map(|axis| ends(axis, neutral));
+            let mut corners = Vec::new();
+            for &x in &ends[0] {
+                for &y in &ends[1] {
+                    corners.extend(ends[2].iter().map(|&z| Choice::Point { point: [x, y, z] }));
+                }
+            }
+            corners
+        }
+        ParameterSpace::Items(items) => {
+            items.iter().take(ITEMS).map(|text| Choice::Text { text: text.clone() }).collect()
+        }
+    }
+}
+
+/// The ends of a range at which a number is strongest: both, where it is mildest between them or nowhere; else the one
+/// that is farther away.
+fn ends(range: Range, neutral: Option<f64>) -> Vec<f64> {
+    let Range { low, high, .. } = range;
+    match neutral {
+        _ if range.is_fixed() => vec![low],
+        Some(neutral) if neutral <= low => vec![high],
+        Some(neutral) if neutral >= high => vec![low],
+        _ => vec![high, low],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use sesame_plan::OperationKind;
+    use sesame_plan::testing::{operation_with, plan, range, value};
+
+    use super::*;
+    use crate::space::test_space::TestSpace;
+
+    fn strongest(kind: OperationKind, parameter: sesame_plan::Parameter) -> Vec<Choice> {
+        let plan = plan(vec![operation_with("o", 0, kind, vec![parameter])]);
+        let space = TestSpace::from_plan(&plan).unwrap();
+        Strongest::of(&plan, &space.operations()[0]).parameters[0].clone()
+    }
+
+    #[test]
+    fn the_strongest_choices_are_the_ends_far_from_where_nothing_is_disturbed() {
+        let value_of = |value| Choice::Value { value };
+        assert_eq!(strongest(OperationKind::Bias, value("bias", 1.0, 3.0)), [value_of(3.0)]);
+        assert_eq!(strongest(OperationKind::Bias, value("bias", -1.0, 3.0)), [value_of(3.0), value_of(-1.0)]);
+        assert_eq!(strongest(OperationKind::Scale, value("factor", 0.0, 1.0)), [value_of(0.0)]);
+        assert_eq!(strongest(OperationKind::RateLimit, value("rate", 1.0, 10.0)), [value_of(1.0)]);
+        assert_eq!(strongest(OperationKind::PacketLoss, value("loss", 0.2, 0.2)), [value_of(0.2)]);
+        let stuck = OperationKind::StuckAt { truth: None };
+        assert_eq!(strongest(stuck, value("value", 0.0, 5.0)), [value_of(5.0), value_of(0.0)]);
+        let noise = strongest(OperationKind::Noise, range("sigma", 0.0, 2.0));
+        assert_eq!(noise, [Choice::Range { low: 2.0, high: 2.0 }, Choice::Range { low: 0.0, high: 2.0 }]);
+    }
+}
