@@ -15,7 +15,7 @@ use crate::space::range::Range;
 use crate::space::test_space::{ActivationSpace, OperationSpace, TestSpace};
 
 /// How many conditions are compared for the one that holds when it is wanted.
-const CONDITIONS: usize = 12;
+const CONDITIONS: usize = 6;
 
 /// What does not change while a search goes on.
 #[derive(Debug, Clone)]

@@ -47,6 +47,8 @@ fn valued(number: u32, test: Test, value: f64) -> Evaluated {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig::with_cases(16))]
+
     /// Whatever a campaign permits, and whatever comes of its tests.
     #[test]
     fn tests_are_permitted(plan in any_plan(), seed: u64) {
