@@ -8,7 +8,7 @@ use anyhow::{Context as _, bail};
 use clap::{Args, Subcommand, ValueEnum};
 
 use sesame_analysis as analysis;
-use sesame_analysis::{GivenFront, Run, Scaling, Selection, Table, regions};
+use sesame_analysis::{GivenFront, Run, Scaling, Selection, Table, causes, regions};
 use sesame_codegen::input;
 use sesame_plan::{CampaignPlan, Dimension};
 use sesame_record::{DATABASE, Repository};
@@ -45,6 +45,13 @@ pub(super) enum Results {
     },
     /// The front: the tests that no other test dominates, by their recorded values.
     Front {
+        #[command(flatten)]
+        input: Input,
+        #[command(flatten)]
+        output: Output,
+    },
+    /// The causes of violations: for each requirement the smallest sets of operations with which tests violate it.
+    Causes {
         #[command(flatten)]
         input: Input,
         #[command(flatten)]
@@ -235,6 +242,14 @@ pub(super) fn results(shell: Shell, asked: Results) -> anyhow::Result<ExitCode> 
                 bail!("campaign `{}` has no objectives, so there is no front", repository.plan().campaign.name);
             }
             print(&analysis::front(&repository, &selection)?, &output)
+        }
+        Results::Causes { input, output } => {
+            let (repository, selection) = open(&input)?;
+            let found = causes::causes(&repository, &selection)?;
+            if found.is_empty() {
+                shell.warning("none of these tests violates a requirement");
+            }
+            print(&causes::table(repository.plan(), &found), &output)
         }
         Results::Sspr { input, dims, compat, output } => {
             let (repository, selection) = open(&input)?;

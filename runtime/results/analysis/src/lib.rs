@@ -11,6 +11,7 @@
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 mod candidates;
+pub mod causes;
 pub mod choice;
 mod compare;
 pub mod compensation;

@@ -1,0 +1,185 @@
+//! The causes of violations: for each requirement, the smallest sets of operations with which tests violate it.
+//!
+//! They follow from the recorded tests of any campaign, whatever its strategy. A set is smallest as far as tests were
+//! run: no recorded test with fewer of its operations violates the requirement. Whether smaller sets were tried at all is
+//! part of each cause. Operations that are known to have had no effect are not part of any.
+
+use std::collections::BTreeSet;
+
+use sesame_plan::{Activation, CampaignPlan, OperationId, RequirementId, Test};
+use sesame_record::{Judge, Origin, RecordError, Repository, TestRow, Verdict};
+use sesame_search::shrink::strength;
+
+use crate::{Datum, Selection, Table};
+
+/// A requirement with a smallest set of operations that violates it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cause {
+    /// The requirement.
+    pub requirement: RequirementId,
+    /// The operations, in order of declaration; at least one.
+    pub operations: BTreeSet<OperationId>,
+    /// The numbers of the tests that violate the requirement and hold these operations, in rising order.
+    pub violating: Vec<u32>,
+    /// How many conclusive tests hold these operations.
+    pub held: u32,
+    /// The smallest of the violating tests that hold no other operations: the fewest uses, then the shortest time, then
+    /// the least strength.
+    pub smallest: u32,
+    /// Whether there is a conclusive test without each single one of the operations and with all others.
+    pub smaller_tried: bool,
+}
+
+/// What a test says about a requirement, and by which operations.
+struct Judged<'a> {
+    row: &'a TestRow,
+    operations: BTreeSet<OperationId>,
+    violates: bool,
+}
+
+/// The causes in the tests of a selection: by requirement, those with few operations first, then those that were found
+/// first.
+pub fn causes(repository: &Repository, selection: &Selection) -> Result<Vec<Cause>, RecordError> {
+    let (plan, judge, rows) = (repository.plan(), repository.judge()?, repository.tests()?);
+    let rows: Vec<&TestRow> =
+        rows.iter().filter(|row| row.origin != Origin::Reference && selection.holds(row.number)).collect();
+    let mut found = Vec::new();
+    for requirement in (0..).map(RequirementId).take(plan.requirements.len()) {
+        found.extend(of_requirement(plan, &judge, &rows, requirement));
+    }
+    Ok(found)
+}
+
+/// The causes as a table.
+pub fn table(plan: &CampaignPlan, causes: &[Cause]) -> Table {
+    let columns = ["requirement", "operations", "violating", "of", "first", "smallest", "fewer"].map(str::to_owned);
+    let mut table = Table::new(columns);
+    for cause in causes {
+        let names: Vec<&str> = cause.operations.iter().map(|&id| plan.operation(id).name.as_str()).collect();
+        let fewer = match (cause.operations.len(), cause.smaller_tried) {
+            (1, _) => "none",
+            (_, true) => "no violation",
+            (_, false) => "not tried",
+        };
+        table.row([
+            Datum::text(&plan.requirement(cause.requirement).name),
+            Datum::Text(names.join(" + ")),
+            Datum::Whole(i64::try_from(cause.violating.len()).unwrap_or(i64::MAX)),
+            Datum::Whole(i64::from(cause.held)),
+            cause.violating.first().map_or(Datum::Missing, |&test| Datum::test(test)),
+            Datum::test(cause.smallest),
+            Datum::text(fewer),
+        ]);
+    }
+    table
+}
+
+fn of_requirement(
+    plan: &CampaignPlan,
+    judge: &Judge<'_>,
+    rows: &[&TestRow],
+    requirement: RequirementId,
+) -> Vec<Cause> {
+    let declared = plan.requirement(requirement);
+    let judged: Vec<Judged<'_>> = rows
+        .iter()
+        .filter_map(|row| {
+            let violates = match judge.verdict(row, declared) {
+                Verdict::Violated => true,
+                Verdict::Satisfied => false,
+                Verdict::Inconclusive => return None,
+            };
+            Some(Judged { row, operations: acting(row), violates })
+        })
+        .collect();
+    let sets: BTreeSet<&BTreeSet<OperationId>> =
+        judged.iter().filter(|test| test.violates && !test.operations.is_empty()).map(|test| &test.operations).collect();
+    let smallest = sets.iter().filter(|set| !sets.iter().any(|other| other != *set && other.is_subset(set)));
+    let mut causes: Vec<Cause> = smallest.map(|set| cause(plan, &judged, requirement, set)).collect();
+    causes.sort_by_key(|cause| (cause.operations.len(), cause.violating.first().copied()));
+    causes
+}
+
+/// The operations of a test, without those that are known to have had no effect.
+fn acting(row: &TestRow) -> BTreeSet<OperationId> {
+    let idle = |at: usize| row.idle.get(at).copied().unwrap_or(false);
+    row.test.operations.iter().enumerate().filter(|(at, _)| !idle(*at)).map(|(_, used)| used.operation).collect()
+}
+
+fn cause(
+    plan: &CampaignPlan,
+    judged: &[Judged<'_>],
+    requirement: RequirementId,
+    set: &BTreeSet<OperationId>,
+) -> Cause {
+    let holding = || judged.iter().filter(|test| set.is_subset(&test.operations));
+    let violating: Vec<u32> = holding().filter(|test| test.violates).map(|test| test.row.number).collect();
+    let only = judged.iter().filter(|test| test.violates && test.operations == *set);
+    let smallest = only.min_by(|a, b| {
+        let size = |test: &Judged<'_>| (test.row.test.operations.len(), length(&test.row.test), strength(plan, &test.row.test));
+        let ((a_uses, a_length, a_strength), (b_uses, b_length, b_strength)) = (size(a), size(b));
+        let by_size = a_uses.cmp(&b_uses).then(a_length.total_cmp(&b_length)).then(a_strength.total_cmp(&b_strength));
+        by_size.then(a.row.number.cmp(&b.row.number))
+    });
+    let was_tried = |left_out: &OperationId| {
+        let fewer: BTreeSet<OperationId> = set.iter().copied().filter(|id| id != left_out).collect();
+        judged.iter().any(|test| test.operations == fewer)
+    };
+    Cause {
+        requirement,
+        operations: set.clone(),
+        violating,
+        held: u32::try_from(holding().count()).unwrap_or(u32::MAX),
+        smallest: smallest.map_or(0, |test| test.row.number),
+        smaller_tried: set.len() > 1 && set.iter().all(was_tried),
+    }
+}
+
+/// The sum of the lengths of windows and activations, in seconds.
+fn length(test: &Test) -> f64 {
+    let lengths = test.operations.iter().map(|used| match &used.activation {
+        Activation::Time { start, end } => end - start,
+        Activation::ConditionFor { length, .. } => *length,
+        Activation::Condition { .. } | Activation::Offline => 0.0,
+    });
+    lengths.sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use sesame_record::sample;
+
+    use super::*;
+
+    /// Beside every set of operations: none with fewer operations violates the requirement, and each violating test
+    /// holds a cause.
+    #[test]
+    fn causes_are_smallest_and_explain_every_violating_test() {
+        let folder = tempfile::tempdir().unwrap();
+        let repository = sample::covering(folder.path());
+        let (plan, judge) = (repository.plan(), repository.judge().unwrap());
+        let found = causes(&repository, &Selection::default()).unwrap();
+        let rows = repository.tests().unwrap();
+        let violating = |requirement: RequirementId| {
+            let declared = plan.requirement(requirement);
+            rows.iter().filter(move |row| {
+                row.origin != Origin::Reference && judge.verdict(row, declared) == Verdict::Violated
+            })
+        };
+        let mut explained = 0;
+        for requirement in (0..).map(RequirementId).take(plan.requirements.len()) {
+            let of: Vec<&Cause> = found.iter().filter(|cause| cause.requirement == requirement).collect();
+            for row in violating(requirement).filter(|row| !acting(row).is_empty()) {
+                assert!(of.iter().any(|cause| cause.operations.is_subset(&acting(row))), "{}", row.number);
+                assert!(!of.iter().any(|cause| {
+                    acting(row).len() < cause.operations.len() && acting(row).is_subset(&cause.operations)
+                }));
+                explained += 1;
+            }
+            for cause in of {
+                assert!(cause.violating.contains(&cause.smallest) && cause.held as usize >= cause.violating.len());
+            }
+        }
+        assert!(explained > 0, "some tests violate a requirement");
+    }
+}
