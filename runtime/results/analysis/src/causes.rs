@@ -74,12 +74,7 @@ pub fn table(plan: &CampaignPlan, causes: &[Cause]) -> Table {
     table
 }
 
-fn of_requirement(
-    plan: &CampaignPlan,
-    judge: &Judge<'_>,
-    rows: &[&TestRow],
-    requirement: RequirementId,
-) -> Vec<Cause> {
+fn of_requirement(plan: &CampaignPlan, judge: &Judge<'_>, rows: &[&TestRow], requirement: RequirementId) -> Vec<Cause> {
     let declared = plan.requirement(requirement);
     let judged: Vec<Judged<'_>> = rows
         .iter()
@@ -92,8 +87,11 @@ fn of_requirement(
             Some(Judged { row, operations: acting(row), violates })
         })
         .collect();
-    let sets: BTreeSet<&BTreeSet<OperationId>> =
-        judged.iter().filter(|test| test.violates && !test.operations.is_empty()).map(|test| &test.operations).collect();
+    let sets: BTreeSet<&BTreeSet<OperationId>> = judged
+        .iter()
+        .filter(|test| test.violates && !test.operations.is_empty())
+        .map(|test| &test.operations)
+        .collect();
     let smallest = sets.iter().filter(|set| !sets.iter().any(|other| other != *set && other.is_subset(set)));
     let mut causes: Vec<Cause> = smallest.map(|set| cause(plan, &judged, requirement, set)).collect();
     causes.sort_by_key(|cause| (cause.operations.len(), cause.violating.first().copied()));
@@ -106,17 +104,14 @@ fn acting(row: &TestRow) -> BTreeSet<OperationId> {
     row.test.operations.iter().enumerate().filter(|(at, _)| !idle(*at)).map(|(_, used)| used.operation).collect()
 }
 
-fn cause(
-    plan: &CampaignPlan,
-    judged: &[Judged<'_>],
-    requirement: RequirementId,
-    set: &BTreeSet<OperationId>,
-) -> Cause {
+fn cause(plan: &CampaignPlan, judged: &[Judged<'_>], requirement: RequirementId, set: &BTreeSet<OperationId>) -> Cause {
     let holding = || judged.iter().filter(|test| set.is_subset(&test.operations));
     let violating: Vec<u32> = holding().filter(|test| test.violates).map(|test| test.row.number).collect();
     let only = judged.iter().filter(|test| test.violates && test.operations == *set);
     let smallest = only.min_by(|a, b| {
-        let size = |test: &Judged<'_>| (test.row.test.operations.len(), length(&test.row.test), strength(plan, &test.row.test));
+        let size = |test: &Judged<'_>| {
+            (test.row.test.operations.len(), length(&test.row.test), strength(plan, &test.row.test))
+        };
         let ((a_uses, a_length, a_strength), (b_uses, b_length, b_strength)) = (size(a), size(b));
         let by_size = a_uses.cmp(&b_uses).then(a_length.total_cmp(&b_length)).then(a_strength.total_cmp(&b_strength));
         by_size.then(a.row.number.cmp(&b.row.number))
@@ -160,16 +155,13 @@ mod tests {
         let (plan, judge) = (repository.plan(), repository.judge().unwrap());
         let found = causes(&repository, &Selection::default()).unwrap();
         let rows = repository.tests().unwrap();
-        let violating = |requirement: RequirementId| {
-            let declared = plan.requirement(requirement);
-            rows.iter().filter(move |row| {
-                row.origin != Origin::Reference && judge.verdict(row, declared) == Verdict::Violated
-            })
-        };
         let mut explained = 0;
         for requirement in (0..).map(RequirementId).take(plan.requirements.len()) {
             let of: Vec<&Cause> = found.iter().filter(|cause| cause.requirement == requirement).collect();
-            for row in violating(requirement).filter(|row| !acting(row).is_empty()) {
+            let declared = plan.requirement(requirement);
+            let violates =
+                |row: &&TestRow| row.origin != Origin::Reference && judge.verdict(row, declared) == Verdict::Violated;
+            for row in rows.iter().filter(violates).filter(|row| !acting(row).is_empty()) {
                 assert!(of.iter().any(|cause| cause.operations.is_subset(&acting(row))), "{}", row.number);
                 assert!(!of.iter().any(|cause| {
                     acting(row).len() < cause.operations.len() && acting(row).is_subset(&cause.operations)

@@ -43,11 +43,6 @@ impl Causes {
             |known: &Cause| known.requirement == requirement && known.kinds.len() == 1 && known.kinds.contains(&kind);
         self.0.iter().any(is)
     }
-
-    /// How many there are.
-    pub(super) fn len(&self) -> usize {
-        self.0.len()
-    }
 }
 
 /// The search for the operations that are to blame for a violation.
@@ -214,7 +209,7 @@ mod tests {
             let held: BTreeSet<usize> = kinds.iter().copied().collect();
             prop_assume!(violating.iter().any(|cause| cause.is_subset(&held)));
             let (causes, asked) = attribute(&kinds, &violating);
-            prop_assert!(causes.len() >= 1);
+            prop_assert!(!causes.0.is_empty());
             for Cause { kinds, .. } in &causes.0 {
                 let violates = |set: &BTreeSet<usize>| violating.iter().any(|cause| cause.is_subset(set));
                 prop_assert!(violates(kinds));
