@@ -1,0 +1,132 @@
+"""The real program: plans of spaces, and searches of whole campaigns, whose recorded tests are judged like any others.
+
+Only what a test contains is used: operations, windows, choices and seeds. Recorded values serve to compare the judge's
+world with Sesame.
+"""
+
+import json
+import sqlite3
+import subprocess
+import tempfile
+from collections.abc import Mapping
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+from bugs.space import Choice, Space, Test, Use
+
+CAMPAIGN = "search"
+
+# What follows `search STRATEGY` for strategies other than that of the case, besides the number of tests.
+SETTINGS = {"nsga2": "population 20", "nsga3": "population 20", "map_elites": "population 20"}
+
+
+class SesamecFailed(Exception):
+    """The program ended with an error; the message has its last lines."""
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A test that Sesame ran, and what it recorded."""
+
+    number: int
+    test: Test
+    values: Mapping[str, float | None]  # of metrics
+    verdicts: Mapping[str, str]  # of requirements: satisfied, violated or inconclusive
+    simulator_seed: int
+
+
+def plan_of(sesamec: Path, space_file: Path) -> dict:
+    """The plan of a space's campaign `search`."""
+    with tempfile.TemporaryDirectory() as folder:
+        _run(sesamec, "generate", str(space_file.resolve()), "--campaign", CAMPAIGN, "--out", folder)
+        return json.loads((Path(folder) / CAMPAIGN / "campaign.plan.json").read_text(encoding="utf-8"))
+
+
+def search(
+    sesamec: Path, space_file: Path, space: Space, seed: int, tests: int, strategy: str | None = None
+) -> list[Recorded]:
+    """Runs the campaign `search`, or the same campaign with another strategy, and returns its tests in order."""
+    with tempfile.TemporaryDirectory() as name:
+        folder, file, campaign = Path(name), space_file.resolve(), CAMPAIGN
+        if strategy is not None:
+            file, campaign = _with_strategy(file, strategy, tests, folder), f"{CAMPAIGN}_by_{strategy}"
+        _run(
+            sesamec, "run", str(file), "--campaign", campaign, "--out", str(folder / "runners"),
+            "--", "--seed", str(seed), "--evaluations", str(tests), "--workers", "1",
+            "--results", str(folder / "results"), "--fail-on", "nothing",
+        )  # fmt: skip
+        return read_results(folder / "results" / str(seed) / "results.sqlite", space)
+
+
+def read_results(file: Path, space: Space) -> list[Recorded]:
+    """The tests of a search in a results file, without reference runs."""
+    with closing(sqlite3.connect(f"file:{file}?mode=ro", uri=True)) as results:
+        tests = results.execute("SELECT number, simulator_seed FROM tests WHERE origin = 'search' ORDER BY number")
+        return [
+            Recorded(
+                number,
+                _recorded_test(results, number, space),
+                dict(results.execute(_VALUES, (number,)).fetchall()),
+                dict(results.execute("SELECT requirement, verdict FROM verdicts WHERE test = ?", (number,)).fetchall()),
+                int(seed),
+            )
+            for number, seed in tests.fetchall()
+        ]
+
+
+# A test that is equal to an earlier one has the values of that one.
+_VALUES = """
+SELECT metrics.name, metric_values.value
+  FROM tests
+  JOIN metric_values ON metric_values.test = coalesce(tests.duplicate_of, tests.number)
+  JOIN metrics ON metrics.id = metric_values.metric
+ WHERE tests.number = ?
+"""
+
+
+def _recorded_test(results: sqlite3.Connection, number: int, space: Space) -> Test:
+    rows = results.execute(
+        "SELECT position, operation, start_s, end_s, operation_seed FROM operations WHERE test = ? ORDER BY position",
+        (number,),
+    )
+    uses = []
+    for position, operation, start, end, seed in rows.fetchall():
+        choices = results.execute(
+            "SELECT parameter, value, low, high, x, y, z, text FROM choices WHERE test = ? AND operation = ?",
+            (number, position),
+        )
+        chosen = {name: _choice(*fields) for name, *fields in choices.fetchall()}
+        parameters = space.operations[operation].parameters
+        uses.append(Use(operation, start, end, tuple(chosen[each.name] for each in parameters), int(seed)))
+    return tuple(uses)
+
+
+def _choice(
+    value: float | None, low: float | None, high: float | None,
+    x: float | None, y: float | None, z: float | None, text: str | None,
+) -> Choice:  # fmt: skip
+    if value is not None:
+        return value
+    if low is not None:
+        return low, high
+    return (x, y, z) if x is not None else text
+
+
+def _with_strategy(space_file: Path, strategy: str, tests: int, folder: Path) -> Path:
+    """A space that imports a case's space, and whose campaign differs from `search` only in its strategy."""
+    file = folder / f"{space_file.stem}_{strategy}.sesame"
+    settings = f"{SETTINGS.get(strategy, '')} evaluations {tests}"
+    file.write_text(
+        f'space {file.stem}\nimport "{space_file}"\n'
+        f"campaign {CAMPAIGN}_by_{strategy} from {CAMPAIGN} {{ search {strategy} {{ {settings} }} }}\n",
+        encoding="utf-8",
+    )
+    return file
+
+
+def _run(sesamec: Path, *arguments: str) -> None:
+    done = subprocess.run([sesamec, *arguments], stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        last = "\n".join(done.stderr.strip().splitlines()[-15:])
+        raise SesamecFailed(f"`{sesamec} {' '.join(arguments)}` ended with {done.returncode}:\n{last}")
