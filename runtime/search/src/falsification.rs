@@ -18,7 +18,7 @@ use sesame_plan::{Activation, CampaignPlan, Choice, Test};
 use sesame_rng::Stream;
 
 use crate::evolve::variation::{Rates, crossover, mutate};
-use crate::margin::{confirmed_margins, margins};
+use crate::margin::evaluated_margins;
 use crate::sample::sampled_search::Sampling;
 use crate::sample::sobol::Sobol;
 use crate::space::initial::fresh_test;
@@ -88,12 +88,7 @@ impl Strategy for Falsification {
 
     fn tell(&mut self, results: &[Evaluated]) {
         let plan = &self.plan;
-        let margins = |result: &Evaluated| match plan.campaign.confirm {
-            Some(confirmation) if !result.fresh_runs.is_empty() => {
-                confirmed_margins(plan, confirmation.by, &result.fresh_runs)
-            }
-            _ => margins(plan, &result.run),
-        };
+        let margins = |result: &Evaluated| evaluated_margins(plan, result);
         let told = "exactly the generation asked last is told";
         match &mut self.search {
             Inner::Tests { search, asked } => {
@@ -283,6 +278,7 @@ mod tests {
     use sesame_plan::{Search, Strategy};
 
     use super::*;
+    use crate::margin::margins;
     use crate::space::test_space::tests::{any_timed_plan, broken_rule};
     use crate::testing::synthetic_robots::{SYNTHETIC_ROBOTS, SyntheticRobot};
 

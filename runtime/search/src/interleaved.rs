@@ -40,7 +40,7 @@ use tried::Tried;
 
 use crate::evolve::predict::VariableTrajectories;
 use crate::falsification::TestDomain;
-use crate::margin::{confirmed_margins, margins};
+use crate::margin::{evaluated_margins, margins};
 use crate::space::initial::fresh_test;
 use crate::space::test_space::TestSpace;
 use crate::{Candidate, Evaluated, Strategy};
@@ -227,12 +227,7 @@ impl Interleaved {
     /// Takes what one test came to.
     fn learn(&mut self, asked: Asked, result: &Evaluated) {
         let plan = &self.setting.plan;
-        let all = match plan.campaign.confirm {
-            Some(confirmation) if !result.fresh_runs.is_empty() => {
-                confirmed_margins(plan, confirmation.by, &result.fresh_runs)
-            }
-            _ => margins(plan, &result.run),
-        };
+        let all = evaluated_margins(plan, result);
         let of = |&(requirement, scale): &(usize, f64)| {
             (all[requirement].value.map(|value| value / scale), all[requirement].violated)
         };

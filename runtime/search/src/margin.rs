@@ -5,6 +5,7 @@ use sesame_base::verdict::{Verdict, verdict};
 use sesame_optimise::falsify::Margin;
 use sesame_plan::{Bound, CampaignPlan, Requirement, Statistic};
 
+use crate::Evaluated;
 use crate::confirmed_front::aggregate_margin;
 
 /// The margin of each requirement of the plan, in its order. One is violated exactly where the requirement's
@@ -39,6 +40,17 @@ pub fn confirmed_margins(plan: &CampaignPlan, by: Statistic, fresh_runs: &[Obser
         aggregate_margin(&margins, by)
     };
     (0..plan.requirements.len()).map(of).collect()
+}
+
+/// The margin of each requirement in an evaluated test: over the fresh runs where the campaign confirms, else in its own
+/// run.
+pub(crate) fn evaluated_margins(plan: &CampaignPlan, result: &Evaluated) -> Vec<Margin> {
+    match plan.campaign.confirm {
+        Some(confirmation) if !result.fresh_runs.is_empty() => {
+            confirmed_margins(plan, confirmation.by, &result.fresh_runs)
+        }
+        _ => margins(plan, &result.run),
+    }
 }
 
 /// How far a value is from breaking a bound.

@@ -16,6 +16,8 @@
 //! The first assumes that tests are drawn independently. Random search draws so; a search that learns does not, and the
 //! reason to stop says that the bound is biased then.
 
+mod causes;
+
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -23,6 +25,8 @@ use sesame_optimise::dominance::Fitness;
 use sesame_optimise::front::Front;
 use sesame_optimise::hypervolume::{self, Growth};
 use sesame_plan::{CampaignPlan, StopRule};
+
+use causes::Seen;
 
 use crate::Evaluated;
 use crate::coverage::{Coverage, Feasible, Grid};
@@ -47,6 +51,8 @@ pub struct StopRules {
     /// Cells that one test has hit, and cells that two have.
     once: u32,
     twice: u32,
+    /// What is known of causes, where a rule asks for them.
+    seen: Option<Seen>,
     front: Front,
     /// The worst value of each objective so far: what hypervolumes are measured from.
     worst: Vec<f64>,
@@ -60,6 +66,8 @@ impl StopRules {
         // A plan whose cells do not form a grid was refused before.
         let cells = plan.campaign.coverage.as_ref().and_then(|goal| Grid::new(goal.axes.clone()).ok());
         let asks = plan.campaign.stop.iter().any(|rule| matches!(rule, StopRule::Completeness { .. }));
+        let is_by_causes = |rule: &StopRule| matches!(rule, StopRule::NoNewCause { .. } | StopRule::EveryPair);
+        let by_causes = plan.campaign.stop.iter().any(is_by_causes);
         StopRules {
             feasible: cells.as_ref().filter(|_| asks).map(|grid| Feasible::from_plan(plan, grid)),
             rules: plan.campaign.stop.clone(),
@@ -72,6 +80,7 @@ impl StopRules {
             tests: 0,
             once: 0,
             twice: 0,
+            seen: by_causes.then(|| Seen::new(plan)),
             front: Front::default(),
             worst: Vec::new(),
             fronts: VecDeque::new(),
@@ -82,6 +91,9 @@ impl StopRules {
     pub fn tell(&mut self, results: &[Evaluated]) {
         for result in results {
             self.tests += 1;
+            if let Some(seen) = &mut self.seen {
+                seen.tell(result);
+            }
             let cells = self.cells.as_ref().zip(result.point.as_ref());
             if let Some(cell) = cells.and_then(|(cells, point)| cells.grid().cell_of(point)) {
                 self.count(cell);
@@ -159,6 +171,22 @@ impl StopRules {
                 })
             }
             StopRule::Completeness { share } => self.complete(share),
+            StopRule::NoNewCause { tests } => {
+                let seen = self.seen.as_ref().filter(|seen| seen.unchanged() >= tests)?;
+                let causes = match seen.causes() {
+                    0 => "no violation, so no cause, was seen".to_owned(),
+                    1 => "1 cause is known".to_owned(),
+                    causes => format!("{causes} causes are known"),
+                };
+                Some(format!("its last {} tests showed no new cause; {causes}", seen.unchanged()))
+            }
+            StopRule::EveryPair => {
+                let pairs = self.seen.as_ref()?.pairs_if_tried()?;
+                Some(format!(
+                    "each two of its operations were tried together, or hold known causes ({pairs} pairs, in any part of \
+                     the run)"
+                ))
+            }
         }
     }
 

@@ -51,8 +51,12 @@ pub(super) fn rich() -> CampaignPlan {
     let children = BoostedChildren::Falling { first: 9, last: 2, drop: 1 };
     plan.campaign.exploration = Some(Exploration::Boost { every_generations: 2, children, tries: 5 });
     plan.campaign.confirm = Some(Confirmation { times: 3, by: Statistic::Quantile { share: 0.5 }, violations: true });
-    plan.campaign.stop =
-        vec![StopRule::Stagnation { generations: 3, below: 0.01 }, StopRule::Completeness { share: 0.9 }];
+    plan.campaign.stop = vec![
+        StopRule::Stagnation { generations: 3, below: 0.01 },
+        StopRule::Completeness { share: 0.9 },
+        StopRule::NoNewCause { tests: 40 },
+        StopRule::EveryPair,
+    ];
     let bound = plan.requirements[0].bound;
     plan.tests[0].expectations = vec![Expectation { metric: MetricId(0), bound }];
     plan.labs = vec![Lab {

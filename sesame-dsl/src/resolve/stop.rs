@@ -24,6 +24,28 @@ impl<'a> Resolver<'a> {
         let completeness = self
             .single(&written.completenesses, "completeness")
             .map(|quantity| Some(StopRule::Completeness { share: self.share(quantity, "the completeness")? }));
+        let causes = self
+            .single(&written.causes, "no new cause")
+            .map(|tests| Some(StopRule::NoNewCause { tests: self.count(*tests, 1, "the number of tests")? }));
+        let pairs = self.single(&written.pairs, "every pair").map(|()| Some(StopRule::EveryPair));
+        let by_causes = written.causes.first().map(|(span, _)| (*span, "no new cause"));
+        let by_causes = by_causes.or(written.pairs.first().map(|(span, ())| (*span, "every pair")));
+        if let Some((span, word)) = by_causes
+            && self.without_requirements(campaign)
+        {
+            let title = format!("`{word}` needs a requirement, whose causes are counted");
+            let diagnostic = Diagnostic::new(Code::NOTHING_TO_EXPLORE, span, title);
+            self.report(diagnostic.label("add a `requirement`"));
+            return None;
+        }
+        if let (Some((span, ())), Some(operations)) = (written.pairs.first(), campaign.operations.first())
+            && operations.max.value.is_some_and(|max| max < 2)
+        {
+            let title = "`every pair` needs tests with at least two operations";
+            let diagnostic = Diagnostic::new(Code::OUT_OF_RANGE, *span, title).label("no test holds a pair");
+            self.report(diagnostic.secondary(operations.max.span, "no test holds more than this"));
+            return None;
+        }
         let by_cells = written.discoveries.first().map(|(span, _)| (*span, "discovery"));
         let by_cells = by_cells.or(written.completenesses.first().map(|(span, _)| (*span, "completeness")));
         if let Some((span, word)) = by_cells
@@ -35,7 +57,7 @@ impl<'a> Resolver<'a> {
             self.report(diagnostic.label("add a `coverage`, whose cells are counted"));
             return None;
         }
-        let rules = [time, stagnation, discovery, completeness];
+        let rules = [time, stagnation, discovery, completeness, causes, pairs];
         let none = rules.iter().all(Option::is_none);
         if none && !written.has_errors {
             let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, written.span, "`stop` needs at least one rule")

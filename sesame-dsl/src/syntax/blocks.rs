@@ -371,6 +371,8 @@ pub(super) const BLOCKS: &[Block] = &[
             Member::new(Rule::stop_stagnation, "stagnation"),
             Member::new(Rule::stop_discovery, "discovery"),
             Member::new(Rule::stop_completeness, "completeness"),
+            Member::like(Rule::stop_causes, "no", "no new cause in 40 tests"),
+            Member::like(Rule::stop_pairs, "every", "every pair"),
         ],
     ),
     Block::settings(Rule::repeat_settings, "repeat", &[Member::new(Rule::setting_seed, "seed")]),

@@ -420,6 +420,7 @@ fn campaign(like: &Campaign, metrics: &[Metric], end_after: f64) -> impl Strateg
         Just(Vec::new()),
         (1.0..1e5f64).prop_map(|seconds| vec![StopRule::WallTime { seconds }]),
         (0.01..0.99f64).prop_map(|share| vec![StopRule::Completeness { share }]),
+        (1..500u32).prop_map(|tests| vec![StopRule::NoNewCause { tests }, StopRule::EveryPair]),
     ];
     let copies = prop::sample::select(vec![Copies::Apart, Copies::MayOverlap, Copies::Once]);
     let recorded = prop::option::of(prop::sample::select(vec![Recorded::Failing, Recorded::All]));

@@ -159,6 +159,8 @@ fn stop_rule(rule: &StopRule) -> String {
         }
         StopRule::Discovery { below } => format!("discovery below {}", Unit::Share.number(below)),
         StopRule::Completeness { share } => format!("completeness {}", Unit::Share.number(share)),
+        StopRule::NoNewCause { tests } => format!("no new cause in {tests} tests"),
+        StopRule::EveryPair => "every pair".to_owned(),
     }
 }
 

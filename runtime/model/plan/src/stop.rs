@@ -29,4 +29,12 @@ pub enum StopRule {
         /// At least this share of them, in `0..=1` and above 0.
         share: f64,
     },
+    /// The last tests showed no new cause: no violation of a requirement that a smaller or equal set of operations did
+    /// not explain already.
+    NoNewCause {
+        /// So many tests; at least 1.
+        tests: u32,
+    },
+    /// Each two operations acted together in a test, or a known cause explains what they would violate.
+    EveryPair,
 }

@@ -76,5 +76,7 @@ pub(crate) struct Stop {
     pub(crate) stagnations: Vec<(Span, (Count, Quantity))>,
     pub(crate) discoveries: Vec<(Span, Quantity)>,
     pub(crate) completenesses: Vec<(Span, Quantity)>,
+    pub(crate) causes: Vec<(Span, Count)>,
+    pub(crate) pairs: Vec<(Span, ())>,
     pub(crate) has_errors: bool,
 }

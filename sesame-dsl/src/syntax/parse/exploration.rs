@@ -115,19 +115,24 @@ impl Reader<'_> {
             stagnations: vec![],
             discoveries: vec![],
             completenesses: vec![],
+            causes: vec![],
+            pairs: vec![],
             has_errors: false,
         };
         stop.has_errors = self.members(&expect_child(pair, Rule::stop_settings), |reader, rule| {
             let span = reader.keyword_span(&rule);
-            let quantity = reader.signed(&expect_child(&rule, Rule::signed));
-            match rule.as_rule() {
-                Rule::stop_time => stop.times.push((span, quantity)),
-                Rule::stop_stagnation => {
-                    let generations = reader.count(&expect_child(&rule, Rule::number));
+            let quantity = child(&rule, Rule::signed).map(|signed| reader.signed(&signed));
+            let count = child(&rule, Rule::number).map(|number| reader.count(&number));
+            match (rule.as_rule(), quantity, count) {
+                (Rule::stop_time, Some(quantity), _) => stop.times.push((span, quantity)),
+                (Rule::stop_stagnation, Some(quantity), Some(generations)) => {
                     stop.stagnations.push((span, (generations, quantity)));
                 }
-                Rule::stop_discovery => stop.discoveries.push((span, quantity)),
-                _ => stop.completenesses.push((span, quantity)),
+                (Rule::stop_discovery, Some(quantity), _) => stop.discoveries.push((span, quantity)),
+                (Rule::stop_completeness, Some(quantity), _) => stop.completenesses.push((span, quantity)),
+                (Rule::stop_causes, _, Some(tests)) => stop.causes.push((span, tests)),
+                (Rule::stop_pairs, ..) => stop.pairs.push((span, ())),
+                (rule, ..) => unreachable!("a rule of `stop` has what the grammar says: {rule:?}"),
             }
         });
         stop

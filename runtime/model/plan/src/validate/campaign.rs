@@ -127,5 +127,7 @@ fn stop_rule(rule: &StopRule) -> Checked {
         }
         StopRule::Discovery { below } => at("below", positive_share(below)),
         StopRule::Completeness { share } => at("share", positive_share(share)),
+        StopRule::NoNewCause { tests } => at("tests", at_least_one(tests)),
+        StopRule::EveryPair => Ok(()),
     }
 }
