@@ -38,5 +38,5 @@ pub use evolve::variation::{Rates, TestVariation};
 pub use margin::{confirmed_margins, margins};
 pub use neighbours::Neighbours;
 pub use objective::{fitness, fitness_of};
-pub use stop::StopRules;
+pub use stop::{StopRules, discovery_at_most};
 pub use strategy::{Candidate, Evaluated, Strategy};

@@ -235,16 +235,22 @@ impl StopRules {
     /// What is known of rare cells; `None` before a test has hit any.
     fn rare(&self) -> Option<Rare> {
         let cells = self.cells.as_ref().filter(|cells| cells.covered() > 0)?;
-        let (once, twice) = (f64::from(self.once), f64::from(self.twice));
-        let z = DEVIATIONS;
-        let new = once + z * z / 2.0 + z * libm::sqrt(once + 2.0 * twice + z * z / 4.0);
-        let discovery = (new / f64::from(self.tests)).min(1.0);
+        let discovery = discovery_at_most(self.once, self.twice, self.tests);
         Some(Rare { hit: cells.covered(), discovery })
     }
 
     fn bias(&self) -> &'static str {
         if self.independent { "" } else { "; a biased bound, as this search does not draw its tests independently" }
     }
+}
+
+/// What the probability that a next test shows something new is at most, at 99 % confidence after Good and Turing, if
+/// tests are drawn independently: of so many tests, so many things were shown by exactly one, and so many by exactly
+/// two. It is 1 where there is no test.
+pub fn discovery_at_most(once: u32, twice: u32, tests: u32) -> f64 {
+    let (once, twice, z) = (f64::from(once), f64::from(twice), DEVIATIONS);
+    let new = once + z * z / 2.0 + z * libm::sqrt(once + 2.0 * twice + z * z / 4.0);
+    if tests == 0 { 1.0 } else { (new / f64::from(tests)).min(1.0) }
 }
 
 /// What is known of rare cells.

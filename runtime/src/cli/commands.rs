@@ -66,6 +66,8 @@ pub enum Showing {
     Export(export::ExportArgs),
     /// Write the page again and print the findings, also of an unfinished run
     Report(report::ReportArgs),
+    /// The causes of violations: for each requirement the smallest sets of operations with which tests violate it
+    Causes(view::Which),
     /// List all tests of a run
     List(view::Which),
     /// Show one test in full: operations, effects, metrics, requirements
@@ -171,6 +173,7 @@ impl Showing {
         match self {
             Showing::Export(args) => export::export(results, args),
             Showing::Report(args) => report::report(results, args),
+            Showing::Causes(which) => view::causes(results, which),
             Showing::List(which) => view::list(results, which),
             Showing::Show { test, at, which } => view::show(results, which, test, *at),
             Showing::Digest(which) => view::digest(results, which),

@@ -31,6 +31,14 @@ pub(super) fn list(results: &Path, which: &Which) -> Result<ExitCode, Failure> {
     }
 }
 
+pub(super) fn causes(results: &Path, which: &Which) -> Result<ExitCode, Failure> {
+    let found = report::causes(&open(results, which.results.as_deref())?)?;
+    match which.format {
+        Format::Text => print(&report::causes_text(&found, text_options())),
+        Format::Json => print_json(&found),
+    }
+}
+
 /// A moment of a test from the command line, in seconds: `12.3s`, `12.3` or `300ms`.
 pub(super) fn moment(text: &str) -> Result<f64, String> {
     let (digits, scale) = match (text.strip_suffix("ms"), text.strip_suffix('s')) {

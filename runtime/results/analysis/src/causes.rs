@@ -6,8 +6,10 @@
 
 use std::collections::BTreeSet;
 
+use serde::Serialize;
 use sesame_plan::{Activation, CampaignPlan, OperationId, RequirementId, Test};
 use sesame_record::{Judge, Origin, RecordError, Repository, TestRow, Verdict};
+use sesame_search::discovery_at_most;
 use sesame_search::shrink::strength;
 
 use crate::{Datum, Selection, Table};
@@ -30,6 +32,29 @@ pub struct Cause {
     pub smaller_tried: bool,
 }
 
+/// The causes of some tests.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Causes {
+    /// By requirement: those with few operations first, then those that were found first.
+    pub found: Vec<Cause>,
+    /// What can be said of causes that were not found; `None` where none was.
+    pub unseen: Option<Unseen>,
+}
+
+/// What the causes of some tests say about causes that none of them showed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Unseen {
+    /// How many tests there are that are conclusive about a requirement.
+    pub tests: u32,
+    /// How many causes only one of them showed.
+    pub once: u32,
+    /// An upper bound, at 99 % confidence after Good and Turing, on the probability that a further test shows a new
+    /// cause, if tests are drawn independently.
+    pub at_most: f64,
+    /// Whether the search draws its tests independently; otherwise the bound is biased.
+    pub independent: bool,
+}
+
 /// What a test says about a requirement, and by which operations.
 struct Judged<'a> {
     row: &'a TestRow,
@@ -41,13 +66,32 @@ struct Judged<'a> {
 /// first.
 pub fn causes(repository: &Repository, selection: &Selection) -> Result<Vec<Cause>, RecordError> {
     let (plan, judge, rows) = (repository.plan(), repository.judge()?, repository.tests()?);
+    let rows: Vec<&TestRow> = rows.iter().filter(|row| selection.holds(row.number)).collect();
+    Ok(causes_in(plan, &judge, &rows).found)
+}
+
+/// The causes in these tests, and what they say about others. Reference runs are left out.
+pub fn causes_in(plan: &CampaignPlan, judge: &Judge<'_>, rows: &[&TestRow]) -> Causes {
     let rows: Vec<&TestRow> =
-        rows.iter().filter(|row| row.origin != Origin::Reference && selection.holds(row.number)).collect();
+        rows.iter().copied().filter(|row| row.origin != Origin::Reference && row.duplicate_of.is_none()).collect();
     let mut found = Vec::new();
+    let mut conclusive = BTreeSet::new();
     for requirement in (0..).map(RequirementId).take(plan.requirements.len()) {
-        found.extend(of_requirement(plan, &judge, &rows, requirement));
+        let judged = judged(plan, judge, &rows, requirement);
+        conclusive.extend(judged.iter().map(|test| test.row.number));
+        found.extend(of_requirement(plan, &judged, requirement));
     }
-    Ok(found)
+    let tests = u32::try_from(conclusive.len()).unwrap_or(u32::MAX);
+    let seen = |times: usize| found.iter().filter(|cause| cause.violating.len() == times).count();
+    let [once, twice] = [1, 2].map(|times| u32::try_from(seen(times)).unwrap_or(u32::MAX));
+    let strategy = plan.campaign.search.strategy();
+    let unseen = (!found.is_empty()).then(|| Unseen {
+        tests,
+        once,
+        at_most: discovery_at_most(once, twice, tests),
+        independent: strategy.is_some_and(|strategy| strategy.kind().properties().independent),
+    });
+    Causes { found, unseen }
 }
 
 /// The causes as a table.
@@ -74,10 +118,15 @@ pub fn table(plan: &CampaignPlan, causes: &[Cause]) -> Table {
     table
 }
 
-fn of_requirement(plan: &CampaignPlan, judge: &Judge<'_>, rows: &[&TestRow], requirement: RequirementId) -> Vec<Cause> {
+/// What each test says about a requirement, if it is conclusive.
+fn judged<'a>(
+    plan: &CampaignPlan,
+    judge: &Judge<'_>,
+    rows: &[&'a TestRow],
+    requirement: RequirementId,
+) -> Vec<Judged<'a>> {
     let declared = plan.requirement(requirement);
-    let judged: Vec<Judged<'_>> = rows
-        .iter()
+    rows.iter()
         .filter_map(|row| {
             let violates = match judge.verdict(row, declared) {
                 Verdict::Violated => true,
@@ -86,14 +135,25 @@ fn of_requirement(plan: &CampaignPlan, judge: &Judge<'_>, rows: &[&TestRow], req
             };
             Some(Judged { row, operations: acting(row), violates })
         })
-        .collect();
+        .collect()
+}
+
+fn of_requirement(plan: &CampaignPlan, judged: &[Judged<'_>], requirement: RequirementId) -> Vec<Cause> {
     let sets: BTreeSet<&BTreeSet<OperationId>> = judged
         .iter()
         .filter(|test| test.violates && !test.operations.is_empty())
         .map(|test| &test.operations)
         .collect();
-    let smallest = sets.iter().filter(|set| !sets.iter().any(|other| other != *set && other.is_subset(set)));
-    let mut causes: Vec<Cause> = smallest.map(|set| cause(plan, &judged, requirement, set)).collect();
+    // Small ones first, so that each needs to be compared with the smallest ones only.
+    let mut sets: Vec<&BTreeSet<OperationId>> = sets.into_iter().collect();
+    sets.sort_by_key(|set| set.len());
+    let mut smallest: Vec<&BTreeSet<OperationId>> = Vec::new();
+    for set in sets {
+        if !smallest.iter().any(|known| known.is_subset(set)) {
+            smallest.push(set);
+        }
+    }
+    let mut causes: Vec<Cause> = smallest.into_iter().map(|set| cause(plan, judged, requirement, set)).collect();
     causes.sort_by_key(|cause| (cause.operations.len(), cause.violating.first().copied()));
     causes
 }

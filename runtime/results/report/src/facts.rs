@@ -1,5 +1,6 @@
 //! The facts of reports, each computed once from the results. They serialise to JSON as they are.
 
+pub(super) mod causes;
 pub(super) mod certificate;
 pub(super) mod coverage;
 pub(super) mod monitors;

@@ -7,6 +7,7 @@ use sesame_present::markup::Markup;
 use sesame_present::number;
 use sesame_record::{RecordError, Repository, Verdict};
 
+use crate::facts::causes::CauseSummary;
 use crate::facts::summary::{ExpectationSummary, Failure, NotFinite, RequirementSummary, Summary, summary};
 use crate::file::write_aside;
 use crate::sentences::headline;
@@ -18,17 +19,23 @@ pub fn write_junit(repository: &Repository, path: &Path) -> Result<(), RecordErr
 
 /// A summary as a JUnit test suite.
 ///
-/// Each requirement is a test case: it fails if a test violates it, and is skipped with a reason if none does but some
-/// are inconclusive. Each expectation of a regression test is a test case: it fails if it is violated, and is an error
+/// Each cause of a violated requirement is a test case that fails. Each other requirement is a test case: it fails if a
+/// test violates it, and is skipped with a reason if none does but some are inconclusive. Each expectation of a regression test is a test case: it fails if it is violated, and is an error
 /// if it is inconclusive. Each crash and each timeout is an error, and so is each test in which a metric read a number
 /// that was not finite. Tests that were run again count with the verdicts of their fresh runs: a finding of the first
 /// run that no fresh run shows is named, but fails nothing.
 pub fn junit(summary: &Summary) -> String {
     let class = format!("{}.{}", summary.space, summary.campaign);
     let mut cases = Vec::new();
-    cases.extend(
-        summary.requirements.iter().map(|requirement| requirement_case(&class, requirement, &summary.confirmed)),
-    );
+    for requirement in &summary.requirements {
+        let causes = summary.causes.iter().flat_map(|found| &found.causes);
+        let causes: Vec<&CauseSummary> =
+            causes.filter(|cause| cause.requirement == requirement.requirement && requirement.violated > 0).collect();
+        if causes.is_empty() {
+            cases.push(requirement_case(&class, requirement, &summary.confirmed));
+        }
+        cases.extend(causes.into_iter().map(|cause| cause_case(&class, requirement, cause)));
+    }
     cases.extend(summary.expectations.iter().map(|expectation| expectation_case(&class, expectation)));
     cases.extend(summary.failures.iter().map(|failure| failure_case(&class, failure)));
     cases.extend(summary.not_finite.iter().map(|found| not_finite_case(&class, found)));
@@ -90,6 +97,22 @@ struct Outcome {
     kind: Option<&'static str>,
     message: String,
     text: String,
+}
+
+/// A cause, which fails: verdicts of tests that were run again are those of their fresh runs, so what no fresh run shows
+/// is no cause.
+fn cause_case(class: &str, requirement: &RequirementSummary, cause: &CauseSummary) -> Case {
+    let CauseSummary { test, metric, value, bound, violating, held, disturbances, .. } = cause;
+    let again = cause.fresh_words().map_or(String::new(), |words| format!("; in fresh runs: {words} violate it"));
+    let message = format!(
+        "violated by {violating} of {held} tests with {}; smallest is {test}: {value}, required is {metric} {bound}{again}",
+        cause.name()
+    );
+    Case {
+        class: format!("{class}.requirements"),
+        name: format!("{}: {}", requirement.requirement, cause.name()),
+        result: Some(Outcome { tag: "failure", kind: Some("cause"), message, text: disturbances.join("\n") }),
+    }
 }
 
 fn requirement_case(class: &str, requirement: &RequirementSummary, confirmed: &[ConfirmedTest]) -> Case {

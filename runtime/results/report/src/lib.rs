@@ -23,6 +23,7 @@ mod twin;
 
 pub use self::twin::twin_text;
 pub use export::{Expected, ExportError, Exported, export};
+pub use facts::causes::{CauseSummary, CausesSummary, Fewer, causes};
 pub use facts::certificate::before_after::{Mend, MendedTest, mend};
 pub use facts::certificate::campaign::{HazardSummary, MissedHazard, MonitorSummary, MonitorsSummary, StateShare};
 pub use facts::certificate::moment::{MomentError, MomentReport, MonitorMoment, PartReport, show_at};
@@ -58,7 +59,9 @@ pub use sentences::headline;
 pub use sesame_analysis::confirmed::{ConfirmedTest, FindingAgain};
 pub use sesame_present::number::quantity;
 pub use sesame_present::table::TextOptions;
-pub use text::{confirmed_text, list_text, moment_text, recording_text, replay_text, summary_text, test_text};
+pub use text::{
+    causes_text, confirmed_text, list_text, moment_text, recording_text, replay_text, summary_text, test_text,
+};
 
 #[cfg(test)]
 mod tests;

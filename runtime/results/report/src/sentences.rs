@@ -9,6 +9,7 @@ use sesame_plan::{Confirmation, Span, Statistic};
 use sesame_present::number::{self, fixed, join_words, plural};
 use sesame_record::{Standing, Verdict};
 
+use crate::facts::causes::CausesSummary;
 use crate::facts::certificate::before_after::Mend;
 use crate::facts::certificate::campaign::MonitorsSummary;
 use crate::facts::coverage::CoverageSummary;
@@ -46,6 +47,8 @@ pub fn headline(summary: &Summary) -> String {
         0 => Some("no requirement violated".to_owned()),
         n => Some(format!("{} violated ({})", plural(n, "requirement", "requirements"), violated.join(", "))),
     });
+    let causes = summary.causes.as_ref().map_or(0, |found| found.causes.len());
+    parts.extend((causes > 0).then(|| plural(causes, "cause", "causes")));
     if let Some(monitors) = &summary.monitors {
         parts.extend(missed_words(monitors));
     }
@@ -79,6 +82,25 @@ fn missed_words(monitors: &MonitorsSummary) -> Option<String> {
     let mut tests: Vec<TestNumber> = monitors.missed.iter().map(|missed| missed.test).collect();
     tests.dedup();
     (!tests.is_empty()).then(|| format!("hazards missed in {}", plural(tests.len(), "test", "tests")))
+}
+
+/// In how many ways requirements are violated, and what is known of others, in sentences.
+pub(crate) fn causes_sentence(found: &CausesSummary) -> Option<String> {
+    let unseen = found.unseen?;
+    let known = plural(found.causes.len(), "cause is known", "causes are known");
+    let once = match unseen.once {
+        0 => "each was seen in several tests".to_owned(),
+        1 => "one of them was seen in a single test".to_owned(),
+        once => format!("{once} of them were seen in a single test each"),
+    };
+    let bias =
+        if unseen.independent { "" } else { "; a biased bound, as this search does not draw its tests independently" };
+    Some(format!(
+        "{known}; {once}. Another test like these shows a new cause with a probability of at most {} % (a bound at 99 % \
+         confidence after Good and Turing, from {}{bias}).",
+        fixed(100.0 * unseen.at_most, 1),
+        plural(unseen.tests as usize, "test", "tests"),
+    ))
 }
 
 /// What the monitors of a campaign did, in a sentence.

@@ -8,6 +8,7 @@ use sesame_present::number::{self, plural, titled};
 use sesame_present::table::{Cell, Column, Datum, Table};
 use sesame_record::{Difference, MetricValue, Verdict};
 
+use crate::facts::causes::CausesSummary;
 use crate::facts::readable::short_numbers;
 use crate::facts::recording::{FedMetric, Sameness};
 use crate::facts::repetition::ViolationRate;
@@ -54,6 +55,36 @@ pub(super) fn requirements(summary: &Summary) -> Table {
             if *reference == Some(Verdict::Violated) { of_reference.bad_if(true) } else { of_reference.quiet() },
             worst.into(),
             Datum::text(&requirement.text).into(),
+        ]);
+        table.row(cells);
+    }
+    table
+}
+
+/// The causes of violations: a row each.
+pub(super) fn causes(found: &CausesSummary) -> Table {
+    let again = found.causes.iter().any(|cause| cause.fresh.is_some());
+    let mut columns = vec![Column::heading("requirement"), Column::line("cause"), Column::words("smallest test")];
+    columns.extend(again.then(|| Column::line("fresh runs")));
+    columns.extend([
+        Column::line("violating"),
+        Column::line("first"),
+        Column::line("fewer"),
+        Column::sentence("what it does"),
+    ]);
+    let mut table = Table::with(columns);
+    for cause in &found.causes {
+        let mut cells: Vec<Cell> = vec![
+            Datum::text(&cause.requirement).bad_if(true),
+            Datum::text(cause.name()).into(),
+            Datum::Test(cause.test).into(),
+        ];
+        cells.extend(again.then(|| Datum::maybe(cause.fresh_words()).into()));
+        cells.extend([
+            Datum::text(format!("{} of {}", cause.violating, cause.held)).into(),
+            Datum::Test(cause.first).into(),
+            Datum::text(cause.fewer.word()).into(),
+            Datum::text(format!("{}; {} is {}", cause.disturbances.join("; "), cause.metric, cause.value)).into(),
         ]);
         table.row(cells);
     }

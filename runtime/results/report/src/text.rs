@@ -8,6 +8,7 @@ use sesame_base::visible::{visible, visible_lines};
 use sesame_present::number::{join_words, plural};
 use sesame_present::table::{Table, TextOptions, wrap};
 
+use crate::facts::causes::CausesSummary;
 use crate::facts::certificate::campaign::MonitorsSummary;
 use crate::facts::certificate::moment::MomentReport;
 use crate::facts::certificate::test::MonitorReport;
@@ -17,9 +18,9 @@ use crate::facts::show::{TestList, TestReport};
 use crate::facts::shrinking::Shrinking;
 use crate::facts::summary::Summary;
 use crate::sentences::{
-    QUARANTINED, beyond_sentence, confirmation_sentence, counts_sentence, coverage_sentence, headline, mend_sentence,
-    monitors_run_again, monitors_sentence, once_sentence, outcome_sentence, shrinking_sentence, values_sentence,
-    without_effect_sentence,
+    QUARANTINED, beyond_sentence, causes_sentence, confirmation_sentence, counts_sentence, coverage_sentence, headline,
+    mend_sentence, monitors_run_again, monitors_sentence, once_sentence, outcome_sentence, shrinking_sentence,
+    values_sentence, without_effect_sentence,
 };
 use crate::tables;
 
@@ -30,6 +31,9 @@ const ROWS: usize = 40;
 pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
     let mut text = String::new();
     paragraph(&mut text, &headline(summary), options);
+    if let Some(found) = &summary.causes {
+        causes(&mut text, found, options);
+    }
     if !summary.front.is_empty() {
         text.push_str(&tables::front(summary).text(options));
         if let Some(confirmation) = summary.confirmation {
@@ -83,6 +87,29 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
     for warning in gathered(&summary.warnings) {
         paragraph(&mut text, &format!("warning: {}", visible(&warning)), options);
     }
+    text
+}
+
+/// The causes of violations, and what is known of others.
+fn causes(text: &mut String, found: &CausesSummary, options: TextOptions) {
+    let mut table = tables::causes(found);
+    let more = table.truncate(ROWS);
+    section(text, "Causes", &table, options);
+    if more > 0 {
+        paragraph(text, &format!("and {more} more; `causes --format json` has all"), options);
+    }
+    if let Some(sentence) = causes_sentence(found) {
+        paragraph(text, &sentence, options);
+    }
+}
+
+/// The causes in the tests of any results.
+pub fn causes_text(found: &CausesSummary, options: TextOptions) -> String {
+    let mut text = String::new();
+    if found.causes.is_empty() {
+        paragraph(&mut text, "No test violates a requirement.", options);
+    }
+    causes(&mut text, found, options);
     text
 }
 

@@ -347,7 +347,8 @@ pub(crate) fn report_on(
     }
 }
 
-fn operations(plan: &CampaignPlan, record: &TestRecord) -> Vec<OperationReport> {
+/// The operations of a test, and what they did.
+pub(crate) fn operations(plan: &CampaignPlan, record: &TestRecord) -> Vec<OperationReport> {
     let reports = record.test.operations.iter().enumerate().map(|(position, used)| {
         let operation = plan.operation(used.operation);
         let effect = record.observation.operations.get(position);

@@ -17,6 +17,7 @@ use sesame_record::{
     is_quarantined, verdict,
 };
 
+use crate::facts::causes::{CausesSummary, causes_of_search};
 use crate::facts::certificate::before_after::Mend;
 use crate::facts::certificate::campaign::{MonitorsSummary, monitors_summary};
 use crate::facts::coverage::{CoverageSummary, coverage};
@@ -59,6 +60,9 @@ pub struct Summary {
     pub once: usize,
     /// All requirements of the space, in its order.
     pub requirements: Vec<RequirementSummary>,
+    /// The causes of violations, if the campaign searches and the space has requirements.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub causes: Option<CausesSummary>,
     /// How well the monitors of the space did, if it has any and their decisions were recorded.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub monitors: Option<MonitorsSummary>,
@@ -339,6 +343,7 @@ pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: &[u3
             .iter()
             .map(|requirement| summarise_requirement(plan, &judge, requirement, rows))
             .collect(),
+        causes: causes_of_search(repository, &judge, rows)?,
         monitors: monitors_summary(repository, rows)?,
         mend: None,
         expectations: expectations(plan, rows),

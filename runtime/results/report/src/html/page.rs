@@ -17,8 +17,11 @@ use crate::html::header::header;
 use crate::html::policy::policy;
 use crate::html::test::test;
 use crate::html::{before_after, cells, monitors, regions, shrinking, tree};
-use crate::sentences::{QUARANTINED, once_sentence};
+use crate::sentences::{QUARANTINED, causes_sentence, once_sentence};
 use crate::tables;
+
+/// Causes whose smallest tests are drawn at most.
+const CAUSES: usize = 16;
 
 /// Timelines drawn at most; of a larger front evenly chosen ones.
 const TIMELINES: usize = 24;
@@ -70,6 +73,7 @@ fn page_in(
     if let Some(shrinking) = &summary.shrinking {
         shrinking::shrinking(&mut body, shrinking, &drawn);
     }
+    causes(&mut body, &summary, &drawn);
     monitors::monitors(&mut body, &summary, &drawn);
     if let Some(before) = before {
         before_after::before_and_after(&mut body, repository, before, &drawn)?;
@@ -141,10 +145,12 @@ fn chosen(summary: &Summary, rows: &[TestRow]) -> Vec<Group> {
     let front = evenly(&all, TIMELINES);
     let worst = summary.requirements.iter().filter_map(|requirement| requirement.worst.as_ref());
     let worst = worst.filter_map(|worst| rows.iter().find(|row| row.number == worst.test.0));
+    let causes = summary.causes.iter().flat_map(|found| &found.causes).take(CAUSES);
+    let causes = causes.filter_map(|cause| rows.iter().find(|row| row.number == cause.test.0));
     let failed = rows.iter().filter(|row| !row.outcome.is_whole()).take(4);
     let known = rows.iter().filter(|row| matches!(row.origin, Origin::Known(_))).take(8);
     let mut more: Vec<u32> = Vec::new();
-    for row in worst.chain(failed).chain(known) {
+    for row in causes.chain(worst).chain(failed).chain(known) {
         if ![&front, &more, &missed].iter().any(|others| others.contains(&row.number)) {
             more.push(row.number);
         }
@@ -170,10 +176,22 @@ fn chosen(summary: &Summary, rows: &[TestRow]) -> Vec<Group> {
         Group { title: "Tests on the front", caption: front_caption, tests: front },
         Group {
             title: "More tests to look at",
-            caption: "The worst violation of each requirement, crashes and timeouts, and regression tests.".to_owned(),
+            caption:
+                "The smallest test of each cause, the worst violation of each requirement, crashes and timeouts, and \
+                      regression tests."
+                    .to_owned(),
             tests: more,
         },
     ]
+}
+
+/// The causes of violations, and the timeline of the smallest test of the first.
+fn causes(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
+    let Some(found) = summary.causes.as_ref().filter(|found| !found.causes.is_empty()) else { return };
+    let sentence = causes_sentence(found);
+    let caption = "A requirement with a smallest set of operations that violates it, as far as tests were run.";
+    let caption = [Some(caption.to_owned()), sentence].into_iter().flatten().collect::<Vec<_>>().join(" ");
+    section(body, "Causes", Some(&caption), tables::causes(found), drawn);
 }
 
 /// Rows of failures shown at most.

@@ -1,0 +1,158 @@
+//! The causes of violations: in how many ways the system becomes dangerous, and the smallest test of each.
+
+use serde::Serialize;
+
+use sesame_analysis::causes::{Cause, Causes, Unseen, causes_in};
+use sesame_base::test_number::TestNumber;
+use sesame_plan::{CampaignPlan, Task};
+use sesame_present::number;
+use sesame_record::{Judge, RecordError, Repository, Tally, TestRow};
+
+use crate::facts::show::{OperationReport, operations};
+use crate::facts::wording;
+use crate::sentences::{choices_text, planned_text};
+
+/// What the tests of a campaign say about causes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CausesSummary {
+    /// The causes, by requirement; of each requirement those with few operations first.
+    pub causes: Vec<CauseSummary>,
+    /// What can be said of causes that were not found; `None` before any was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unseen: Option<Unseen>,
+}
+
+/// A requirement with a smallest set of operations that violates it, as far as tests were run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CauseSummary {
+    /// The requirement's name.
+    pub requirement: String,
+    /// Its sentence.
+    pub text: String,
+    /// The names of the operations, in the order of the space.
+    pub operations: Vec<String>,
+    /// The smallest test that violates the requirement with these operations alone.
+    pub test: TestNumber,
+    /// What its operations do, each in words: `lag_link1: latency 310 ms, 4.00–9.00 s`.
+    pub disturbances: Vec<String>,
+    /// The metric that the requirement bounds.
+    pub metric: String,
+    /// Its value in that test, in words.
+    pub value: String,
+    /// The bound in words.
+    pub bound: String,
+    /// The first test that violates the requirement and holds these operations.
+    pub first: TestNumber,
+    /// How many tests that hold these operations violate the requirement.
+    pub violating: usize,
+    /// How many conclusive tests hold these operations.
+    pub held: usize,
+    /// Whether fewer of the operations would do.
+    pub fewer: Fewer,
+    /// What fresh runs of the smallest test say, if it was run again.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fresh: Option<Tally>,
+}
+
+impl CauseSummary {
+    /// How many fresh runs of the smallest test violate the requirement, if it was run again.
+    pub(crate) fn fresh_words(&self) -> Option<String> {
+        self.fresh.map(|fresh| format!("{} of {}", fresh.violated, fresh.conclusive()))
+    }
+
+    /// The operations as a name: `lag_link1 + drop_link0`.
+    pub(crate) fn name(&self) -> String {
+        self.operations.join(" + ")
+    }
+}
+
+/// What is known of a cause with some of its operations left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Fewer {
+    /// It has a single operation.
+    Single,
+    /// Without any one of them a test with all others does not violate the requirement.
+    NoViolation,
+    /// That was not tried, or not for each of them.
+    NotTried,
+}
+
+impl Fewer {
+    /// The word that tables use.
+    pub fn word(self) -> &'static str {
+        match self {
+            Fewer::Single => "–",
+            Fewer::NoViolation => "no violation",
+            Fewer::NotTried => "not tried",
+        }
+    }
+}
+
+/// The causes in the tests of a campaign that searches; `None` for others, whose tests are variations of one.
+pub(crate) fn causes_of_search(
+    repository: &Repository,
+    judge: &Judge<'_>,
+    rows: &[TestRow],
+) -> Result<Option<CausesSummary>, RecordError> {
+    let searches =
+        matches!(repository.task(), Task::Campaign) && repository.plan().campaign.search.strategy().is_some();
+    if !searches || repository.plan().requirements.is_empty() {
+        return Ok(None);
+    }
+    causes_summary(repository, judge, rows).map(Some)
+}
+
+/// The causes in the tests of any results.
+pub fn causes(repository: &Repository) -> Result<CausesSummary, RecordError> {
+    causes_summary(repository, &repository.judge()?, &repository.tests()?)
+}
+
+fn causes_summary(repository: &Repository, judge: &Judge<'_>, rows: &[TestRow]) -> Result<CausesSummary, RecordError> {
+    let plan = repository.plan();
+    let rows: Vec<&TestRow> = rows.iter().collect();
+    let Causes { found, unseen } = causes_in(plan, judge, &rows);
+    let causes = found.iter().map(|cause| summarise(repository, judge, plan, cause)).collect::<Result<_, _>>()?;
+    Ok(CausesSummary { causes, unseen })
+}
+
+fn summarise(
+    repository: &Repository,
+    judge: &Judge<'_>,
+    plan: &CampaignPlan,
+    cause: &Cause,
+) -> Result<CauseSummary, RecordError> {
+    let requirement = plan.requirement(cause.requirement);
+    let metric = plan.metric(requirement.metric);
+    let record = repository.test(cause.smallest)?;
+    let shown = record.observation.value(requirement.metric);
+    let value = wording::value_text(shown, metric.unit.as_deref(), &[requirement.bound]);
+    let acts = |used: &OperationReport| used.counters.is_none_or(|counters| counters.any_effect());
+    let fresh = Tally::of(judge.runs(cause.smallest).iter().map(|run| run.verdict(requirement)));
+    Ok(CauseSummary {
+        requirement: requirement.name.clone(),
+        text: requirement.text.clone(),
+        operations: cause.operations.iter().map(|&id| plan.operation(id).name.clone()).collect(),
+        test: TestNumber(cause.smallest),
+        disturbances: operations(plan, &record).iter().filter(|used| acts(used)).map(disturbance).collect(),
+        metric: metric.name.clone(),
+        value,
+        bound: number::bound(requirement.bound, metric.unit.as_deref()),
+        first: TestNumber(cause.violating.first().copied().unwrap_or(cause.smallest)),
+        violating: cause.violating.len(),
+        held: cause.held as usize,
+        fewer: match (cause.operations.len(), cause.smaller_tried) {
+            (1, _) => Fewer::Single,
+            (_, true) => Fewer::NoViolation,
+            (_, false) => Fewer::NotTried,
+        },
+        fresh: (fresh.conclusive() > 0).then_some(fresh),
+    })
+}
+
+/// What an operation does in a test, and when.
+fn disturbance(used: &OperationReport) -> String {
+    let words = [choices_text(used), planned_text(used)];
+    let words: Vec<&str> = words.iter().map(String::as_str).filter(|words| *words != "–").collect();
+    if words.is_empty() { used.operation.clone() } else { format!("{}: {}", used.operation, words.join(", ")) }
+}
