@@ -14,7 +14,7 @@ const PAGE: &str = "docs/json.md";
 const MARK: &str = "<!-- From here on a test writes this page; CONTRIBUTING.md says how. -->\n";
 
 /// What is printed: the heading, how the values come, and the type with its file.
-const PRINTED: [(&str, &str, &str, &str); 15] = [
+const PRINTED: [(&str, &str, &str, &str); 17] = [
     (
         "`run`, `resume`, `known`, `repeat`, `shrink`, `report`",
         "One object.",
@@ -22,6 +22,7 @@ const PRINTED: [(&str, &str, &str, &str); 15] = [
         "runtime/src/cli/execution.rs",
     ),
     ("`null`, `mitm`, `known --lab`, `prepare`", "One object.", "Concluded", "runtime/src/cli/preparation.rs"),
+    ("`causes`", "One object.", "CausesSummary", "runtime/results/report/src/facts/causes.rs"),
     ("`list`", "One object.", "TestList", "runtime/results/report/src/facts/show.rs"),
     ("`show`", "One object.", "TestReport", "runtime/results/report/src/facts/show.rs"),
     ("`show --at`", "One object.", "MomentReport", "runtime/results/report/src/facts/certificate/moment.rs"),
@@ -36,6 +37,7 @@ const PRINTED: [(&str, &str, &str, &str); 15] = [
     ("`monitors`", "One object.", "MonitorsCompared", "runtime/results/report/src/facts/monitors.rs"),
     ("`twin`", "One object.", "Twin", "runtime/results/report/src/facts/twin.rs"),
     ("`export`", "One object.", "Exported", "runtime/results/report/src/export.rs"),
+    ("`export --causes`", "A list with an object for each test.", "Exported", "runtime/results/report/src/export.rs"),
     ("`digest`", "One object.", "Digest", "runtime/src/cli/view.rs"),
     (
         "`sesamec check`, `fmt`, `generate`, `run`",

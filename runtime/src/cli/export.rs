@@ -20,7 +20,11 @@ use crate::cli::view::Which;
 #[derive(Debug, Args)]
 pub struct ExportArgs {
     /// The test, for example `T158`
-    test: String,
+    #[arg(required_unless_present = "causes")]
+    test: Option<String>,
+    /// Instead of one test, the smallest test of each cause of a violation
+    #[arg(long, conflicts_with_all = ["test", "name"])]
+    causes: bool,
     /// Name of the block; by default made of the campaign's name and the test's
     #[arg(long, value_name = "NAME", value_parser = name)]
     name: Option<String>,
@@ -42,11 +46,28 @@ fn name(text: &str) -> Result<String, String> {
 pub(super) fn export(results: &Path, args: &ExportArgs) -> Result<ExitCode, Failure> {
     let repository = open(results, args.which.results.as_deref())?;
     let expected = if args.pin { Expected::Values } else { Expected::Requirements };
-    let exported = report::export(&repository, &args.test, args.name.as_deref(), expected)?;
-    match args.which.format {
-        // A block is the test to the last sign of its texts; on a terminal some of these would do more than be read.
-        Format::Text if console::Term::stdout().is_term() => print(&visible_lines(&exported.block)),
-        Format::Text => print(&exported.block),
-        Format::Json => print_json(&exported),
+    match &args.test {
+        Some(test) => {
+            let exported = report::export(&repository, test, args.name.as_deref(), expected)?;
+            match args.which.format {
+                Format::Text => print_blocks(&exported.block),
+                Format::Json => print_json(&exported),
+            }
+        }
+        None => {
+            let exported = report::export_causes(&repository, expected)?;
+            match args.which.format {
+                Format::Text => {
+                    let blocks: Vec<&str> = exported.iter().map(|exported| exported.block.as_str()).collect();
+                    print_blocks(&blocks.join("\n"))
+                }
+                Format::Json => print_json(&exported),
+            }
+        }
     }
+}
+
+/// A block is the test to the last sign of its texts; on a terminal some of these would do more than be read.
+fn print_blocks(blocks: &str) -> Result<ExitCode, Failure> {
+    if console::Term::stdout().is_term() { print(&visible_lines(blocks)) } else { print(blocks) }
 }

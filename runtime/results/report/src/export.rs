@@ -3,6 +3,8 @@
 //! Every number is written so that the language reads back exactly the one that was used, in the unit of its field: the
 //! block is the same test, bit for bit.
 
+use std::collections::BTreeSet;
+
 use serde::Serialize;
 
 use sesame_base::test_number::TestNumber;
@@ -11,6 +13,7 @@ use sesame_plan::{Bound, CampaignPlan, Expectation, MetricId, Requirement};
 use sesame_present::number;
 use sesame_record::{RecordError, Repetition, Repository, TestRecord, Verdict, verdict};
 
+use crate::facts::causes::causes;
 use crate::facts::wording::outcome_words;
 
 /// A test in the words of the language.
@@ -80,6 +83,13 @@ pub fn export(
     };
     let block = block(plan, &doc, &record, &name, expectations);
     Ok(Exported { test: TestNumber(record.number), name, block })
+}
+
+/// The smallest test of each cause as a block of its own, by number. A test that is the smallest of several causes is
+/// one block, which expects all requirements that it violates.
+pub fn export_causes(repository: &Repository, expected: Expected) -> Result<Vec<Exported>, ExportError> {
+    let smallest: BTreeSet<u32> = causes(repository)?.causes.iter().map(|cause| cause.test.0).collect();
+    smallest.into_iter().map(|test| export(repository, &TestNumber(test).to_string(), None, expected)).collect()
 }
 
 /// The block of a test that was made out of another one, `original`, in a campaign of this seed.

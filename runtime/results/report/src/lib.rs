@@ -22,7 +22,7 @@ mod text;
 mod twin;
 
 pub use self::twin::twin_text;
-pub use export::{Expected, ExportError, Exported, export};
+pub use export::{Expected, ExportError, Exported, export, export_causes};
 pub use facts::causes::{CauseSummary, CausesSummary, Fewer, causes};
 pub use facts::certificate::before_after::{Mend, MendedTest, mend};
 pub use facts::certificate::campaign::{HazardSummary, MissedHazard, MonitorSummary, MonitorsSummary, StateShare};
