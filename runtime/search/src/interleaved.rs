@@ -2,13 +2,13 @@
 //! system, attribution of each violation to its smallest set of operations, and goal-directed search between them.
 //!
 //! What is dangerous lies at the ends of ranges and at events, and uniform draws seldom do. So each operation is tried
-//! alone first, as strong and as long as it may be ([opening]); then each two together ([pairs]), over the whole run and
-//! over parts of it. Meanwhile and afterwards tests come from windows that are [aligned] with the moments of the
+//! alone first, as strong and as long as it may be ([opening]); then each two together ([pairs]), over the whole run
+//! and over parts of it. Meanwhile and afterwards tests come from windows that are [aligned] with the moments of the
 //! reference run ([moments]), from the [near misses](near_misses) so far, and from uniform draws.
 //!
-//! A test that violates a requirement is reduced to the operations that are to blame ([causes]); each question is a test
-//! of the campaign. Operations that are known to be dangerous alone are drawn seldom from then on, so that one loud
-//! cause does not hide the others.
+//! A test that violates a requirement is reduced to the operations that are to blame ([causes]); each question is a
+//! test of the campaign. Operations that are known to be dangerous alone are drawn seldom from then on, so that one
+//! loud cause does not hide the others.
 //!
 //! Everything is decided per generation of a constant size, by a stream per generation, so the tests are the same for
 //! any number of workers, and a search is resumed by telling it what was recorded.

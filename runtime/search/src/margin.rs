@@ -42,8 +42,8 @@ pub fn confirmed_margins(plan: &CampaignPlan, by: Statistic, fresh_runs: &[Obser
     (0..plan.requirements.len()).map(of).collect()
 }
 
-/// The margin of each requirement in an evaluated test: over the fresh runs where the campaign confirms, else in its own
-/// run.
+/// The margin of each requirement in an evaluated test: over the fresh runs where the campaign confirms, else in its
+/// own run.
 pub(crate) fn evaluated_margins(plan: &CampaignPlan, result: &Evaluated) -> Vec<Margin> {
     match plan.campaign.confirm {
         Some(confirmation) if !result.fresh_runs.is_empty() => {

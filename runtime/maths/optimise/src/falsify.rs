@@ -286,9 +286,9 @@ impl<P: Clone> Surrogate<P> {
     }
 }
 
-/// A point that a surrogate of what is known proposes: the one with the lowest lower confidence bound of those compared,
-/// for a random weight of the deviation. `known` are at least one point with their margins, where these are known; the
-/// cost grows with the cube of their number.
+/// A point that a surrogate of what is known proposes: the one with the lowest lower confidence bound of those
+/// compared, for a random weight of the deviation. `known` are at least one point with their margins, where these are
+/// known; the cost grows with the cube of their number.
 pub fn propose<D: SearchDomain>(domain: &D, known: &[(D::Point, Option<f64>)], stream: &mut Stream) -> D::Point {
     let surrogate = Surrogate::fit(domain, &History { points: known.to_vec() });
     let kappa = KAPPAS[stream.below(KAPPAS.len())];

@@ -1,8 +1,8 @@
 //! The causes of violations: for each requirement, the smallest sets of operations with which tests violate it.
 //!
 //! They follow from the recorded tests of any campaign, whatever its strategy. A set is smallest as far as tests were
-//! run: no recorded test with fewer of its operations violates the requirement. Whether smaller sets were tried at all is
-//! part of each cause. Operations that are known to have had no effect are not part of any.
+//! run: no recorded test with fewer of its operations violates the requirement. Whether smaller sets were tried at all
+//! is part of each cause. Operations that are known to have had no effect are not part of any.
 
 use std::collections::BTreeSet;
 

@@ -13,6 +13,16 @@ use sesame_base::visible::{is_hidden, visible_lines};
 pub struct Markup {
     text: String,
     open: Vec<&'static str>,
+    headings: Vec<Heading>,
+}
+
+/// The heading of a section, to which a table of contents leads.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Heading {
+    /// The id of its element.
+    pub id: String,
+    /// Its words.
+    pub title: String,
 }
 
 /// Attributes of an element.
@@ -50,6 +60,19 @@ impl Markup {
         self.close();
     }
 
+    /// The heading of a section, under an id that is its own.
+    pub fn heading(&mut self, title: &str) {
+        let word = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' };
+        let id = format!("section-{}-{}", self.headings.len() + 1, title.chars().map(word).collect::<String>());
+        self.element("h2", &[("id", &id)], title);
+        self.headings.push(Heading { id, title: title.to_owned() });
+    }
+
+    /// The headings of sections so far, in order.
+    pub fn headings(&self) -> &[Heading] {
+        &self.headings
+    }
+
     /// Text.
     pub fn text(&mut self, text: &str) {
         escape(text, &mut self.text);
@@ -84,8 +107,11 @@ impl Markup {
         self.close();
     }
 
-    /// Appends other markup, in which every element must be closed.
-    pub fn append(&mut self, other: Markup) {
+    /// Appends other markup, in which every element must be closed. Only one of the two may have headings of sections,
+    /// so that their ids differ.
+    pub fn append(&mut self, mut other: Markup) {
+        assert!(self.headings.is_empty() || other.headings.is_empty(), "ids of headings would repeat");
+        self.headings.append(&mut other.headings);
         self.text.push_str(&other.finish());
     }
 

@@ -34,6 +34,7 @@ mod monitors;
 mod original_extents;
 mod plan;
 mod quarantine;
+mod read_courses;
 mod read_monitors;
 mod read_tests;
 mod recognise;

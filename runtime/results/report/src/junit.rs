@@ -10,7 +10,7 @@ use sesame_record::{RecordError, Repository, Verdict};
 use crate::facts::causes::CauseSummary;
 use crate::facts::summary::{ExpectationSummary, Failure, NotFinite, RequirementSummary, Summary, summary};
 use crate::file::write_aside;
-use crate::sentences::headline;
+use crate::sentences::{disturbances_text, headline};
 
 /// Writes the JUnit file of a campaign's results.
 pub fn write_junit(repository: &Repository, path: &Path) -> Result<(), RecordError> {
@@ -20,10 +20,11 @@ pub fn write_junit(repository: &Repository, path: &Path) -> Result<(), RecordErr
 /// A summary as a JUnit test suite.
 ///
 /// Each cause of a violated requirement is a test case that fails. Each other requirement is a test case: it fails if a
-/// test violates it, and is skipped with a reason if none does but some are inconclusive. Each expectation of a regression test is a test case: it fails if it is violated, and is an error
-/// if it is inconclusive. Each crash and each timeout is an error, and so is each test in which a metric read a number
-/// that was not finite. Tests that were run again count with the verdicts of their fresh runs: a finding of the first
-/// run that no fresh run shows is named, but fails nothing.
+/// test violates it, and is skipped with a reason if none does but some are inconclusive. Each expectation of a
+/// regression test is a test case: it fails if it is violated, and is an error if it is inconclusive. Each crash and
+/// each timeout is an error, and so is each test in which a metric read a number that was not finite. Tests that were
+/// run again count with the verdicts of their fresh runs: a finding of the first run that no fresh run shows is named,
+/// but fails nothing.
 pub fn junit(summary: &Summary) -> String {
     let class = format!("{}.{}", summary.space, summary.campaign);
     let mut cases = Vec::new();
@@ -99,19 +100,20 @@ struct Outcome {
     text: String,
 }
 
-/// A cause, which fails: verdicts of tests that were run again are those of their fresh runs, so what no fresh run shows
-/// is no cause.
+/// A cause, which fails: verdicts of tests that were run again are those of their fresh runs, so what no fresh run
+/// shows is no cause.
 fn cause_case(class: &str, requirement: &RequirementSummary, cause: &CauseSummary) -> Case {
-    let CauseSummary { test, metric, value, bound, violating, held, disturbances, .. } = cause;
+    let CauseSummary { test, metric, value, bound, violating, held, acting, .. } = cause;
     let again = cause.fresh_words().map_or(String::new(), |words| format!("; in fresh runs: {words} violate it"));
     let message = format!(
-        "violated by {violating} of {held} tests with {}; smallest is {test}: {value}, required is {metric} {bound}{again}",
+        "violated by {violating} of {} with {}; smallest is {test}: {value}, required is {metric} {bound}{again}",
+        number::plural(*held, "test", "tests"),
         cause.name()
     );
     Case {
         class: format!("{class}.requirements"),
-        name: format!("{}: {}", requirement.requirement, cause.name()),
-        result: Some(Outcome { tag: "failure", kind: Some("cause"), message, text: disturbances.join("\n") }),
+        name: format!("{}: {} ({})", requirement.requirement, requirement.text, cause.name()),
+        result: Some(Outcome { tag: "failure", kind: Some("cause"), message, text: disturbances_text(acting) }),
     }
 }
 

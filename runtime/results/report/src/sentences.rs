@@ -329,6 +329,16 @@ pub(crate) fn verdict_value_text(requirement: &VerdictReport) -> String {
     }
 }
 
+/// What operations do in a test, and when: `lag_link1 (latency 310 ms, 4.00–9.00 s)`.
+pub(crate) fn disturbances_text(operations: &[OperationReport]) -> String {
+    let words = |used: &OperationReport| {
+        let words = [choices_text(used), planned_text(used)];
+        let words: Vec<&str> = words.iter().map(String::as_str).filter(|words| *words != "–").collect();
+        if words.is_empty() { used.operation.clone() } else { format!("{} ({})", used.operation, words.join(", ")) }
+    };
+    operations.iter().map(words).collect::<Vec<_>>().join(" + ")
+}
+
 /// What an operation's parameters are, in words.
 pub(crate) fn choices_text(operation: &OperationReport) -> String {
     let words: Vec<&str> = operation.choices.iter().map(|choice| choice.text.as_str()).collect();

@@ -8,7 +8,7 @@ use sesame_present::number::{self, plural, titled};
 use sesame_present::table::{Cell, Column, Datum, Table};
 use sesame_record::{Difference, MetricValue, Verdict};
 
-use crate::facts::causes::CausesSummary;
+use crate::facts::causes::{CausesSummary, Fewer};
 use crate::facts::readable::short_numbers;
 use crate::facts::recording::{FedMetric, Sameness};
 use crate::facts::repetition::ViolationRate;
@@ -21,7 +21,8 @@ use crate::facts::summary::{
 use crate::facts::wording::outcome_words;
 use crate::facts::wording::value_text;
 use crate::sentences::{
-    as_expected, beyond_text, choices_text, effect_text, planned_text, rate_text, spans_text, verdict_value_text,
+    as_expected, beyond_text, choices_text, disturbances_text, effect_text, planned_text, rate_text, spans_text,
+    verdict_value_text,
 };
 
 /// The time of a failure, in seconds.
@@ -64,14 +65,12 @@ pub(super) fn requirements(summary: &Summary) -> Table {
 /// The causes of violations: a row each.
 pub(super) fn causes(found: &CausesSummary) -> Table {
     let again = found.causes.iter().any(|cause| cause.fresh.is_some());
+    let several = found.causes.iter().any(|cause| cause.fewer != Fewer::Single);
     let mut columns = vec![Column::heading("requirement"), Column::line("cause"), Column::words("smallest test")];
     columns.extend(again.then(|| Column::line("fresh runs")));
-    columns.extend([
-        Column::line("violating"),
-        Column::line("first"),
-        Column::line("fewer"),
-        Column::sentence("what it does"),
-    ]);
+    columns.extend([Column::line("violating"), Column::line("first")]);
+    columns.extend(several.then(|| Column::line("fewer")));
+    columns.push(Column::sentence("what it does"));
     let mut table = Table::with(columns);
     for cause in &found.causes {
         let mut cells: Vec<Cell> = vec![
@@ -80,12 +79,11 @@ pub(super) fn causes(found: &CausesSummary) -> Table {
             Datum::Test(cause.test).into(),
         ];
         cells.extend(again.then(|| Datum::maybe(cause.fresh_words()).into()));
-        cells.extend([
-            Datum::text(format!("{} of {}", cause.violating, cause.held)).into(),
-            Datum::Test(cause.first).into(),
-            Datum::text(cause.fewer.word()).into(),
-            Datum::text(format!("{}; {} is {}", cause.disturbances.join("; "), cause.metric, cause.value)).into(),
-        ]);
+        cells.push(Datum::text(format!("{} of {}", cause.violating, cause.held)).into());
+        cells.push(Datum::Test(cause.first).into());
+        cells.extend(several.then(|| Datum::text(cause.fewer.word()).into()));
+        let what = disturbances_text(&cause.acting);
+        cells.push(Datum::text(format!("{what}: {} is {}", cause.metric, cause.value)).into());
         table.row(cells);
     }
     table

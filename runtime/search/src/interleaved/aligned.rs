@@ -1,5 +1,5 @@
-//! Tests whose windows are aligned with what happens in the undisturbed system: they last from one moment to another, or
-//! begin at one, or end there.
+//! Tests whose windows are aligned with what happens in the undisturbed system: they last from one moment to another,
+//! or begin at one, or end there.
 
 use sesame_plan::{Activation, Choice, Span, Test, TestOperation};
 use sesame_rng::Stream;
@@ -77,8 +77,8 @@ pub(super) fn choice(setting: &Setting, kind: usize, parameter: usize, stream: &
     }
 }
 
-/// An aligned activation. Where conditions switch, one that is active at all in the undisturbed system, and at the given
-/// time, if several tries find one.
+/// An aligned activation. Where conditions switch, one that is active at all in the undisturbed system, and at the
+/// given time, if several tries find one.
 pub(super) fn activation(setting: &Setting, kind: usize, at: Option<f64>, stream: &mut Stream) -> Activation {
     match &setting.kind(kind).activation {
         ActivationSpace::Offline => Activation::Offline,

@@ -96,8 +96,8 @@ impl Attribution {
         self.reduced(causes).unwrap_or_else(Next::Ask)
     }
 
-    /// Whether a test of only these operations violates the requirement; the error asks for it. What a campaign does not
-    /// permit is not asked, and counts as no violation.
+    /// Whether a test of only these operations violates the requirement; the error asks for it. What a campaign does
+    /// not permit is not asked, and counts as no violation.
     fn violates(&self, positions: &BTreeSet<usize>) -> Result<bool, BTreeSet<usize>> {
         if positions.len() == self.kinds.len() {
             return Ok(true);

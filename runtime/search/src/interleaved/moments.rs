@@ -30,8 +30,8 @@ pub(super) struct Moment {
 pub(super) struct Moments {
     /// When a run ends, in seconds.
     pub(super) end: f64,
-    /// The shortest time in which anything can happen, in seconds: a step of the simulator, or the shortest time that is
-    /// usual between two messages of a topic that operations disturb.
+    /// The shortest time in which anything can happen, in seconds: a step of the simulator, or the shortest time that
+    /// is usual between two messages of a topic that operations disturb.
     pub(super) grain: f64,
     /// In order of time, at least one.
     pub(super) moments: Vec<Moment>,

@@ -1,5 +1,5 @@
-//! Pairwise interaction testing: each two operations act together, as strong as they can be, over the whole run; then in
-//! each half of it, each quarter, each eighth.
+//! Pairwise interaction testing: each two operations act together, as strong as they can be, over the whole run; then
+//! in each half of it, each quarter, each eighth.
 
 use std::collections::BTreeSet;
 

@@ -75,8 +75,8 @@ impl Setting {
         TestOperation { operation: self.kind(kind).operation, activation, parameters, operation_seed: stream.bits() }
     }
 
-    /// An activation that covers as much of a stretch of time as is permitted; `None` if no permitted window lies in it.
-    /// Where conditions switch, the best of several.
+    /// An activation that covers as much of a stretch of time as is permitted; `None` if no permitted window lies in
+    /// it. Where conditions switch, the best of several.
     pub(super) fn over(&self, kind: usize, stretch: Span, stream: &mut Stream) -> Option<Activation> {
         match &self.kind(kind).activation {
             ActivationSpace::Offline => Some(Activation::Offline),

@@ -75,9 +75,9 @@ impl Seen {
         self.smallest.iter().map(Vec::len).sum()
     }
 
-    /// How many pairs of operations there are, if each was tried. A pair was tried if both operations acted in one test,
-    /// or if one of the two never acts in any and both were in one test, or if causes of all requirements are in it. A
-    /// campaign whose tests hold one operation never tries a pair.
+    /// How many pairs of operations there are, if each was tried. A pair was tried if both operations acted in one
+    /// test, or if one of the two never acts in any and both were in one test, or if causes of all requirements are in
+    /// it. A campaign whose tests hold one operation never tries a pair.
     pub(super) fn pairs_if_tried(&self) -> Option<usize> {
         let campaign = &self.plan.campaign;
         if campaign.count.max < 2 {

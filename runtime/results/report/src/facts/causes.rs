@@ -10,7 +10,6 @@ use sesame_record::{Judge, RecordError, Repository, Tally, TestRow};
 
 use crate::facts::show::{OperationReport, operations};
 use crate::facts::wording;
-use crate::sentences::{choices_text, planned_text};
 
 /// What the tests of a campaign say about causes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -33,8 +32,8 @@ pub struct CauseSummary {
     pub operations: Vec<String>,
     /// The smallest test that violates the requirement with these operations alone.
     pub test: TestNumber,
-    /// What its operations do, each in words: `lag_link1: latency 310 ms, 4.00–9.00 s`.
-    pub disturbances: Vec<String>,
+    /// Its operations, without those that had no effect.
+    pub acting: Vec<OperationReport>,
     /// The metric that the requirement bounds.
     pub metric: String,
     /// Its value in that test, in words.
@@ -134,7 +133,7 @@ fn summarise(
         text: requirement.text.clone(),
         operations: cause.operations.iter().map(|&id| plan.operation(id).name.clone()).collect(),
         test: TestNumber(cause.smallest),
-        disturbances: operations(plan, &record).iter().filter(|used| acts(used)).map(disturbance).collect(),
+        acting: operations(plan, &record).into_iter().filter(acts).collect(),
         metric: metric.name.clone(),
         value,
         bound: number::bound(requirement.bound, metric.unit.as_deref()),
@@ -148,11 +147,4 @@ fn summarise(
         },
         fresh: (fresh.conclusive() > 0).then_some(fresh),
     })
-}
-
-/// What an operation does in a test, and when.
-fn disturbance(used: &OperationReport) -> String {
-    let words = [choices_text(used), planned_text(used)];
-    let words: Vec<&str> = words.iter().map(String::as_str).filter(|words| *words != "–").collect();
-    if words.is_empty() { used.operation.clone() } else { format!("{}: {}", used.operation, words.join(", ")) }
 }

@@ -45,7 +45,7 @@ pub(super) fn all_tests(
     let shown = chosen(summary, &judge, repository.plan(), rows, drawn, MOST);
     let data = data(repository, summary, &shown, drawn, violated)?;
     body.open("section", &[("id", "tests")]);
-    body.element("h2", &[], "All tests");
+    body.heading("All tests");
     if shown.len() < rows.len() {
         let words = format!(
             "{} of {} tests: the front, the tests with a timeline, and evenly chosen others, half of which violate a \

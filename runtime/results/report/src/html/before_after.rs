@@ -24,7 +24,7 @@ pub(super) fn before_and_after(
 ) -> Result<(), RecordError> {
     let mend = mend(repository, before)?;
     body.open("section", &[("id", "mend")]);
-    body.element("h2", &[], "Before and after the mend");
+    body.heading("Before and after the mend");
     body.open("p", &[("class", "headline")]);
     body.prose(&format!("{}.", mend_sentence(&mend)));
     body.close();

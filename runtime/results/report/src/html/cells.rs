@@ -21,7 +21,7 @@ const MOST_DRAWN: usize = 10_000;
 pub(crate) fn coverage(markup: &mut Markup, plan: &CampaignPlan, coverage: &CoverageSummary, drawn: &[u32]) {
     let published = is_published_grid(coverage);
     markup.open("section", &[("id", "coverage")]);
-    markup.element("h2", &[], "Coverage");
+    markup.heading("Coverage");
     markup.element("p", &[], &format!("{}.", coverage_sentence(coverage)));
     markup.open("div", &[("class", "charts two")]);
     over_evaluations(markup, coverage, published);

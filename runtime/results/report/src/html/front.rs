@@ -22,12 +22,12 @@ pub(super) fn front(body: &mut Markup, repository: &Repository, summary: &Summar
     }
     body.open("section", &[("id", "front")]);
     if summary.objectives.is_empty() {
-        body.element("h2", &[], "Values");
+        body.heading("Values");
         tables::spreads(&summary.spreads).html(body, drawn);
         body.close();
         return;
     }
-    body.element("h2", &[], "Front");
+    body.heading("Front");
     let plan = repository.plan();
     let objectives = &summary.objectives;
     let pairs: Vec<(usize, usize)> = (0..objectives.len()).flat_map(|y| (0..y).map(move |x| (x, y))).take(10).collect();

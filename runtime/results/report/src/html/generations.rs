@@ -56,7 +56,7 @@ pub(crate) fn generations(
         return Ok(());
     }
     markup.open("section", &[("id", "generations")]);
-    markup.element("h2", &[], "By generation");
+    markup.heading("By generation");
     fronts(markup, repository, summary, rows, drawn)?;
     markup.open("div", &[("class", "charts two")]);
     charts(markup, &analysis);

@@ -1,4 +1,4 @@
-//! The head of the page: what was run, and how.
+//! The head of the page, and how its results were made.
 
 use sesame_base::gathered::gathered;
 use sesame_plan::{Search, Task};
@@ -10,15 +10,9 @@ use crate::facts::repetition::repeated_words;
 use crate::facts::summary::Summary;
 use crate::sentences::{counts_sentence, headline};
 
-pub(super) fn header(
-    body: &mut Markup,
-    repository: &Repository,
-    summary: &Summary,
-    digest: &str,
-) -> Result<(), RecordError> {
-    let facts = repository.campaign();
-    let plan = &facts.plan;
-    let sessions = repository.sessions()?;
+/// The head: the campaign, what was found in a sentence, and the warnings.
+pub(super) fn header(body: &mut Markup, repository: &Repository, summary: &Summary) {
+    let plan = repository.plan();
     body.open("header", &[]);
     body.element("p", &[("class", "kicker")], &plan.space);
     body.element("h1", &[], &plan.campaign.name);
@@ -29,6 +23,21 @@ pub(super) fn header(
     }
     body.element("p", &[("class", "headline")], &format!("{}.", headline(summary)));
     body.element("p", &[], &format!("{}.", counts_sentence(summary)));
+    for warning in gathered(&summary.warnings) {
+        body.open("p", &[("class", "warning")]);
+        body.prose(&format!("Warning: {warning}"));
+        body.close();
+    }
+    body.close();
+}
+
+/// How the results were made.
+pub(super) fn about(body: &mut Markup, repository: &Repository, digest: &str) -> Result<(), RecordError> {
+    let facts = repository.campaign();
+    let plan = &facts.plan;
+    let sessions = repository.sessions()?;
+    body.open("section", &[]);
+    body.heading("About this run");
     let budget = |what: &str| format!("{what}, {} evaluations", facts.task.evaluations(plan));
     let search = match (&facts.task, &plan.campaign.search) {
         (Task::Campaign, Search::Strategy { strategy, .. }) => budget(&strategy.title()),
@@ -86,11 +95,6 @@ pub(super) fn header(
         body.close();
     }
     body.close();
-    for warning in gathered(&summary.warnings) {
-        body.open("p", &[("class", "warning")]);
-        body.prose(&format!("Warning: {warning}"));
-        body.close();
-    }
     body.close();
     Ok(())
 }

@@ -13,7 +13,7 @@ const MISSED: usize = 50;
 pub(super) fn monitors(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
     let Some(found) = &summary.monitors else { return };
     body.open("section", &[("id", "monitors")]);
-    body.element("h2", &[], "Monitors");
+    body.heading("Monitors");
     let sentences = [monitors_sentence(found)].into_iter().chain(monitors_run_again(found));
     body.element("p", &[], &sentences.map(|sentence| format!("{sentence}.")).collect::<Vec<_>>().join(" "));
     let mut missed = tables::missed_hazards(found);

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use sesame_present::chart::evenly;
-use sesame_present::markup::{Markup, fill};
+use sesame_present::markup::{Heading, Markup, fill};
 use sesame_present::table::Table;
 use sesame_record::{Origin, RecordError, Repository, TestRow};
 
@@ -13,7 +13,7 @@ use crate::file::write_aside;
 use crate::html::all_tests::all_tests;
 use crate::html::front::front;
 use crate::html::generations::generations;
-use crate::html::header::header;
+use crate::html::header::{about, header};
 use crate::html::policy::policy;
 use crate::html::test::test;
 use crate::html::{before_after, cells, monitors, regions, shrinking, tree};
@@ -65,15 +65,19 @@ fn page_in(
     let members = repository.latest_result_set()?.map_or_else(Vec::new, |set| set.members);
     let summary = summarise(repository, &rows, &members)?;
     let groups = chosen(&summary, &rows);
-    let drawn: Vec<u32> = groups.iter().flat_map(|group| group.tests.iter().copied()).collect();
+    let first = first_of_causes(&summary);
+    let drawn: Vec<u32> =
+        first.into_iter().chain(groups.iter().flat_map(|group| group.tests.iter().copied())).collect();
 
     let mut body = Markup::default();
-    header(&mut body, repository, &summary, digest)?;
-    body.open("main", &[]);
+    body.open("main", &[("id", "main")]);
     if let Some(shrinking) = &summary.shrinking {
         shrinking::shrinking(&mut body, shrinking, &drawn);
     }
     causes(&mut body, &summary, &drawn);
+    if let Some(number) = first {
+        test(&mut body, repository, &summary, number, folder)?;
+    }
     monitors::monitors(&mut body, &summary, &drawn);
     if let Some(before) = before {
         before_after::before_and_after(&mut body, repository, before, &drawn)?;
@@ -90,21 +94,27 @@ fn page_in(
     sections(&mut body, &summary, &drawn);
     for group in groups.iter().filter(|group| !group.tests.is_empty()) {
         body.open("section", &[]);
-        body.element("h2", &[], group.title);
+        body.heading(group.title);
         body.element("p", &[("class", "quiet")], &group.caption);
         for &number in &group.tests {
             test(&mut body, repository, &summary, number, folder)?;
         }
         body.close();
     }
+    about(&mut body, repository, digest)?;
     body.close();
+    let mut whole = Markup::default();
+    whole.element("a", &[("class", "skip"), ("href", "#main")], "Skip to the results");
+    header(&mut whole, repository, &summary);
+    contents(&mut whole, &body);
+    whole.append(body);
     let title = format!("{} of {}, seed {}", summary.campaign, summary.space, summary.seed);
     let mut escaped = Markup::default();
     escaped.text(&title);
     let shell = sesame_templates::report::page();
     // The policy is of the shell alone: what is filled in is not permitted to hold styles or scripts.
     let policy = policy(&shell);
-    Ok(fill(&shell, &[("policy", &policy), ("title", &escaped.finish()), ("body", &body.finish())]))
+    Ok(fill(&shell, &[("policy", &policy), ("title", &escaped.finish()), ("body", &whole.finish())]))
 }
 
 /// What the marks of a timeline mean.
@@ -165,7 +175,7 @@ fn chosen(summary: &Summary, rows: &[TestRow]) -> Vec<Group> {
     let missed: Vec<u32> =
         missed.into_iter().filter(|number| !shrunk.contains(number) && !reference.contains(number)).collect();
     let shrunk_caption = "The test before and after it was shrunk.".to_owned();
-    vec![
+    let mut groups = vec![
         Group { title: "Before and after", caption: shrunk_caption, tests: shrunk },
         Group {
             title: "Reference run",
@@ -182,16 +192,35 @@ fn chosen(summary: &Summary, rows: &[TestRow]) -> Vec<Group> {
                     .to_owned(),
             tests: more,
         },
-    ]
+    ];
+    let first = first_of_causes(summary);
+    for group in &mut groups {
+        group.tests.retain(|number| Some(*number) != first);
+    }
+    groups
 }
 
-/// The causes of violations, and the timeline of the smallest test of the first.
+/// The causes of violations.
 fn causes(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
     let Some(found) = summary.causes.as_ref().filter(|found| !found.causes.is_empty()) else { return };
     let sentence = causes_sentence(found);
     let caption = "A requirement with a smallest set of operations that violates it, as far as tests were run.";
     let caption = [Some(caption.to_owned()), sentence].into_iter().flatten().collect::<Vec<_>>().join(" ");
     section(body, "Causes", Some(&caption), tables::causes(found), drawn);
+}
+
+/// The smallest test of the first cause, which is drawn next to the causes.
+fn first_of_causes(summary: &Summary) -> Option<u32> {
+    summary.causes.iter().flat_map(|found| &found.causes).map(|cause| cause.test.0).next()
+}
+
+/// What is on the page, to jump to.
+fn contents(body: &mut Markup, main: &Markup) {
+    body.open("nav", &[("class", "contents"), ("aria-label", "Contents")]);
+    for Heading { id, title } in main.headings() {
+        body.element("a", &[("href", &format!("#{id}"))], title);
+    }
+    body.close();
 }
 
 /// Rows of failures shown at most.
@@ -204,7 +233,7 @@ fn requirements(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
         return;
     }
     body.open("section", &[]);
-    body.element("h2", &[], "Requirements");
+    body.heading("Requirements");
     table.html(body, drawn);
     if let Some(sentence) = once_sentence(summary) {
         body.element("p", &[("class", "quiet")], &format!("{sentence}."));
@@ -231,7 +260,7 @@ fn section(body: &mut Markup, title: &str, caption: Option<&str>, mut table: Tab
         return;
     }
     body.open("section", &[]);
-    body.element("h2", &[], title);
+    body.heading(title);
     if let Some(caption) = caption {
         body.element("p", &[("class", "quiet")], caption);
     }

@@ -26,7 +26,7 @@ pub(super) fn regions(body: &mut Markup, repository: &Repository) -> Result<(), 
         return Ok(());
     }
     body.open("section", &[("id", "regions")]);
-    body.element("h2", &[], "Where tests fail");
+    body.heading("Where tests fail");
     let caption = "Regions of tests that a small decision tree separates, by the reduced space (T1 to O3) and the \
                    operations; the redder, the more fail. Rules describe these tests; only further tests can show \
                    whether they hold for others.";

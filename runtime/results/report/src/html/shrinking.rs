@@ -9,7 +9,7 @@ use crate::tables;
 /// Before and after, the block, and every test that was tried.
 pub(super) fn shrinking(body: &mut Markup, shrinking: &Shrinking, drawn: &[u32]) {
     body.open("section", &[("id", "shrinking")]);
-    body.element("h2", &[], &format!("{} shrunk", shrinking.test));
+    body.heading(&format!("{} shrunk", shrinking.test));
     body.element("p", &[], &format!("{}.", shrinking_sentence(shrinking)));
     tables::sizes(shrinking).html(body, drawn);
     let caption = "Active: how long operations were active in total. Intensity P1: the mean of the parameters as shares of \

@@ -25,7 +25,7 @@ pub(super) fn certificates(body: &mut Markup, plan: &CampaignPlan) {
         return;
     }
     body.open("section", &[("id", "certificates")]);
-    body.element("h2", &[], "Certificates");
+    body.heading("Certificates");
     let said = "What each guarantee needs, the strongest first; a monitor is in its safe state (dashed) if none holds. A \
                 demand leads to the certificate of another monitor.";
     body.element("p", &[("class", "quiet")], said);

@@ -28,8 +28,19 @@ fn the_page_is_well_formed_and_needs_nothing_but_itself() {
         let spoken = svg.attribute("aria-label").is_some() || svg.attribute("aria-hidden") == Some("true");
         assert!(spoken, "a picture without words");
     }
-    let first = document.descendants().find(|node| node.attribute("class") == Some("test")).unwrap();
-    assert_eq!(first.attribute("id"), Some("T0"), "the reference run comes first");
+    let mut tests = document.descendants().filter(|node| node.attribute("class") == Some("test"));
+    let mut next = || tests.next().unwrap().attribute("id").unwrap().to_owned();
+    let smallest = causes(&repository).unwrap().causes[0].test.to_string();
+    assert_eq!(
+        [next(), next()],
+        [smallest.as_str(), "T0"],
+        "the smallest test of the first cause, then the reference run"
+    );
+    let contents = document.descendants().find(|node| node.attribute("class") == Some("contents")).unwrap();
+    let sections: Vec<&str> = contents.children().filter_map(|link| link.text()).collect();
+    assert_eq!(sections.first(), Some(&"Causes"));
+    assert_eq!(sections.last(), Some(&"About this run"));
+    assert_eq!(sections.len(), document.descendants().filter(|node| node.has_tag_name("h2")).count());
 }
 
 #[test]
