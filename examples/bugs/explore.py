@@ -17,7 +17,7 @@ from random import Random
 
 from bugs.case import MOST_OPERATIONS, BadCase, Case, Cause, load_cases
 from bugs.judge import Judge, minimal
-from bugs.space import Choice, Operation, Space, Test, Use
+from bugs.space import Choice, Operation, Space, Test, Use, check_permitted
 from bugs.strategies.sampling import NEUTRAL, fresh_choice, fresh_test, fresh_window, strongest
 from bugs.world import Outcome
 
@@ -119,12 +119,18 @@ def simplified(cause: Cause, witness: Test, space: Space, judge: Judge) -> Test:
                 changes.append(lambda use, digits=digits, number=number: _rounded(use, number, digits + 1))
         for change in changes:
             use = change(witness[at])
-            permitted = operation.start <= use.start < use.end <= operation.end
-            if permitted and use.end - use.start <= operation.longest + 1e-9:
-                candidate = (*witness[:at], use, *witness[at + 1 :])
-                if shows(cause, candidate, judge):
-                    witness = candidate
+            candidate = (*witness[:at], use, *witness[at + 1 :])
+            if is_permitted(use, operation) and shows(cause, candidate, judge):
+                witness = candidate
     return witness
+
+
+def is_permitted(use: Use, operation: Operation) -> bool:
+    try:
+        check_permitted(use, operation)
+    except ValueError:
+        return False
+    return use.start < use.end
 
 
 def shows(cause: Cause, test: Test, judge: Judge) -> bool:

@@ -26,7 +26,7 @@ from bugs.campaign import Job, Record, agrees, record_from, run
 from bugs.case import Case, TrueCause, cause, load_cases
 from bugs.judge import Judge, minimal
 from bugs.protocol import Bus, serve
-from bugs.sesamec import plan_of, search
+from bugs.sesamec import CAMPAIGN, plan_of, search
 from bugs.space import Metric, Operation, Parameter, Requirement, Space, Test, Topic, Use, check_permitted, space_of
 from bugs.strategies import MODULES, Problem, strategy_class
 from bugs.table import as_csv, as_json, as_text, rows
@@ -56,7 +56,7 @@ class Cases(unittest.TestCase):
     def test_the_campaign_is_a_search_of_120_tests(self):
         for case in self.each():
             campaign = json.loads((case.folder / "plan.json").read_text())["campaign"]
-            self.assertEqual((campaign["name"], campaign["search"]["evaluations"]), ("search", 120))
+            self.assertEqual((campaign["name"], campaign["search"]["evaluations"]), (CAMPAIGN, 120))
 
     def test_nothing_is_violated_without_a_disturbance(self):
         for case in self.each():

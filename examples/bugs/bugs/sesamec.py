@@ -15,7 +15,7 @@ from pathlib import Path
 
 from bugs.space import Choice, Space, Test, Use
 
-CAMPAIGN = "search"
+CAMPAIGN = "find_causes"
 
 # What follows `search STRATEGY` for strategies other than that of the case, besides the number of tests.
 SETTINGS = {"nsga2": "population 20", "nsga3": "population 20", "map_elites": "population 20"}
@@ -37,7 +37,7 @@ class Recorded:
 
 
 def plan_of(sesamec: Path, space_file: Path) -> dict:
-    """The plan of a space's campaign `search`."""
+    """The plan of a space's campaign `find_causes`."""
     with tempfile.TemporaryDirectory() as folder:
         _run(sesamec, "generate", str(space_file.resolve()), "--campaign", CAMPAIGN, "--out", folder)
         return json.loads((Path(folder) / CAMPAIGN / "campaign.plan.json").read_text(encoding="utf-8"))
@@ -46,7 +46,7 @@ def plan_of(sesamec: Path, space_file: Path) -> dict:
 def search(
     sesamec: Path, space_file: Path, space: Space, seed: int, tests: int, strategy: str | None = None
 ) -> list[Recorded]:
-    """Runs the campaign `search`, or the same campaign with another strategy, and returns its tests in order."""
+    """Runs the campaign `find_causes`, or the same campaign with another strategy, and returns its tests in order."""
     with tempfile.TemporaryDirectory() as name:
         folder, file, campaign = Path(name), space_file.resolve(), CAMPAIGN
         if strategy is not None:
@@ -114,7 +114,7 @@ def _choice(
 
 
 def _with_strategy(space_file: Path, strategy: str, tests: int, folder: Path) -> Path:
-    """A space that imports a case's space, and whose campaign differs from `search` only in its strategy."""
+    """A space that imports a case's space, and whose campaign differs from it only in its strategy."""
     file = folder / f"{space_file.stem}_{strategy}.sesame"
     settings = f"{SETTINGS.get(strategy, '')} evaluations {tests}"
     file.write_text(
