@@ -39,67 +39,70 @@ SESAMEC = os.environ.get("SESAMEC")
 class Cases(unittest.TestCase):
     """Every folder of `cases` is complete, and its true causes are true."""
 
-    def each(self) -> Iterator[Case]:
+    def test_a_case_says_what_it_is(self):
         for case in CASES:
             with self.subTest(case.name):
-                yield case
-
-    def test_a_case_says_what_it_is(self):
-        for case in self.each():
-            self.assertEqual(case.space.name, case.name)
-            self.assertTrue(case.space_file.is_file())
-            self.assertTrue(case.title and case.field and case.mechanism)
-            self.assertTrue(case.reports and all(report.startswith("https://") for report in case.reports))
-            self.assertIn(len(case.space.operations), range(6, 9))
-            self.assertTrue(all(known.when for known in case.causes))
+                self.assertEqual(case.space.name, case.name)
+                self.assertTrue(case.space_file.is_file())
+                self.assertTrue(case.title and case.field and case.mechanism)
+                self.assertTrue(case.reports and all(report.startswith("https://") for report in case.reports))
+                self.assertIn(len(case.space.operations), range(6, 9))
+                self.assertTrue(all(known.when for known in case.causes))
 
     def test_the_campaign_is_a_search_of_120_tests(self):
-        for case in self.each():
-            campaign = json.loads((case.folder / "plan.json").read_text())["campaign"]
-            self.assertEqual((campaign["name"], campaign["search"]["evaluations"]), (CAMPAIGN, 120))
+        for case in CASES:
+            with self.subTest(case.name):
+                campaign = json.loads((case.folder / "plan.json").read_text())["campaign"]
+                self.assertEqual((campaign["name"], campaign["search"]["evaluations"]), (CAMPAIGN, 120))
 
     def test_nothing_is_violated_without_a_disturbance(self):
-        for case in self.each():
-            outcome = case.world().run(())
-            self.assertEqual((outcome.violated, outcome.crash), (frozenset(), None))
+        for case in CASES:
+            with self.subTest(case.name):
+                outcome = case.world().run(())
+                self.assertEqual((outcome.violated, outcome.crash), (frozenset(), None))
 
     def test_what_requirements_read_is_published_in_every_step(self):
-        for case in self.each():
-            reference = case.world().run((), keep_messages=True)
-            steps = round(case.space.end * 1e9) // case.space.step
-            for requirement in case.space.requirements.values():
-                formula = case.space.metrics[requirement.metric].formula
-                for number in {each["field"]["topic"] for each in formula["inputs"]}:
-                    for path in case.space.topics[number].paths:
-                        self.assertEqual(len([each for each in reference.messages if each.topic == path]), steps, path)
+        for case in CASES:
+            with self.subTest(case.name):
+                reference = case.world().run((), keep_messages=True)
+                steps = round(case.space.end * 1e9) // case.space.step
+                for requirement in case.space.requirements.values():
+                    formula = case.space.metrics[requirement.metric].formula
+                    for number in {each["field"]["topic"] for each in formula["inputs"]}:
+                        for path in case.space.topics[number].paths:
+                            published = [each for each in reference.messages if each.topic == path]
+                            self.assertEqual(len(published), steps, path)
 
     def test_no_true_cause_contains_another(self):
-        for case in self.each():
-            self.assertTrue(case.causes)
-            self.assertEqual(len(case.causes), len(case.true_causes))
-            self.assertEqual(minimal(case.true_causes), case.true_causes)
+        for case in CASES:
+            with self.subTest(case.name):
+                self.assertTrue(case.causes)
+                self.assertEqual(len(case.causes), len(case.true_causes))
+                self.assertEqual(minimal(case.true_causes), case.true_causes)
 
     def test_the_operations_of_a_true_cause_violate_its_requirement_together_and_no_part_of_them_does(self):
-        for case in self.each():
-            judge = Judge(case.world())
-            for known in case.causes:
-                requirement, witness = known.cause.requirement, known.witness
-                self.assertIn(requirement, judge.outcome(witness).violated, known.cause)
-                for size in range(len(witness)):
-                    for part in combinations(known.cause.operations, size):
-                        outcome = judge.outcome(tuple(use for use in witness if use.operation in part))
-                        self.assertNotIn(requirement, outcome.violated, f"{known.cause}, {part}")
-                self.assertIn(known.cause, judge.causes(witness))
+        for case in CASES:
+            with self.subTest(case.name):
+                judge = Judge(case.world())
+                for known in case.causes:
+                    requirement, witness = known.cause.requirement, known.witness
+                    self.assertIn(requirement, judge.outcome(witness).violated, known.cause)
+                    for size in range(len(witness)):
+                        for part in combinations(known.cause.operations, size):
+                            outcome = judge.outcome(tuple(use for use in witness if use.operation in part))
+                            self.assertNotIn(requirement, outcome.violated, f"{known.cause}, {part}")
+                    self.assertIn(known.cause, judge.causes(witness))
 
     def test_a_threshold_is_where_the_witness_begins_to_violate(self):
-        for case in self.each():
-            world = case.world()
-            for known in (known for known in case.causes if known.threshold is not None):
-                for violating in (True, False):
-                    test = known.threshold.applied_to(known.witness, case.space, violating)
-                    self.assertNotEqual(test, known.witness)
-                    violated = known.cause.requirement in world.run(test).violated
-                    self.assertEqual(violated, violating, f"{known.cause}, {test}")
+        for case in CASES:
+            with self.subTest(case.name):
+                world = case.world()
+                for known in (known for known in case.causes if known.threshold is not None):
+                    for violating in (True, False):
+                        test = known.threshold.applied_to(known.witness, case.space, violating)
+                        self.assertNotEqual(test, known.witness)
+                        violated = known.cause.requirement in world.run(test).violated
+                        self.assertEqual(violated, violating, f"{known.cause}, {test}")
 
 
 class Protocol(unittest.TestCase):

@@ -3,7 +3,7 @@
 Motion capture tells each of them by radio where it is. Between two poses, a drone integrates the velocity that it
 believes to have, whose error nobody knows. Nothing limits how long it does so: without poses, it flies on as if it
 were tracked, until it meets a wall or the other drone: https://github.com/IMRCLab/crazyswarm2/issues/38, and lost poses
-in https://github.com/USC-ACTLab/crazyswarm/issues/360
+in https://github.com/USC-ACTLab/crazyswarm/issues/588
 """
 
 import math

@@ -3,8 +3,8 @@
 Vehicle 1 gets an order to drive across, and a cancel before it is there. It stops and reports that it is idle; then the
 crossing belongs to vehicle 2. The control sends an order again that is not acknowledged in time. The vehicle ignores an
 order that it already has, but a cancel makes it forget which one that was: an order that arrives after the cancel is a
-new order, and vehicle 1 drives across too. The standard leaves open what happens then:
-https://github.com/VDA5050/VDA5050/issues/346, about repeated orders https://github.com/VDA5050/VDA5050/issues/342
+new order, and vehicle 1 drives across too. Implementations differ in what a vehicle may forget, and in repeated orders:
+https://github.com/VDA5050/VDA5050/issues/183, https://github.com/VDA5050/VDA5050/issues/342
 """
 
 from bugs.protocol import Bus

@@ -2,8 +2,7 @@
 
 The servo loop keeps the position that it commanded last. Normally the first jog after the pause makes it start from
 where the arm is. But without a fresh jog it publishes the kept position, also right after the pause, when the planner
-has moved the arm elsewhere: the arm jumps back.
-https://github.com/moveit/moveit2/pull/707, https://github.com/moveit/moveit2/issues/1885
+has moved the arm elsewhere: the arm jumps back: https://github.com/moveit/moveit2/pull/707
 """
 
 from bugs.protocol import Bus

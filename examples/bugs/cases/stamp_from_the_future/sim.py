@@ -1,6 +1,6 @@
 """An arm is jogged by hand: a joint moves as long as the operator holds a key.
 
-While a key is held, the pendant sends velocities with time stamps; after that it sends nothing. The servo loop stops the
+While a key is held, the pendant sends velocities with time stamps, and afterwards nothing. The servo loop stops the
 joint once the last message is stale. It compares the sender's stamp with its own clock, so a pendant whose clock is
 ahead sends messages that are never stale in time, and the joint moves on after the key was released:
 https://github.com/moveit/moveit2/issues/772

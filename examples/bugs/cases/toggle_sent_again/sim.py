@@ -1,10 +1,9 @@
 """A ground station makes a drone grab a load, fly over people, and drop the load behind them.
 
 The command says "the other state". A gripper needs half a second, then the drone acknowledges. A station that hears no
-acknowledgement sends the command again, so a late or lost one makes the gripper open over people. The reports are of
-acknowledgements that must wait for the gripper, and of commands that a driver repeats; that the command toggles is our
-addition, as the plainest command that must not be repeated: https://github.com/PX4/PX4-Autopilot/pull/20331,
-https://github.com/PickNikRobotics/ros2_epick_gripper/pull/6
+acknowledgement sends the command again, so a late or lost one makes the gripper open over people. The report is of
+acknowledgements that came too late, and of commands that were sent again every three seconds because of that; that the
+command toggles is our addition: https://github.com/PX4/PX4-Autopilot/pull/20331
 """
 
 from bugs.protocol import Bus
