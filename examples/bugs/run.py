@@ -32,7 +32,7 @@ from itertools import islice
 from pathlib import Path
 
 from bugs.campaign import Job, Record, fingerprint, origin, record_from, run
-from bugs.case import BadCase, Case, load_cases
+from bugs.case import BadCase, Case, case_folders, load_cases
 from bugs.sesamec import SesamecFailed, plan_of
 from bugs.strategies import Unavailable, strategy_class
 from bugs.table import as_csv, as_json, as_text, rows
@@ -43,11 +43,11 @@ HERE = Path(__file__).resolve().parent
 def main(arguments: list[str]) -> int:
     options = parsed(arguments)
     try:
+        if options.update_plans:
+            return update_plans(case_folders(options.cases), options.sesamec)
         cases = load_cases(options.cases)
         if options.list:
             return show_cases(cases)
-        if options.update_plans:
-            return update_plans(cases, options.sesamec)
         for strategy in options.strategies:
             check(strategy, options.sesamec)
         store = Store(options.out, cases)
@@ -145,10 +145,10 @@ def show_cases(cases: list[Case]) -> int:
     return 0
 
 
-def update_plans(cases: list[Case], sesamec: Path) -> int:
-    for case in cases:
-        plan = json.dumps(plan_of(sesamec, case.space_file), indent=1) + "\n"
-        (case.folder / "plan.json").write_text(plan, encoding="utf-8")
+def update_plans(folders: list[Path], sesamec: Path) -> int:
+    for folder in folders:
+        plan = json.dumps(plan_of(sesamec, folder / f"{folder.name}.sesame"), indent=1) + "\n"
+        (folder / "plan.json").write_text(plan, encoding="utf-8")
     return 0
 
 

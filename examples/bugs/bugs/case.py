@@ -115,11 +115,16 @@ class Case:
 
 def load_cases(names: list[str] | None = None, folder: Path = CASES) -> list[Case]:
     """These cases, or all, in the order of their names."""
-    known = sorted(path.name for path in folder.iterdir() if (path / "case.toml").is_file())
+    return [load_case(path) for path in case_folders(names, folder)]
+
+
+def case_folders(names: list[str] | None = None, folder: Path = CASES) -> list[Path]:
+    """The folders of these cases, or of all: those with a space. Other files may still be missing."""
+    known = sorted(path.name for path in folder.iterdir() if (path / f"{path.name}.sesame").is_file())
     unknown = sorted(set(names or ()) - set(known))
     if unknown:
         raise BadCase(f"there is no case `{unknown[0]}`; there are {', '.join(known)}")
-    return [load_case(folder / name) for name in known if names is None or name in names]
+    return [folder / name for name in known if names is None or name in names]
 
 
 def load_case(folder: Path) -> Case:
@@ -133,7 +138,7 @@ def load_case(folder: Path) -> Case:
             field=facts["field"],
             reports=tuple(facts["reports"]),
             mechanism=facts["mechanism"],
-            causes=tuple(_true_cause(each, space) for each in facts["cause"]),
+            causes=tuple(_true_cause(each, space) for each in facts.get("cause", ())),
             space=space,
         )
     except (OSError, tomllib.TOMLDecodeError, ValueError) as error:
