@@ -35,6 +35,9 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
         causes(&mut text, found, options);
     }
     if !summary.front.is_empty() {
+        if summary.causes.as_ref().is_some_and(|found| !found.causes.is_empty()) {
+            text.push('\n');
+        }
         text.push_str(&tables::front(summary).text(options));
         if let Some(confirmation) = summary.confirmation {
             paragraph(&mut text, &values_sentence(confirmation), options);
