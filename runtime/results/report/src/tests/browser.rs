@@ -85,7 +85,9 @@ fn a_browser_finds_nothing_on_the_page_that_its_policy_forbids() {
     // It is looked for where it would be: what has no hash is refused, and does nothing.
     let foreign = "<script>document.title = 'taken'</script><p style=\"color: red\" onclick=\"1\">x</p>\
                    <img src=\"data:image/gif;base64,R0lGODlhAQABAAAAACw=\"/>";
-    let foreign = html.replace("<main>", &format!("<main>{foreign}"));
+    let main = "<main id=\"main\">";
+    assert!(html.contains(main));
+    let foreign = html.replace(main, &format!("{main}{foreign}"));
     let (shown, log) = opened(browser, &foreign, 1280, Scheme::Light);
     assert!(!shown.contains("<title>taken"));
     assert!(refused(&log) >= 3, "{log}");
