@@ -182,7 +182,7 @@ impl Interleaved {
                 && (0..self.requirements.len()).all(|requirement| self.causes.explain(requirement, &both))
         };
         let share = stream.unit();
-        let source = if !self.pairs.first_level_is_complete(&self.setting, &paired, &is_known) { 0.0 } else { share };
+        let source = if self.pairs.first_level_is_complete(&self.setting, &paired, &is_known) { share } else { 0.0 };
         let mut pairs = std::mem::take(&mut self.pairs);
         let found = if source < PAIRWISE {
             pairs.next(&self.setting, &paired, &is_known, stream).map(|test| (test, Vec::new()))

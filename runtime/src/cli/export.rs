@@ -46,24 +46,20 @@ fn name(text: &str) -> Result<String, String> {
 pub(super) fn export(results: &Path, args: &ExportArgs) -> Result<ExitCode, Failure> {
     let repository = open(results, args.which.results.as_deref())?;
     let expected = if args.pin { Expected::Values } else { Expected::Requirements };
-    match &args.test {
-        Some(test) => {
-            let exported = report::export(&repository, test, args.name.as_deref(), expected)?;
-            match args.which.format {
-                Format::Text => print_blocks(&exported.block),
-                Format::Json => print_json(&exported),
-            }
+    if let Some(test) = &args.test {
+        let exported = report::export(&repository, test, args.name.as_deref(), expected)?;
+        return match args.which.format {
+            Format::Text => print_blocks(&exported.block),
+            Format::Json => print_json(&exported),
+        };
+    }
+    let exported = report::export_causes(&repository, expected)?;
+    match args.which.format {
+        Format::Text => {
+            let blocks: Vec<&str> = exported.iter().map(|exported| exported.block.as_str()).collect();
+            print_blocks(&blocks.join("\n"))
         }
-        None => {
-            let exported = report::export_causes(&repository, expected)?;
-            match args.which.format {
-                Format::Text => {
-                    let blocks: Vec<&str> = exported.iter().map(|exported| exported.block.as_str()).collect();
-                    print_blocks(&blocks.join("\n"))
-                }
-                Format::Json => print_json(&exported),
-            }
-        }
+        Format::Json => print_json(&exported),
     }
 }
 

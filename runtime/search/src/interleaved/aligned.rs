@@ -148,7 +148,7 @@ fn from_moment_to_moment(
     at: Option<f64>,
     stream: &mut Stream,
 ) -> (f64, f64) {
-    let moments = setting.moments.moments.iter().map(|moment| moment.at);
+    let moments = setting.moments.all.iter().map(|moment| moment.at);
     let own = setting.moments.heard[kind].rare.iter().copied();
     let mut ends = vec![range.low];
     ends.extend(moments.chain(own).filter(|at| range.low < *at && *at < range.high));
@@ -157,12 +157,11 @@ fn from_moment_to_moment(
         let kept: Vec<f64> = ends.iter().copied().filter(|end| keep(*end)).collect();
         if kept.is_empty() { otherwise } else { kept[stream.below(kept.len())] }
     };
-    let (start, end) = match at {
-        Some(at) => (one_of(&|end| end <= at, range.low, stream), one_of(&|end| end > at, range.high, stream)),
-        None => {
-            let (a, b) = (one_of(&|_| true, range.low, stream), one_of(&|_| true, range.high, stream));
-            if a == b { (range.low, range.high) } else { (a.min(b), a.max(b)) }
-        }
+    let (start, end) = if let Some(at) = at {
+        (one_of(&|end| end <= at, range.low, stream), one_of(&|end| end > at, range.high, stream))
+    } else {
+        let (a, b) = (one_of(&|_| true, range.low, stream), one_of(&|_| true, range.high, stream));
+        if a == b { (range.low, range.high) } else { (a.min(b), a.max(b)) }
     };
     // Most often it begins just before what happens, so that it is disturbed; it ends just before or just after.
     let half = setting.moments.grain / 2.0;

@@ -34,7 +34,7 @@ pub(super) struct Moments {
     /// is usual between two messages of a topic that operations disturb.
     pub(super) grain: f64,
     /// In order of time, at least one.
-    pub(super) moments: Vec<Moment>,
+    pub(super) all: Vec<Moment>,
     /// Per operation of the test space: when there are messages that it could disturb.
     pub(super) heard: Vec<Heard>,
 }
@@ -64,7 +64,7 @@ impl Moments {
         let moments = course.map_or_else(Vec::new, |course| moments(course, end, grain));
         let even = || (0..EVEN).map(|at| Moment { at: end * (f64::from(at) + 0.5) / f64::from(EVEN), weight: 1.0 });
         let moments = if moments.is_empty() { even().collect() } else { moments };
-        Moments { end, grain, moments, heard }
+        Moments { end, grain, all: moments, heard }
     }
 
     /// Whether an operation meets a message in a window of the undisturbed run.
@@ -74,21 +74,21 @@ impl Moments {
 
     /// A moment, likelier the weightier it is.
     pub(super) fn draw(&self, stream: &mut Stream) -> f64 {
-        let at = weighted(self.moments.iter().map(|moment| libm::sqrt(moment.weight)), stream);
-        self.moments[at].at
+        let at = weighted(self.all.iter().map(|moment| libm::sqrt(moment.weight)), stream);
+        self.all[at].at
     }
 
     /// How much happens in a stretch of time.
     pub(super) fn weight_in(&self, start: f64, end: f64) -> f64 {
-        self.moments.iter().filter(|moment| start <= moment.at && moment.at < end).map(|moment| moment.weight).sum()
+        self.all.iter().filter(|moment| start <= moment.at && moment.at < end).map(|moment| moment.weight).sum()
     }
 
     /// The run in at most so many parts in which about equally much happens.
     pub(super) fn parts(&self, count: usize) -> Vec<Span> {
-        let all: f64 = self.moments.iter().map(|moment| moment.weight).sum();
+        let all: f64 = self.all.iter().map(|moment| moment.weight).sum();
         let mut cuts = vec![0.0];
         let mut sum = 0.0;
-        for moment in &self.moments {
+        for moment in &self.all {
             sum += moment.weight;
             if sum >= all * cuts.len() as f64 / count as f64 && cuts.len() < count && moment.at > self.grain {
                 cuts.push(moment.at - self.grain / 2.0);

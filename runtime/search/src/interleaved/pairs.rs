@@ -143,8 +143,7 @@ fn together(setting: &Setting, kinds: &[usize], stretch: Span, stream: &mut Stre
 
 /// A moment in a stretch of time, likelier the more happens then; any time if nothing does.
 fn moment_in(setting: &Setting, low: f64, high: f64, stream: &mut Stream) -> f64 {
-    let inside: Vec<_> =
-        setting.moments.moments.iter().filter(|moment| low <= moment.at && moment.at <= high).collect();
+    let inside: Vec<_> = setting.moments.all.iter().filter(|moment| low <= moment.at && moment.at <= high).collect();
     if inside.is_empty() {
         return stream.uniform(low, high);
     }

@@ -62,7 +62,7 @@ impl Tried {
 }
 
 fn items(setting: &Setting, test: &Test) -> BTreeMap<Item, f64> {
-    let moments = &setting.moments.moments;
+    let moments = &setting.moments.all;
     let all: f64 = moments.iter().map(|moment| moment.weight).sum();
     let weight = |at: usize| moments[at].weight / all * moments.len() as f64;
     let near = AT_A_MOMENT * setting.moments.end;

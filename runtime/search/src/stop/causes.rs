@@ -171,9 +171,9 @@ mod tests {
     fn pairs_that_cannot_act_or_hold_known_causes_need_not_act_together() {
         let mut seen = Seen::new(&plan(2));
         seen.tell(&result(1, &[(0, true)], true));
-        for (number, (first, second)) in [(1, 2), (1, 3)].into_iter().enumerate() {
-            assert_eq!(seen.pairs_if_tried(), None, "after {number}");
-            seen.tell(&result(2 + number as u32, &[(first, true), (second, second != 3)], false));
+        for (number, second) in [(2, 2), (3, 3)] {
+            assert_eq!(seen.pairs_if_tried(), None, "before {number}");
+            seen.tell(&result(number, &[(1, true), (second, second != 3)], false));
         }
         // Nothing was said about 2 and 3 yet, and 3 never has an effect.
         assert_eq!(seen.pairs_if_tried(), None);
