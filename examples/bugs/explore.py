@@ -18,7 +18,7 @@ from random import Random
 from bugs.case import MOST_OPERATIONS, BadCase, Case, Cause, load_cases
 from bugs.judge import Judge, minimal
 from bugs.space import Choice, Operation, Space, Test, Use, check_permitted
-from bugs.strategies.sampling import NEUTRAL, fresh_choice, fresh_test, fresh_window, strongest
+from bugs.strategies.sampling import NEUTRAL, fresh_choice, fresh_test, fresh_window, overlap, strongest
 from bugs.world import Outcome
 
 RARE = 12  # a topic with at most so many messages: windows are drawn around them
@@ -67,7 +67,7 @@ def size(test: Test) -> tuple[int, float]:
 
 def draws(space: Space, reference: Outcome, luck: Random) -> Iterator[Test]:
     """Every third test is uniform. In the others operations are strong half of the time, and their windows long, or
-    around a message of a rare topic, or around a common moment."""
+    around a message of a rare topic, or around a common moment; in one of four, one acts twice in a row."""
     rare = rare_messages(space, reference)
     operations = list(space.operations.values())
     while True:
@@ -76,7 +76,10 @@ def draws(space: Space, reference: Outcome, luck: Random) -> Iterator[Test]:
             continue
         chosen = luck.sample(operations, luck.randint(space.fewest, min(space.most, len(operations))))
         moment = luck.uniform(0.0, space.end)
-        yield tuple(_use(each, rare.get(each.topic, []), moment, luck) for each in chosen)
+        test = [_use(each, rare.get(each.topic, []), moment, luck) for each in chosen]
+        if len(test) < space.most and luck.random() < 0.25:
+            test += _again(luck.choice(test), space, luck)
+        yield tuple(test)
 
 
 def rare_messages(space: Space, reference: Outcome) -> dict[int, list[float]]:
@@ -107,6 +110,12 @@ def _use(operation: Operation, rare: list[float], moment: float, luck: Random) -
     return Use(operation.name, start, end, choices, luck.getrandbits(64))
 
 
+def _again(use: Use, space: Space, luck: Random) -> list[Use]:
+    """The same operation right after itself, if there is time left."""
+    end = min(use.end + (use.end - use.start), space.operations[use.operation].end)
+    return [replace(use, start=use.end, end=end, seed=luck.getrandbits(64))] if end > use.end else []
+
+
 def simplified(cause: Cause, witness: Test, space: Space, judge: Judge) -> Test:
     """The same operations with rounder times and choices, and the first seed, as far as the cause remains."""
     for at in range(len(witness)):
@@ -120,7 +129,7 @@ def simplified(cause: Cause, witness: Test, space: Space, judge: Judge) -> Test:
         for change in changes:
             use = change(witness[at])
             candidate = (*witness[:at], use, *witness[at + 1 :])
-            if is_permitted(use, operation) and shows(cause, candidate, judge):
+            if is_permitted(use, operation) and not overlap(candidate) and shows(cause, candidate, judge):
                 witness = candidate
     return witness
 

@@ -27,7 +27,7 @@ def fresh_test(space: Space, luck: Random) -> Test:
         chosen += luck.choices(operations, k=count - len(chosen))
     while True:
         test = tuple(fresh_use(operation, luck) for operation in chosen)
-        if not _overlap(test):
+        if not overlap(test):
             return test
 
 
@@ -85,7 +85,7 @@ def _ends(parameter: Parameter, neutral: float | None, luck: Random) -> list[Cho
     return [max(low, high, key=lambda end: abs(end - neutral))]
 
 
-def _overlap(test: Test) -> bool:
+def overlap(test: Test) -> bool:
     """Whether two uses of one operation act at the same time."""
     uses = sorted(test, key=lambda use: (use.operation, use.start))
     return any(one.operation == other.operation and other.start < one.end for one, other in zip(uses, uses[1:]))
