@@ -87,7 +87,7 @@ class Cases(unittest.TestCase):
                 for known in case.causes:
                     requirement, witness = known.cause.requirement, known.witness
                     self.assertIn(requirement, judge.outcome(witness).violated, known.cause)
-                    for size in range(len(witness)):
+                    for size in range(len(known.cause.operations)):
                         for part in combinations(known.cause.operations, size):
                             outcome = judge.outcome(tuple(use for use in witness if use.operation in part))
                             self.assertNotIn(requirement, outcome.violated, f"{known.cause}, {part}")
