@@ -104,7 +104,8 @@ struct Outcome {
 /// shows is no cause.
 fn cause_case(class: &str, requirement: &RequirementSummary, cause: &CauseSummary) -> Case {
     let CauseSummary { test, metric, value, bound, violating, held, acting, .. } = cause;
-    let again = cause.fresh_words().map_or(String::new(), |words| format!("; in fresh runs: {words} violate it"));
+    let again =
+        cause.again.as_ref().map_or(String::new(), |again| format!("; in fresh runs: {test} {}", again.words()));
     let message = format!(
         "violated by {violating} of {} with {}; smallest is {test}: {value}, required is {metric} {bound}{again}",
         number::plural(*held, "test", "tests"),

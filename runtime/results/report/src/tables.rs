@@ -64,7 +64,7 @@ pub(super) fn requirements(summary: &Summary) -> Table {
 
 /// The causes of violations: a row each.
 pub(super) fn causes(found: &CausesSummary) -> Table {
-    let again = found.causes.iter().any(|cause| cause.fresh.is_some());
+    let again = found.causes.iter().any(|cause| cause.again.is_some());
     let several = found.causes.iter().any(|cause| cause.fewer != Fewer::Single);
     let mut columns = vec![Column::heading("requirement"), Column::line("cause"), Column::words("smallest test")];
     columns.extend(again.then(|| Column::line("fresh runs")));
@@ -78,7 +78,7 @@ pub(super) fn causes(found: &CausesSummary) -> Table {
             Datum::text(cause.name()).into(),
             Datum::Test(cause.test).into(),
         ];
-        cells.extend(again.then(|| Datum::maybe(cause.fresh_words()).into()));
+        cells.extend(again.then(|| Datum::maybe(cause.again.as_ref().map(FindingAgain::words)).into()));
         cells.push(Datum::text(format!("{} of {}", cause.violating, cause.held)).into());
         cells.push(Datum::Test(cause.first).into());
         cells.extend(several.then(|| Datum::text(cause.fewer.word()).into()));

@@ -3,10 +3,11 @@
 use serde::Serialize;
 
 use sesame_analysis::causes::{Cause, Causes, Unseen, causes_in};
+use sesame_analysis::confirmed::FindingAgain;
 use sesame_base::test_number::TestNumber;
 use sesame_plan::{CampaignPlan, Task};
 use sesame_present::number;
-use sesame_record::{Judge, RecordError, Repository, Tally, TestRow};
+use sesame_record::{Judge, RecordError, Repository, TestRow, verdict};
 
 use crate::facts::show::{OperationReport, operations};
 use crate::facts::wording;
@@ -48,17 +49,12 @@ pub struct CauseSummary {
     pub held: usize,
     /// Whether fewer of the operations would do.
     pub fewer: Fewer,
-    /// What fresh runs of the smallest test say, if it was run again.
+    /// How often fresh runs of the smallest test show it, if it was run again.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub fresh: Option<Tally>,
+    pub again: Option<FindingAgain>,
 }
 
 impl CauseSummary {
-    /// How many fresh runs of the smallest test violate the requirement, if it was run again.
-    pub(crate) fn fresh_words(&self) -> Option<String> {
-        self.fresh.map(|fresh| format!("{} of {}", fresh.violated, fresh.conclusive()))
-    }
-
     /// The operations as a name: `lag_link1 + drop_link0`.
     pub(crate) fn name(&self) -> String {
         self.operations.join(" + ")
@@ -127,7 +123,9 @@ fn summarise(
     let shown = record.observation.value(requirement.metric);
     let value = wording::value_text(shown, metric.unit.as_deref(), &[requirement.bound]);
     let acts = |used: &OperationReport| used.counters.is_none_or(|counters| counters.any_effect());
-    let fresh = Tally::of(judge.runs(cause.smallest).iter().map(|run| run.verdict(requirement)));
+    let first = verdict(requirement.bound, &record.observation.outcome, shown);
+    let was_run_again = !judge.runs(cause.smallest).is_empty();
+    let again = FindingAgain::of(&requirement.name, judge.tally(cause.smallest, requirement), first);
     Ok(CauseSummary {
         requirement: requirement.name.clone(),
         text: requirement.text.clone(),
@@ -145,6 +143,6 @@ fn summarise(
             (_, true) => Fewer::NoViolation,
             (_, false) => Fewer::NotTried,
         },
-        fresh: (fresh.conclusive() > 0).then_some(fresh),
+        again: again.filter(|_| was_run_again),
     })
 }
