@@ -459,6 +459,9 @@ pub(crate) fn plans(like: &CampaignPlan) -> impl Strategy<Value = Shown> + use<>
             if campaign.copies != Copies::MayOverlap {
                 campaign.count = Count { min: 1, max: u32::try_from(operations.len()).expect("there are a few") };
             }
+            if campaign.count.max < 2 {
+                campaign.stop.retain(|rule| *rule != StopRule::EveryPair);
+            }
             let by_condition = matches!(campaign.activation, ActivationMode::Condition { .. });
             let operations = operations.iter().map(|drawn| operation(drawn, campaign.end_after, by_condition));
             let like = like.clone();
