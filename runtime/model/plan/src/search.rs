@@ -320,6 +320,8 @@ pub struct StrategyProperties {
     pub needs_coverage: bool,
     /// Whether an exploration (`boost`, `construct`, `predict`, `novelty`) can direct it.
     pub explores: bool,
+    /// Whether it places windows by what happens in the undisturbed run, which that run has to record for it.
+    pub reads_course: bool,
     /// Whether its tests are drawn independently of each other.
     pub independent: bool,
 }
@@ -403,6 +405,7 @@ impl StrategyKind {
             StrategyKind::Interleaved => StrategyProperties {
                 averaging: Averaging::ByItself,
                 needs_requirements: true,
+                reads_course: true,
                 ..properties("interleaved", "interleaved", "an interleaved search")
             },
         }
@@ -421,6 +424,7 @@ const fn properties(keyword: &'static str, title: &'static str, noun: &'static s
         needs_requirements: false,
         needs_coverage: false,
         explores: false,
+        reads_course: false,
         independent: false,
     }
 }

@@ -1,7 +1,7 @@
 //! The tables of the course of reference runs: when messages came on each wire, and what happened in their fields.
 //!
 //! Searches place windows by it, so a resumed search has to have it. It explains what they do, and the digest leaves it
-//! out. The tables are only there if a run without operations was recorded.
+//! out. The tables are only there if a run without operations was recorded for a search that reads them.
 
 use rusqlite::{Transaction, params};
 

@@ -207,7 +207,7 @@ impl<'a> Relay<'a> {
             pipelines,
             published: vec![0; wires.len()],
             traffic: traffic::Recorder::new(plan, wires, test),
-            course: test.operations.is_empty().then(|| Box::new(course::Recorder::new(wires))),
+            course: course::is_read(plan, test).then(|| Box::new(course::Recorder::new(wires))),
             queue: ReleaseQueue::new(test.operations.len(), wires.len_with_links()),
             monitors,
             publishing: Publishing::default(),

@@ -9,6 +9,7 @@ mod stretches;
 
 use sesame_base::observation::{Course, Heard, Signal};
 use sesame_base::time::SimTime;
+use sesame_plan::{CampaignPlan, Test};
 
 use crate::relay::course::happenings::Field;
 use crate::relay::course::stretches::Stretches;
@@ -19,6 +20,12 @@ use crate::wire::{Wire, WireTable};
 const FIELDS: usize = 400;
 /// Lists of at most so many numbers are followed number by number; of longer ones, the length is.
 const NUMBERS: usize = 8;
+
+/// Whether the course of a run is recorded: of one without operations, for a search that places windows by it.
+pub(super) fn is_read(plan: &CampaignPlan, test: &Test) -> bool {
+    let strategy = plan.campaign.search.strategy();
+    test.operations.is_empty() && strategy.is_some_and(|strategy| strategy.kind().properties().reads_course)
+}
 
 /// The course of one run.
 pub(super) struct Recorder {
@@ -148,7 +155,8 @@ impl Layout {
 mod tests {
     use sesame_base::observation::{Happening, SignalEvent};
     use sesame_plan::testing::{field, message, minimal, topic};
-    use sesame_plan::{CampaignPlan, MessageId, Type};
+    use sesame_plan::testing::{test_of, use_of};
+    use sesame_plan::{MessageId, Search, Strategy, Type};
 
     use super::*;
     use crate::value::{Fields, Record};
@@ -206,6 +214,19 @@ mod tests {
         assert_eq!(of("mode", 1), [(3.0, Happening::Changes)]);
         assert_eq!(of("pose.x", 1), [(3.1, Happening::SetsOut), (6.0, Happening::Rests)]);
         assert_eq!(of("pose.y", 1), []);
+    }
+
+    #[test]
+    fn only_undisturbed_runs_of_searches_that_read_it_record_it() {
+        let with = |search| {
+            let mut plan = plan();
+            plan.campaign.search = search;
+            plan
+        };
+        let (undisturbed, disturbed) = (Test::default(), test_of(vec![use_of(0, 0.0, 1.0, vec![], 1)]));
+        let interleaved = with(Search::new(Strategy::Interleaved { keep_causes: false }, 8));
+        assert!(is_read(&interleaved, &undisturbed) && !is_read(&interleaved, &disturbed));
+        assert!(!is_read(&with(Search::new(Strategy::Random, 8)), &undisturbed));
     }
 
     #[test]
