@@ -28,8 +28,33 @@ pub struct Cause {
     /// The smallest of the violating tests that hold no other operations: the fewest uses, then the shortest time, then
     /// the least strength.
     pub smallest: u32,
-    /// Whether there is a conclusive test without each single one of the operations and with all others.
-    pub smaller_tried: bool,
+    /// How many of the violating tests hold no other known cause of the requirement, so that this one explains them.
+    pub shown: u32,
+    /// What is known of fewer of the operations.
+    pub fewer: Fewer,
+}
+
+/// What is known of a cause with some of its operations left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Fewer {
+    /// It has a single operation.
+    Single,
+    /// Without any one of them a test with all others does not violate the requirement.
+    NoViolation,
+    /// That was not tried, or not for each of them.
+    NotTried,
+}
+
+impl Fewer {
+    /// The word that tables use.
+    pub fn word(self) -> &'static str {
+        match self {
+            Fewer::Single => "none",
+            Fewer::NoViolation => "no violation",
+            Fewer::NotTried => "not tried",
+        }
+    }
 }
 
 /// The causes of some tests.
@@ -46,7 +71,7 @@ pub struct Causes {
 pub struct Unseen {
     /// How many tests there are that are conclusive about a requirement.
     pub tests: u32,
-    /// How many causes only one of them showed.
+    /// How many causes only one of them showed: a test shows a cause if it holds no other one of the requirement.
     pub once: u32,
     /// An upper bound, at 99 % confidence after Good and Turing, on the probability that a further test shows a new
     /// cause, if tests are drawn independently.
@@ -82,8 +107,8 @@ pub fn causes_in(plan: &CampaignPlan, judge: &Judge<'_>, rows: &[&TestRow]) -> C
         found.extend(of_requirement(plan, &judged, requirement));
     }
     let tests = u32::try_from(conclusive.len()).unwrap_or(u32::MAX);
-    let seen = |times: usize| found.iter().filter(|cause| cause.violating.len() == times).count();
-    let [once, twice] = [1, 2].map(|times| u32::try_from(seen(times)).unwrap_or(u32::MAX));
+    let shown = |times: u32| found.iter().filter(|cause| cause.shown == times).count();
+    let [once, twice] = [1, 2].map(|times| u32::try_from(shown(times)).unwrap_or(u32::MAX));
     let strategy = plan.campaign.search.strategy();
     let unseen = (!found.is_empty()).then(|| Unseen {
         tests,
@@ -100,11 +125,6 @@ pub fn table(plan: &CampaignPlan, causes: &[Cause]) -> Table {
     let mut table = Table::new(columns);
     for cause in causes {
         let names: Vec<&str> = cause.operations.iter().map(|&id| plan.operation(id).name.as_str()).collect();
-        let fewer = match (cause.operations.len(), cause.smaller_tried) {
-            (1, _) => "none",
-            (_, true) => "no violation",
-            (_, false) => "not tried",
-        };
         table.row([
             Datum::text(&plan.requirement(cause.requirement).name),
             Datum::Text(names.join(" + ")),
@@ -112,7 +132,7 @@ pub fn table(plan: &CampaignPlan, causes: &[Cause]) -> Table {
             Datum::Whole(i64::from(cause.held)),
             cause.violating.first().map_or(Datum::Missing, |&test| Datum::test(test)),
             Datum::test(cause.smallest),
-            Datum::text(fewer),
+            Datum::text(cause.fewer.word()),
         ]);
     }
     table
@@ -153,7 +173,7 @@ fn of_requirement(plan: &CampaignPlan, judged: &[Judged<'_>], requirement: Requi
             smallest.push(set);
         }
     }
-    let mut causes: Vec<Cause> = smallest.into_iter().map(|set| cause(plan, judged, requirement, set)).collect();
+    let mut causes: Vec<Cause> = smallest.iter().map(|set| cause(plan, judged, requirement, set, &smallest)).collect();
     causes.sort_by_key(|cause| (cause.operations.len(), cause.violating.first().copied()));
     causes
 }
@@ -164,7 +184,14 @@ fn acting(row: &TestRow) -> BTreeSet<OperationId> {
     row.test.operations.iter().enumerate().filter(|(at, _)| !idle(*at)).map(|(_, used)| used.operation).collect()
 }
 
-fn cause(plan: &CampaignPlan, judged: &[Judged<'_>], requirement: RequirementId, set: &BTreeSet<OperationId>) -> Cause {
+/// The cause with a set of operations; `all` are the sets of all causes of the requirement.
+fn cause(
+    plan: &CampaignPlan,
+    judged: &[Judged<'_>],
+    requirement: RequirementId,
+    set: &BTreeSet<OperationId>,
+    all: &[&BTreeSet<OperationId>],
+) -> Cause {
     let holding = || judged.iter().filter(|test| set.is_subset(&test.operations));
     let violating: Vec<u32> = holding().filter(|test| test.violates).map(|test| test.row.number).collect();
     let only = judged.iter().filter(|test| test.violates && test.operations == *set);
@@ -176,6 +203,8 @@ fn cause(plan: &CampaignPlan, judged: &[Judged<'_>], requirement: RequirementId,
         let by_size = a_uses.cmp(&b_uses).then(a_length.total_cmp(&b_length)).then(a_strength.total_cmp(&b_strength));
         by_size.then(a.row.number.cmp(&b.row.number))
     });
+    let is_alone = |test: &&Judged<'_>| all.iter().filter(|other| other.is_subset(&test.operations)).count() == 1;
+    let shown = holding().filter(|test| test.violates).filter(is_alone).count();
     let was_tried = |left_out: &OperationId| {
         let fewer: BTreeSet<OperationId> = set.iter().copied().filter(|id| id != left_out).collect();
         judged.iter().any(|test| test.operations == fewer)
@@ -186,7 +215,12 @@ fn cause(plan: &CampaignPlan, judged: &[Judged<'_>], requirement: RequirementId,
         violating,
         held: u32::try_from(holding().count()).unwrap_or(u32::MAX),
         smallest: smallest.map_or(0, |test| test.row.number),
-        smaller_tried: set.len() > 1 && set.iter().all(was_tried),
+        shown: u32::try_from(shown).unwrap_or(u32::MAX),
+        fewer: match set.len() {
+            1 => Fewer::Single,
+            _ if set.iter().all(was_tried) => Fewer::NoViolation,
+            _ => Fewer::NotTried,
+        },
     }
 }
 
@@ -230,6 +264,7 @@ mod tests {
             }
             for cause in of {
                 assert!(cause.violating.contains(&cause.smallest) && cause.held as usize >= cause.violating.len());
+                assert!((1..=cause.violating.len()).contains(&(cause.shown as usize)), "its smallest test shows it");
             }
         }
         assert!(explained > 0, "some tests violate a requirement");

@@ -100,8 +100,8 @@ struct Outcome {
     text: String,
 }
 
-/// A cause, which fails: verdicts of tests that were run again are those of their fresh runs, so what no fresh run
-/// shows is no cause.
+/// A cause, as a case that fails. Tests that were run again have the verdicts of their fresh runs, so a violation that
+/// no fresh run shows does not count.
 fn cause_case(class: &str, requirement: &RequirementSummary, cause: &CauseSummary) -> Case {
     let CauseSummary { test, metric, value, bound, violating, held, acting, .. } = cause;
     let again =

@@ -23,7 +23,7 @@ mod twin;
 
 pub use self::twin::twin_text;
 pub use export::{Expected, ExportError, Exported, export, export_causes};
-pub use facts::causes::{CauseSummary, CausesSummary, Fewer, causes};
+pub use facts::causes::{CauseSummary, CausesSummary, causes};
 pub use facts::certificate::before_after::{Mend, MendedTest, mend};
 pub use facts::certificate::campaign::{HazardSummary, MissedHazard, MonitorSummary, MonitorsSummary, StateShare};
 pub use facts::certificate::moment::{MomentError, MomentReport, MonitorMoment, PartReport, show_at};

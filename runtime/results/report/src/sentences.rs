@@ -88,10 +88,12 @@ fn missed_words(monitors: &MonitorsSummary) -> Option<String> {
 pub(crate) fn causes_sentence(found: &CausesSummary) -> Option<String> {
     let unseen = found.unseen?;
     let known = plural(found.causes.len(), "cause is known", "causes are known");
-    let once = match unseen.once {
-        0 => "each was seen in several tests".to_owned(),
-        1 => "one of them was seen in a single test".to_owned(),
-        once => format!("{once} of them were seen in a single test each"),
+    let once = match (found.causes.len(), unseen.once) {
+        (1, 0) => "several violating tests show it".to_owned(),
+        (1, _) => "a single violating test shows it".to_owned(),
+        (_, 0) => "each of them explains several violating tests on its own".to_owned(),
+        (_, 1) => "one of them explains only one violating test on its own".to_owned(),
+        (_, once) => format!("{once} of them each explain only one violating test on their own"),
     };
     let bias =
         if unseen.independent { "" } else { "; a biased bound, as this search does not draw its tests independently" };

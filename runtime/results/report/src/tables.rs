@@ -2,13 +2,14 @@
 
 pub(super) mod monitors;
 
+use sesame_analysis::causes::Fewer;
 use sesame_analysis::confirmed::{ConfirmedTest, FindingAgain, tally_words};
 use sesame_analysis::regions::Rule;
 use sesame_present::number::{self, plural, titled};
 use sesame_present::table::{Cell, Column, Datum, Table};
 use sesame_record::{Difference, MetricValue, Verdict};
 
-use crate::facts::causes::{CausesSummary, Fewer};
+use crate::facts::causes::CausesSummary;
 use crate::facts::readable::short_numbers;
 use crate::facts::recording::{FedMetric, Sameness};
 use crate::facts::repetition::ViolationRate;

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use sesame_analysis::causes::{Cause, Causes, Unseen, causes_in};
+use sesame_analysis::causes::{Cause, Causes, Fewer, Unseen, causes_in};
 use sesame_analysis::confirmed::FindingAgain;
 use sesame_base::test_number::TestNumber;
 use sesame_plan::{CampaignPlan, Task};
@@ -61,30 +61,7 @@ impl CauseSummary {
     }
 }
 
-/// What is known of a cause with some of its operations left out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Fewer {
-    /// It has a single operation.
-    Single,
-    /// Without any one of them a test with all others does not violate the requirement.
-    NoViolation,
-    /// That was not tried, or not for each of them.
-    NotTried,
-}
-
-impl Fewer {
-    /// The word that tables use.
-    pub fn word(self) -> &'static str {
-        match self {
-            Fewer::Single => "–",
-            Fewer::NoViolation => "no violation",
-            Fewer::NotTried => "not tried",
-        }
-    }
-}
-
-/// The causes in the tests of a campaign that searches; `None` for others, whose tests are variations of one.
+/// The causes in the tests of a campaign if it searches. Other campaigns run variations of one test, so `None`.
 pub(crate) fn causes_of_search(
     repository: &Repository,
     judge: &Judge<'_>,
@@ -138,11 +115,7 @@ fn summarise(
         first: TestNumber(cause.violating.first().copied().unwrap_or(cause.smallest)),
         violating: cause.violating.len(),
         held: cause.held as usize,
-        fewer: match (cause.operations.len(), cause.smaller_tried) {
-            (1, _) => Fewer::Single,
-            (_, true) => Fewer::NoViolation,
-            (_, false) => Fewer::NotTried,
-        },
+        fewer: cause.fewer,
         again: again.filter(|_| was_run_again),
     })
 }
