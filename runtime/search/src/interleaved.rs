@@ -10,8 +10,8 @@
 //! test of the campaign. Operations that are known to be dangerous alone are drawn seldom from then on, so that one
 //! loud cause does not hide the others.
 //!
-//! Everything is decided per generation of a constant size, by a stream per generation, so the tests are the same for
-//! any number of workers, and a search is resumed by telling it what was recorded.
+//! A generation always has the same size, and a stream of its own decides its tests. So the tests are the same for any
+//! number of workers, and a search resumes once it has the recorded results.
 
 mod aligned;
 mod causes;
@@ -101,7 +101,7 @@ impl Interleaved {
         let moments = Moments::from_reference(plan, &space, &nothing);
         let domain = space.conditions().is_none().then(|| TestDomain::new(space.clone(), seed));
         let mut search = Interleaved {
-            setting: Setting::new(plan, space, moments, None),
+            setting: Setting::new(plan.clone(), space, moments, None),
             domain,
             seed,
             avoids_causes,
@@ -134,16 +134,12 @@ impl Interleaved {
             && (0..self.requirements.len()).all(|requirement| self.causes.is_alone(requirement, kind))
     }
 
-    /// Whether a known cause of a requirement is among the operations of a test.
-    fn explains(&self, requirement: usize, test: &Test) -> bool {
-        self.causes.explain(requirement, &self.setting.held(test))
-    }
-
-    /// Whether known causes explain a violation of every requirement by a test, so that it would show nothing new.
-    fn is_explained(&self, test: &Test) -> bool {
+    /// Whether known causes explain a violation of every requirement by a test with these operations, so that it would
+    /// show nothing new.
+    fn is_explained(&self, held: &BTreeSet<usize>) -> bool {
         self.avoids_causes
             && !self.requirements.is_empty()
-            && (0..self.requirements.len()).all(|requirement| self.explains(requirement, test))
+            && (0..self.requirements.len()).all(|requirement| self.causes.explain(requirement, held))
     }
 
     /// The operations to draw from: those known to be dangerous alone only seldom.
@@ -175,22 +171,17 @@ impl Interleaved {
         }
         let paired: Vec<usize> =
             self.setting.usable().into_iter().filter(|&kind| !self.is_always_a_cause(kind)).collect();
-        let is_known = |first: usize, second: usize| {
-            let both = BTreeSet::from([first, second]);
-            self.avoids_causes
-                && !self.requirements.is_empty()
-                && (0..self.requirements.len()).all(|requirement| self.causes.explain(requirement, &both))
-        };
-        let share = stream.unit();
-        let source = if self.pairs.first_level_is_complete(&self.setting, &paired, &is_known) { share } else { 0.0 };
         let mut pairs = std::mem::take(&mut self.pairs);
+        let is_known = |first: usize, second: usize| self.is_explained(&BTreeSet::from([first, second]));
+        let share = stream.unit();
+        let source = if pairs.first_level_is_complete(&self.setting, &paired, &is_known) { share } else { 0.0 };
         let found = if source < PAIRWISE {
             pairs.next(&self.setting, &paired, &is_known, stream).map(|test| (test, Vec::new()))
         } else if source < PAIRWISE + UNIFORM {
             self.uniform(stream).map(|test| (test, Vec::new()))
         } else if source < PAIRWISE + UNIFORM + NEAR_MISSES {
             let pool = self.pool(stream);
-            let explained = |requirement: usize, test: &Test| self.explains(requirement, test);
+            let explained = |requirement: usize, held: &BTreeSet<usize>| self.causes.explain(requirement, held);
             let domain = self.domain.as_ref();
             near_misses::step(&self.setting, domain, &self.ran, &self.undisturbed, explained, &pool, stream)
         } else {
@@ -217,7 +208,7 @@ impl Interleaved {
                 }
             }
             self.setting.space.settle(&mut test, stream);
-            if self.setting.reaches(&test) && !self.is_explained(&test) {
+            if self.setting.reaches(&test) && !self.is_explained(&self.setting.held(&test)) {
                 return Some(test);
             }
         }
@@ -257,19 +248,15 @@ impl Interleaved {
             if self.attributions.iter().any(is_asked) {
                 continue;
             }
-            // What had no effect is not to blame. What acts before the start or after the end cannot be counted.
-            let is_to_blame = |at: &usize| {
-                asked.test.operations[*at].activation == Activation::Offline
-                    || effects.get(*at).is_none_or(|effect| effect.counters.any_effect())
-            };
-            let blamed: Vec<usize> = (0..kinds.len()).filter(is_to_blame).collect();
+            // What had no effect is not to blame.
+            let blamed: Vec<usize> = (0..kinds.len()).filter(|&at| result.acted(at)).collect();
             let blamed = if blamed.len() < self.setting.space.fewest() { (0..kinds.len()).collect() } else { blamed };
             let test = Test { operations: blamed.iter().map(|&at| asked.test.operations[at].clone()).collect() };
             let kinds = blamed.iter().map(|&at| kinds[at]).collect();
             let fewest = self.setting.space.fewest();
             self.attributions.push(Attribution::new(test, kinds, requirement, result.number, fewest));
         }
-        self.ran.push(Ran { number: result.number, test: asked.test, margins, violated, had_effect });
+        self.ran.push(Ran { number: result.number, test: asked.test, held, margins, violated, had_effect });
     }
 
     /// Ends the attributions that have no more questions, and returns those of the others.
@@ -312,7 +299,7 @@ impl Strategy for Interleaved {
             self.requirements.push((requirement, scale));
             self.undisturbed.push(margin.value.map_or(f64::INFINITY, |value| value / scale));
         }
-        self.setting = Setting::new(&plan.clone(), self.setting.space.clone(), moments, trajectories);
+        self.setting = Setting::new(plan.clone(), self.setting.space.clone(), moments, trajectories);
         self.open();
     }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use sesame_base::observation::Observation;
 use sesame_optimise::dominance::Fitness;
 use sesame_optimise::nsga2::{self, Nsga2, Variation};
-use sesame_plan::{KnownTestId, Test};
+use sesame_plan::{Activation, KnownTestId, Test};
 
 use crate::evolve::variation::TestVariation;
 use crate::sspr::Point;
@@ -79,6 +79,16 @@ pub struct Evaluated {
     pub run: Arc<Observation>,
     /// The runs that confirm it, without series; empty if it is not confirmed.
     pub fresh_runs: Vec<Observation>,
+}
+
+impl Evaluated {
+    /// Whether an operation of its test, by position, acted in its own run: it had an effect, or acted before the start
+    /// or after the end, where no effect can be counted. An operation whose effects are unknown counts as one that
+    /// acted.
+    pub(crate) fn acted(&self, position: usize) -> bool {
+        self.test.operations[position].activation == Activation::Offline
+            || self.run.operations.get(position).is_none_or(|effect| effect.counters.any_effect())
+    }
 }
 
 /// Variation of tests that learns from results.

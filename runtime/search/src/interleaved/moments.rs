@@ -8,7 +8,7 @@ use sesame_rng::Stream;
 
 use crate::space::test_space::TestSpace;
 
-/// Events that are no further apart than this share of the run are one moment.
+/// Events that lie within this share of the run are one moment.
 const ONE_MOMENT: f64 = 0.015;
 /// How many moments are kept, the weightiest ones.
 const KEPT: usize = 24;
@@ -129,7 +129,7 @@ fn wires_of(plan: &CampaignPlan, topic: TopicId) -> Vec<u32> {
     wires.filter(|(_, (of, _))| *of == topic).map(|(wire, _)| wire).collect()
 }
 
-/// The moments of a course, in order of time.
+/// Reads the moments from a course, in order of time.
 fn moments(course: &Course, end: f64, grain: f64) -> Vec<Moment> {
     let mut events: Vec<(f64, f64, usize)> = Vec::new();
     for (of, signal) in course.signals.iter().enumerate() {

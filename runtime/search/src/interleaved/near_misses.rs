@@ -2,7 +2,9 @@
 //!
 //! Half of the steps are proposals of a surrogate of the margins, as in a [falsification](crate::falsification); the
 //! others change windows, choices and operations a little, or halve and double windows. Where conditions switch
-//! operations there is no surrogate, and steps are mutations as in NSGA-II.
+//! operations, the search uses no surrogate: steps are mutations as in NSGA-II.
+
+use std::collections::BTreeSet;
 
 use sesame_optimise::falsify::propose;
 use sesame_plan::{Activation, Test};
@@ -27,6 +29,8 @@ pub(super) struct Ran {
     /// The caller's number.
     pub(super) number: u32,
     pub(super) test: Test,
+    /// The operations of the test space that it holds.
+    pub(super) held: BTreeSet<usize>,
     /// Per requirement of the search the margin, as a share of the reference run's; `None` where it is not known.
     pub(super) margins: Vec<Option<f64>>,
     /// Per requirement, whether it is violated.
@@ -42,18 +46,16 @@ pub(super) fn step(
     domain: Option<&TestDomain>,
     ran: &[Ran],
     requirements: &[f64],
-    explained: impl Fn(usize, &Test) -> bool,
+    explained: impl Fn(usize, &BTreeSet<usize>) -> bool,
     pool: &[usize],
     stream: &mut Stream,
 ) -> Option<(Test, Vec<u32>)> {
     let mut near: Vec<Vec<(f64, usize)>> = Vec::new();
     let mut of: Vec<usize> = Vec::new();
     for (requirement, &undisturbed) in requirements.iter().enumerate() {
-        let counts = |run: &&(usize, &Ran)| {
-            run.1.had_effect && !run.1.violated[requirement] && !explained(requirement, &run.1.test)
-        };
-        let all: Vec<(usize, &Ran)> = ran.iter().enumerate().collect();
-        let with_margin = all.iter().filter(counts).filter_map(|(at, run)| Some((run.margins[requirement]?, *at)));
+        let counts = |run: &Ran| run.had_effect && !run.violated[requirement] && !explained(requirement, &run.held);
+        let counted = ran.iter().enumerate().filter(|(_, run)| counts(run));
+        let with_margin = counted.filter_map(|(at, run)| Some((run.margins[requirement]?, at)));
         let mut margins: Vec<(f64, usize)> = with_margin.collect();
         margins.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         // Only what is nearer than the undisturbed system leads anywhere.

@@ -31,13 +31,13 @@ pub(super) struct Setting {
 
 impl Setting {
     pub(super) fn new(
-        plan: &CampaignPlan,
+        plan: CampaignPlan,
         space: TestSpace,
         moments: Moments,
         trajectories: Option<VariableTrajectories>,
     ) -> Self {
-        let strongest = space.operations().iter().map(|kind| Strongest::of(plan, kind)).collect();
-        Setting { plan: plan.clone(), space, moments, strongest, trajectories }
+        let strongest = space.operations().iter().map(|kind| Strongest::of(&plan, kind)).collect();
+        Setting { plan, space, moments, strongest, trajectories }
     }
 
     /// An operation of the test space.
@@ -94,7 +94,8 @@ impl Setting {
         }
     }
 
-    /// Of several fresh conditions the best, by a measure that is above zero for those that will do; any if none does.
+    /// Draws several fresh conditions and returns the one that measures most. The measure is above zero for conditions
+    /// that will do.
     pub(super) fn best_condition(
         &self,
         kind: usize,

@@ -33,7 +33,8 @@ impl Strongest {
         Strongest { parameters, ways }
     }
 
-    /// A way of a number below [`Strongest::ways`]; where there are more, as for corners of a box, one of these.
+    /// One of the [ways](Strongest::ways), by its number. A parameter with more choices than there are ways, such as
+    /// the corners of a box, gets any of them.
     pub(super) fn way(&self, way: usize, stream: &mut Stream) -> Vec<Choice> {
         let choose = |choices: &Vec<Choice>| {
             let at = if choices.len() > self.ways { stream.below(choices.len()) } else { way % choices.len() };

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use sesame_plan::{Activation, CampaignPlan, OperationId};
+use sesame_plan::{CampaignPlan, OperationId};
 
 use crate::Evaluated;
 use crate::margin::evaluated_margins;
@@ -38,17 +38,11 @@ impl Seen {
 
     pub(super) fn tell(&mut self, result: &Evaluated) {
         self.unchanged += 1;
-        let effects = &result.run.operations;
-        // What acts before the start or after the end cannot be counted.
-        let acts = |at: usize| {
-            result.test.operations[at].activation == Activation::Offline
-                || effects.get(at).is_none_or(|effect| effect.counters.any_effect())
-        };
         let of = |wanted: &dyn Fn(usize) -> bool| -> BTreeSet<OperationId> {
             let used = result.test.operations.iter().enumerate();
             used.filter(|(at, _)| wanted(*at)).map(|(_, used)| used.operation).collect()
         };
-        let acting = of(&acts);
+        let acting = of(&|at| result.acted(at));
         self.held.extend(pairs(&of(&|_| true)));
         self.together.extend(pairs(&acting));
         self.effective.extend(&acting);

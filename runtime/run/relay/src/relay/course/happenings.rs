@@ -29,10 +29,11 @@ pub(super) struct Field {
     pub(super) name: String,
     last: Option<State>,
     /// When it changed.
-    changes: Changes,
+    changes: Evenly<SimTime>,
     /// The numbers that it took, as long as they are at most [`STATES`], or one more.
     numbers: Vec<f64>,
-    samples: Samples,
+    /// The numbers that it took over time.
+    samples: Evenly<(SimTime, f64)>,
 }
 
 /// A value that is compared with the one before.
@@ -42,25 +43,17 @@ enum State {
     Number(f64),
 }
 
-/// An even selection of the times of changes.
-#[derive(Default)]
-struct Changes {
-    kept: Vec<SimTime>,
-    seen: u64,
-    stride: u64,
-}
-
-/// An even selection of values.
-#[derive(Default)]
-struct Samples {
-    kept: Vec<(SimTime, f64)>,
+/// An even selection of items: every `stride`th.
+struct Evenly<T> {
+    kept: Vec<T>,
+    most: usize,
     seen: u64,
     stride: u64,
 }
 
 impl Field {
     pub(super) fn new(name: String) -> Self {
-        let (changes, samples) = (Changes::default(), Samples::default());
+        let (changes, samples) = (Evenly::at_most(EVENTS), Evenly::at_most(SAMPLES));
         Field { name, last: None, changes, numbers: Vec::new(), samples }
     }
 
@@ -78,7 +71,7 @@ impl Field {
         if !number.is_finite() {
             return;
         }
-        self.samples.take(now, number);
+        self.samples.take((now, number));
         if self.is_state() {
             if !self.numbers.contains(&number) {
                 self.numbers.push(number);
@@ -109,35 +102,28 @@ impl Field {
     }
 }
 
-impl Changes {
-    fn take(&mut self, now: SimTime) {
-        keep(&mut self.kept, &mut self.seen, &mut self.stride, EVENTS, now);
+impl<T> Evenly<T> {
+    fn at_most(most: usize) -> Self {
+        Evenly { kept: Vec::new(), most, seen: 0, stride: 1 }
     }
-}
 
-impl Samples {
-    fn take(&mut self, now: SimTime, number: f64) {
-        keep(&mut self.kept, &mut self.seen, &mut self.stride, SAMPLES, (now, number));
-    }
-}
-
-/// Keeps every `stride`th item; when there are too many, every second one of them leaves and the stride doubles.
-fn keep<T>(kept: &mut Vec<T>, seen: &mut u64, stride: &mut u64, most: usize, item: T) {
-    *stride = (*stride).max(1);
-    if seen.is_multiple_of(*stride) {
-        if kept.len() == most {
-            let mut at = 0;
-            kept.retain(|_| {
-                at += 1;
-                at % 2 == 1
-            });
-            *stride *= 2;
+    /// Takes the next item. When there are too many, every second one of them leaves and the stride doubles.
+    fn take(&mut self, item: T) {
+        if self.seen.is_multiple_of(self.stride) {
+            if self.kept.len() == self.most {
+                let mut at = 0;
+                self.kept.retain(|_| {
+                    at += 1;
+                    at % 2 == 1
+                });
+                self.stride *= 2;
+            }
+            if self.seen.is_multiple_of(self.stride) {
+                self.kept.push(item);
+            }
         }
-        if seen.is_multiple_of(*stride) {
-            kept.push(item);
-        }
+        self.seen += 1;
     }
-    *seen += 1;
 }
 
 /// An even selection of events, in order of time.
@@ -208,7 +194,7 @@ fn happenings(samples: &[(SimTime, f64)]) -> Vec<SignalEvent> {
 mod tests {
     use super::*;
 
-    /// The events of a field with these values, one each tenth of a second.
+    /// The events of a field that takes these values, one each tenth of a second.
     fn events(values: impl IntoIterator<Item = f64>) -> Vec<(f64, Happening)> {
         let mut field = Field::new(String::new());
         for (tenth, value) in (0i64..).zip(values) {
