@@ -5,8 +5,8 @@ there, `matched` when somebody is at the other end. Somebody who is matched on o
 on the other, so a publisher that is told `probe` sends a message that belongs to nothing, and a subscriber says `heard`
 with its number. When all have heard the latest one, nothing that is sent from then on is lost.
 
-Whoever is done says its result with its exit `code` before it leaves: a middleware may hang while it takes a node down,
-which is nothing that a test of what was exchanged is about.
+A peer says its result together with its exit `code` before it leaves. A middleware may hang while it takes a node down,
+and a test of what was exchanged does not depend on that.
 """
 
 import argparse

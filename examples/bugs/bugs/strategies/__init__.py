@@ -1,4 +1,4 @@
-"""Strategies by name. Each chooses tests one after another, and is told what came out.
+"""Strategies by name. Each chooses tests one after another and learns from what came out.
 
 A strategy is a class `Strategy` in a module of this package, or any class of yours: `run.py my_search.py:MySearch`.
 """
@@ -35,7 +35,7 @@ class Problem:
 
 
 class Strategy(Protocol):
-    """Chooses tests. Everything that it does follows from the problem, the seed and what it is told."""
+    """Chooses tests. Everything that it does follows from the problem, the seed and what `tell` got."""
 
     def __init__(self, problem: Problem, seed: int) -> None: ...
 
