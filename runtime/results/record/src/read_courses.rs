@@ -46,7 +46,11 @@ impl Repository {
             for (wire, field, what, at) in events {
                 let what = what.ok_or_else(|| self.odd(test, "something in a field that no run can show"))?;
                 let event = SignalEvent { at, what };
-                match of.last_mut().filter(|last| last.wire == wire && last.field == field) {
+                // A message that is a single value has a nameless field, as have the messages as such.
+                let same = |last: &&mut Signal| {
+                    last.wire == wire && last.field == field && last.is_of_messages() == what.is_of_messages()
+                };
+                match of.last_mut().filter(same) {
                     Some(last) => last.events.push(event),
                     None => of.push(Signal { wire, field, events: vec![event] }),
                 }

@@ -19,6 +19,7 @@ use sesame_search::{Rates, TestVariation};
 
 use super::*;
 
+mod courses;
 mod damage;
 mod digests;
 mod earlier;

@@ -38,6 +38,13 @@ pub struct Signal {
     pub events: Vec<SignalEvent>,
 }
 
+impl Signal {
+    /// Whether it is about the messages of the wire as such, not about a field of them.
+    pub fn is_of_messages(&self) -> bool {
+        self.events.first().is_some_and(|event| event.what.is_of_messages())
+    }
+}
+
 /// Something that happened in a field, or to the messages of a wire.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SignalEvent {
@@ -84,6 +91,11 @@ impl Happening {
         Happening::ChangesSign,
         Happening::Turns,
     ];
+
+    /// Whether it happens to the messages of a wire as such, whatever they hold.
+    pub fn is_of_messages(self) -> bool {
+        matches!(self, Happening::Message | Happening::Begins | Happening::Ends)
+    }
 
     /// Its word in tables and the database.
     pub fn word(self) -> &'static str {
