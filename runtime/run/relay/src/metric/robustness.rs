@@ -595,24 +595,29 @@ mod tests {
         assert!(refused.starts_with("metric `fuzzing_time`: the formula names signal 7 of 1"), "{refused}");
     }
 
-    /// By trying every moment at which anything can be decided, each with a monitor of its own.
+    /// By trying every moment at which anything can be decided, each with a monitor of its own: at whole milliseconds,
+    /// and just before them. A signal has an old value up to a nanosecond before it changes, and a formula in a formula
+    /// up to a nanosecond before that.
     fn lost_by_trying(robustness: &Robustness, bound: Bound, sent: &[Sent], end: i64) -> Option<f64> {
-        let nanos = |millis: i64| SimTime::from_nanos(millis * 1_000_000);
+        const NESTED: i64 = 4;
+        let millis = |millis: i64| SimTime::from_nanos(millis * 1_000_000);
         let first = |path: usize| sent.iter().find(|sent| sent.1 == path).map(|sent| sent.0);
         let start = first(0)?.max(first(1)?);
-        let is_lost = |now: i64| {
+        let is_lost = |now: SimTime| {
             let mut monitor = Monitor::new(&robustness.formula, 2).unwrap();
             let mut last = [None, None];
-            for &(time, path, number) in sent.iter().filter(|sent| sent.0 <= now) {
+            for &(time, path, number) in sent.iter().filter(|sent| millis(sent.0) <= now) {
                 last[path] = Some(number);
                 if let [Some(command), Some(level)] = last {
-                    monitor.push(nanos(time), 0, command);
-                    monitor.push(nanos(time), 1, level);
+                    monitor.push(millis(time), 0, command);
+                    monitor.push(millis(time), 1, level);
                 }
             }
-            breaks(bound, reach_of_least(&[monitor.reach(nanos(now) + TICK)]))
+            breaks(bound, reach_of_least(&[monitor.reach(now + TICK)]))
         };
-        (start..=end).find(|&now| is_lost(now)).map(|now| nanos(now).seconds())
+        let moments = (start..=end).flat_map(|at| (0..=NESTED).rev().map(move |before| (at, before)));
+        let moments = moments.map(|(at, before)| SimTime::from_nanos(at * 1_000_000 - before));
+        moments.filter(|now| *now >= millis(start)).find(|&now| is_lost(now)).map(SimTime::seconds)
     }
 
     /// Formulas over two signals; all ends of intervals are whole milliseconds.
