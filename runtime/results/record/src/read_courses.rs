@@ -46,7 +46,7 @@ impl Repository {
             for (wire, field, what, at) in events {
                 let what = what.ok_or_else(|| self.odd(test, "something in a field that no run can show"))?;
                 let event = SignalEvent { at, what };
-                // A message that is a single value has a nameless field, as have the messages as such.
+                // The field has no name if a message is a single value, and if an event is about when messages come.
                 let same = |last: &&mut Signal| {
                     last.wire == wire && last.field == field && last.is_of_messages() == what.is_of_messages()
                 };

@@ -31,15 +31,15 @@ pub struct Heard {
 pub struct Signal {
     /// The position of the wire.
     pub wire: u32,
-    /// The field from the message inwards, as in `pose.x`; empty for a message that is a single value, and for what
-    /// happened to the messages as such.
+    /// The field from the message inwards, as in `pose.x`; empty for a message that is a single value, and for
+    /// events about when messages come.
     pub field: String,
     /// What happened, in order of time, at least one. Of a great many an even selection.
     pub events: Vec<SignalEvent>,
 }
 
 impl Signal {
-    /// Whether it is about the messages of the wire as such, not about a field of them.
+    /// Whether its events are about when messages come, not about a field of them.
     pub fn is_of_messages(&self) -> bool {
         self.events.first().is_some_and(|event| event.what.is_of_messages())
     }
@@ -92,7 +92,7 @@ impl Happening {
         Happening::Turns,
     ];
 
-    /// Whether it happens to the messages of a wire as such, whatever they hold.
+    /// Whether it is about when messages come, whatever they contain.
     pub fn is_of_messages(self) -> bool {
         matches!(self, Happening::Message | Happening::Begins | Happening::Ends)
     }

@@ -599,6 +599,7 @@ mod tests {
     /// and just before them. A signal has an old value up to a nanosecond before it changes, and a formula in a formula
     /// up to a nanosecond before that.
     fn lost_by_trying(robustness: &Robustness, bound: Bound, sent: &[Sent], end: i64) -> Option<f64> {
+        // At least as deep as `formulas` nests them.
         const NESTED: i64 = 4;
         let millis = |millis: i64| SimTime::from_nanos(millis * 1_000_000);
         let first = |path: usize| sent.iter().find(|sent| sent.1 == path).map(|sent| sent.0);
