@@ -91,17 +91,23 @@ struct Judged<'a> {
 /// first.
 pub fn causes(repository: &Repository, selection: &Selection) -> Result<Vec<Cause>, RecordError> {
     let (plan, judge, rows) = (repository.plan(), repository.judge()?, repository.tests()?);
-    let rows: Vec<&TestRow> = rows.iter().filter(|row| selection.holds(row.number)).collect();
+    let counts = |row: &&TestRow| row.origin == Origin::Reference || selection.holds(row.number);
+    let rows: Vec<&TestRow> = rows.iter().filter(counts).collect();
     Ok(causes_in(plan, &judge, &rows).found)
 }
 
-/// The causes in these tests, and what they say about others. Reference runs are left out.
+/// The causes in these tests, and what they say about others. A requirement that a reference run among them violates has
+/// none: no operation is needed to violate it.
 pub fn causes_in(plan: &CampaignPlan, judge: &Judge<'_>, rows: &[&TestRow]) -> Causes {
-    let rows: Vec<&TestRow> =
-        rows.iter().copied().filter(|row| row.origin != Origin::Reference && row.duplicate_of.is_none()).collect();
+    let (references, tests): (Vec<&TestRow>, Vec<&TestRow>) =
+        rows.iter().copied().partition(|row| row.origin == Origin::Reference);
+    let rows: Vec<&TestRow> = tests.into_iter().filter(|row| row.duplicate_of.is_none()).collect();
     let mut found = Vec::new();
     let mut conclusive = BTreeSet::new();
     for requirement in (0..).map(RequirementId).take(plan.requirements.len()) {
+        if judged(plan, judge, &references, requirement).iter().any(|run| run.violates) {
+            continue;
+        }
         let judged = judged(plan, judge, &rows, requirement);
         conclusive.extend(judged.iter().map(|test| test.row.number));
         found.extend(of_requirement(plan, &judged, requirement));
@@ -236,6 +242,7 @@ fn length(test: &Test) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use sesame_plan::Bound;
     use sesame_record::sample;
 
     use super::*;
@@ -268,5 +275,23 @@ mod tests {
             }
         }
         assert!(explained > 0, "some tests violate a requirement");
+    }
+    #[test]
+    fn what_the_undisturbed_system_violates_has_no_cause() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut plan = sample::plan();
+        plan.requirements[0].bound = Bound::Below { value: 0.0 };
+        let repository = sample::campaign(folder.path(), &plan, 60);
+        let of_first = |rows: &[&TestRow]| {
+            let found = causes_in(&plan, &repository.judge().unwrap(), rows).found;
+            found.iter().filter(|cause| cause.requirement == RequirementId(0)).count()
+        };
+        let rows = repository.tests().unwrap();
+        let all: Vec<&TestRow> = rows.iter().collect();
+        let disturbed: Vec<&TestRow> = rows.iter().filter(|row| row.origin != Origin::Reference).collect();
+        assert!(of_first(&disturbed) > 0, "operations would be blamed for it");
+        assert_eq!(of_first(&all), 0);
+        let selected = causes(&repository, &Selection::default()).unwrap();
+        assert!(selected.iter().all(|cause| cause.requirement != RequirementId(0)));
     }
 }
