@@ -96,8 +96,8 @@ pub fn causes(repository: &Repository, selection: &Selection) -> Result<Vec<Caus
     Ok(causes_in(plan, &judge, &rows).found)
 }
 
-/// The causes in these tests, and what they say about others. A requirement that a reference run among them violates has
-/// none: no operation is needed to violate it.
+/// The causes in these tests, and what they say about others. A requirement that a reference run among them violates
+/// has none: no operation is needed to violate it.
 pub fn causes_in(plan: &CampaignPlan, judge: &Judge<'_>, rows: &[&TestRow]) -> Causes {
     let (references, tests): (Vec<&TestRow>, Vec<&TestRow>) =
         rows.iter().copied().partition(|row| row.origin == Origin::Reference);
