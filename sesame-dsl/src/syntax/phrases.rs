@@ -12,9 +12,16 @@ pub(super) fn keyword_of(rule: Rule) -> Option<&'static str> {
 }
 
 pub(super) fn rule_name(rule: Rule) -> &'static str {
-    static NAMES: std::sync::LazyLock<Vec<(Rule, String)>> =
-        std::sync::LazyLock::new(|| Rule::all_rules().iter().map(|&rule| (rule, format!("{rule:?}"))).collect());
-    NAMES.iter().find(|(known, _)| *known == rule).map_or("", |(_, name)| name)
+    // By number: the end of the text has one too, but is no rule of the grammar.
+    static NAMES: std::sync::LazyLock<Vec<String>> = std::sync::LazyLock::new(|| {
+        let mut names = Vec::new();
+        for &rule in Rule::all_rules() {
+            names.resize(names.len().max(rule as usize + 1), String::new());
+            names[rule as usize] = format!("{rule:?}");
+        }
+        names
+    });
+    NAMES.get(rule as usize).map_or("", String::as_str)
 }
 
 /// What a message calls a rule; nothing for what is not worth naming: recovery, comments, constructs of later versions.
@@ -191,4 +198,17 @@ pub(super) fn phrases_of(rule: Rule) -> Vec<String> {
         }
     };
     phrases.iter().map(|&phrase| phrase.to_owned()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_rule_has_its_own_name() {
+        for rule in Rule::all_rules() {
+            assert_eq!(rule_name(*rule), format!("{rule:?}"));
+        }
+        assert_eq!(rule_name(Rule::EOI), "");
+    }
 }
