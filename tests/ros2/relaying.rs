@@ -122,14 +122,15 @@ impl Exchanged {
     }
 }
 
-/// After how long another probe is sent. Only what was lost is sent again, so it may be long.
+/// After how long the second probe is sent. Only what was lost is sent again, so it may be long; and each wait is twice
+/// as long as the one before, so that a busy machine has time for the latest probe, however slow it is.
 const ANOTHER: Duration = Duration::from_secs(1);
 
 /// Sends probes until the latest one has been heard by all.
 #[derive(Default)]
 struct Probing {
     sent: u64,
-    since: Option<Instant>,
+    next: Option<Instant>,
     begun: Option<Instant>,
 }
 
@@ -138,12 +139,13 @@ impl Probing {
         if self.sent > 0 && to.iter().all(|peer| peer.told("heard") == self.sent) {
             return true;
         }
-        if self.since.is_none_or(|since| since.elapsed() >= ANOTHER) {
-            let begun = self.begun.get_or_insert_with(Instant::now);
-            assert!(begun.elapsed() < LIMIT, "of {} probes none was heard by all", self.sent);
+        let begun = self.begun.get_or_insert_with(Instant::now);
+        let heard = || to.iter().map(|peer| peer.told("heard")).collect::<Vec<_>>();
+        assert!(begun.elapsed() < LIMIT, "of {} probes, the peers heard {:?}", self.sent, heard());
+        if self.next.is_none_or(|next| Instant::now() >= next) {
             from.probe();
+            self.next = Some(Instant::now() + ANOTHER * (1 << self.sent));
             self.sent += 1;
-            self.since = Some(Instant::now());
         }
         false
     }
