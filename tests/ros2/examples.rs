@@ -154,6 +154,13 @@ fn a_parameter_a_service_and_nodes_change_the_motion_and_afterwards_everything_i
     assert!(counted("denied", "seen") > 1, "the service is called outside of the window, too");
 }
 
+/// Expects success of tests of a system that runs freely. On a busy machine arms that nobody steps may move in another
+/// way at the end, and then it has to say so.
+fn ended_freely(done: Done) -> Done {
+    let differs = done.err.contains("the reference run after the campaign differs from the one before it");
+    done.expect(if differs { 3 } else { 0 })
+}
+
 /// What is said of the spread of three runs of a test of a system that runs freely, with its deviation and its largest
 /// value.
 fn spread_of_free_runs(folder: &str) -> Option<(Value, f64, f64)> {
@@ -169,8 +176,8 @@ fn spread_of_free_runs(folder: &str) -> Option<(Value, f64, f64)> {
     let cell = iiwa_cell(folder, &freely)?;
     let done = cell.sesamec("run", "repeated", &["--", "--workers", "1", "--format", "json"]);
     let ran: Value = serde_json::from_str(&done.out).unwrap_or_else(|_| panic!("no JSON: {}", done.err));
-    // On a busy machine arms that nobody steps may move in another way at the end, and then the run has to say so.
-    done.expect(if ran["closing_run"].is_null() { 0 } else { 3 });
+    let done = ended_freely(done);
+    assert_eq!(ran["closing_run"].is_null(), done.code == Some(0), "{ran}");
     let spreads = ran["spreads"].as_array().expect("there are spreads");
     let spread = spreads.iter().find(|spread| spread["metric"] == "arm_distance").expect("one is of the arms");
     let number = |field: &str| spread[field].as_f64().unwrap_or_else(|| panic!("no `{field}` in {spread}"));
@@ -209,7 +216,7 @@ fn a_known_test_is_run_in_the_hall_on_another_engine_and_the_gap_is_reported() {
     ];
     let Some(cell) = iiwa_cell("iiwa_hall", &changes) else { return };
     cell.sesamec("run", "repeated", &WORKERS).expect(0);
-    cell.sesamec("physical", "repeated", &["T1", "--times", "1"]).expect(0);
+    ended_freely(cell.sesamec("physical", "repeated", &["T1", "--times", "1"]));
 
     let results = cell.folder().join("runners/repeated/results");
     let [simulated, in_hall] = ["1", "1-hall"].map(|folder| results.join(folder));
