@@ -1,5 +1,8 @@
 //! What messages call the rules of the grammar.
 
+use std::collections::HashMap;
+use std::sync::LazyLock;
+
 use sesame_grammar::Rule;
 use sesame_plan::SimulatorKind;
 
@@ -11,17 +14,11 @@ pub(super) fn keyword_of(rule: Rule) -> Option<&'static str> {
     rule_name(rule).strip_prefix("k_")
 }
 
+/// The name of a rule in the grammar; empty for the end of the text, which is not in it.
 pub(super) fn rule_name(rule: Rule) -> &'static str {
-    // By number: the end of the text has one too, but is no rule of the grammar.
-    static NAMES: std::sync::LazyLock<Vec<String>> = std::sync::LazyLock::new(|| {
-        let mut names = Vec::new();
-        for &rule in Rule::all_rules() {
-            names.resize(names.len().max(rule as usize + 1), String::new());
-            names[rule as usize] = format!("{rule:?}");
-        }
-        names
-    });
-    NAMES.get(rule as usize).map_or("", String::as_str)
+    static NAMES: LazyLock<HashMap<Rule, String>> =
+        LazyLock::new(|| Rule::all_rules().iter().map(|&rule| (rule, format!("{rule:?}"))).collect());
+    NAMES.get(&rule).map_or("", String::as_str)
 }
 
 /// What a message calls a rule; nothing for what is not worth naming: recovery, comments, constructs of later versions.
