@@ -122,29 +122,30 @@ impl Exchanged {
     }
 }
 
-/// After how long the second probe is sent. Only what was lost is sent again, so it may be long; and each wait is twice
-/// as long as the one before, so that a busy machine has time for the latest probe, however slow it is.
-const ANOTHER: Duration = Duration::from_secs(1);
+/// How long the first probe has before a second one is sent. It may be long, as a probe is only needed again if the
+/// last one was lost. Each later probe has twice as long as the one before, so that a slow machine catches up with the
+/// latest.
+const FIRST_WAIT: Duration = Duration::from_secs(1);
 
 /// Sends probes until the latest one has been heard by all.
 #[derive(Default)]
 struct Probing {
     sent: u64,
-    next: Option<Instant>,
     begun: Option<Instant>,
+    next: Option<Instant>,
 }
 
 impl Probing {
     fn is_over(&mut self, from: &Peer, to: &[&Peer]) -> bool {
-        if self.sent > 0 && to.iter().all(|peer| peer.told("heard") == self.sent) {
+        let heard: Vec<u64> = to.iter().map(|peer| peer.told("heard")).collect();
+        if self.sent > 0 && heard.iter().all(|&latest| latest == self.sent) {
             return true;
         }
         let begun = self.begun.get_or_insert_with(Instant::now);
-        let heard = || to.iter().map(|peer| peer.told("heard")).collect::<Vec<_>>();
-        assert!(begun.elapsed() < LIMIT, "of {} probes, the peers heard {:?}", self.sent, heard());
+        assert!(begun.elapsed() < LIMIT, "of {} probes, the latest that each peer heard: {heard:?}", self.sent);
         if self.next.is_none_or(|next| Instant::now() >= next) {
             from.probe();
-            self.next = Some(Instant::now() + ANOTHER * (1 << self.sent));
+            self.next = Some(Instant::now() + FIRST_WAIT * (1 << self.sent));
             self.sent += 1;
         }
         false
