@@ -20,7 +20,6 @@ mod near_misses;
 mod opening;
 mod pairs;
 mod setting;
-mod strongest;
 #[cfg(test)]
 mod tests;
 mod tried;
@@ -28,12 +27,12 @@ mod tried;
 use std::collections::{BTreeSet, VecDeque};
 
 use sesame_base::observation::Observation;
-use sesame_plan::{Activation, CampaignPlan, Test};
+use sesame_plan::{CampaignPlan, Test};
 use sesame_rng::Stream;
 
 use causes::{Attribution, Cause, Causes, Next};
 use moments::Moments;
-use near_misses::Ran;
+use near_misses::{Kept, Ran};
 use pairs::Pairs;
 use setting::Setting;
 use tried::Tried;
@@ -47,8 +46,11 @@ use crate::{Candidate, Evaluated, Strategy};
 
 /// Tests of a generation: a constant, so that the number of workers decides nothing.
 const GENERATION: usize = 8;
-/// How many of them may be questions of attributions.
+/// How many of them may be questions of attributions, as long as there is time for other tests.
 const QUESTIONS: usize = GENERATION * 3 / 4;
+/// How many different operations the tests of the last generation hold that answer no question, and those of the one
+/// before it: what they show needs no attribution for which there is no time any more.
+const AT_THE_END: [usize; 2] = [1, 2];
 
 /// The shares of the sources of tests once the opening is over and each two operations were tried together; the rest is
 /// aligned.
@@ -183,7 +185,11 @@ impl Interleaved {
             let pool = self.pool(stream);
             let explained = |requirement: usize, held: &BTreeSet<usize>| self.causes.explain(requirement, held);
             let domain = self.domain.as_ref();
-            near_misses::step(&self.setting, domain, &self.ran, &self.undisturbed, explained, &pool, stream)
+            let kept: Vec<Kept> = (0..)
+                .zip(&self.undisturbed)
+                .map(|(requirement, &undisturbed)| Kept { undisturbed, causes: self.causes.count(requirement) })
+                .collect();
+            near_misses::step(&self.setting, domain, &self.ran, &kept, explained, &pool, stream)
         } else {
             None
         };
@@ -194,25 +200,22 @@ impl Interleaved {
         })
     }
 
-    /// A test that is uniform over what is permitted, but for windows without messages, if several tries find one that
-    /// could show something new.
+    /// A test with no more different operations than this, if there is a limit and the campaign permits so few.
+    fn of_few_kinds(&self, test: Test, most: Option<usize>, stream: &mut Stream) -> Test {
+        let kinds = self.setting.kinds_of(&test);
+        let different: Vec<usize> = kinds.iter().copied().collect::<BTreeSet<usize>>().into_iter().collect();
+        let Some(most) = most.filter(|&most| most < different.len()) else { return test };
+        let kept: Vec<usize> = stream.permutation(different.len())[..most].iter().map(|&at| different[at]).collect();
+        let operations = kinds.iter().zip(&test.operations).filter(|(kind, _)| kept.contains(kind));
+        let fewer = Test { operations: operations.map(|(_, used)| used.clone()).collect() };
+        if fewer.operations.len() < self.setting.space.fewest() { test } else { fewer }
+    }
+
+    /// A fresh test that could show something new, if several tries find one.
     fn uniform(&self, stream: &mut Stream) -> Option<Test> {
-        for _ in 0..TRIES {
-            let mut test = fresh_test(&self.setting.space, stream);
-            for (kind, used) in self.setting.kinds_of(&test).into_iter().zip(&mut test.operations) {
-                if let (Activation::Time { start, end }, Some(range)) =
-                    (&mut used.activation, self.setting.window(kind))
-                    && !self.setting.moments.is_heard(kind, *start, *end)
-                {
-                    (*start, *end) = aligned::heard_window(&self.setting, kind, range, stream);
-                }
-            }
-            self.setting.space.settle(&mut test, stream);
-            if self.setting.reaches(&test) && !self.is_explained(&self.setting.held(&test)) {
-                return Some(test);
-            }
-        }
-        None
+        let space = &self.setting.space;
+        let mut fresh = (0..TRIES).map(|_| fresh_test(space, stream));
+        fresh.find(|test| space.is_heard(test) && !self.is_explained(&self.setting.held(test)))
     }
 
     /// Takes what one test came to.
@@ -259,23 +262,25 @@ impl Interleaved {
         self.ran.push(Ran { number: result.number, test: asked.test, held, margins, violated, had_effect });
     }
 
-    /// Ends the attributions that have no more questions, and returns those of the others.
+    /// Ends the attributions that have no more questions, and returns those of the others: first those about the
+    /// requirements of which the fewest causes are known.
     fn questions(&mut self) -> Vec<(usize, BTreeSet<usize>)> {
         let mut questions = Vec::new();
         let mut open = Vec::new();
         for attribution in std::mem::take(&mut self.attributions) {
             match attribution.next(&self.causes) {
-                Next::Ask(positions) => {
-                    questions.push((open.len(), positions));
+                Next::Ask(sets) => {
+                    questions.extend(sets.into_iter().map(|positions| (open.len(), positions)));
                     open.push(attribution);
                 }
                 Next::Done(found) => {
-                    if let Some(kinds) = found {
+                    for kinds in found {
                         self.causes.add(Cause { requirement: attribution.requirement, kinds });
                     }
                 }
             }
         }
+        questions.sort_by_key(|(at, _): &(usize, _)| self.causes.count(open[*at].requirement));
         self.attributions = open;
         questions
     }
@@ -283,8 +288,10 @@ impl Interleaved {
 
 impl Strategy for Interleaved {
     fn begin(&mut self, reference: &Observation) {
-        let plan = &self.setting.plan;
-        let moments = Moments::from_reference(plan, &self.setting.space, reference);
+        self.setting.space.take_reference(reference);
+        let (plan, space) = (&self.setting.plan, &self.setting.space);
+        self.domain = self.domain.is_some().then(|| TestDomain::new(space.clone(), self.seed));
+        let moments = Moments::from_reference(plan, space, reference);
         let trajectories = VariableTrajectories::from_observation(plan, reference);
         (self.requirements, self.undisturbed) = (Vec::new(), Vec::new());
         for (requirement, margin) in margins(plan, reference).into_iter().enumerate() {
@@ -316,7 +323,10 @@ impl Strategy for Interleaved {
         let mut candidates = Vec::with_capacity(size);
         let candidate =
             |test: Test, parents| Candidate { test, parents, generation, known: None, simulator_seed: None };
-        for (at, positions) in self.questions().into_iter().take(QUESTIONS.min(size)) {
+        let later = (self.left as usize - size).div_ceil(GENERATION);
+        let at_the_end = AT_THE_END.get(later).copied();
+        let room = if at_the_end.is_some() { size } else { QUESTIONS.min(size) };
+        for (at, positions) in self.questions().into_iter().take(room) {
             let attribution = &self.attributions[at];
             let test = attribution.subset(&positions);
             candidates.push(candidate(test.clone(), vec![attribution.number]));
@@ -324,6 +334,7 @@ impl Strategy for Interleaved {
         }
         while candidates.len() < size {
             let (test, parents) = self.choose(&mut stream);
+            let test = self.of_few_kinds(test, at_the_end, &mut stream);
             // The tests of one generation see each other, too.
             self.tried.add(&self.setting, &test);
             candidates.push(candidate(test.clone(), parents));

@@ -21,6 +21,7 @@ mod causes;
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use sesame_base::observation::Observation;
 use sesame_optimise::dominance::Fitness;
 use sesame_optimise::front::Front;
 use sesame_optimise::hypervolume::{self, Growth};
@@ -84,6 +85,13 @@ impl StopRules {
             front: Front::default(),
             worst: Vec::new(),
             fronts: VecDeque::new(),
+        }
+    }
+
+    /// Takes the reference run, before the first generation.
+    pub fn begin(&mut self, reference: &Observation) {
+        if let Some(seen) = &mut self.seen {
+            seen.begin(reference);
         }
     }
 

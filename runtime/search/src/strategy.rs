@@ -111,6 +111,10 @@ pub(crate) trait Learning: Variation<Genome = Test> {
 }
 
 impl Learning for TestVariation {
+    fn begin(&mut self, reference: &Observation) {
+        self.take_reference(reference);
+    }
+
     /// Results only matter to selection.
     fn learn(&mut self, _: &[Evaluated]) {}
 }

@@ -25,6 +25,6 @@ pub(super) fn observers(plan: &CampaignPlan, reference: &Observation) -> Result<
     if let Some(goal) = &plan.campaign.coverage {
         observers.push(Box::new(coverage::CoverageOfEachGeneration::new(plan, goal)?));
     }
-    observers.push(Box::new(stop::Rules::new(plan)));
+    observers.push(Box::new(stop::Rules::new(plan, reference)));
     Ok(observers)
 }

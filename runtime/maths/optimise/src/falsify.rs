@@ -123,6 +123,11 @@ impl<D: SearchDomain> Falsifier<D> {
         }
     }
 
+    /// The domain, for what becomes known of it before the first points are asked for.
+    pub fn domain_mut(&mut self) -> &mut D {
+        &mut self.domain
+    }
+
     /// How many quasi-random tests come first.
     fn first(&self) -> u32 {
         let components = u32::try_from(self.domain.components()).unwrap_or(u32::MAX);

@@ -320,10 +320,21 @@ pub struct StrategyProperties {
     pub needs_coverage: bool,
     /// Whether an exploration (`boost`, `construct`, `predict`, `novelty`) can direct it.
     pub explores: bool,
-    /// Whether it places windows by what happens in the undisturbed run, which that run has to record for it.
-    pub reads_course: bool,
+    /// What it reads of the undisturbed run to place windows, which that run has to record for it.
+    pub course: CourseRead,
     /// Whether its tests are drawn independently of each other.
     pub independent: bool,
+}
+
+/// What a strategy reads of the course of the undisturbed run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CourseRead {
+    /// Nothing: its windows are the same whatever happens.
+    Nothing,
+    /// When messages come, so that it draws no window without any.
+    Messages,
+    /// When messages come and what happens in them, so that it aligns windows with it.
+    Happenings,
 }
 
 impl StrategyKind {
@@ -393,6 +404,7 @@ impl StrategyKind {
             StrategyKind::Grid => StrategyProperties {
                 own: Some(OwnSetting::LEVELS),
                 by_time_only: true,
+                course: CourseRead::Nothing,
                 ..properties("grid", "grid", "a grid search")
             },
             StrategyKind::Falsification => StrategyProperties {
@@ -405,7 +417,7 @@ impl StrategyKind {
             StrategyKind::Interleaved => StrategyProperties {
                 averaging: Averaging::ByItself,
                 needs_requirements: true,
-                reads_course: true,
+                course: CourseRead::Happenings,
                 ..properties("interleaved", "interleaved", "an interleaved search")
             },
         }
@@ -424,7 +436,7 @@ const fn properties(keyword: &'static str, title: &'static str, noun: &'static s
         needs_requirements: false,
         needs_coverage: false,
         explores: false,
-        reads_course: false,
+        course: CourseRead::Messages,
         independent: false,
     }
 }

@@ -207,7 +207,7 @@ impl<'a> Relay<'a> {
             pipelines,
             published: vec![0; wires.len()],
             traffic: traffic::Recorder::new(plan, wires, test),
-            course: course::is_read(plan, test).then(|| Box::new(course::Recorder::new(wires))),
+            course: course::Recorder::new(wires, course::read(plan, test)).map(Box::new),
             queue: ReleaseQueue::new(test.operations.len(), wires.len_with_links()),
             monitors,
             publishing: Publishing::default(),

@@ -7,6 +7,7 @@
 //!
 //! A cell into which an earlier child of the same generation is planned to fall counts as hit already.
 
+use sesame_base::observation::Observation;
 use sesame_optimise::nsga2::{Child, Variation};
 use sesame_plan::{BoostedChildren, Test};
 use sesame_rng::Stream;
@@ -84,6 +85,10 @@ impl Variation for BoostingVariation {
 }
 
 impl Learning for BoostingVariation {
+    fn begin(&mut self, reference: &Observation) {
+        self.tests.take_reference(reference);
+    }
+
     fn learn(&mut self, results: &[Evaluated]) {
         self.cells.learn(results);
     }

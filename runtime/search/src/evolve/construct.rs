@@ -11,6 +11,7 @@
 
 pub(crate) mod placement;
 
+use sesame_base::observation::Observation;
 use sesame_optimise::nsga2::{Child, Variation};
 use sesame_plan::Test;
 use sesame_rng::Stream;
@@ -155,6 +156,11 @@ impl Variation for ConstructingVariation {
 }
 
 impl Learning for ConstructingVariation {
+    fn begin(&mut self, reference: &Observation) {
+        self.tests.take_reference(reference);
+        self.placer.take_reference(reference);
+    }
+
     fn learn(&mut self, results: &[Evaluated]) {
         for (aim, result) in self.aims.drain(..).zip(results) {
             let hit = result.point.as_ref().and_then(|point| self.cells.grid().cell_of(point));

@@ -7,6 +7,7 @@
 
 use std::collections::BTreeMap;
 
+use sesame_base::observation::Observation;
 use sesame_optimise::dominance::{Fitness, dominates};
 use sesame_optimise::nsga2::{Heritage, Settings, Variation};
 use sesame_optimise::selection::survivors;
@@ -94,6 +95,10 @@ impl MapElites {
 }
 
 impl Strategy for MapElites {
+    fn begin(&mut self, reference: &Observation) {
+        self.tests.take_reference(reference);
+    }
+
     fn ask(&mut self) -> Vec<Candidate> {
         assert!(self.awaited == 0, "a generation is told before the next is asked");
         let size = self.settings.population.min(self.settings.evaluations - self.asked);

@@ -10,6 +10,7 @@
 
 use std::collections::BTreeMap;
 
+use sesame_base::observation::Observation;
 use sesame_optimise::dominance::Fitness;
 use sesame_optimise::nsga2::{Nsga2, Told};
 use sesame_plan::Dimension;
@@ -39,6 +40,10 @@ impl Novel {
 }
 
 impl Strategy for Novel {
+    fn begin(&mut self, reference: &Observation) {
+        Strategy::begin(&mut self.evolution, reference);
+    }
+
     fn ask(&mut self) -> Vec<Candidate> {
         Strategy::ask(&mut self.evolution)
     }

@@ -251,6 +251,8 @@ impl Variation for PredictingVariation {
 
 impl Learning for PredictingVariation {
     fn begin(&mut self, reference: &Observation) {
+        self.tests.take_reference(reference);
+        self.test_space.take_reference(reference);
         self.reference = VariableTrajectories::from_observation(self.cells.plan(), reference);
     }
 

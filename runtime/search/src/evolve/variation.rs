@@ -11,6 +11,7 @@ mod rates;
 
 use std::collections::BTreeSet;
 
+use sesame_base::observation::Observation;
 use sesame_optimise::nsga2::{Child, Heritage, Variation};
 use sesame_plan::Test;
 use sesame_rng::Stream;
@@ -40,6 +41,11 @@ impl TestVariation {
     /// Variation of what is permitted, at these rates, with all draws from streams of the seed.
     pub fn new(test_space: TestSpace, rates: Rates, seed: u64) -> Self {
         TestVariation { test_space, rates, seed, made: BTreeSet::new() }
+    }
+
+    /// Learns from the reference run when there are messages to disturb.
+    pub(crate) fn take_reference(&mut self, reference: &Observation) {
+        self.test_space.take_reference(reference);
     }
 
     /// Mutates a permitted test once more.

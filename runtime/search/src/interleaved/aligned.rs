@@ -6,6 +6,7 @@ use sesame_rng::Stream;
 
 use super::setting::Setting;
 use super::tried::Tried;
+use crate::space::initial::fresh_window;
 use crate::space::range::Range;
 use crate::space::test_space::ActivationSpace;
 
@@ -71,7 +72,7 @@ pub(super) fn operation(setting: &Setting, kind: usize, at: Option<f64>, stream:
 /// A choice for a parameter of an operation: half of the time a strongest one.
 pub(super) fn choice(setting: &Setting, kind: usize, parameter: usize, stream: &mut Stream) -> Choice {
     if stream.chance(STRONGEST) {
-        setting.strongest[kind].choice(parameter, stream)
+        setting.kind(kind).strongest.choice(parameter, stream)
     } else {
         setting.kind(kind).parameters[parameter].fresh(stream)
     }
@@ -101,7 +102,7 @@ pub(super) fn activation(setting: &Setting, kind: usize, at: Option<f64>, stream
 
 /// A moment for an operation: often one of the few messages of its own topic.
 fn moment(setting: &Setting, kind: usize, stream: &mut Stream) -> f64 {
-    let own = &setting.moments.heard[kind].rare;
+    let own = setting.kind(kind).heard.rare();
     if !own.is_empty() && stream.chance(OWN_MESSAGE) {
         return own[stream.below(own.len())];
     }
@@ -110,6 +111,7 @@ fn moment(setting: &Setting, kind: usize, stream: &mut Stream) -> f64 {
 
 /// A window of an operation that meets a message; one around a time, if one is given.
 pub(super) fn window(setting: &Setting, kind: usize, range: Range, at: Option<f64>, stream: &mut Stream) -> (f64, f64) {
+    let heard = &setting.kind(kind).heard;
     let shortest = range.shortest.max(setting.moments.grain).min(range.greatest_length());
     for _ in 0..TRIES {
         let share = stream.unit();
@@ -122,23 +124,11 @@ pub(super) fn window(setting: &Setting, kind: usize, range: Range, at: Option<f6
         };
         let (start, end) = (start.max(range.low), end.min(range.high));
         let end = end.min(start + range.longest);
-        if end - start >= shortest && setting.moments.is_heard(kind, start, end) {
+        if end - start >= shortest && heard.is_in((start, end)) {
             return (start, end);
         }
     }
-    heard_window(setting, kind, range, stream)
-}
-
-/// A window that is uniform over all that are permitted and meets a message, if several tries find one.
-pub(super) fn heard_window(setting: &Setting, kind: usize, range: Range, stream: &mut Stream) -> (f64, f64) {
-    let mut drawn = range.interval(stream);
-    for _ in 0..TRIES {
-        if setting.moments.is_heard(kind, drawn.0, drawn.1) {
-            break;
-        }
-        drawn = range.interval(stream);
-    }
-    drawn
+    fresh_window(range, heard, stream)
 }
 
 fn from_moment_to_moment(
@@ -149,7 +139,7 @@ fn from_moment_to_moment(
     stream: &mut Stream,
 ) -> (f64, f64) {
     let moments = setting.moments.all.iter().map(|moment| moment.at);
-    let own = setting.moments.heard[kind].rare.iter().copied();
+    let own = setting.kind(kind).heard.rare().iter().copied();
     let mut ends = vec![range.low];
     ends.extend(moments.chain(own).filter(|at| range.low < *at && *at < range.high));
     ends.push(range.high);
@@ -186,7 +176,7 @@ fn from_moment_to_moment(
 fn of_any_length(setting: &Setting, kind: usize, range: Range, at: Option<f64>, stream: &mut Stream) -> (f64, f64) {
     let moments = &setting.moments;
     let longest = range.greatest_length();
-    let period = moments.heard[kind].period.unwrap_or(moments.grain);
+    let period = setting.kind(kind).heard.period().unwrap_or(moments.grain);
     let usual = (1.5 * period).min(0.1 * moments.end);
     let shortest = longest.min(range.shortest.max(2.0 * moments.grain).max(usual));
     let length = shortest * libm::pow(longest / shortest, stream.unit());

@@ -2,7 +2,8 @@
 //!
 //! A cause is a requirement with a smallest set of operations that violates it. A test that violates a requirement is
 //! reduced by delta debugging over its operations [Zeller 2002]: each operation alone, then what is left without those
-//! that are to blame alone, then pairs. Each question is a test of the campaign like any other.
+//! that are to blame alone, then pairs. Each question is a test of the campaign like any other; those of one stage do
+//! not depend on each other and are asked in one generation.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -22,6 +23,11 @@ pub(super) struct Cause {
 pub(super) struct Causes(Vec<Cause>);
 
 impl Causes {
+    /// How many causes of a requirement there are.
+    pub(super) fn count(&self, requirement: usize) -> usize {
+        self.0.iter().filter(|known| known.requirement == requirement).count()
+    }
+
     /// Adds a cause, unless a smaller one explains it; those that it explains leave. Returns whether it is new.
     pub(super) fn add(&mut self, cause: Cause) -> bool {
         if self.explain(cause.requirement, &cause.kinds) {
@@ -65,10 +71,10 @@ pub(super) struct Attribution {
 /// What an attribution comes to.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Next {
-    /// It asks whether a test of only these operations, by position, violates the requirement.
-    Ask(BTreeSet<usize>),
-    /// It found this set of kinds to be to blame, or nothing that is not known.
-    Done(Option<BTreeSet<usize>>),
+    /// It asks of each of these sets of operations, by position, whether a test of them alone violates the requirement.
+    Ask(Vec<BTreeSet<usize>>),
+    /// It found these sets of kinds to be to blame, or nothing that is not known.
+    Done(Vec<BTreeSet<usize>>),
 }
 
 impl Attribution {
@@ -96,19 +102,29 @@ impl Attribution {
         self.reduced(causes).unwrap_or_else(Next::Ask)
     }
 
-    /// Whether a test of only these operations violates the requirement; the error asks for it. What a campaign does
-    /// not permit is not asked, and counts as no violation.
-    fn violates(&self, positions: &BTreeSet<usize>) -> Result<bool, BTreeSet<usize>> {
+    /// Whether a test of only these operations violates the requirement, if that is known. What a campaign does not
+    /// permit is not asked, and counts as no violation.
+    fn known(&self, positions: &BTreeSet<usize>) -> Option<bool> {
         if positions.len() == self.kinds.len() {
-            return Ok(true);
+            return Some(true);
         }
         if positions.len() < self.fewest {
-            return Ok(false);
+            return Some(false);
         }
-        self.answers.get(positions).copied().ok_or_else(|| positions.clone())
+        self.answers.get(positions).copied()
     }
 
-    fn reduced(&self, causes: &Causes) -> Result<Next, BTreeSet<usize>> {
+    /// Whether tests of only these operations violate the requirement; the error asks for all that are not known.
+    fn each_violates(&self, sets: &[BTreeSet<usize>]) -> Result<Vec<bool>, Vec<BTreeSet<usize>>> {
+        let known: Option<Vec<bool>> = sets.iter().map(|set| self.known(set)).collect();
+        known.ok_or_else(|| sets.iter().filter(|set| self.known(set).is_none()).cloned().collect())
+    }
+
+    fn violates(&self, positions: &BTreeSet<usize>) -> Result<bool, Vec<BTreeSet<usize>>> {
+        self.known(positions).ok_or_else(|| vec![positions.clone()])
+    }
+
+    fn reduced(&self, causes: &Causes) -> Result<Next, Vec<BTreeSet<usize>>> {
         let unknown = |positions: BTreeSet<usize>| -> BTreeSet<usize> {
             positions.into_iter().filter(|&at| !causes.is_alone(self.requirement, self.kinds[at])).collect()
         };
@@ -118,36 +134,38 @@ impl Attribution {
             let of = |wanted: &[usize]| -> BTreeSet<usize> {
                 rest.iter().copied().filter(|&at| wanted.contains(&self.kinds[at])).collect()
             };
-            let mut alone = None;
-            if kinds.len() > 1 {
-                for &kind in &kinds {
-                    if self.violates(&of(&[kind]))? {
-                        alone = Some(kind);
-                        break;
-                    }
-                }
+            // All at once: a generation has room for them, and the next one has the answers.
+            let single: Vec<BTreeSet<usize>> = kinds.iter().map(|&kind| of(&[kind])).collect();
+            let violate = if kinds.len() > 1 { self.each_violates(&single)? } else { vec![false] };
+            let alone: BTreeSet<usize> =
+                kinds.iter().zip(violate).filter(|(_, is)| *is).map(|(&kind, _)| kind).collect();
+            if alone.is_empty() {
+                return self.smallest(&kinds, of);
             }
-            let Some(alone) = alone else { return self.smallest(&kinds, of) };
-            // The caller knows of it by the answer; what is left may be a cause of its own.
-            rest = unknown(rest.iter().copied().filter(|&at| self.kinds[at] != alone).collect());
+            // The caller knows of them by the answers; what is left may be a cause of its own.
+            rest = unknown(rest.iter().copied().filter(|&at| !alone.contains(&self.kinds[at])).collect());
         }
-        Ok(Next::Done(None))
+        Ok(Next::Done(Vec::new()))
     }
 
-    /// The smallest set among these kinds, none of which violates the requirement alone.
+    /// The smallest sets among these kinds, none of which violates the requirement alone.
     fn smallest(
         &self,
         kinds: &BTreeSet<usize>,
         of: impl Fn(&[usize]) -> BTreeSet<usize>,
-    ) -> Result<Next, BTreeSet<usize>> {
+    ) -> Result<Next, Vec<BTreeSet<usize>>> {
         let list: Vec<usize> = kinds.iter().copied().collect();
         if list.len() > 2 {
-            for (at, &first) in list.iter().enumerate() {
-                for &second in &list[at + 1..] {
-                    if self.violates(&of(&[first, second]))? {
-                        return Ok(Next::Done(Some([first, second].into())));
-                    }
-                }
+            let pairs = list
+                .iter()
+                .enumerate()
+                .flat_map(|(at, &first)| list[at + 1..].iter().map(move |&second| [first, second]));
+            let pairs: Vec<[usize; 2]> = pairs.collect();
+            let violate = self.each_violates(&pairs.iter().map(|pair| of(pair)).collect::<Vec<_>>())?;
+            let found: Vec<BTreeSet<usize>> =
+                pairs.into_iter().zip(violate).filter(|(_, is)| *is).map(|(pair, _)| pair.into()).collect();
+            if !found.is_empty() {
+                return Ok(Next::Done(found));
             }
             // Beyond pairs, one operation after the other is left out, as long as the rest violates the requirement.
             let mut left = list.clone();
@@ -161,9 +179,9 @@ impl Attribution {
                     at += 1;
                 }
             }
-            return Ok(Next::Done(Some(left.into_iter().collect())));
+            return Ok(Next::Done(vec![left.into_iter().collect()]));
         }
-        Ok(Next::Done(Some(kinds.clone())))
+        Ok(Next::Done(vec![kinds.clone()]))
     }
 }
 
@@ -182,17 +200,19 @@ mod tests {
         let (mut causes, mut asked) = (Causes::default(), 0);
         loop {
             match attribution.next(&causes) {
-                Next::Ask(positions) => {
-                    let held: BTreeSet<usize> = positions.iter().map(|&at| kinds[at]).collect();
-                    let violates = violating.iter().any(|cause| cause.is_subset(&held));
-                    if violates && held.len() == 1 {
-                        causes.add(Cause { requirement: 0, kinds: held });
+                Next::Ask(sets) => {
+                    for positions in sets {
+                        let held: BTreeSet<usize> = positions.iter().map(|&at| kinds[at]).collect();
+                        let violates = violating.iter().any(|cause| cause.is_subset(&held));
+                        if violates && held.len() == 1 {
+                            causes.add(Cause { requirement: 0, kinds: held });
+                        }
+                        attribution.answer(positions, violates);
+                        asked += 1;
                     }
-                    attribution.answer(positions, violates);
-                    asked += 1;
                 }
                 Next::Done(found) => {
-                    causes.0.extend(found.map(|kinds| Cause { requirement: 0, kinds }));
+                    causes.0.extend(found.into_iter().map(|kinds| Cause { requirement: 0, kinds }));
                     return (causes, asked);
                 }
             }

@@ -1,9 +1,7 @@
-//! What the reference run says about when a disturbance is worth a test: moments at which something happens, and when
-//! the topic of an operation has messages at all.
+//! What the reference run says about when a disturbance is worth a test: moments at which something happens.
 
-use sesame_base::observation::{Course, Observation, RARE};
-use sesame_base::silence::wires;
-use sesame_plan::{CampaignPlan, OperationId, Span, TopicId};
+use sesame_base::observation::{Course, Observation};
+use sesame_plan::{CampaignPlan, Span};
 use sesame_rng::Stream;
 
 use crate::space::test_space::TestSpace;
@@ -25,7 +23,7 @@ pub(super) struct Moment {
     pub(super) weight: f64,
 }
 
-/// The moments of a run, and what is heard in it.
+/// The moments of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Moments {
     /// When a run ends, in seconds.
@@ -35,41 +33,21 @@ pub(super) struct Moments {
     pub(super) grain: f64,
     /// In order of time, at least one.
     pub(super) all: Vec<Moment>,
-    /// Per operation of the test space: when there are messages that it could disturb.
-    pub(super) heard: Vec<Heard>,
-}
-
-/// When there are messages that an operation could disturb.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Heard {
-    /// Stretches with messages, in order; `None` where nothing is known, or the operation needs no messages.
-    stretches: Option<Vec<Span>>,
-    /// The times of its messages if there are few, in order; else empty.
-    pub(super) rare: Vec<f64>,
-    /// The usual time between two messages, in seconds, if it is known.
-    pub(super) period: Option<f64>,
 }
 
 impl Moments {
-    /// Those of a reference run.
+    /// Those of a reference run that the test space knows already.
     pub(super) fn from_reference(plan: &CampaignPlan, space: &TestSpace, reference: &Observation) -> Self {
         let end = plan.campaign.end_after;
-        let heard: Vec<Heard> =
-            space.operations().iter().map(|kind| Heard::of(plan, kind.operation, reference)).collect();
         let step = plan.simulator.step_ns().map(|ns| ns as f64 * 1e-9);
-        let periods = heard.iter().filter_map(|heard| heard.period).filter(|period| *period > 0.0);
+        let periods = space.operations().iter().filter_map(|kind| kind.heard.period()).filter(|period| *period > 0.0);
         let grain = step.or_else(|| periods.reduce(f64::min)).unwrap_or(end * 1e-3);
         let grain = grain.clamp(end * 1e-5, end * 0.02);
         let course = reference.course.as_ref();
         let moments = course.map_or_else(Vec::new, |course| moments(course, end, grain));
         let even = || (0..EVEN).map(|at| Moment { at: end * (f64::from(at) + 0.5) / f64::from(EVEN), weight: 1.0 });
         let moments = if moments.is_empty() { even().collect() } else { moments };
-        Moments { end, grain, all: moments, heard }
-    }
-
-    /// Whether an operation meets a message in a window of the undisturbed run.
-    pub(super) fn is_heard(&self, kind: usize, start: f64, end: f64) -> bool {
-        self.heard[kind].is_heard(start, end)
+        Moments { end, grain, all: moments }
     }
 
     /// A moment, likelier the weightier it is.
@@ -98,35 +76,6 @@ impl Moments {
         let parts = cuts.windows(2).map(|ends| Span { start: ends[0], end: ends[1] });
         parts.filter(|part| part.length() > self.grain).collect()
     }
-}
-
-impl Heard {
-    fn of(plan: &CampaignPlan, operation: OperationId, reference: &Observation) -> Heard {
-        let (Some(topic), Some(course)) = (plan.operation(operation).topic, &reference.course) else {
-            return Heard::default();
-        };
-        let wires = wires_of(plan, topic);
-        let on_topic = course.heard.iter().filter(|heard| wires.contains(&heard.wire));
-        let mut stretches: Vec<Span> = on_topic.flat_map(|heard| heard.stretches.iter().copied()).collect();
-        stretches.sort_by(|a, b| a.start.total_cmp(&b.start));
-        let traffic = reference.traffic.iter().filter(|traffic| wires.contains(&traffic.wire));
-        let messages: u64 = traffic.clone().map(|traffic| traffic.messages).sum();
-        let rare = if messages <= RARE as u64 { stretches.iter().map(|span| span.start).collect() } else { Vec::new() };
-        let period = traffic.map(|traffic| traffic.median_gap).filter(|gap| *gap > 0.0).reduce(f64::min);
-        Heard { stretches: Some(stretches), rare, period }
-    }
-
-    fn is_heard(&self, start: f64, end: f64) -> bool {
-        let Some(stretches) = &self.stretches else { return true };
-        // Stretches of several wires may overlap, so their ends need not be in order; they nearly are.
-        stretches.iter().take_while(|span| span.start < end).any(|span| span.end >= start)
-    }
-}
-
-/// The positions of the wires of a topic.
-fn wires_of(plan: &CampaignPlan, topic: TopicId) -> Vec<u32> {
-    let wires = (0..).zip(wires(plan));
-    wires.filter(|(_, (of, _))| *of == topic).map(|(wire, _)| wire).collect()
 }
 
 /// Reads the moments from a course, in order of time.

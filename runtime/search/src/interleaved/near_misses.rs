@@ -11,6 +11,7 @@ use sesame_plan::{Activation, Test};
 use sesame_rng::Stream;
 
 use super::aligned;
+use super::moments::weighted;
 use super::setting::Setting;
 use crate::evolve::variation::{Rates, mutate};
 use crate::falsification::TestDomain;
@@ -39,36 +40,44 @@ pub(super) struct Ran {
     pub(super) had_effect: bool,
 }
 
-/// The tests that came nearest to a violation of a requirement, the nearest first, and all others that can teach
-/// something about it. `explained` are those that a known cause explains.
+/// A requirement that the undisturbed system keeps.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Kept {
+    /// Its margin without a disturbance, in the scale of margins.
+    pub(super) undisturbed: f64,
+    /// How many causes of it are known.
+    pub(super) causes: usize,
+}
+
+/// A step from one of the tests that came nearest to a violation of a requirement: any of those that can be approached,
+/// likelier one of which few causes are known. `explained` are tests that a known cause explains.
 pub(super) fn step(
     setting: &Setting,
     domain: Option<&TestDomain>,
     ran: &[Ran],
-    requirements: &[f64],
+    requirements: &[Kept],
     explained: impl Fn(usize, &BTreeSet<usize>) -> bool,
     pool: &[usize],
     stream: &mut Stream,
 ) -> Option<(Test, Vec<u32>)> {
     let mut near: Vec<Vec<(f64, usize)>> = Vec::new();
-    let mut of: Vec<usize> = Vec::new();
-    for (requirement, &undisturbed) in requirements.iter().enumerate() {
+    let mut need: Vec<f64> = Vec::new();
+    for (requirement, kept) in requirements.iter().enumerate() {
         let counts = |run: &Ran| run.had_effect && !run.violated[requirement] && !explained(requirement, &run.held);
         let counted = ran.iter().enumerate().filter(|(_, run)| counts(run));
         let with_margin = counted.filter_map(|(at, run)| Some((run.margins[requirement]?, at)));
         let mut margins: Vec<(f64, usize)> = with_margin.collect();
         margins.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         // Only what is nearer than the undisturbed system leads anywhere.
-        if margins.first().is_some_and(|(least, _)| *least < undisturbed - 1e-6) {
+        if margins.first().is_some_and(|(least, _)| *least < kept.undisturbed - 1e-6) {
             near.push(margins);
-            of.push(requirement);
+            need.push(1.0 / (1.0 + kept.causes as f64));
         }
     }
     if near.is_empty() {
         return None;
     }
-    let chosen = stream.below(near.len());
-    let near = &near[chosen];
+    let near = &near[weighted(need.iter().copied(), stream)];
     if let Some(domain) = domain.filter(|_| stream.chance(0.5)) {
         // The nearest ones, and the latest others.
         let (nearest, others) = near.split_at(near.len().min(FITTED / 2));

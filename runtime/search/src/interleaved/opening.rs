@@ -17,7 +17,7 @@ pub(super) fn opening(setting: &Setting, stream: &mut Stream) -> Vec<(usize, Tes
     let mut tests = Vec::new();
     for at in stream.permutation(usable.len()) {
         let kind = usable[at];
-        let ways = setting.strongest[kind].ways;
+        let ways = setting.kind(kind).strongest.ways();
         let whole = |stream: &mut Stream| {
             setting.over(kind, Span { start: 0.0, end: setting.moments.end }, stream).into_iter().collect()
         };
@@ -31,7 +31,7 @@ pub(super) fn opening(setting: &Setting, stream: &mut Stream) -> Vec<(usize, Tes
         };
         for way in 0..ways {
             for activations in windows.iter().filter(|activations| !activations.is_empty()) {
-                let parameters = setting.strongest[kind].way(way, stream);
+                let parameters = setting.kind(kind).strongest.way(way, stream);
                 let operations = activations
                     .iter()
                     .map(|activation| setting.operation(kind, activation.clone(), parameters.clone(), stream));
@@ -57,7 +57,7 @@ fn tiles(setting: &Setting, kind: usize, range: Range, stream: &mut Stream) -> V
             // Where nothing tells them apart, chance does.
             (weight + 1e-3 * stream.unit(), start)
         })
-        .filter(|(_, start)| setting.moments.is_heard(kind, *start, start + range.longest))
+        .filter(|(_, start)| setting.kind(kind).heard.is_in((*start, start + range.longest)))
         .collect();
     tiles.sort_by(|a, b| b.0.total_cmp(&a.0));
     let most = setting.space.most().min(setting.space.most_copies(setting.kind(kind))).max(1);

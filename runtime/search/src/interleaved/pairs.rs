@@ -133,7 +133,7 @@ fn together(setting: &Setting, kinds: &[usize], stretch: Span, stream: &mut Stre
             None => setting.over(kind, stretch, stream).or_else(|| setting.over(kind, whole, stream)),
         };
         let Some(activation) = activation else { continue };
-        let parameters = setting.strongest[kind].any(stream);
+        let parameters = setting.kind(kind).strongest.any(stream);
         operations.push(setting.operation(kind, activation, parameters, stream));
     }
     let mut test = Test { operations };

@@ -7,7 +7,6 @@ use sesame_plan::{Activation, CampaignPlan, Choice, Span, Test, TestOperation};
 use sesame_rng::Stream;
 
 use super::moments::Moments;
-use super::strongest::Strongest;
 use crate::evolve::predict::VariableTrajectories;
 use crate::shrink::strength;
 use crate::space::initial::fresh_activation;
@@ -23,8 +22,6 @@ pub(super) struct Setting {
     pub(super) plan: CampaignPlan,
     pub(super) space: TestSpace,
     pub(super) moments: Moments,
-    /// Per operation of the test space.
-    pub(super) strongest: Vec<Strongest>,
     /// The values of the variables of conditions in the reference run, in campaigns by condition.
     trajectories: Option<VariableTrajectories>,
 }
@@ -36,8 +33,7 @@ impl Setting {
         moments: Moments,
         trajectories: Option<VariableTrajectories>,
     ) -> Self {
-        let strongest = space.operations().iter().map(|kind| Strongest::of(&plan, kind)).collect();
-        Setting { plan, space, moments, strongest, trajectories }
+        Setting { plan, space, moments, trajectories }
     }
 
     /// An operation of the test space.
@@ -102,10 +98,9 @@ impl Setting {
         measure: impl Fn(&Activation) -> f64,
         stream: &mut Stream,
     ) -> Option<Activation> {
-        let space = &self.kind(kind).activation;
         let mut best: Option<(f64, Activation)> = None;
         for _ in 0..CONDITIONS {
-            let activation = fresh_activation(space, stream);
+            let activation = fresh_activation(self.kind(kind), stream);
             let measured = measure(&activation);
             if best.as_ref().is_none_or(|(most, _)| measured > *most) {
                 best = Some((measured, activation));
@@ -124,14 +119,6 @@ impl Setting {
                 trajectories.intervals_of(&self.plan, self.kind(kind).operation, activation)
             }
         }
-    }
-
-    /// Whether each operation of a test meets a message of the undisturbed system, as far as that is known.
-    pub(super) fn reaches(&self, test: &Test) -> bool {
-        self.kinds_of(test).iter().zip(&test.operations).all(|(&kind, used)| match used.activation {
-            Activation::Time { start, end } => self.moments.is_heard(kind, start, end),
-            _ => true,
-        })
     }
 
     /// How strong a single operation is, from 0 to 1.

@@ -85,7 +85,7 @@ fn items(setting: &Setting, test: &Test) -> BTreeMap<Item, f64> {
                     acting.entry(at).or_default().insert(kind);
                 }
             }
-            for (at, &message) in setting.moments.heard[kind].rare.iter().enumerate() {
+            for (at, &message) in setting.kind(kind).heard.rare().iter().enumerate() {
                 if start <= message && message < end {
                     items.insert(Item::Message(kind, at, level), 1.0);
                 }
@@ -103,7 +103,7 @@ fn items(setting: &Setting, test: &Test) -> BTreeMap<Item, f64> {
 }
 
 fn level(setting: &Setting, kind: usize, used: &TestOperation) -> Level {
-    match setting.strongest[kind].which(&used.parameters) {
+    match setting.kind(kind).strongest.which(&used.parameters) {
         Some(way) => Level::Strongest(way),
         None if setting.strength(used) > 0.5 => Level::High,
         None => Level::Low,

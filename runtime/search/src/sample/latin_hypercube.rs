@@ -4,6 +4,7 @@
 //! window's length in the shortest n-th part of all lengths, one in the next, and so on; likewise for every other
 //! choice of every operation. Campaigns by condition have no such choices and are not sampled so.
 
+use sesame_base::observation::Observation;
 use sesame_plan::Test;
 use sesame_rng::{Stream, derive_seed, keyed_unit};
 
@@ -40,6 +41,10 @@ impl LatinHypercube {
 }
 
 impl Sampling for LatinHypercube {
+    fn begin(&mut self, reference: &Observation) {
+        self.test_space.take_reference(reference);
+    }
+
     fn test(&mut self, index: u32) -> Option<Test> {
         let test_space = self.test_space.clone();
         Some(decoded(&test_space, self.seed, index, |choice| self.value(choice, index)))

@@ -1,5 +1,6 @@
 //! Random search: independent fresh tests, the baseline of every other strategy.
 
+use sesame_base::observation::Observation;
 use sesame_plan::Test;
 use sesame_rng::Stream;
 
@@ -23,6 +24,10 @@ impl Random {
 }
 
 impl Sampling for Random {
+    fn begin(&mut self, reference: &Observation) {
+        self.test_space.take_reference(reference);
+    }
+
     fn test(&mut self, index: u32) -> Option<Test> {
         Some(fresh_test(&self.test_space, &mut Stream::derive(self.seed, "initial", &[u64::from(index)])))
     }

@@ -1,5 +1,6 @@
 //! Tests that do not depend on results, handed out one after the other.
 
+use sesame_base::observation::Observation;
 use sesame_plan::Test;
 
 use crate::{Candidate, Evaluated, Strategy};
@@ -9,8 +10,11 @@ const GENERATION: u32 = 50;
 
 /// Tests that are there before any is run.
 pub(crate) trait Sampling: Send {
-    /// The test of an index; asked for in order, from 0. It depends on the index alone. `None` after the last one.
+    /// The test of an index; asked for in order, from 0. It depends on the index and the reference run alone. `None` after the last one.
     fn test(&mut self, index: u32) -> Option<Test>;
+
+    /// Takes the reference run, before the first test is asked for.
+    fn begin(&mut self, _reference: &Observation) {}
 
     /// As [`Strategy::tests`].
     fn tests(&self) -> Option<u128> {
@@ -42,6 +46,10 @@ impl<S: Sampling> SampledSearch<S> {
 }
 
 impl<S: Sampling> Strategy for SampledSearch<S> {
+    fn begin(&mut self, reference: &Observation) {
+        self.sampling.begin(reference);
+    }
+
     fn ask(&mut self) -> Vec<Candidate> {
         assert!(self.awaited == 0, "a generation is told before the next is asked");
         let generation = self.asked / GENERATION;

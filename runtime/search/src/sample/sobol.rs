@@ -3,6 +3,7 @@
 //! Every beginning of the search is spread evenly over each choice, not only the whole: so it may be stopped at any
 //! time. Campaigns by condition have no such choices and are not sampled so.
 
+use sesame_base::observation::Observation;
 use sesame_optimise::sobol::SobolPoints;
 use sesame_plan::Test;
 
@@ -26,6 +27,10 @@ impl Sobol {
 }
 
 impl Sampling for Sobol {
+    fn begin(&mut self, reference: &Observation) {
+        self.test_space.take_reference(reference);
+    }
+
     fn test(&mut self, index: u32) -> Option<Test> {
         Some(decoded(&self.test_space, self.seed, index, |choice| self.points.value(choice, index)))
     }

@@ -10,14 +10,20 @@
 //! sort, and one with fewer kinds than places is shorter, as far as that is permitted.
 //!
 //! Windows and sub-ranges are uniform over all feasible pairs of ends, values uniform over their range; windows of
-//! copies that must not overlap are uniform over all [disjoint ones](crate::space::separation). The order of the list
-//! is random. Where conditions switch, start and end are grown independently, and lengths are uniform.
+//! copies that must not overlap are uniform over all [disjoint ones](crate::space::separation). But a tenth of the
+//! windows are as long as is permitted, and a tenth of the choices are a [strongest one][Strongest]: uniform draws are
+//! nearly always of middling length and strength, and what is dangerous is at the ends. Windows in which the undisturbed
+//! system has no message to disturb are drawn again, several times. The order of the list is random. Where conditions
+//! switch, start and end are grown independently, and lengths are uniform, with a tenth at the greatest one.
+//!
+//! [Strongest]: crate::space::Strongest
 
 use sesame_plan::condition::ConditionEnd;
-use sesame_plan::{Activation, Copies, Test, TestOperation};
+use sesame_plan::{Activation, Choice, Copies, Test, TestOperation};
 use sesame_rng::Stream;
 
 use crate::space::condition::grown;
+use crate::space::heard::Heard;
 use crate::space::range::Range;
 use crate::space::separation;
 use crate::space::test_space::{ActivationSpace, OperationSpace, TestSpace};
@@ -25,12 +31,34 @@ use crate::space::test_space::{ActivationSpace, OperationSpace, TestSpace};
 /// The share of fresh tests in which each place is drawn for itself.
 const EACH_FOR_ITSELF: f64 = 0.25;
 
+/// The share of fresh windows that are as long as is permitted, and of fresh choices that are a strongest one.
+pub(crate) const ENDS: f64 = 0.1;
+
+/// How often what meets no message is drawn again.
+const TRIES: usize = 12;
+
 /// A fresh test; one that the campaign permits.
 pub fn fresh_test(test_space: &TestSpace, stream: &mut Stream) -> Test {
     let kinds = fresh_kinds(test_space, &mut || stream.unit());
     let mut test = Test { operations: kinds.into_iter().map(|kind| fresh_operation(kind, stream)).collect() };
-    test_space.settle_windows(&mut test, separation::spread);
+    spread_copies(test_space, &mut test, stream);
     test
+}
+
+/// Moves the windows of copies apart that must not overlap. Those that meet no message then are drawn again.
+pub(crate) fn spread_copies(test_space: &TestSpace, test: &mut Test, stream: &mut Stream) {
+    test_space.settle_windows(test, separation::spread);
+    for _ in 0..TRIES {
+        if test_space.is_heard(test) {
+            break;
+        }
+        for used in &mut test.operations {
+            if let Some(kind) = test_space.find(used.operation) {
+                used.activation = fresh_activation(kind, stream);
+            }
+        }
+        test_space.settle_windows(test, separation::spread);
+    }
 }
 
 /// The kinds of operations of a fresh test, in their order, by numbers in `0..1`. Numbers that are uniform and
@@ -85,17 +113,41 @@ pub(crate) fn place(value: f64, parts: usize) -> usize {
 
 /// A fresh instance of an operation, with an operation seed of its own.
 pub(crate) fn fresh_operation(kind: &OperationSpace, stream: &mut Stream) -> TestOperation {
-    let activation = fresh_activation(&kind.activation, stream);
-    let parameters = kind.parameters.iter().map(|parameter_space| parameter_space.fresh(stream)).collect();
+    let activation = fresh_activation(kind, stream);
+    let parameters = (0..kind.parameters.len()).map(|parameter| fresh_choice(kind, parameter, stream)).collect();
     TestOperation { operation: kind.operation, activation, parameters, operation_seed: stream.bits() }
 }
 
+/// A fresh choice for a parameter, by its position.
+pub(crate) fn fresh_choice(kind: &OperationSpace, parameter: usize, stream: &mut Stream) -> Choice {
+    if stream.chance(ENDS) {
+        kind.strongest.choice(parameter, stream)
+    } else {
+        kind.parameters[parameter].fresh(stream)
+    }
+}
+
+/// A fresh window that meets a message, if several tries find one.
+pub(crate) fn fresh_window(range: Range, heard: &Heard, stream: &mut Stream) -> (f64, f64) {
+    let draw = |stream: &mut Stream| {
+        if stream.chance(ENDS) { range.longest_interval(stream.unit()) } else { range.interval(stream) }
+    };
+    let mut window = draw(stream);
+    for _ in 0..TRIES {
+        if heard.is_in(window) {
+            break;
+        }
+        window = draw(stream);
+    }
+    window
+}
+
 /// A fresh window, or fresh conditions; of an offline operation there is nothing to choose.
-pub(crate) fn fresh_activation(activation: &ActivationSpace, stream: &mut Stream) -> Activation {
-    match activation {
+pub(crate) fn fresh_activation(kind: &OperationSpace, stream: &mut Stream) -> Activation {
+    match &kind.activation {
         ActivationSpace::Offline => Activation::Offline,
         ActivationSpace::Time(window) => {
-            let (start, end) = window.interval(stream);
+            let (start, end) = fresh_window(*window, &kind.heard, stream);
             Activation::Time { start, end }
         }
         ActivationSpace::Condition { space, constraints, first } => {
@@ -107,7 +159,7 @@ pub(crate) fn fresh_activation(activation: &ActivationSpace, stream: &mut Stream
                     Activation::Condition { start, end, times: space.times }
                 }
                 ConditionEnd::Length { low, high } => {
-                    let length = Range::between(low, high).number(stream);
+                    let length = if stream.chance(ENDS) { high } else { Range::between(low, high).number(stream) };
                     Activation::ConditionFor { start, length, times: space.times }
                 }
             }

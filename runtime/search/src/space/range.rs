@@ -141,6 +141,13 @@ impl Range {
         (start.max(self.low), (start + length).min(self.high))
     }
 
+    /// A longest interval, at a share in `0..=1` of the places that it can have.
+    pub fn longest_interval(self, place: f64) -> (f64, f64) {
+        let length = self.greatest_length();
+        let start = (self.low + (self.high - self.low - length) * place).max(self.low);
+        (start, (start + length).min(self.high))
+    }
+
     /// A number near another. It differs unless the step ends where it began, at an end of the range.
     pub fn number_near(self, number: f64, steps: StepSizes, stream: &mut Stream) -> f64 {
         (number + self.step(steps, stream)).clamp(self.low, self.high)

@@ -12,6 +12,7 @@
 
 use std::collections::BTreeSet;
 
+use sesame_base::observation::Observation;
 use sesame_plan::condition::{Condition, ConditionEnd, ConditionSpace, Constraint};
 use sesame_plan::{
     Activation, ActivationMode, CampaignPlan, Copies, Count, Lengths, OperationId, Test, TestOperation, Times,
@@ -20,10 +21,12 @@ use sesame_rng::Stream;
 
 use crate::SearchError;
 use crate::space::condition::grown;
+use crate::space::heard::Heard;
 use crate::space::initial::fresh_operation;
 use crate::space::parameter_space::ParameterSpace;
 use crate::space::range::Range;
 use crate::space::separation;
+use crate::space::strongest::Strongest;
 
 /// How often a first condition is tried before a campaign is said to have none; so rarely does one try fail where there
 /// are any that this is certain enough.
@@ -47,6 +50,10 @@ pub struct OperationSpace {
     pub activation: ActivationSpace,
     /// Its parameters, in the operation's order.
     pub parameters: Vec<ParameterSpace>,
+    /// How it disturbs most.
+    pub strongest: Strongest,
+    /// When there are messages that it could disturb.
+    pub heard: Heard,
     /// Probability that a fresh test includes it.
     pub inclusion: f64,
 }
@@ -138,7 +145,9 @@ impl TestSpace {
                         }
                     }
                 },
+                strongest: Strongest::of(operation, &parameters),
                 parameters,
+                heard: Heard::of(plan, id),
                 inclusion: operation.inclusion,
             });
         }
@@ -151,6 +160,23 @@ impl TestSpace {
             return Err(SearchError::TooFew { campaign: name(), min: count.min, most });
         }
         Ok(test_space)
+    }
+
+    /// Learns from the reference run when there are messages to disturb.
+    pub fn take_reference(&mut self, reference: &Observation) {
+        for kind in &mut self.operations {
+            kind.heard.take_reference(reference);
+        }
+    }
+
+    /// Whether each window of a test meets a message of the reference run, as far as that is known.
+    pub fn is_heard(&self, test: &Test) -> bool {
+        test.operations.iter().all(|used| match used.activation {
+            Activation::Time { start, end } => {
+                self.find(used.operation).is_none_or(|kind| kind.heard.is_in((start, end)))
+            }
+            _ => true,
+        })
     }
 
     /// What holds of several copies of one operation.

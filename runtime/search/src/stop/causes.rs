@@ -3,17 +3,19 @@
 
 use std::collections::BTreeSet;
 
+use sesame_base::observation::Observation;
 use sesame_plan::{CampaignPlan, OperationId};
 
 use crate::Evaluated;
-use crate::margin::evaluated_margins;
+use crate::margin::{evaluated_margins, margins};
 
 /// What the tests of a search have shown so far.
 #[derive(Debug, Clone)]
 pub(super) struct Seen {
     plan: CampaignPlan,
-    /// For each requirement the sets of operations that violate it, none of which contains another one.
-    smallest: Vec<Vec<BTreeSet<OperationId>>>,
+    /// For each requirement that the undisturbed system keeps the sets of operations that violate it, none of which
+    /// contains another one. A requirement that it violates without any operation has no causes.
+    smallest: Vec<Option<Vec<BTreeSet<OperationId>>>>,
     /// Since how many tests none of them changed.
     unchanged: u32,
     /// Operations that had an effect in a test.
@@ -27,12 +29,18 @@ pub(super) struct Seen {
 impl Seen {
     pub(super) fn new(plan: &CampaignPlan) -> Seen {
         Seen {
-            smallest: vec![Vec::new(); plan.requirements.len()],
+            smallest: vec![Some(Vec::new()); plan.requirements.len()],
             unchanged: 0,
             effective: BTreeSet::new(),
             together: BTreeSet::new(),
             held: BTreeSet::new(),
             plan: plan.clone(),
+        }
+    }
+
+    pub(super) fn begin(&mut self, reference: &Observation) {
+        for (smallest, margin) in self.smallest.iter_mut().zip(margins(&self.plan, reference)) {
+            *smallest = smallest.take().filter(|_| !margin.violated);
         }
     }
 
@@ -51,6 +59,7 @@ impl Seen {
         }
         let margins = evaluated_margins(&self.plan, result);
         for (smallest, margin) in self.smallest.iter_mut().zip(margins) {
+            let Some(smallest) = smallest else { continue };
             if margin.violated && !smallest.iter().any(|known| known.is_subset(&acting)) {
                 smallest.retain(|known| !acting.is_subset(known));
                 smallest.push(acting.clone());
@@ -66,7 +75,7 @@ impl Seen {
 
     /// How many causes there are.
     pub(super) fn causes(&self) -> usize {
-        self.smallest.iter().map(Vec::len).sum()
+        self.smallest.iter().flatten().map(Vec::len).sum()
     }
 
     /// How many pairs of operations there are, if each was tried. A pair was tried if both operations acted in one
@@ -78,11 +87,12 @@ impl Seen {
             return None;
         }
         let all: BTreeSet<OperationId> = campaign.operations.iter().copied().collect();
+        let causes: Vec<&Vec<BTreeSet<OperationId>>> = self.smallest.iter().flatten().collect();
         let is_tried = |&(first, second): &(OperationId, OperationId)| {
             let both = BTreeSet::from([first, second]);
             self.together.contains(&(first, second))
                 || (self.held.contains(&(first, second)) && !both.is_subset(&self.effective))
-                || self.smallest.iter().all(|known| known.iter().any(|cause| cause.is_subset(&both)))
+                || !causes.is_empty() && causes.iter().all(|known| known.iter().any(|cause| cause.is_subset(&both)))
         };
         let mut count = 0;
         for pair in pairs(&all) {
@@ -159,6 +169,18 @@ mod tests {
         assert_eq!((seen.causes(), seen.unchanged()), (1, 0));
         seen.tell(&result(4, &[(2, true)], false));
         assert_eq!((seen.causes(), seen.unchanged()), (1, 1));
+    }
+
+    #[test]
+    fn what_the_undisturbed_system_violates_has_no_causes() {
+        let mut plan = plan(3);
+        plan.requirements.push(requirement("violated at once", 0, Bound::AtLeast { value: 5.0 }));
+        let mut seen = Seen::new(&plan);
+        seen.begin(&result(1, &[], false).run);
+        seen.tell(&result(2, &[(0, true)], false));
+        assert_eq!((seen.causes(), seen.unchanged()), (0, 1));
+        seen.tell(&result(3, &[(1, true)], true));
+        assert_eq!((seen.causes(), seen.unchanged()), (1, 0));
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use std::ops::ControlFlow;
 use std::time::Instant;
 
+use sesame_base::observation::Observation;
 use sesame_plan::CampaignPlan;
 use sesame_record::{RecordError, Recorder};
 use sesame_search::StopRules;
@@ -17,9 +18,11 @@ pub(super) struct Rules {
 }
 
 impl Rules {
-    /// The rules of a plan, from now on.
-    pub(super) fn new(plan: &CampaignPlan) -> Self {
-        Rules { rules: StopRules::from_plan(plan), begun: Instant::now() }
+    /// The rules of a plan, from now on, after this reference run.
+    pub(super) fn new(plan: &CampaignPlan, reference: &Observation) -> Self {
+        let mut rules = StopRules::from_plan(plan);
+        rules.begin(reference);
+        Rules { rules, begun: Instant::now() }
     }
 }
 

@@ -9,7 +9,7 @@ mod stretches;
 
 use sesame_base::observation::{Course, Heard, Signal};
 use sesame_base::time::SimTime;
-use sesame_plan::{CampaignPlan, Test};
+use sesame_plan::{CampaignPlan, CourseRead, Test};
 
 use crate::relay::course::happenings::Field;
 use crate::relay::course::stretches::Stretches;
@@ -21,15 +21,19 @@ const FIELDS: usize = 400;
 /// Lists of at most so many numbers are followed number by number; of longer ones, the length is.
 const NUMBERS: usize = 8;
 
-/// Whether the course of a run is recorded: of one without operations, for a search that places windows by it.
-pub(super) fn is_read(plan: &CampaignPlan, test: &Test) -> bool {
-    let strategy = plan.campaign.search.strategy();
-    test.operations.is_empty() && strategy.is_some_and(|strategy| strategy.kind().properties().reads_course)
+/// What is recorded of the course of a run: something of one without operations, for a search that places windows by
+/// it.
+pub(super) fn read(plan: &CampaignPlan, test: &Test) -> CourseRead {
+    match plan.campaign.search.strategy() {
+        Some(strategy) if test.operations.is_empty() => strategy.kind().properties().course,
+        _ => CourseRead::Nothing,
+    }
 }
 
 /// The course of one run.
 pub(super) struct Recorder {
     wires: Vec<Option<OfWire>>,
+    read: CourseRead,
     /// How many more fields can be followed.
     left: usize,
 }
@@ -58,8 +62,14 @@ enum Layout {
 }
 
 impl Recorder {
-    pub(super) fn new(wires: &WireTable) -> Self {
-        Recorder { wires: wires.iter().map(|_| None).collect(), left: FIELDS }
+    /// A recorder of what is read of a course; `None` if that is nothing.
+    pub(super) fn new(wires: &WireTable, read: CourseRead) -> Option<Self> {
+        let left = match read {
+            CourseRead::Nothing => return None,
+            CourseRead::Messages => 0,
+            CourseRead::Happenings => FIELDS,
+        };
+        Some(Recorder { wires: wires.iter().map(|_| None).collect(), read, left })
     }
 
     /// A message was published on a wire.
@@ -80,6 +90,9 @@ impl Recorder {
         for (wire, of) in (0..).zip(&self.wires) {
             let Some(of) = of else { continue };
             course.heard.push(Heard { wire, stretches: of.stretches.spans() });
+            if self.read == CourseRead::Messages {
+                continue;
+            }
             let messages = ("", of.stretches.events(end));
             let fields = of.fields.iter().map(|field| (field.name.as_str(), field.events()));
             let happened = std::iter::once(messages).chain(fields).filter(|(_, events)| !events.is_empty());
@@ -192,7 +205,7 @@ mod tests {
         let plan = plan();
         let wires = WireTable::new(&plan);
         let wire = |path: &str| wires.find(path).unwrap();
-        let mut recorder = Recorder::new(&wires);
+        let mut recorder = Recorder::new(&wires, CourseRead::Happenings).unwrap();
         for step in 1..=100 {
             if step == 20 || step == 70 {
                 recorder.published(at(step), wire("order"), &Value::Text("go".into()));
@@ -217,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn only_undisturbed_runs_of_searches_that_read_it_record_it() {
+    fn undisturbed_runs_record_what_their_search_reads() {
         let with = |search| {
             let mut plan = plan();
             plan.campaign.search = search;
@@ -225,15 +238,22 @@ mod tests {
         };
         let (undisturbed, disturbed) = (Test::default(), test_of(vec![use_of(0, 0.0, 1.0, vec![], 1)]));
         let interleaved = with(Search::new(Strategy::Interleaved { keep_causes: false }, 8));
-        assert!(is_read(&interleaved, &undisturbed) && !is_read(&interleaved, &disturbed));
-        assert!(!is_read(&with(Search::new(Strategy::Random, 8)), &undisturbed));
+        assert_eq!(read(&interleaved, &undisturbed), CourseRead::Happenings);
+        assert_eq!(read(&interleaved, &disturbed), CourseRead::Nothing);
+        assert_eq!(read(&with(Search::new(Strategy::Random, 8)), &undisturbed), CourseRead::Messages);
+        assert_eq!(read(&with(Search::new(Strategy::Grid { levels: 3 }, 8)), &undisturbed), CourseRead::Nothing);
+        let wires = WireTable::new(&plan());
+        let mut recorder = Recorder::new(&wires, CourseRead::Messages).unwrap();
+        recorder.published(at(1), wires.find("state").unwrap(), &state(1.0, "rest"));
+        let course = recorder.course(at(2));
+        assert_eq!((course.heard.len(), course.signals.len()), (1, 0));
     }
 
     #[test]
     fn its_size_is_bounded() {
         let plan = plan();
         let wires = WireTable::new(&plan);
-        let mut recorder = Recorder::new(&wires);
+        let mut recorder = Recorder::new(&wires, CourseRead::Happenings).unwrap();
         let wire = wires.find("silent").unwrap();
         for step in 0..200_000u32 {
             // A zigzag with a jump, a turn and a change of its sign over and over.

@@ -25,6 +25,7 @@ mod spread;
 
 use spread::{Member, Wanted};
 
+use sesame_base::observation::Observation;
 use sesame_plan::{Activation, CampaignPlan, Choice, Copies, Dimension, Domain, OperationId, Test, TestOperation};
 use sesame_rng::Stream;
 
@@ -89,6 +90,11 @@ struct Number {
 impl CellPlacer {
     pub(crate) fn new(test_space: TestSpace, grid: Grid, feasible: Feasible, copies: Copies) -> Self {
         CellPlacer { test_space, grid, feasible, copies }
+    }
+
+    /// Learns from the reference run when there are messages to disturb, for the fresh operations of its tests.
+    pub(super) fn take_reference(&mut self, reference: &Observation) {
+        self.test_space.take_reference(reference);
     }
 
     /// A permitted test in a cell, similar to the given one; `None` if none was found.

@@ -6,7 +6,7 @@ use sesame_rng::Stream;
 
 use super::rates::Rates;
 use crate::space::condition::{self, contains};
-use crate::space::initial::fresh_operation;
+use crate::space::initial::{fresh_choice, fresh_operation, fresh_window};
 use crate::space::range::Range;
 use crate::space::test_space::{ActivationSpace, OperationSpace, TestSpace};
 
@@ -61,10 +61,10 @@ fn mutate_operation(
         change_activation(operation, test_space, rates, stream);
     }
     let kind = kind_of(operation, test_space);
-    for (choice, parameter_space) in operation.parameters.iter_mut().zip(&kind.parameters) {
+    for (at, (choice, parameter_space)) in operation.parameters.iter_mut().zip(&kind.parameters).enumerate() {
         if !parameter_space.is_fixed() && stream.chance(rates.parameter) {
             *choice = if stream.chance(rates.fresh) {
-                parameter_space.fresh(stream)
+                fresh_choice(kind, at, stream)
             } else {
                 parameter_space.near(choice, rates.steps, stream)
             };
@@ -81,7 +81,7 @@ fn retarget(operation: &mut TestOperation, kind: &OperationSpace, stream: &mut S
         (&Activation::Time { start, end }, ActivationSpace::Time(window)) => {
             let start = start.max(window.low);
             let end = end.min(window.high).min(start + window.longest);
-            if end - start >= window.shortest {
+            if end - start >= window.shortest && kind.heard.is_in((start, end)) {
                 fresh.activation = Activation::Time { start, end };
             }
         }
@@ -129,9 +129,16 @@ fn change_activation(operation: &mut TestOperation, test_space: &TestSpace, rate
         (Activation::Offline, ActivationSpace::Offline) => return,
         (Activation::Time { start, end }, ActivationSpace::Time(window)) => {
             (*start, *end) = if stream.chance(rates.fresh) {
-                window.interval(stream)
+                fresh_window(*window, &kind.heard, stream)
             } else {
-                window.interval_near((*start, *end), rates.steps, stream)
+                let mut near = window.interval_near((*start, *end), rates.steps, stream);
+                for _ in 0..rates.tries {
+                    if kind.heard.is_in(near) {
+                        break;
+                    }
+                    near = window.interval_near((*start, *end), rates.steps, stream);
+                }
+                near
             };
         }
         (Activation::Condition { start, end, .. }, ActivationSpace::Condition { space, constraints, .. }) => {

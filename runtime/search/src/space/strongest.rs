@@ -1,41 +1,44 @@
 //! The strongest choices of an operation: the ends of its ranges that are farthest from where it disturbs nothing.
 
-use sesame_plan::{CampaignPlan, Choice, ChoiceKind};
+use sesame_plan::{Choice, ChoiceKind, Operation};
 use sesame_rng::Stream;
 
 use crate::space::parameter_space::ParameterSpace;
 use crate::space::range::Range;
-use crate::space::test_space::OperationSpace;
 
 /// Of how many texts or files each counts as a strongest choice.
 const ITEMS: usize = 4;
 
 /// The ways in which one operation is strongest.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Strongest {
+pub struct Strongest {
     /// Per parameter its strongest choices, at least one.
     parameters: Vec<Vec<Choice>>,
-    /// How many ways the search tries one by one: corners of a box are too many.
-    pub(super) ways: usize,
+    ways: usize,
 }
 
 impl Strongest {
-    pub(super) fn of(plan: &CampaignPlan, kind: &OperationSpace) -> Strongest {
-        let operation = plan.operation(kind.operation);
-        let named = operation.parameters.iter().zip(&kind.parameters);
+    /// Those of an operation with these parameters to choose.
+    pub(crate) fn of(operation: &Operation, spaces: &[ParameterSpace]) -> Strongest {
+        let named = operation.parameters.iter().zip(spaces);
         let parameters: Vec<Vec<Choice>> =
             named.map(|(named, space)| choices(space, operation.kind.neutral_value(&named.name))).collect();
         let count = |(choices, space): (&Vec<Choice>, &ParameterSpace)| match space {
             ParameterSpace::Point(_) => 1,
             ParameterSpace::Number(..) | ParameterSpace::Items(_) => choices.len(),
         };
-        let ways = parameters.iter().zip(&kind.parameters).map(count).max().unwrap_or(1);
+        let ways = parameters.iter().zip(spaces).map(count).max().unwrap_or(1);
         Strongest { parameters, ways }
+    }
+
+    /// How many ways a search tries one by one: corners of a box are too many.
+    pub(crate) fn ways(&self) -> usize {
+        self.ways
     }
 
     /// One of the [ways](Strongest::ways), by its number. A parameter with more choices than there are ways, such as
     /// the corners of a box, gets any of them.
-    pub(super) fn way(&self, way: usize, stream: &mut Stream) -> Vec<Choice> {
+    pub(crate) fn way(&self, way: usize, stream: &mut Stream) -> Vec<Choice> {
         let choose = |choices: &Vec<Choice>| {
             let at = if choices.len() > self.ways { stream.below(choices.len()) } else { way % choices.len() };
             choices[at].clone()
@@ -44,19 +47,24 @@ impl Strongest {
     }
 
     /// Any way.
-    pub(super) fn any(&self, stream: &mut Stream) -> Vec<Choice> {
+    pub(crate) fn any(&self, stream: &mut Stream) -> Vec<Choice> {
         let way = stream.below(self.ways);
         self.way(way, stream)
     }
 
+    /// The strongest choices of a parameter, at least one.
+    pub(crate) fn choices(&self, parameter: usize) -> &[Choice] {
+        &self.parameters[parameter]
+    }
+
     /// One of the strongest choices of a parameter.
-    pub(super) fn choice(&self, parameter: usize, stream: &mut Stream) -> Choice {
-        let choices = &self.parameters[parameter];
+    pub(crate) fn choice(&self, parameter: usize, stream: &mut Stream) -> Choice {
+        let choices = self.choices(parameter);
         choices[stream.below(choices.len())].clone()
     }
 
     /// Which of its strongest choices the first parameter has, if all parameters have one.
-    pub(super) fn which(&self, chosen: &[Choice]) -> Option<usize> {
+    pub(crate) fn which(&self, chosen: &[Choice]) -> Option<usize> {
         let mut places = self
             .parameters
             .iter()
@@ -119,7 +127,7 @@ mod tests {
     fn strongest(kind: OperationKind, parameter: sesame_plan::Parameter) -> Vec<Choice> {
         let plan = plan(vec![operation_with("o", 0, kind, vec![parameter])]);
         let space = TestSpace::from_plan(&plan).unwrap();
-        Strongest::of(&plan, &space.operations()[0]).parameters[0].clone()
+        space.operations()[0].strongest.choices(0).to_vec()
     }
 
     #[test]
