@@ -334,7 +334,8 @@ impl Strategy for Interleaved {
         }
         while candidates.len() < size {
             let (test, parents) = self.choose(&mut stream);
-            let test = self.of_few_kinds(test, at_the_end, &mut stream);
+            let mut test = self.of_few_kinds(test, at_the_end, &mut stream);
+            self.setting.space.settle_on_messages(&mut test, &mut stream);
             // The tests of one generation see each other, too.
             self.tried.add(&self.setting, &test);
             candidates.push(candidate(test.clone(), parents));

@@ -3,9 +3,10 @@
 use sesame_plan::{Activation, Choice, ChoiceKind, Test, TestOperation};
 use sesame_rng::{Stream, derive_seed};
 
-use crate::space::initial::{ENDS, fresh_kinds, place, spread_copies};
+use crate::space::initial::{ENDS, fresh_kinds, place};
 use crate::space::parameter_space::ParameterSpace;
 use crate::space::range::Range;
+use crate::space::separation;
 use crate::space::test_space::{ActivationSpace, OperationSpace, TestSpace};
 
 /// The test of these numbers, given by the place of the choice: first how many operations there are and which, then of
@@ -38,7 +39,8 @@ pub(super) fn decoded(test_space: &TestSpace, seed: u64, index: u32, mut number:
         })
         .collect();
     let mut test = Test { operations };
-    spread_copies(test_space, &mut test, &mut Stream::derive(seed, "unheard", &[u64::from(index)]));
+    test_space.settle_windows(&mut test, separation::spread);
+    test_space.settle_on_messages(&mut test, &mut Stream::derive(seed, "unheard", &[u64::from(index)]));
     test
 }
 

@@ -3,6 +3,9 @@
 use sesame_base::observation::{Observation, RARE};
 use sesame_base::silence::wires;
 use sesame_plan::{CampaignPlan, OperationId, Span};
+use sesame_rng::Stream;
+
+use crate::space::range::Range;
 
 /// When there are messages that an operation could disturb. Until a reference run is known, there may always be some.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -44,6 +47,21 @@ impl Heard {
         let Some(stretches) = &self.stretches else { return true };
         // Stretches of several wires may overlap, so their ends need not be in order; they nearly are.
         stretches.iter().take_while(|span| span.start < end).any(|span| span.end >= start)
+    }
+
+    /// A window of this length that meets a message, at any place in what is permitted; `None` if there is no message, or
+    /// nothing is known.
+    pub(crate) fn around_a_message(&self, range: Range, length: f64, stream: &mut Stream) -> Option<(f64, f64)> {
+        let inside = |span: &Span| (span.start.max(range.low), span.end.min(range.high));
+        let stretches = self.stretches.iter().flatten().map(inside);
+        let permitted: Vec<(f64, f64)> = stretches.filter(|(start, end)| start <= end && *start < range.high).collect();
+        if permitted.is_empty() {
+            return None;
+        }
+        let (first, last) = permitted[stream.below(permitted.len())];
+        let message = stream.uniform(first, last);
+        let start = (message - length * stream.unit()).clamp(range.low, (range.high - length).max(range.low));
+        Some((start, (start + length).min(range.high)))
     }
 
     /// The times of its messages if there are few, in order; else none.

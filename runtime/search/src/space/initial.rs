@@ -13,7 +13,7 @@
 //! copies that must not overlap are uniform over all [disjoint ones](crate::space::separation). But a tenth of the
 //! windows are as long as is permitted, and a tenth of the choices are a [strongest one][Strongest]: uniform draws are
 //! nearly always of middling length and strength, and what is dangerous is at the ends. Windows in which the undisturbed
-//! system has no message to disturb are drawn again, several times. The order of the list is random. Where conditions
+//! system has no message to disturb are drawn again. The order of the list is random. Where conditions
 //! switch, start and end are grown independently, and lengths are uniform, with a tenth at the greatest one.
 //!
 //! [Strongest]: crate::space::Strongest
@@ -35,30 +35,15 @@ const EACH_FOR_ITSELF: f64 = 0.25;
 pub(crate) const ENDS: f64 = 0.1;
 
 /// How often what meets no message is drawn again.
-const TRIES: usize = 12;
+pub(crate) const TRIES: usize = 12;
 
 /// A fresh test; one that the campaign permits.
 pub fn fresh_test(test_space: &TestSpace, stream: &mut Stream) -> Test {
     let kinds = fresh_kinds(test_space, &mut || stream.unit());
     let mut test = Test { operations: kinds.into_iter().map(|kind| fresh_operation(kind, stream)).collect() };
-    spread_copies(test_space, &mut test, stream);
+    test_space.settle_windows(&mut test, separation::spread);
+    test_space.settle_on_messages(&mut test, stream);
     test
-}
-
-/// Moves the windows of copies apart that must not overlap. Those that meet no message then are drawn again.
-pub(crate) fn spread_copies(test_space: &TestSpace, test: &mut Test, stream: &mut Stream) {
-    test_space.settle_windows(test, separation::spread);
-    for _ in 0..TRIES {
-        if test_space.is_heard(test) {
-            break;
-        }
-        for used in &mut test.operations {
-            if let Some(kind) = test_space.find(used.operation) {
-                used.activation = fresh_activation(kind, stream);
-            }
-        }
-        test_space.settle_windows(test, separation::spread);
-    }
 }
 
 /// The kinds of operations of a fresh test, in their order, by numbers in `0..1`. Numbers that are uniform and
@@ -127,7 +112,8 @@ pub(crate) fn fresh_choice(kind: &OperationSpace, parameter: usize, stream: &mut
     }
 }
 
-/// A fresh window that meets a message, if several tries find one.
+/// A fresh window that meets a message, if there is any: it is drawn again until it does, but so often only; then it is
+/// laid around a message.
 pub(crate) fn fresh_window(range: Range, heard: &Heard, stream: &mut Stream) -> (f64, f64) {
     let draw = |stream: &mut Stream| {
         if stream.chance(ENDS) { range.longest_interval(stream.unit()) } else { range.interval(stream) }
@@ -135,11 +121,11 @@ pub(crate) fn fresh_window(range: Range, heard: &Heard, stream: &mut Stream) -> 
     let mut window = draw(stream);
     for _ in 0..TRIES {
         if heard.is_in(window) {
-            break;
+            return window;
         }
         window = draw(stream);
     }
-    window
+    heard.around_a_message(range, window.1 - window.0, stream).unwrap_or(window)
 }
 
 /// A fresh window, or fresh conditions; of an offline operation there is nothing to choose.
@@ -218,6 +204,24 @@ mod tests {
         assert!((share(&tests, |kinds| kinds == [0]) - 0.5).abs() < 0.02);
         let tests = fresh_tests(&[0.001, 0.0], Count { min: 1, max: 2 });
         assert!(tests.iter().all(|kinds| kinds.iter().all(|&kind| kind == 0)), "never what has probability 0");
+    }
+
+    #[test]
+    fn a_tenth_of_the_windows_are_longest_and_a_tenth_of_the_choices_strongest() {
+        let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(Strategy::Random, 1));
+        plan.campaign.copies = Copies::MayOverlap;
+        plan.operations[0].lengths = Some(sesame_plan::Lengths { low: 0.0, high: 2.0 });
+        let test_space = TestSpace::from_plan(&plan).unwrap();
+        let kind = &test_space.operations()[0];
+        let drawn: Vec<TestOperation> =
+            (0..6_000).map(|i| fresh_operation(kind, &mut Stream::derive(1, "test", &[i]))).collect();
+        let share = |holds: &dyn Fn(&TestOperation) -> bool| {
+            drawn.iter().filter(|used| holds(used)).count() as f64 / drawn.len() as f64
+        };
+        let longest =
+            share(&|used| matches!(used.activation, Activation::Time { start, end } if end - start > 1.999_999));
+        let strongest = share(&|used| kind.strongest.which(&used.parameters).is_some());
+        assert!((longest - ENDS).abs() < 0.015 && (strongest - ENDS).abs() < 0.015, "{longest} {strongest}");
     }
 
     proptest! {

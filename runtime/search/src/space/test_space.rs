@@ -22,7 +22,7 @@ use sesame_rng::Stream;
 use crate::SearchError;
 use crate::space::condition::grown;
 use crate::space::heard::Heard;
-use crate::space::initial::fresh_operation;
+use crate::space::initial::{TRIES, fresh_activation, fresh_operation};
 use crate::space::parameter_space::ParameterSpace;
 use crate::space::range::Range;
 use crate::space::separation;
@@ -242,6 +242,26 @@ impl TestSpace {
             while !draws.insert((operation.operation, operation.operation_seed)) {
                 operation.operation_seed = stream.bits();
             }
+        }
+    }
+
+    /// Draws the windows of a permitted test anew that meet no message of the reference run, as far as several tries
+    /// find others. A test without such windows stays as it is and takes nothing from the stream.
+    pub fn settle_on_messages(&self, test: &mut Test, stream: &mut Stream) {
+        for _ in 0..TRIES {
+            if self.is_heard(test) {
+                break;
+            }
+            for used in &mut test.operations {
+                let Some(kind) = self.find(used.operation) else { continue };
+                if let (&Activation::Time { start, end }, ActivationSpace::Time(_)) =
+                    (&used.activation, &kind.activation)
+                    && !kind.heard.is_in((start, end))
+                {
+                    used.activation = fresh_activation(kind, stream);
+                }
+            }
+            self.settle(test, stream);
         }
     }
 

@@ -1,8 +1,11 @@
 //! What all strategies draw: permitted tests, and the same ones.
 
+use sesame_base::observation::{Course, Heard, Observation};
+use sesame_base::silence::wires;
 use sesame_plan::condition::ConditionEnd;
 use sesame_plan::{
-    Activation, CampaignPlan, Copies, Count, CoverageGoal, Dimension, Exploration, Lengths, Search, Strategy, Test,
+    Activation, Campaign, CampaignPlan, Copies, Count, CoverageGoal, Dimension, Exploration, Lengths, Search, Span,
+    Strategy, StrategyKind, Test, Type,
 };
 
 use crate::coverage::Grid;
@@ -145,6 +148,72 @@ fn fresh_tests_contain_copies_equally_often_with_each_strategy() {
         // A quarter draws each of up to five places from six kinds: 0, 1/6, 4/9, 13/18 and 49/54 of them have copies.
         let expected = 0.25 / 5.0 * (1.0 / 6.0 + 4.0 / 9.0 + 13.0 / 18.0 + 49.0 / 54.0);
         assert!(shares.iter().all(|share| (share - expected).abs() < 0.02), "{shares:?} and {expected}");
+    }
+}
+
+/// A strategy that is told of another reference run than the synthetic robots'.
+struct Begun(Box<dyn crate::Strategy>, Observation);
+
+impl crate::Strategy for Begun {
+    fn begin(&mut self, _: &Observation) {
+        self.0.begin(&self.1);
+    }
+
+    fn ask(&mut self) -> Vec<crate::Candidate> {
+        self.0.ask()
+    }
+
+    fn tell(&mut self, results: &[crate::Evaluated]) {
+        self.0.tell(results);
+    }
+}
+
+/// Short windows would miss three messages nearly always.
+#[test]
+fn no_strategy_but_a_grid_spends_tests_on_windows_without_a_message() {
+    let times = [5.0, 31.0, 60.0];
+    let interleaved = Search::new(Strategy::Interleaved { keep_causes: true }, 200);
+    for copies in [Copies::Apart, Copies::MayOverlap] {
+        let mut plans = by_time(copies, 200);
+        plans.retain(|plan| plan.campaign.search.strategy().unwrap().kind() != StrategyKind::Grid);
+        plans.push(CampaignPlan {
+            campaign: Campaign { search: interleaved.clone(), ..plans[0].campaign.clone() },
+            ..plans[0].clone()
+        });
+        for mut plan in plans {
+            plan.campaign.count.max = 2;
+            let count = plan.operations.iter().filter_map(|operation| operation.topic).map(|topic| topic.0 + 1).max();
+            let topic = |at: u32| {
+                sesame_plan::testing::topic(&format!("t{at}"), &[&format!("t{at}")], Type::Real { unit: None })
+            };
+            plan.topics = (0..count.unwrap()).map(topic).collect();
+            for operation in &mut plan.operations {
+                operation.lengths = Some(Lengths { low: 0.0, high: 3.0 });
+            }
+            // Construction puts windows where a cell wants them.
+            let constructs = matches!(plan.campaign.exploration, Some(Exploration::Construct { .. }));
+            let stretches: Vec<Span> = times.iter().map(|&at| Span { start: at, end: at }).collect();
+            let heard = (0..).zip(wires(&plan)).map(|(wire, _)| Heard { wire, stretches: stretches.clone() });
+            let course = Course { heard: heard.collect(), signals: Vec::new() };
+            let mut reference = SyntheticRobot::without_disturbance(&plan);
+            reference.course = Some(course);
+            let mut strategy = Begun(strategy(&plan, 4).unwrap(), reference);
+            let tests = SYNTHETIC_ROBOTS[0].campaign_of(&plan, &mut strategy).tests;
+            let windows = tests.iter().flat_map(|test| &test.test.operations).map(|used| &used.activation);
+            let (mut all, mut missed) = (0, 0);
+            for window in windows {
+                let &Activation::Time { start, end } = window else { panic!("{window:?}") };
+                all += 1;
+                missed += u32::from(!times.iter().any(|at| start <= *at && *at < end));
+            }
+            let permitted = if constructs { all / 2 } else { all / 50 };
+            assert!(
+                missed <= permitted,
+                "{missed} of {all}: {:?} {:?}",
+                plan.campaign.search,
+                plan.campaign.exploration
+            );
+        }
     }
 }
 

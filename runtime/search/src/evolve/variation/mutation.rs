@@ -39,6 +39,7 @@ pub(crate) fn mutate(test: &mut Test, test_space: &TestSpace, rates: &Rates, str
         operations.insert(place, fresh_operation(kind, stream));
     }
     test_space.settle(test, stream);
+    test_space.settle_on_messages(test, stream);
 }
 
 fn mutate_operation(
@@ -131,14 +132,8 @@ fn change_activation(operation: &mut TestOperation, test_space: &TestSpace, rate
             (*start, *end) = if stream.chance(rates.fresh) {
                 fresh_window(*window, &kind.heard, stream)
             } else {
-                let mut near = window.interval_near((*start, *end), rates.steps, stream);
-                for _ in 0..rates.tries {
-                    if kind.heard.is_in(near) {
-                        break;
-                    }
-                    near = window.interval_near((*start, *end), rates.steps, stream);
-                }
-                near
+                let mut steps = (0..=rates.tries).map(|_| window.interval_near((*start, *end), rates.steps, stream));
+                steps.find(|near| kind.heard.is_in(*near)).unwrap_or((*start, *end))
             };
         }
         (Activation::Condition { start, end, .. }, ActivationSpace::Condition { space, constraints, .. }) => {
