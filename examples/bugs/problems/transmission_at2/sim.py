@@ -1,0 +1,7 @@
+"""The second problem of the transmission: does the engine exceed 4750/min within 10 s?"""
+
+from problems.transmission import Transmission
+
+
+class Simulator(Transmission):
+    throttle = 80.0
