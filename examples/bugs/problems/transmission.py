@@ -1,9 +1,9 @@
 """A car with an automatic transmission of four gears, from a standing start: the model of the falsification contests.
 
-A driver holds the throttle as each problem says, and does not brake. The engine turns the impeller of a torque converter, whose
-turbine drives the wheels through the gearbox. With `n` the speed of the engine, `w` that of the wheels (both in 1/min)
-and `g` the ratio of the gear, the converter slips by `s = 3.23 g w / n`; tables say how much torque it takes up at a
-slip, and by how much it multiplies it:
+A driver holds the throttle as each problem says, and does not brake. The engine turns the impeller of a torque
+converter, whose turbine drives the wheels through the gearbox. With `n` the speed of the engine, `w` that of the wheels
+(both in 1/min) and `g` the ratio of the gear, the turbine turns `s = 3.23 g w / n` times as fast as the impeller. Tables
+say for each `s` how much torque the converter takes up, and by how much it multiplies it:
 
     0.02199 dn/dt = engine torque(throttle, n) - (n / capacity(s))²
     12.0941 dw/dt = 3.23 g gain(s) (n / capacity(s))² - 40 - 0.02 v² - brake
@@ -17,6 +17,7 @@ B. Hoxha, H. Abbas, G. Fainekos: Benchmarks for temporal logic requirements for 
 
 import math
 from bisect import bisect_right
+from collections.abc import Sequence
 
 from bugs.protocol import Bus
 
@@ -55,8 +56,8 @@ GAINS = (
     2.232, 2.075, 1.975, 1.846, 1.72, 1.564, 1.409, 1.254, 1.096, 1.08, 1.061, 1.043, 1.028, 1.012, 1.002, 1.002, 1.001,
     0.998, 0.999, 1.001, 1.002,
 )  # fmt: skip
-# Speeds in mph above which the first, second and third gear is left for the next, and below which the second, third and
-# fourth is left for the one before, by throttle.
+# By throttle: the speeds in mph above which the first, second and third gear is left for the next one, and those below
+# which the second, third and fourth gear is left for the one before.
 UP_THROTTLES, UP = (0, 25, 35, 50, 90, 100), (
     (10, 10, 15, 23, 40, 40), (30, 30, 30, 41, 70, 70), (50, 50, 50, 60, 100, 100),
 )  # fmt: skip
@@ -65,7 +66,7 @@ DOWN_THROTTLES, DOWN = (0, 5, 40, 50, 90, 100), (
 )  # fmt: skip
 
 
-def between(places, values, at):
+def between(places: Sequence[float], values: Sequence[float], at: float) -> float:
     """The value at a place of a table; beyond its ends, the outermost pieces go on."""
     after = min(max(bisect_right(places, at), 1), len(places) - 1)
     low, high = places[after - 1], places[after]

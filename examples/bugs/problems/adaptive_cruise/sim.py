@@ -1,8 +1,8 @@
 """A car with adaptive cruise control follows another one, which brakes hard twice.
 
-The car ahead radios its speed, and a radar measures the gap. The controller wants a gap that grows with its own speed, and
-gets there by a proportional law on the errors of gap and speed, within the limits of drive and brakes: a constant time gap
-policy. Drive and brakes follow its commands with a time constant.
+The car ahead radios its speed, and a radar measures the gap. The controller wants a gap that grows with its own speed,
+the same time at any speed. It accelerates in proportion to the errors of gap and speed, within the limits of drive and
+brakes, which follow its commands with a time constant.
 
 R. Rajamani: Vehicle dynamics and control. Springer 2012, chapter 6.
 """

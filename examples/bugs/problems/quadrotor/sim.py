@@ -1,8 +1,8 @@
-"""A quadrotor flies to a hover point in front of a wall, in the plane: it moves along `x` and up and down along `z`.
+"""A quadrotor flies to a place in front of a wall and hovers there, then further down. It moves along `x` and `z` only.
 
-Its state is position, velocity, pitch and pitch rate; two pairs of rotors give a thrust along its axis and a torque. Two
-loops control it, one inside of the other: from the position and its velocity follows the acceleration that is wanted, from
-that the thrust and the pitch, from the pitch and its rate the torque. Air resists.
+Its state is position, velocity, pitch and pitch rate. The rotors give a thrust along its axis, and a torque; air
+resists. Two loops control it, one inside of the other: position and velocity say which acceleration is wanted, that
+says which thrust and pitch, and pitch and pitch rate say which torque.
 
 T. Lee, M. Leok, N. H. McClamroch: Geometric tracking control of a quadrotor UAV on SE(3). CDC 2010.
 """

@@ -1,4 +1,4 @@
-"""The first problem of the transmission: does the car reach 120 mph within 20 s? Full throttle all the time just does."""
+"""AT1, the first problem of the transmission: does the car reach 120 mph in 20 s? With full throttle it just does."""
 
 from problems.transmission import Transmission
 

@@ -1,4 +1,4 @@
-"""The second problem of the transmission: does the engine exceed 4750/min within 10 s?"""
+"""AT2, the second problem of the transmission: does the engine reach 4750/min within 10 s?"""
 
 from problems.transmission import Transmission
 
