@@ -10,6 +10,7 @@ import importlib.util
 import io
 import json
 import os
+import shutil
 import sys
 import tempfile
 import unittest
@@ -59,6 +60,14 @@ class Cases(unittest.TestCase):
                 self.assertTrue(problem.space_file.is_file())
                 self.assertTrue(problem.title and problem.field and problem.mechanism)
                 self.assertTrue(all(report.startswith("https://") for report in problem.reports))
+
+    def test_a_change_of_a_model_that_problems_share_makes_their_results_old(self):
+        with tempfile.TemporaryDirectory() as folder:
+            shutil.copytree(PROBLEMS_FOLDER, folder, dirs_exist_ok=True)
+            before, shared = load_cases(folder=Path(folder))[0].fingerprint, Path(folder) / "transmission.py"
+            self.assertEqual(before, PROBLEMS[0].fingerprint)
+            shared.write_text(shared.read_text() + "# Another one.\n")
+            self.assertNotEqual(before, load_cases(folder=Path(folder))[0].fingerprint)
 
     def test_the_campaign_is_a_search_of_120_tests(self):
         for case in ALL:
