@@ -2,8 +2,8 @@
 
 A driver holds the throttle as each problem says, and does not brake. The engine turns the impeller of a torque
 converter, whose turbine drives the wheels through the gearbox. With `n` the speed of the engine, `w` that of the wheels
-(both in 1/min) and `g` the ratio of the gear, the turbine turns `s = 3.23 g w / n` times as fast as the impeller. Tables
-say for each `s` how much torque the converter takes up, and by how much it multiplies it:
+(both in 1/min) and `g` the ratio of the gear, the turbine turns `s = 3.23 g w / n` times as fast as the impeller.
+Tables say for each `s` how much torque the converter takes up, and by how much it multiplies it:
 
     0.02199 dn/dt = engine torque(throttle, n) - (n / capacity(s))²
     12.0941 dw/dt = 3.23 g gain(s) (n / capacity(s))² - 40 - 0.02 v² - brake
