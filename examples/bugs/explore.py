@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Looks for the true causes of a case, for its author: many tests, each violation reduced by the judge.
+"""Looks for the true causes of a case or a problem, for its author: many tests, each violation reduced by the judge.
 
     python3 explore.py CASE [--tests 3000] [--seed 1]
 
@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from random import Random
 
-from bugs.case import MOST_OPERATIONS, BadCase, Case, Cause, load_cases
+from bugs.case import CASES, MOST_OPERATIONS, PROBLEMS, BadCase, Case, Cause, load_cases
 from bugs.judge import Judge, minimal
 from bugs.space import Choice, Operation, Space, Test, Use, check_permitted
 from bugs.strategies.sampling import NEUTRAL, fresh_choice, fresh_test, fresh_window, overlap, strongest
@@ -31,7 +31,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1, help="determines the tests (default: 1)")
     arguments = parser.parse_args()
     try:
-        (case,) = load_cases([arguments.case])
+        (case,) = load_cases([arguments.case], PROBLEMS if (PROBLEMS / arguments.case).is_dir() else CASES)
     except BadCase as error:
         print(f"error: {error}", file=sys.stderr)
         return 1

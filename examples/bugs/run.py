@@ -32,10 +32,10 @@ from itertools import islice
 from pathlib import Path
 
 from bugs.campaign import Job, Record, fingerprint, origin, record_from, run
-from bugs.case import BadCase, Case, case_folders, load_cases
+from bugs.case import CASES, PROBLEMS, BadCase, Case, case_folders, load_cases
 from bugs.sesamec import SesamecFailed, plan_of
 from bugs.strategies import Unavailable, strategy_class
-from bugs.table import as_csv, as_json, as_text, rows
+from bugs.table import as_csv, as_json, as_text, as_text_of_problems, rows
 
 HERE = Path(__file__).resolve().parent
 
@@ -44,8 +44,8 @@ def main(arguments: list[str]) -> int:
     options = parsed(arguments)
     try:
         if options.update_plans:
-            return update_plans(case_folders(options.cases), options.sesamec)
-        cases = load_cases(options.cases)
+            return update_plans(case_folders(options.cases, options.folder), options.sesamec)
+        cases = load_cases(options.cases, options.folder)
         if options.list:
             return show_cases(cases)
         for strategy in options.strategies:
@@ -72,6 +72,7 @@ def parsed(arguments: list[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("strategies", nargs="*", metavar="STRATEGY", help="strategies to run, see above")
     parser.add_argument("--cases", type=lambda text: text.split(","), metavar="A,B", help="these cases (default: all)")
+    parser.add_argument("--problems", action="store_true", help="the problems of falsification in place of the cases")
     parser.add_argument(
         "--seeds", type=seeds, default="1-20", metavar="1-20", help="seeds, such as 1-5,9 (default: 1-20)"
     )
@@ -86,7 +87,7 @@ def parsed(arguments: list[str]) -> argparse.Namespace:
         help="processes (default: one per processor); they do not affect results",
     )  # fmt: skip
     parser.add_argument(
-        "--out", type=Path, default=HERE / "results", metavar="DIR", help="folder for results (default: results)"
+        "--out", type=Path, metavar="DIR", help="folder for results (default: results, for problems results/problems)"
     )
     parser.add_argument("--format", choices=["text", "csv", "json"], default="text", help="of what is printed")
     parser.add_argument("--list", action="store_true", help="print the cases with their causes, and run nothing")
@@ -94,6 +95,8 @@ def parsed(arguments: list[str]) -> argparse.Namespace:
         "--update-plans", action="store_true", help="write plan.json of the cases by sesamec, and run nothing"
     )
     options = parser.parse_args(arguments)
+    options.folder = PROBLEMS if options.problems else CASES
+    options.out = options.out or HERE / ("results/problems" if options.problems else "results")
     if options.update_plans and options.sesamec is None:
         parser.error("--update-plans needs --sesamec")
     if options.early > options.tests:
@@ -247,7 +250,8 @@ def _duration(seconds: float) -> str:
 def show(records: list[Record], cases: list[Case], options: argparse.Namespace) -> int:
     """Prints the table and writes it into the folder of the results, in all formats."""
     table = rows(records, cases, options.early)
-    texts = {"text": as_text(table, cases) + "\n", "csv": as_csv(table), "json": as_json(table)}
+    text = as_text_of_problems(table, cases) if options.problems else as_text(table, cases)
+    texts = {"text": text + "\n", "csv": as_csv(table), "json": as_json(table)}
     if table:
         for name, text in texts.items():
             ending = {"text": "txt"}.get(name, name)

@@ -1,4 +1,4 @@
-"""Tests of the benchmark: its cases, the judge's world, strategies and the table.
+"""Tests of the benchmark: its cases and problems, the judge's world, strategies and the table.
 
     python3 examples/bugs/test_bugs.py
 
@@ -10,6 +10,7 @@ import importlib.util
 import io
 import json
 import os
+import shutil
 import sys
 import tempfile
 import unittest
@@ -23,21 +24,24 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import run as command
 from bugs.campaign import Job, Record, agrees, record_from, run
+from bugs.case import PROBLEMS as PROBLEMS_FOLDER
 from bugs.case import Case, TrueCause, cause, load_cases
 from bugs.judge import Judge, minimal
 from bugs.protocol import Bus, serve
 from bugs.sesamec import CAMPAIGN, plan_of, search
 from bugs.space import Metric, Operation, Parameter, Requirement, Space, Test, Topic, Use, check_permitted, space_of
 from bugs.strategies import MODULES, Problem, strategy_class
-from bugs.table import as_csv, as_json, as_text, rows
+from bugs.table import as_csv, as_json, as_text, as_text_of_problems, rows
 from bugs.world import Outcome, World
 
 CASES = load_cases()
+PROBLEMS = load_cases(folder=PROBLEMS_FOLDER)
+ALL = CASES + PROBLEMS
 SESAMEC = os.environ.get("SESAMEC")
 
 
 class Cases(unittest.TestCase):
-    """Every folder of `cases` is complete, and its true causes are true."""
+    """Every folder of `cases` and of `problems` is complete, and the causes that it lists are true."""
 
     def test_a_case_says_what_it_is(self):
         for case in CASES:
@@ -49,20 +53,36 @@ class Cases(unittest.TestCase):
                 self.assertIn(len(case.space.operations), range(6, 9))
                 self.assertTrue(all(known.when for known in case.causes))
 
+    def test_a_problem_says_what_it_is(self):
+        for problem in PROBLEMS:
+            with self.subTest(problem.name):
+                self.assertEqual(problem.space.name, problem.name)
+                self.assertTrue(problem.space_file.is_file())
+                self.assertTrue(problem.title and problem.field and problem.mechanism)
+                self.assertTrue(all(report.startswith("https://") for report in problem.reports))
+
+    def test_a_change_of_a_model_that_problems_share_makes_their_results_old(self):
+        with tempfile.TemporaryDirectory() as folder:
+            shutil.copytree(PROBLEMS_FOLDER, folder, dirs_exist_ok=True)
+            before, shared = load_cases(folder=Path(folder))[0].fingerprint, Path(folder) / "transmission.py"
+            self.assertEqual(before, PROBLEMS[0].fingerprint)
+            shared.write_text(shared.read_text() + "# Another one.\n")
+            self.assertNotEqual(before, load_cases(folder=Path(folder))[0].fingerprint)
+
     def test_the_campaign_is_a_search_of_120_tests(self):
-        for case in CASES:
+        for case in ALL:
             with self.subTest(case.name):
                 campaign = json.loads((case.folder / "plan.json").read_text())["campaign"]
                 self.assertEqual((campaign["name"], campaign["search"]["evaluations"]), (CAMPAIGN, 120))
 
     def test_nothing_is_violated_without_a_disturbance(self):
-        for case in CASES:
+        for case in ALL:
             with self.subTest(case.name):
                 outcome = case.world().run(())
                 self.assertEqual((outcome.violated, outcome.crash), (frozenset(), None))
 
     def test_what_requirements_read_is_published_in_every_step(self):
-        for case in CASES:
+        for case in ALL:
             with self.subTest(case.name):
                 reference = case.world().run((), keep_messages=True)
                 steps = round(case.space.end * 1e9) // case.space.step
@@ -73,15 +93,19 @@ class Cases(unittest.TestCase):
                             published = [each for each in reference.messages if each.topic == path]
                             self.assertEqual(len(published), steps, path)
 
-    def test_no_true_cause_contains_another(self):
+    def test_a_case_has_causes(self):
         for case in CASES:
             with self.subTest(case.name):
                 self.assertTrue(case.causes)
+
+    def test_no_true_cause_contains_another(self):
+        for case in ALL:
+            with self.subTest(case.name):
                 self.assertEqual(len(case.causes), len(case.true_causes))
                 self.assertEqual(minimal(case.true_causes), case.true_causes)
 
     def test_the_operations_of_a_true_cause_violate_its_requirement_together_and_no_part_of_them_does(self):
-        for case in CASES:
+        for case in ALL:
             with self.subTest(case.name):
                 judge = Judge(case.world())
                 for known in case.causes:
@@ -94,7 +118,7 @@ class Cases(unittest.TestCase):
                     self.assertIn(known.cause, judge.causes(witness))
 
     def test_a_threshold_is_where_the_witness_begins_to_violate(self):
-        for case in CASES:
+        for case in ALL:
             with self.subTest(case.name):
                 world = case.world()
                 for known in (known for known in case.causes if known.threshold is not None):
@@ -107,7 +131,7 @@ class Cases(unittest.TestCase):
 
 class Protocol(unittest.TestCase):
     def test_a_simulator_says_the_same_over_the_line_and_in_the_world(self):
-        for case in CASES:
+        for case in ALL:
             with self.subTest(case.name):
                 world = case.world()
                 expected = [[each.topic, _plain(each.value)] for each in world.run((), keep_messages=True).messages]
@@ -344,6 +368,19 @@ class Table(unittest.TestCase):
         self.assertEqual(json.loads(as_json([row]))[0]["causes"], 2.0)
         self.assertIn("causes_early_low", as_csv([row]).splitlines()[0])
 
+    def test_of_problems_it_shows_the_first_violation_in_the_median(self):
+        problem = PROBLEMS[0]
+        records = [
+            Record("mine", problem.name, seed, 120, "", "", violating, [], [], [], [], 1.0)
+            for seed, violating in enumerate([[7, 9], [30], [50], []])
+        ]
+        table = rows(records, [problem], early=40)
+        self.assertEqual((table[0].any_early, table[0].any, table[0].first_median), (0.5, 0.75, 40.0))
+        line = as_text_of_problems(table, [problem]).splitlines()[-1]
+        self.assertEqual(line.split(), [problem.name, "mine", "50%", "75%", "40", "0%"])
+        missed = rows(records[3:], [problem], early=40)
+        self.assertIn("none", as_text_of_problems(missed, [problem]))
+
     def test_what_is_finished_is_not_run_again(self):
         with tempfile.TemporaryDirectory() as folder:
             arguments = ["random", "--cases", CASES[0].name, "--seeds", "1-2", "--tests", "5", "--early", "5"]
@@ -372,14 +409,14 @@ class WithSesame(unittest.TestCase):
     """The judge's world and the real program."""
 
     def test_the_plan_of_a_case_is_that_of_its_space(self):
-        for case in CASES:
+        for case in ALL:
             with self.subTest(case.name):
                 plan = json.loads((case.folder / "plan.json").read_text())
                 now = plan_of(Path(SESAMEC), case.space_file)
                 self.assertEqual(space_of(plan), space_of(now), "run `run.py --update-plans`")
 
     def test_recorded_values_and_verdicts_are_those_of_the_world(self):
-        for case in CASES:
+        for case in ALL:
             with self.subTest(case.name):
                 for recorded in search(Path(SESAMEC), case.space_file, case.space, 1, 40, "random"):
                     outcome = case.world(recorded.simulator_seed).run(recorded.test)

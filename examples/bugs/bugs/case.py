@@ -15,6 +15,8 @@ from bugs.world import World
 MOST_OPERATIONS = 2
 
 CASES = Path(__file__).resolve().parent.parent / "cases"
+# Problems of falsification: folders like those of cases, which need not list causes.
+PROBLEMS = CASES.parent / "problems"
 
 
 class BadCase(Exception):
@@ -106,7 +108,8 @@ class Case:
     @cached_property
     def fingerprint(self) -> str:
         """Changes whenever tests of the case may come out differently."""
-        return file_hash(self.folder / "sim.py", self.folder / "plan.json")
+        shared = sorted(self.folder.parent.glob("*.py"))  # models that simulators have in common
+        return file_hash(self.folder / "sim.py", self.folder / "plan.json", *shared)
 
     def world(self, simulator_seed: int = 1) -> World:
         """What runs its tests. Nothing of one world is in another."""

@@ -8,9 +8,9 @@ import csv
 import io
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from random import Random
-from statistics import fmean
+from statistics import fmean, median
 
 from bugs.campaign import Record
 from bugs.case import MOST_OPERATIONS, Case
@@ -39,6 +39,7 @@ class Row:
     any: float
     first: float  # first violating test; `tests + 1` for a search without any
     first_interval: Interval
+    first_median: float  # of all searches
     without_effect: float  # share of tests
     precision: float | None  # share of what a reader sees violate; `None` if nobody saw anything
     precision_interval: Interval | None
@@ -101,6 +102,7 @@ def _row(strategy: str, name: str, groups: list[tuple[Case, list[Record]]], earl
         any=fmean(_means(samples, any_by(tests))),
         first=fmean(_means(samples, first)),
         first_interval=bootstrap(samples, first, fmean),
+        first_median=median(first(record) for some in samples for record in some),
         without_effect=fmean(_means(samples, lambda record: len(record.without_effect) / tests)),
         precision=fmean(_means(precise, precision)) if precise else None,
         precision_interval=bootstrap(precise, precision, fmean) if precise else None,
@@ -143,11 +145,34 @@ def as_text(table: list[Row], cases: Sequence[Case]) -> str:
     return "\n\n".join([*parts, *(["\n".join(notes)] if notes else [])])
 
 
+def as_text_of_problems(table: list[Row], problems: Sequence[Case]) -> str:
+    """A table of problems with a row per strategy; their causes are not counted."""
+    if not table:
+        return "There are no results."
+    early, tests = table[0].early, table[0].tests
+    lines = [["problem", "strategy", f"any by {early}", f"any by {tests}", "first violation", "no effect"]]
+    for problem in problems:
+        for row in (row for row in table if row.case == problem.name):
+            any_ = f"{row.any_early:.0%}", f"{row.any:.0%}"
+            lines.append([problem.name, row.strategy, *any_, _median(row), f"{row.without_effect:.0%}"])
+    seeds = _seeds([row for row in table if row.case != "all"])
+    notes = [note for row in table if row.case != "all" for note in _notes(replace(row, unlisted=0.0))]
+    parts = [f"{len(problems)} {'problem' if len(problems) == 1 else 'problems'}, {seeds} seeds", _aligned(lines)]
+    return "\n\n".join([*parts, *(["\n".join(notes)] if notes else [])])
+
+
+def _median(row: Row) -> str:
+    return f"{row.first_median:g}" if row.first_median <= row.tests else "none"
+
+
 def _heading(overall: list[Row], cases: Sequence[Case]) -> str:
     causes = sum(len(case.true_causes) for case in cases)
-    seeds = sorted({row.seeds for row in overall})
-    numbers = str(seeds[0]) if len(seeds) == 1 else f"{seeds[0]} to {seeds[-1]}"
-    return f"{len(cases)} {'case' if len(cases) == 1 else 'cases'} with {causes} true causes, {numbers} seeds"
+    return f"{len(cases)} {'case' if len(cases) == 1 else 'cases'} with {causes} true causes, {_seeds(overall)} seeds"
+
+
+def _seeds(table: list[Row]) -> str:
+    seeds = sorted({row.seeds for row in table})
+    return str(seeds[0]) if len(seeds) == 1 else f"{seeds[0]} to {seeds[-1]}"
 
 
 def _subject(row: Row) -> str:

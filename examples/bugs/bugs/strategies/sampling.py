@@ -17,7 +17,10 @@ NEUTRAL = {
 
 
 def fresh_test(space: Space, luck: Random) -> Test:
-    """A test as Sesame's `random` draws it: three of four have different operations, as far as there are enough."""
+    """A test with uniform windows and choices: three of four have different operations, as far as there are enough.
+
+    Sesame's `random` draws the same, but for a share of windows and choices that it takes from the ends.
+    """
     count = luck.randint(space.fewest, space.most)
     operations = list(space.operations.values())
     if luck.random() < 0.25:
