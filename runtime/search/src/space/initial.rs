@@ -87,7 +87,7 @@ pub(crate) fn place(value: f64, parts: usize) -> usize {
 pub(crate) fn fresh_operation(kind: &OperationSpace, stream: &mut Stream) -> TestOperation {
     let activation = fresh_activation(&kind.activation, stream);
     let parameters = kind.parameters.iter().map(|parameter_space| parameter_space.fresh(stream)).collect();
-    TestOperation { operation: kind.operation, activation, parameters, operation_seed: stream.bits() }
+    TestOperation { operation: kind.operation, activation, parameters, operation_seed: stream.bits(), messages: None }
 }
 
 /// A fresh window, or fresh conditions; of an offline operation there is nothing to choose.
