@@ -280,6 +280,7 @@ impl Simulations<'_> {
                 trace: Some(TraceRequest { file: file.clone(), keep: Recorded::All }),
                 compensation: with.cloned(),
                 withheld: Vec::new(),
+                lists_altered: false,
             });
             waiting.insert(number, (at, file));
         }

@@ -302,6 +302,7 @@ mod tests {
             &["confirm", "a.sesame", "-n", "3", "--violations", "--workers", "2"],
             &["repeat", "a.sesame", "T5", "7", "--allow-unheard"],
             &["shrink", "a.sesame", "--requirement", "R1", "--requirement", "R2", "--", "T5"],
+            &["shrink", "a.sesame", "--violations", "--budget", "60", "--messages"],
         ];
         for line in lines {
             let matches = command_line().get_matches_from(["sesamec"].iter().chain(line));

@@ -100,6 +100,7 @@ fn check(plan: &CampaignPlan, tests: &[(Test, f64)]) {
             unreached: Vec::new(),
             traffic: Vec::new(),
             course: None,
+            altered: None,
             metrics: vec![metric(*value); plan.metrics.len()],
             monitors: Vec::new(),
             messages: 0,
@@ -217,6 +218,7 @@ fn the_ends_of_what_is_permitted_read_back_as_they_are() {
                 })
                 .collect(),
             operation_seed: if share == 0.0 { 0 } else { u64::MAX },
+            messages: None,
         });
         Test { operations: operations.collect() }
     };
@@ -244,6 +246,7 @@ proptest! {
                 activation: Activation::Time { start, end: start.next_up() },
                 parameters: vec![Choice::Value { value: choice }],
                 operation_seed,
+                messages: None,
             };
             // SQLite keeps no sign of zero, and the language has none either.
             (Test { operations: vec![operation("lose", loss), operation("lag", delay)] }, value + 0.0)

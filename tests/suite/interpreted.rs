@@ -6,7 +6,7 @@ use sesame_patience as patience;
 use sesame_tests::{Done, Project, command, done, fresh_folder, sesamec, workspace};
 
 /// A copy of the example with a simulator in Python, with fewer tests.
-fn two_robots(name: &str) -> Project {
+pub(crate) fn two_robots(name: &str) -> Project {
     let folder = fresh_folder(name);
     let example = workspace().join("examples/two_robots");
     fs::copy(example.join("sim.py"), folder.join("sim.py")).unwrap();
@@ -17,7 +17,7 @@ fn two_robots(name: &str) -> Project {
 }
 
 /// `sesamec` in the project's folder, where cargo is a program that fails.
-fn without_cargo(project: &Project, arguments: &[&str]) -> Done {
+pub(crate) fn without_cargo(project: &Project, arguments: &[&str]) -> Done {
     let broken = project.folder.join("broken");
     fs::create_dir_all(&broken).unwrap();
     std::os::unix::fs::symlink("/bin/false", broken.join("cargo")).ok();

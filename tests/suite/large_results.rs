@@ -115,6 +115,7 @@ fn record(plan: &CampaignPlan, permitted: &TestSpace, number: u32) -> TestRecord
             unreached: Vec::new(),
             traffic: Vec::new(),
             course: None,
+            altered: None,
             metrics: values(objectives, number, &mut stream).map(metric).to_vec(),
             monitors: Vec::new(),
             messages: 10_000,

@@ -32,6 +32,8 @@ mod kuka_cell;
 mod lab_safety;
 mod large_results;
 mod latest;
+#[cfg(unix)]
+mod messages;
 mod monitor_alone;
 mod monitors;
 mod optimisers;

@@ -22,7 +22,7 @@ use crate::sample::latin_hypercube::LatinHypercube;
 use crate::sample::random::Random;
 use crate::sample::sampled_search::SampledSearch;
 use crate::sample::sobol::Sobol;
-use crate::shrink::Shrink;
+use crate::shrink::ShrinkEach;
 use crate::space::test_space::TestSpace;
 use crate::{SearchError, Strategy};
 
@@ -32,7 +32,7 @@ pub fn strategy_of_task(plan: &CampaignPlan, task: &Task, seed: u64) -> Result<B
         Task::Campaign => strategy(plan, seed),
         Task::Known { tests, .. } => Ok(Box::new(FixedTests::known(plan, tests))),
         Task::Repeat { test, times, .. } => Ok(Box::new(FixedTests::repeated(test, *times, seed))),
-        Task::Shrink(shrinking) => Ok(Box::new(Shrink::new(plan, shrinking.clone()))),
+        Task::Shrink(_) | Task::ShrinkEach { .. } => Ok(Box::new(ShrinkEach::new(plan, task.shrinkings()))),
         Task::Variations(variations) => Ok(Box::new(FixedTests::each_once(&variations.tests))),
         Task::Undisturbed(undisturbed) => Ok(Box::new(FixedTests::undisturbed(undisturbed, seed))),
         Task::Lab(lab) | Task::Compensated(lab) => Ok(Box::new(FixedTests::in_lab(lab, seed))),

@@ -1,5 +1,5 @@
 //! Shrinking a failing test: the fewest operations, then the shortest windows, then the simplest conditions, then the
-//! mildest parameters with which it still fails in the same way.
+//! mildest parameters with which it still fails in the same way; and if that is asked for, the fewest messages.
 //!
 //! Guarantees: the result fails, or is the original test; it is permitted if the original is; it keeps the operation
 //! seeds, so that the rest of a disturbance is what it was; no single step can shrink it further, unless the
@@ -7,9 +7,10 @@
 //! a condition, one activation by condition, or [`RESOLUTION`] of the permitted range of a time or a parameter. Times
 //! and parameters end on numbers with three significant digits of that range where the test with these still fails.
 //!
-//! Like every [`Strategy`] it is a function of what it was told, so an interrupted run can be resumed.
+//! Like every [`Strategy`](crate::Strategy) it is a function of what it was told, so an interrupted run can be resumed.
 
 mod axis;
+mod each;
 mod reduce;
 mod space;
 #[cfg(test)]
@@ -17,17 +18,19 @@ mod tests;
 
 use std::collections::BTreeMap;
 
+pub use reduce::MessagesEnd;
 use reduce::{Oracle, Pending, Reduced, reduce};
 use space::ShrinkSpace;
 
-use sesame_base::observation::Observation;
+use sesame_base::observation::AlteredMessages;
 use sesame_base::verdict::fails;
-use sesame_plan::{CampaignPlan, Failing, Shrinking, Test};
+use sesame_plan::{CampaignPlan, Choice, Failing, Shrinking, Test};
 use sesame_rng::derive_seed;
 
 use crate::test_key::TestKey;
-use crate::{Candidate, Evaluated, Strategy};
+use crate::{Candidate, Evaluated};
 
+pub use each::ShrinkEach;
 pub use space::{RESOLUTION, strength};
 
 /// What is being shrunk.
@@ -45,6 +48,10 @@ pub enum Phase {
     Parameters,
     /// Every single step that is left is tried, so that none is.
     LocalMinimality,
+    /// The smallest test so far is run again, and lists the messages that its operations alter.
+    Listing,
+    /// Fewer messages are altered.
+    Messages,
 }
 
 impl Phase {
@@ -57,6 +64,8 @@ impl Phase {
             Phase::Conditions => "conditions",
             Phase::Parameters => "parameters",
             Phase::LocalMinimality => "last steps",
+            Phase::Listing => "list of messages",
+            Phase::Messages => "messages",
         }
     }
 }
@@ -74,6 +83,19 @@ pub struct Tried {
     pub failed: Option<u32>,
     /// Number of the first of its runs in the campaign, from 1; the others follow.
     pub number: u32,
+    /// The messages that its operations altered in any of its runs, if that was asked for.
+    pub altered: Option<AlteredMessages>,
+}
+
+/// What one run of a test showed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shown {
+    /// The run's number in the campaign.
+    pub number: u32,
+    /// Whether it failed as the test did.
+    pub failed: bool,
+    /// The messages that operations altered, if that was asked for.
+    pub altered: Option<AlteredMessages>,
 }
 
 /// Shrinks a test, by ask and tell of which candidates fail as it does.
@@ -90,6 +112,10 @@ pub struct Shrink {
     tried: Vec<Tried>,
     /// Positions among those tried, by content.
     known: BTreeMap<TestKey, usize>,
+    /// The same of those that list messages.
+    listings: BTreeMap<TestKey, usize>,
+    /// Whether the reduction goes on to single messages.
+    to_messages: bool,
     /// Position of the first test of the generation asked last.
     asked: usize,
     generation: u32,
@@ -105,7 +131,7 @@ impl Shrink {
     }
 
     fn with_resolution(plan: &CampaignPlan, shrinking: Shrinking, resolution: f64) -> Shrink {
-        let Shrinking { test, failing, simulator_seed, runs, evaluations, name: _ } = shrinking;
+        let Shrinking { test, failing, simulator_seed, runs, evaluations, messages, name: _ } = shrinking;
         let runs = runs.max(1);
         Shrink {
             space: ShrinkSpace::from_plan(plan, resolution),
@@ -117,6 +143,8 @@ impl Shrink {
             left: evaluations / runs,
             tried: Vec::new(),
             known: BTreeMap::new(),
+            listings: BTreeMap::new(),
+            to_messages: messages,
             asked: 0,
             generation: 0,
             awaited: 0,
@@ -124,14 +152,15 @@ impl Shrink {
         }
     }
 
-    /// Takes of each run of the generation asked last its number, and whether it failed as the test did.
-    pub fn learn(&mut self, results: &[(u32, bool)]) {
+    /// Takes what each run of the generation asked last showed.
+    pub fn learn(&mut self, results: &[Shown]) {
         assert!(results.len() == self.awaited, "exactly the generation asked last is told");
         self.awaited = 0;
         for (tried, runs) in self.tried[self.asked..].iter_mut().zip(results.chunks(self.runs as usize)) {
-            let failed = runs.iter().filter(|(_, failed)| *failed).count();
+            let failed = runs.iter().filter(|run| run.failed).count();
             tried.failed = Some(u32::try_from(failed).unwrap_or(u32::MAX));
-            tried.number = runs[0].0;
+            tried.number = runs[0].number;
+            tried.altered = runs.iter().filter_map(|run| run.altered.clone()).reduce(AlteredMessages::with);
         }
         self.generation += 1;
     }
@@ -146,8 +175,18 @@ impl Shrink {
     pub fn accepted(&self) -> Vec<usize> {
         let reduced = self.reduced.clone();
         // With nothing more to be run the reduce goes as far as what is known leads.
-        let reduced = reduced.or_else(|| reduce(&self.space, &self.test, self, true).ok());
+        let reduced = reduced.or_else(|| reduce(&self.space, &self.test, self, true, self.to_messages).ok());
         reduced.map_or_else(Vec::new, |reduced| reduced.accepted)
+    }
+
+    /// How the reduction to single messages ended; `None` if it was not asked for, or has not.
+    pub fn messages(&self) -> Option<MessagesEnd> {
+        self.reduced.as_ref()?.messages
+    }
+
+    /// The messages that the operations of a test that was tried alter, if that was asked for.
+    pub fn altered_by(&self, tried: usize) -> Option<&AlteredMessages> {
+        self.altered(&self.tried[tried].test)
     }
 
     /// Whether no single step can shrink the smallest test: all of them were run.
@@ -161,35 +200,105 @@ impl Shrink {
     }
 }
 
+/// Where a parameter of a test begins to matter: a step further towards its mildest value the test does not fail.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Threshold {
+    /// The position of the operation in the test.
+    pub operation: usize,
+    /// The position of the parameter in the operation.
+    pub parameter: usize,
+    /// The mildest choice that was seen to fail.
+    pub fails: Choice,
+    /// The strongest one that was seen not to.
+    pub passes: Choice,
+}
+
+impl Shrink {
+    /// The thresholds of the smallest test, before it was reduced to messages; with each the position of the test among
+    /// those tried. None of parameters that can be as mild as is permitted, or whose next step was not tried.
+    pub fn thresholds(&self) -> Vec<(usize, Threshold)> {
+        let accepted = self.accepted();
+        let of_messages = |&&at: &&usize| self.tried[at].phase == Phase::Messages;
+        let Some(&smallest) = accepted.iter().rev().find(|at| !of_messages(at)) else { return Vec::new() };
+        let test = &self.tried[smallest].test;
+        let mut found = Vec::new();
+        for axis in axis::parameters(test) {
+            if axis.steps(&self.space, test) == 0 {
+                continue;
+            }
+            let milder = axis.shrink_along(&self.space, test, 1);
+            if self.find(&milder).is_none_or(|(_, fails)| fails) {
+                continue;
+            }
+            let pairs = test.operations.iter().zip(&milder.operations).enumerate();
+            found.extend(pairs.flat_map(|(operation, (used, milder))| {
+                let choices = used.parameters.iter().zip(&milder.parameters).enumerate();
+                let differing = choices.filter(|(_, (fails, passes))| fails != passes);
+                differing.map(move |(parameter, (fails, passes))| {
+                    let (fails, passes) = (fails.clone(), passes.clone());
+                    (smallest, Threshold { operation, parameter, fails, passes })
+                })
+            }));
+        }
+        found
+    }
+
+    /// Takes away the tests that it can still try, and says how many they were.
+    fn take_left(&mut self) -> u32 {
+        std::mem::take(&mut self.left)
+    }
+
+    /// Lets it try so many tests more. If it was over for want of them, it goes on.
+    fn add(&mut self, tests: u32) {
+        self.left += tests;
+        if tests > 0 && self.wants_more() {
+            self.reduced = None;
+        }
+    }
+
+    /// Whether it is over for want of runs.
+    fn wants_more(&self) -> bool {
+        self.reduced.as_ref().is_some_and(|reduced| !reduced.accepted.is_empty() && !reduced.minimal)
+    }
+}
+
 impl Oracle for Shrink {
     fn find(&self, test: &Test) -> Option<(usize, bool)> {
         let &at = self.known.get(&TestKey::exact(test))?;
         Some((at, self.tried[at].failed? == self.runs))
     }
+
+    fn altered(&self, test: &Test) -> Option<&AlteredMessages> {
+        let &at = self.listings.get(&TestKey::exact(test))?;
+        self.tried[at].altered.as_ref()
+    }
 }
 
-impl Strategy for Shrink {
-    fn ask(&mut self) -> Vec<Candidate> {
+impl Shrink {
+    /// The tests to run next; none when the shrink is over.
+    pub fn ask(&mut self) -> Vec<Candidate> {
         assert!(self.awaited == 0, "a generation is told before the next is asked");
         if self.reduced.is_some() {
             return Vec::new();
         }
-        let Pending { phase, mut tests, base } = match reduce(&self.space, &self.test, self, self.left == 0) {
-            Ok(reduced) => {
-                self.reduced = Some(reduced);
-                return Vec::new();
-            }
-            Err(asked) => asked,
-        };
+        let Pending { phase, mut tests, base } =
+            match reduce(&self.space, &self.test, self, self.left == 0, self.to_messages) {
+                Ok(reduced) => {
+                    self.reduced = Some(reduced);
+                    return Vec::new();
+                }
+                Err(asked) => asked,
+            };
         tests.truncate(self.left as usize);
         self.asked = self.tried.len();
         let parents: Vec<u32> = base.map(|base| self.tried[base].number).into_iter().collect();
         let mut candidates = Vec::with_capacity(tests.len() * self.runs as usize);
         for test in tests {
             self.left -= 1;
-            self.known.insert(TestKey::exact(&test), self.tried.len());
+            let list = if phase == Phase::Listing { &mut self.listings } else { &mut self.known };
+            list.insert(TestKey::exact(&test), self.tried.len());
             let number = u32::try_from(self.tried.len()).unwrap_or(u32::MAX).saturating_mul(self.runs) + 1;
-            self.tried.push(Tried { test: test.clone(), phase, base, failed: None, number });
+            self.tried.push(Tried { test: test.clone(), phase, base, failed: None, number, altered: None });
             candidates.extend((0..self.runs).map(|run| Candidate {
                 test: test.clone(),
                 parents: parents.clone(),
@@ -205,18 +314,39 @@ impl Strategy for Shrink {
         candidates
     }
 
-    fn tell(&mut self, results: &[Evaluated]) {
-        let failed = |run: &Observation| fails(&self.plan, &self.failing, &run.outcome, |id| run.value(id));
-        let results: Vec<(u32, bool)> = results.iter().map(|result| (result.number, failed(&result.run))).collect();
-        self.learn(&results);
+    /// What a run of a candidate showed.
+    fn shown(&self, result: &Evaluated) -> Shown {
+        let run = &result.run;
+        Shown {
+            number: result.number,
+            failed: fails(&self.plan, &self.failing, &run.outcome, |id| run.value(id)),
+            altered: run.altered.clone(),
+        }
     }
 
-    fn ended(&self) -> Option<String> {
+    /// Whether the runs of the generation asked last list the messages that operations alter.
+    pub fn lists_altered(&self) -> bool {
+        self.awaited > 0 && self.tried[self.asked].phase == Phase::Listing
+    }
+
+    /// Why it is over.
+    pub fn ended(&self) -> Option<String> {
         let reduced = self.reduced.as_ref()?;
         Some(if reduced.accepted.is_empty() {
             "the test did not fail again".to_owned()
         } else if reduced.minimal {
-            "no single step is left that still fails".to_owned()
+            match reduced.messages {
+                None => "no single step is left that still fails",
+                Some(MessagesEnd::Reduced) => "no single step and no single message is left that can be spared",
+                Some(MessagesEnd::NoneAltered) => "no single step is left that still fails, and no message is altered",
+                Some(MessagesEnd::TooMany) => {
+                    "no single step is left that still fails, and too many messages are altered to go on with them"
+                }
+                Some(MessagesEnd::NotReproduced | MessagesEnd::OutOfRuns) => {
+                    "no single step is left that still fails; single messages could not be tried"
+                }
+            }
+            .to_owned()
         } else {
             "all evaluations were used up".to_owned()
         })

@@ -32,6 +32,11 @@ pub trait Strategy: Send {
         false
     }
 
+    /// Whether the runs of the generation asked last list the messages that operations alter.
+    fn lists_altered(&self) -> bool {
+        false
+    }
+
     /// What the search gave up, for the record of the campaign.
     fn given_up(&self) -> Vec<String> {
         Vec::new()

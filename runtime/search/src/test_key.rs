@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use sesame_plan::{Activation, Choice, Test};
+use sesame_plan::{Activation, Choice, Messages, Test};
 use sesame_rng::derive_seed;
 
 use crate::space::condition;
@@ -76,6 +76,9 @@ pub(crate) fn identity(test: &Test) -> Vec<Vec<u64>> {
                         numbers.extend(text.bytes().map(u64::from));
                     }
                 }
+            }
+            for run in operation.messages.iter().flat_map(Messages::runs) {
+                numbers.extend([u64::from(run.wire), run.first, run.last]);
             }
             numbers
         })

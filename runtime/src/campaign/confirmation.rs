@@ -230,6 +230,7 @@ impl Evaluator<'_> {
                     trace: None,
                     compensation: self.compensation(),
                     withheld: Vec::new(),
+                    lists_altered: false,
                 });
                 waiting.insert(job, (number, position, simulator_seed));
             }

@@ -36,6 +36,8 @@ pub(super) struct Evaluator<'a> {
     traces: Option<Traces>,
     /// Whether the search looks at how metrics went in the course of a run.
     series: bool,
+    /// Whether runs list the messages that operations alter, from now on.
+    pub(super) lists_altered: bool,
     interrupted: &'a AtomicBool,
 }
 
@@ -75,7 +77,18 @@ impl<'a> Evaluator<'a> {
             None => None,
         };
         let reference = None;
-        Ok(Evaluator { plan, reference, recorder, executor, recorded, repetitions, traces, series, interrupted })
+        Ok(Evaluator {
+            plan,
+            reference,
+            recorder,
+            executor,
+            recorded,
+            repetitions,
+            traces,
+            series,
+            lists_altered: false,
+            interrupted,
+        })
     }
 
     /// One that only repeats tests that are recorded.
@@ -88,7 +101,18 @@ impl<'a> Evaluator<'a> {
         let repetitions = recorder.repository().repetitions()?;
         let reference = recorder.repository().reference_run()?.map(|record| record.observation);
         let (recorded, traces, series) = (BTreeSet::new(), None, false);
-        Ok(Evaluator { plan, reference, recorder, executor, recorded, repetitions, traces, series, interrupted })
+        Ok(Evaluator {
+            plan,
+            reference,
+            recorder,
+            executor,
+            recorded,
+            repetitions,
+            traces,
+            series,
+            lists_altered: false,
+            interrupted,
+        })
     }
 
     /// From now on, what is heard in a run is compared with what was heard in this one.
@@ -133,6 +157,7 @@ impl<'a> Evaluator<'a> {
                     trace: self.traces.as_ref().map(|traces| traces.request(&test)),
                     compensation: self.compensation(),
                     withheld: Vec::new(),
+                    lists_altered: self.lists_altered,
                 });
                 waiting.insert(test.number, test);
             }

@@ -43,6 +43,9 @@ pub struct Job {
     /// Monitors whose mitigation is not sent in this run.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub withheld: Vec<MonitorId>,
+    /// Whether the run lists the messages that operations alter.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub lists_altered: bool,
 }
 
 /// Asks for the trace of a test.

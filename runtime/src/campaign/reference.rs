@@ -100,7 +100,9 @@ pub(super) fn ineffective(plan: &CampaignPlan, task: &Task, reference: &Observat
     let operations: BTreeSet<OperationId> = match (task, task.repeated(plan)) {
         (_, Some(repeated)) => of_test(repeated.test).into_iter().collect(),
         (Task::Known { tests, .. }, _) => tests.iter().flat_map(|&id| of_test(&plan.test(id).test)).collect(),
-        (Task::Shrink(shrinking), _) => of_test(&shrinking.test).into_iter().collect(),
+        (Task::Shrink(_) | Task::ShrinkEach { .. }, _) => {
+            task.shrinkings().iter().flat_map(|shrinking| of_test(&shrinking.test)).collect()
+        }
         (Task::Variations(variations), _) => variations.tests.iter().flat_map(of_test).collect(),
         (Task::Undisturbed(_), _) => BTreeSet::new(),
         (Task::Lab(lab) | Task::Compensated(lab), _) => {

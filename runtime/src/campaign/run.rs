@@ -228,6 +228,7 @@ impl<'a, 'l> Campaign<'a, 'l> {
     /// no next one.
     fn step(&mut self) -> Result<ControlFlow<String>, Halt> {
         let candidates = self.strategy.ask();
+        self.evaluator.lists_altered = self.strategy.lists_altered();
         let Some(number) = candidates.first().map(|candidate| candidate.generation) else {
             return Ok(ControlFlow::Break("all tests were evaluated".to_owned()));
         };

@@ -31,8 +31,8 @@ pub(super) fn run(
     directory: &Path,
     custom: &mut Custom<'_>,
 ) -> (Observation, Option<String>) {
-    let Job { test, simulator_seed, withheld, .. } = job;
-    let what = Run { test, simulator_seed: *simulator_seed, withheld };
+    let Job { test, simulator_seed, withheld, lists_altered, .. } = job;
+    let what = Run { test, simulator_seed: *simulator_seed, withheld, lists_altered: *lists_altered };
     let Some(request) = &job.trace else {
         let observed = evaluate_tapped(plan, wires, metrics, transport, &what, custom, None);
         return (observed.unwrap_or_else(|mismatch| Observation::crashed(mismatch.to_string())), None);

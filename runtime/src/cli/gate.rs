@@ -150,11 +150,11 @@ fn seed_note(summary: &Summary, plan: &CampaignPlan, task: &Task, seed: u64) -> 
 
 /// Why results are insufficient: so little is known that "nothing was found" would mislead, whichever gates are set.
 ///
-/// Shrinking and repeating are about a single test: if it crashes, so do most of their runs. What is run in a lab is
+/// Shrinking and repeating are about single tests: if one crashes, so do most of their runs. What is run in a lab is
 /// chosen for how dangerous it is.
 fn insufficient(summary: &Summary, plan: &CampaignPlan, task: &Task) -> Vec<String> {
     let counts = summary.counts;
-    let is_about_one_test = task.shrinking().is_some() || task.repeated(plan).is_some() || task.of_lab().is_some();
+    let is_about_one_test = !task.shrinkings().is_empty() || task.repeated(plan).is_some() || task.of_lab().is_some();
     let disturbs_nothing = task.undisturbed().is_some();
     let ran = counts.evaluations - counts.duplicates;
     let mut objections: Vec<String> = summary.closing_run.iter().cloned().collect();

@@ -69,6 +69,7 @@ pub(super) fn run_again(session: &Session, asked: Asked<'_>) -> Result<Option<Ag
         trace: asked.record.then(|| TraceRequest { file: file.clone(), keep: Recorded::All }),
         compensation: repository.plan().compensation.clone(),
         withheld: asked.withheld,
+        lists_altered: false,
     };
     let ended = run_single(job, &settings, &interrupted);
     files.finish()?;

@@ -1,4 +1,4 @@
-//! `shrink`: reduces a failing test while it still fails in the same way.
+//! `shrink`: reduces a failing test while it still fails in the same way, or the smallest test of each cause.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -17,12 +17,24 @@ use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execu
 use crate::cli::failure::Failure;
 use crate::cli::results_folder::{open, refuse_changed};
 use crate::cli::session::{Session, World};
+use crate::cli::terminal::say;
 
-/// Which test is shrunk, and how.
+/// How many runs each cause may take if `--budget` does not say it.
+const RUNS_OF_A_CAUSE: u32 = 200;
+
+/// Which tests are shrunk, and how.
 #[derive(Debug, Args)]
 pub struct ShrinkArgs {
     /// The test, for example `T158`; to shrink a regression test, run `known` and give its folder with `--results`
-    test: String,
+    #[arg(required_unless_present = "violations")]
+    test: Option<String>,
+    /// Shrink the smallest test of each cause, one after the other
+    #[arg(long, conflicts_with_all = ["test", "evaluations"])]
+    violations: bool,
+    /// The maximum number of simulator runs with `--violations`: each cause first gets an equal share, and runs that one
+    /// does not need go on to the others; by default 200 for each cause
+    #[arg(long, value_name = "N", requires = "violations", value_parser = clap::value_parser!(u32).range(1..))]
+    budget: Option<u32>,
     /// Folder of the run that recorded the test, for example `results/42`; by default the latest
     #[arg(long, value_name = "DIR")]
     results: Option<PathBuf>,
@@ -30,7 +42,7 @@ pub struct ShrinkArgs {
     #[arg(long, value_name = "DIR")]
     into: Option<PathBuf>,
     /// The requirement that a smaller test must violate; may be repeated. By default it must violate every requirement
-    /// that the test violates, or crash or time out as the test did
+    /// that the test violates, or crash or time out as the test did; with `--violations`, the causes of all requirements
     #[arg(long, value_name = "NAME")]
     requirement: Vec<String>,
     /// In how many runs a smaller test must fail, for noisy simulators: the first has the test's simulator seed, the
@@ -40,6 +52,10 @@ pub struct ShrinkArgs {
     /// The maximum number of simulator runs
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
     evaluations: u32,
+    /// Go on to single messages: find the fewest that operations must alter. The simulator must be stepped, or `--runs`
+    /// at least 2
+    #[arg(long)]
+    messages: bool,
     #[command(flatten)]
     world: World,
     #[command(flatten)]
@@ -50,6 +66,26 @@ pub struct ShrinkArgs {
 
 pub(super) fn shrink(session: &Session, args: &ShrinkArgs) -> Result<ExitCode, Failure> {
     let session = &*args.world.of(session)?;
+    if args.messages {
+        refuse_free_running(session, args.runs)?;
+    }
+    let (repository, name, task) = match &args.test {
+        Some(test) => one(session, args, test)?,
+        None => each_cause(session, args)?,
+    };
+    let run = repository.path().parent().unwrap_or(&session.results);
+    let into = args.into.as_deref().or(run.parent()).unwrap_or(run);
+    let seed = repository.campaign().seed;
+    let plan = task.plan(repository.plan());
+    let files = claim_files(&session.runner, &plan)?;
+    refuse_unfilled(&session.runner, &plan, true)?;
+    let folder_name = format!("shrink-{name}");
+    let (recorder, folder) = begin(session, into, &folder_name, &plan, &task, seed, &args.execution)?;
+    execute(session, recorder, &folder, &args.execution, &args.output, files)
+}
+
+/// The task of shrinking one test, with the results that have it and its name there.
+fn one(session: &Session, args: &ShrinkArgs, test: &str) -> Result<(Repository, String, Task), Failure> {
     let Session { results, .. } = session;
     if args.evaluations < args.runs {
         return Err(Failure(format!(
@@ -57,36 +93,97 @@ pub(super) fn shrink(session: &Session, args: &ShrinkArgs) -> Result<ExitCode, F
             args.evaluations, args.runs
         )));
     }
-    let declared = session.plan.tests.iter().any(|test| test.name == args.test);
+    let declared = session.plan.tests.iter().any(|declared| declared.name == test);
     if declared && args.results.is_none() && record::latest_folder(results)?.is_none() {
-        return Err(not_recorded(&session.caller, &args.test));
+        return Err(not_recorded(&session.caller, test));
     }
     let repository = open(results, args.results.as_deref())?;
-    let number = match repository.find(&args.test) {
-        Err(RecordError::NoSuchTest { .. }) if declared => return Err(not_recorded(&session.caller, &args.test)),
+    let number = match repository.find(test) {
+        Err(RecordError::NoSuchTest { .. }) if declared => return Err(not_recorded(&session.caller, test)),
         found => found?,
     };
     let record = repository.test(number)?;
-    let name = TestNumber(record.number).to_string();
     let failing = failing(&repository, &record, &args.requirement)?;
     refuse_changed(session, &repository, record.number)?;
-    let run = repository.path().parent().unwrap_or(results);
-    let into = args.into.as_deref().or(run.parent()).unwrap_or(run);
-    let seed = repository.campaign().seed;
-    let folder_name = format!("shrink-{name}");
-    let task = Task::Shrink(Shrinking {
-        name,
+    let shrinking = shrinking(record, failing, args, args.evaluations);
+    Ok((repository, shrinking.name.clone(), Task::Shrink(shrinking)))
+}
+
+/// The task of shrinking the smallest test of each cause, with the results that have them.
+fn each_cause(session: &Session, args: &ShrinkArgs) -> Result<(Repository, String, Task), Failure> {
+    let repository = open(&session.results, args.results.as_deref())?;
+    let names: Vec<&str> = repository.plan().requirements.iter().map(|requirement| requirement.name.as_str()).collect();
+    if let Some(stranger) = args.requirement.iter().find(|wanted| !names.contains(&wanted.as_str())) {
+        let known = if names.is_empty() { "it has none".to_owned() } else { format!("it has {}", names.join(", ")) };
+        return Err(Failure(format!("the campaign has no requirement `{stranger}`; {known}")));
+    }
+    let mut found = Vec::new();
+    for cause in sesame_report::causes(&repository)?.causes {
+        if !args.requirement.is_empty() && !args.requirement.contains(&cause.requirement) {
+            continue;
+        }
+        let record = repository.test(cause.test.0)?;
+        refuse_changed(session, &repository, record.number)?;
+        match failing(&repository, &record, std::slice::from_ref(&cause.requirement)) {
+            Ok(failing) => found.push((record, failing)),
+            // Fresh runs violate it, and the run that would be shrunk does not.
+            Err(Failure(why)) => say(format_args!("note: this cause of {} is left out: {why}", cause.requirement)),
+        }
+    }
+    let Some(count) = u32::try_from(found.len()).ok().filter(|&count| count > 0) else {
+        return Err(Failure(
+            "no test violates a requirement that the reference run satisfies, so there is no cause to shrink; the command \
+             `causes` shows what is known"
+                .to_owned(),
+        ));
+    };
+    let budget = args.budget.unwrap_or(RUNS_OF_A_CAUSE.saturating_mul(args.runs).saturating_mul(count));
+    let shares = shares(budget, args.runs, count).ok_or_else(|| {
+        let fewest = u64::from(args.runs) * u64::from(count);
+        Failure(format!(
+            "--budget {budget} is too little for {count} causes, each of which takes at least --runs {}: give {fewest} or \
+             more, or name a requirement with --requirement",
+            args.runs
+        ))
+    })?;
+    let each = found.into_iter().zip(shares);
+    let each = each.map(|((record, failing), share)| shrinking(record, failing, args, share)).collect();
+    Ok((repository, "violations".to_owned(), Task::ShrinkEach { each }))
+}
+
+/// A budget in equal shares, each a multiple of the runs of a test; the first ones get what does not come out even.
+/// `None` if not each can run one test.
+fn shares(budget: u32, runs: u32, count: u32) -> Option<Vec<u32>> {
+    let tests = budget / runs;
+    let share = move |at: u32| (tests / count + u32::from(at < tests % count)) * runs;
+    (tests >= count).then(|| (0..count).map(share).collect())
+}
+
+fn shrinking(record: TestRecord, failing: Failing, args: &ShrinkArgs, evaluations: u32) -> Shrinking {
+    Shrinking {
+        name: TestNumber(record.number).to_string(),
         test: record.test,
         failing,
         simulator_seed: record.simulator_seed,
         runs: args.runs,
-        evaluations: args.evaluations,
-    });
-    let plan = task.plan(repository.plan());
-    let files = claim_files(&session.runner, &plan)?;
-    refuse_unfilled(&session.runner, &plan, true)?;
-    let (recorder, folder) = begin(session, into, &folder_name, &plan, &task, seed, &args.execution)?;
-    execute(session, recorder, &folder, &args.execution, &args.output, files)
+        evaluations,
+        messages: args.messages,
+    }
+}
+
+/// Insists that a run shows whether a message matters: that equal tests give equal runs, or that several runs decide.
+fn refuse_free_running(session: &Session, runs: u32) -> Result<(), Failure> {
+    // Nothing is started before the first test.
+    let transport = session.runner.connect.transport(&session.plan);
+    if runs > 1 || transport.capabilities().lock_stepped {
+        return Ok(());
+    }
+    Err(Failure(format!(
+        "the simulator of `{}` runs freely: the same test sends other messages in each run, so one run does not show whether \
+         a message matters. With `--runs 3`, a test with fewer messages counts only if it fails in each of three runs; or \
+         leave out `--messages`",
+        session.plan.space
+    )))
 }
 
 /// What to do for a regression test that these results do not have.
@@ -176,6 +273,15 @@ mod tests {
             commands,
             ["sesamec known cell.sesame cut_both", "sesamec shrink cell.sesame cut_both --results known"]
         );
+    }
+
+    #[test]
+    fn a_budget_is_shared_in_whole_tests() {
+        assert_eq!(shares(100, 1, 3), Some(vec![34, 33, 33]));
+        assert_eq!(shares(100, 3, 4), Some(vec![27, 24, 24, 24]), "of 33 tests with three runs each");
+        assert_eq!(shares(5, 2, 2), Some(vec![2, 2]));
+        assert_eq!(shares(5, 2, 3), None);
+        assert_eq!(shares(u32::MAX, 1, 1), Some(vec![u32::MAX]));
     }
 
     fn found(name: &str, wanted: &[&str]) -> Result<Failing, String> {

@@ -42,7 +42,7 @@ pub(super) fn run(plan: &CampaignPlan, connect: &Connect, shown: &mut Shown<'_>)
     let mut transport = UntilStopped { transport, asked_to_stop, running, noted: Instant::now() };
     let mut told = Told { shown, asked_to_stop: Arc::clone(&transport.asked_to_stop), failure: None };
     let test = Test { operations: Vec::new() };
-    let run = Run { test: &test, simulator_seed: 0, withheld: &[] };
+    let run = Run::of(&test);
     let ended = evaluate_tapped(plan, &wires, &table, &mut transport, &run, &mut Custom::none(), Some(&mut told))?;
     transport.note();
     transport.close();

@@ -153,6 +153,7 @@ pub(super) fn wholes() -> Vec<Whole> {
             simulator_seed: u64::MAX,
             runs: 1,
             evaluations: 12,
+            messages: false,
         });
         plan = task.plan(&plan);
         let mut recorder = Recorder::create_for(folder.path(), &plan, &task, 1, 0).unwrap();

@@ -127,7 +127,7 @@ pub(crate) fn run_over(
     let metrics = MetricTable::new(plan, &wires, &entries()).expect("made-up metrics are sound");
     let mut ledger = Ledger::new(&wires);
     set_script(script.clone());
-    let run = Run { test, simulator_seed, withheld: &[] };
+    let run = Run { simulator_seed, ..Run::of(test) };
     let observation =
         evaluate_tapped(plan, &wires, &metrics, transport.as_mut(), &run, &mut Custom::none(), Some(&mut ledger));
     transport.close();

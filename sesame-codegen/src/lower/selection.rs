@@ -93,6 +93,7 @@ impl Selection {
                 activation: self.activation(&operation.activation, within.end),
                 parameters: operation.choices.clone(),
                 operation_seed: operation.draw_seed,
+                messages: operation.messages.clone(),
             }
         });
         let expectations = test

@@ -1,7 +1,7 @@
 //! Fuzzing operations and the known tests that apply them.
 
 use super::condition::{Condition, Constraint};
-use sesame_plan::{Bound, Choice, ChoiceKind, Moment, OperationKind, Step};
+use sesame_plan::{Bound, Choice, ChoiceKind, Messages, Moment, OperationKind, Step};
 
 use super::declaration::Declaration;
 use super::ids::{MetricId, NodeId, OperationId, TopicId};
@@ -124,6 +124,8 @@ pub struct TestOperation {
     pub activation: Activation,
     /// Seed of its draws: as written, else [`draw_seed`].
     pub draw_seed: u64,
+    /// The only messages that it alters, on wires that it acts on; `None` for all.
+    pub messages: Option<Messages>,
 }
 
 /// When an operation of a known test is active; inside the operation's `within` only.

@@ -8,7 +8,8 @@ use super::words::list;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{
-    self, Activation, Choice, ChoiceKind, Domain, Id as _, OperationId, OperationKind, Parameter, Range,
+    self, Activation, Choice, ChoiceKind, Domain, Id as _, MessageRun, Messages, OperationId, OperationKind, Parameter,
+    Range,
 };
 
 use crate::span::Span;
@@ -155,10 +156,11 @@ impl<'a> Resolver<'a> {
         let mut operations = Vec::new();
         for (position, operation) in test.operations.iter().enumerate() {
             match self.test_operation(operation) {
-                Some((id, choices, activation)) => operations.push(model::TestOperation {
+                Some((id, choices, activation, messages)) => operations.push(model::TestOperation {
                     operation: id,
                     choices,
                     activation,
+                    messages,
                     draw_seed: match operation.seed {
                         Some(seed) => seed.value?,
                         None => model::draw_seed(&test.head.name.text, position),
@@ -235,7 +237,10 @@ impl<'a> Resolver<'a> {
         }
     }
 
-    fn test_operation(&mut self, test: &'a ast::TestOperation) -> Option<(OperationId, Vec<Choice>, Activation)> {
+    fn test_operation(
+        &mut self,
+        test: &'a ast::TestOperation,
+    ) -> Option<(OperationId, Vec<Choice>, Activation, Option<Messages>)> {
         let index = self.find(&test.operation, Kind::Operation);
         let activation = match &test.activation {
             ast::Activation::Window(window) => self.test_window(window).map(Activation::Window),
@@ -269,7 +274,51 @@ impl<'a> Resolver<'a> {
         if !self.fits_lengths(test, index, &operation, &activation) {
             return None;
         }
-        Some((OperationId::from_index(index), choices?, activation))
+        let messages = self.listed_messages(test, &operation)?;
+        Some((OperationId::from_index(index), choices?, activation, messages))
+    }
+
+    /// The only messages that an operation alters; the inner `None` where the test lists none, the outer one after an
+    /// error.
+    fn listed_messages(&mut self, test: &ast::TestOperation, operation: &model::Operation) -> Option<Option<Messages>> {
+        /// Results record numbers up to this one.
+        const GREATEST: u64 = i64::MAX.unsigned_abs();
+        let (Some(first), Some(last)) = (test.messages.first(), test.messages.last()) else { return Some(None) };
+        let name = &test.operation.text;
+        let Some(topic) = operation.topic() else {
+            let title = format!("`{name}` acts on no messages");
+            let diagnostic = Diagnostic::new(Code::WRONG_CHOICE, first.span.to(last.span), title);
+            self.report(diagnostic.label("remove this list"));
+            return None;
+        };
+        let wires = self.system.topics.get(topic.index())?.as_ref()?.paths.len() * operation.to.len().max(1);
+        let mut runs = Vec::new();
+        for run in &test.messages {
+            let (from, to) = (run.first.value?, run.last.map_or(run.first.value, |last| last.value)?);
+            let wire = run.wire.map_or(Some(1), |wire| wire.value)?;
+            let problem = if from > to {
+                Some((Code::REVERSED_RANGE, format!("message {from} comes after message {to}"), "swap the two"))
+            } else if to > GREATEST {
+                let title = format!("message {to} is beyond what can be recorded");
+                Some((Code::BAD_NUMBER, title, "expected at most 9223372036854775807"))
+            } else if wire == 0 || wire > wires as u64 {
+                let title = match wires {
+                    1 => format!("`{name}` acts on one wire, not on wire {wire}"),
+                    _ => format!("`{name}` acts on wires 1 to {wires}, not on wire {wire}"),
+                };
+                Some((Code::WRONG_CHOICE, title, "no messages of the operation are there"))
+            } else {
+                None
+            };
+            if let Some((code, title, label)) = problem {
+                self.report(Diagnostic::new(code, run.span, title).label(label));
+                return None;
+            }
+            // It is at most the number of wires.
+            let wire = u32::try_from(wire - 1).ok()?;
+            runs.push(MessageRun { wire, first: from, last: to });
+        }
+        Some(Messages::of_runs(runs))
     }
 
     fn test_window(&mut self, window: &ast::Range) -> Option<Range> {

@@ -142,6 +142,7 @@ impl Importer<'_> {
                 unreached: Vec::new(),
                 traffic: Vec::new(),
                 course: None,
+                altered: None,
                 metrics,
                 monitors: Vec::new(),
                 messages: 0,
@@ -249,8 +250,8 @@ impl Importer<'_> {
             }
             (cut.start <= cut.end).then_some(cut)
         });
-        let test_operation =
-            TestOperation { operation: id, activation, parameters, operation_seed: operation.seed.cast_unsigned() };
+        let operation_seed = operation.seed.cast_unsigned();
+        let test_operation = TestOperation { operation: id, activation, parameters, operation_seed, messages: None };
         let effect = OperationEffect { intervals: intervals.into_iter().collect(), ..OperationEffect::default() };
         Ok((test_operation, effect))
     }

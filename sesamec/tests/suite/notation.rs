@@ -343,6 +343,7 @@ fn used(id: OperationId, of: &Operation, metrics: &[Metric]) -> BoxedStrategy<Te
             activation,
             parameters,
             operation_seed,
+            messages: None,
         })
         .boxed()
 }

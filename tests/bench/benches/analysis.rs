@@ -55,6 +55,7 @@ fn record(permitted: &TestSpace, metrics: usize, number: u32) -> TestRecord {
             unreached: Vec::new(),
             traffic: Vec::new(),
             course: None,
+            altered: None,
             metrics,
             monitors: Vec::new(),
             messages: 10_000,

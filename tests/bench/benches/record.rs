@@ -26,6 +26,7 @@ fn test(number: u32, points: u32) -> TestRecord {
             unreached: Vec::new(),
             traffic: Vec::new(),
             course: None,
+            altered: None,
             metrics: vec![metric.clone(), metric],
             monitors: Vec::new(),
             messages: 10_000,

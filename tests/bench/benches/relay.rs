@@ -31,6 +31,7 @@ fn active(plan: &CampaignPlan, names: &[&str]) -> Test {
             activation: Activation::Time { start: 0.0, end: 1000.0 },
             parameters: parameters.collect(),
             operation_seed: 1,
+            messages: None,
         }
     };
     Test { operations: names.iter().map(operation).collect() }

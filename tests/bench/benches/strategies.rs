@@ -94,6 +94,7 @@ fn observe(plan: &CampaignPlan, number: u32, operations: &[sesame_plan::TestOper
         unreached: Vec::new(),
         traffic: Vec::new(),
         course: None,
+        altered: None,
         metrics: vec![
             MetricObservation::whole(Some(touched), true, Vec::new()),
             MetricObservation::whole(Some(-level), true, series),

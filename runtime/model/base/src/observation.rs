@@ -1,5 +1,6 @@
 //! What was observed in one run of a test: what a worker reports and the results repository keeps.
 
+mod altered;
 mod course;
 mod monitor;
 mod traffic;
@@ -10,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use sesame_plan::{RequirementId, Span, Trend};
 
+pub use altered::{ALTERED_LISTED, AlteredMessage, AlteredMessages};
 pub use course::{Course, Happening, Heard, RARE, Signal, SignalEvent};
 pub use monitor::{CHANGES_KEPT, ChangeCause, EvidenceChange, MonitorDecision, MonitorHazard, MonitorObservation};
 pub use traffic::{Traffic, Unreached};
@@ -142,6 +144,9 @@ pub struct Observation {
     /// operations are worth a test, and is not part of the digest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub course: Option<Course>,
+    /// The messages that operations of the test altered, if the run was asked for them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub altered: Option<AlteredMessages>,
     /// Per metric of the plan, in its order; empty after a crash of the worker.
     pub metrics: Vec<MetricObservation>,
     /// Per monitor of the plan, in its order; empty after a crash of the worker.
@@ -347,6 +352,7 @@ impl Observation {
             unreached: Vec::new(),
             traffic: Vec::new(),
             course: None,
+            altered: None,
             metrics: Vec::new(),
             monitors: Vec::new(),
             messages: 0,
@@ -375,6 +381,7 @@ impl Observation {
             unreached: self.unreached.clone(),
             traffic: Vec::new(),
             course: None,
+            altered: self.altered.clone(),
             metrics: self.metrics.iter().map(metric).collect(),
             monitors: Vec::new(),
             messages: self.messages,

@@ -22,7 +22,7 @@ pub use campaign::{
 pub use monitor::{evidence, mitigation};
 pub use operation::{Clauses, constraint, custom_domain, integer_constraint, operation, resource};
 pub use test::{
-    activation, activation_named, expectation, expected_requirement, simulator_seed, test_block, test_member,
+    activation, activation_named, expectation, expected_requirement, messages, simulator_seed, test_block, test_member,
     test_operation,
 };
 pub use text::{doc_comment, is_name, quoted};

@@ -1,6 +1,8 @@
 //! Tests: the operations of a test with what it chose for each, when they are active, and what is expected of it.
 
-use sesame_plan::{Activation, CampaignPlan, Expectation, Metric, MetricId, Moment, OperationKind, TestOperation};
+use sesame_plan::{
+    Activation, CampaignPlan, Expectation, MessageRun, Messages, Metric, MetricId, Moment, OperationKind, TestOperation,
+};
 
 use crate::condition;
 use crate::text::block;
@@ -18,7 +20,19 @@ pub fn test_operation(plan: &CampaignPlan, used: &TestOperation) -> String {
     let choices = parameters.zip(&used.parameters).map(|(parameter, choice)| {
         (parameter.name.as_str(), Unit::of_parameter(&operation.kind, parameter).choice(choice))
     });
-    test_member(&operation.name, choices, &activation(plan, used), Some(used.operation_seed))
+    let member = test_member(&operation.name, choices, &activation(plan, used), Some(used.operation_seed));
+    let listed = used.messages.iter().map(|listed| format!(" messages {}", messages(listed)));
+    std::iter::once(member).chain(listed).collect()
+}
+
+/// Messages that an operation of a test alters: `248..250, 12 on 2`. Wires count from 1, and the first is not written.
+pub fn messages(messages: &Messages) -> String {
+    let words = messages.runs().iter().map(|&MessageRun { wire, first, last }| {
+        let last = if first == last { String::new() } else { format!("..{last}") };
+        let wire = if wire == 0 { String::new() } else { format!(" on {}", u64::from(wire) + 1) };
+        format!("{first}{last}{wire}")
+    });
+    words.collect::<Vec<_>>().join(", ")
 }
 
 /// The member of a `test` block of an operation's name, its choices by the names of parameters, its activation, and the

@@ -30,6 +30,12 @@ pub enum Task {
     },
     /// It shrinks a failing test: `shrink`.
     Shrink(Shrinking),
+    /// It shrinks several failing tests, one after the other: `shrink --violations`. Runs that one does not need go on
+    /// to the next.
+    ShrinkEach {
+        /// Which; at least one.
+        each: Vec<Shrinking>,
+    },
     /// It runs chosen tests of a campaign in a lab: `physical`; or somebody ran them there by hand.
     Lab(LabTask),
     /// It simulates the tests that a lab ran, with what [compensates](crate::Compensation) for the reality gap:
@@ -113,6 +119,9 @@ pub struct Shrinking {
     pub runs: u32,
     /// The most runs.
     pub evaluations: u32,
+    /// Whether the reduction goes on to single messages.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub messages: bool,
 }
 
 /// How a test fails.
@@ -152,7 +161,9 @@ impl Task {
             Task::Campaign => plan.campaign.search.evaluations(),
             Task::Known { tests, .. } => u32::try_from(tests.len()).unwrap_or(u32::MAX),
             Task::Repeat { times, .. } => *times,
-            Task::Shrink(shrinking) => shrinking.evaluations,
+            Task::Shrink(_) | Task::ShrinkEach { .. } => {
+                self.shrinkings().iter().fold(0, |sum: u32, shrinking| sum.saturating_add(shrinking.evaluations))
+            }
             Task::Lab(LabTask { tests, repeats, .. }) | Task::Compensated(LabTask { tests, repeats, .. }) => {
                 u32::try_from(tests.len()).unwrap_or(u32::MAX).saturating_mul(*repeats)
             }
@@ -193,9 +204,13 @@ impl Task {
         }
     }
 
-    /// How a test is shrunk; `None` if none is.
-    pub fn shrinking(&self) -> Option<&Shrinking> {
-        if let Task::Shrink(shrinking) = self { Some(shrinking) } else { None }
+    /// How tests are shrunk; none if no test is.
+    pub fn shrinkings(&self) -> &[Shrinking] {
+        match self {
+            Task::Shrink(shrinking) => std::slice::from_ref(shrinking),
+            Task::ShrinkEach { each } => each,
+            _ => &[],
+        }
     }
 
     /// What is run in a lab; `None` if nothing is.
@@ -223,7 +238,12 @@ impl Task {
         match self {
             Task::Known { lab, .. } | Task::Undisturbed(Undisturbed { lab, .. }) => lab.as_deref(),
             Task::Lab(task) => Some(&task.lab),
-            Task::Campaign | Task::Repeat { .. } | Task::Shrink(_) | Task::Compensated(_) | Task::Variations(_) => None,
+            Task::Campaign
+            | Task::Repeat { .. }
+            | Task::Shrink(_)
+            | Task::ShrinkEach { .. }
+            | Task::Compensated(_)
+            | Task::Variations(_) => None,
         }
     }
 
@@ -238,7 +258,7 @@ impl Task {
             Task::Campaign => plan.campaign.search.keyword(),
             Task::Known { .. } => "known tests",
             Task::Repeat { .. } => "repeat",
-            Task::Shrink(_) => "shrink",
+            Task::Shrink(_) | Task::ShrinkEach { .. } => "shrink",
             Task::Lab(_) => "lab",
             Task::Compensated(_) => "compensated",
             Task::Variations(_) => "variations",

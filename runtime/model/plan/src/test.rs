@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::condition::Condition;
-use crate::{Bound, MetricId, OperationId};
+use crate::{Bound, Messages, MetricId, OperationId};
 
 /// One test configuration: what a search evolves and a run applies. An empty list disturbs nothing.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -23,6 +23,10 @@ pub struct TestOperation {
     pub parameters: Vec<Choice>,
     /// Seed of its draws, which are keyed by message index: repeating a test repeats its disturbance exactly.
     pub operation_seed: u64,
+    /// The only messages that it alters while it is active; `None` for all. It decides on all messages as it would
+    /// without the list.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub messages: Option<Messages>,
 }
 
 /// When an operation of a test is active. [`Activation::Offline`] is that of the operations that are

@@ -361,6 +361,7 @@ pub fn use_of(operation: u32, start: f64, end: f64, parameters: Vec<Choice>, ope
         activation: Activation::Time { start, end },
         parameters,
         operation_seed,
+        messages: None,
     }
 }
 

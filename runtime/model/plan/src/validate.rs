@@ -20,8 +20,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use crate::condition::{Condition, Constraint, Operand};
 use crate::{
     Activation, Bound, CampaignPlan, Choice, Domain, Failing, FieldRef, KnownTest, KnownTestId, LabTask, MessageId,
-    Metric, MetricId, MetricSource, Operation, OperationId, OperationKind, RequirementId, SCHEMA, Shrinking, Span,
-    Task, Test, TopicId, Type, Undisturbed, Variations,
+    Messages, Metric, MetricId, MetricSource, Operation, OperationId, OperationKind, RequirementId, SCHEMA, Shrinking,
+    Span, Task, Test, TopicId, Type, Undisturbed, Variations,
 };
 
 use check::{
@@ -111,7 +111,19 @@ impl CampaignPlan {
             let (needed, chosen) = (operation.parameters.len(), used.parameters.len());
             at("parameters", require(needed == chosen, || format!("there are {chosen} instead of {needed}")))?;
             let mut domains = operation.parameters.iter().map(|parameter| &parameter.domain);
-            each("parameters", &used.parameters, |choice| domains.next().map_or(Ok(()), |domain| fits(choice, domain)))
+            each("parameters", &used.parameters, |choice| {
+                domains.next().map_or(Ok(()), |domain| fits(choice, domain))
+            })?;
+            at("messages", used.messages.as_ref().map_or(Ok(()), |messages| self.sound_messages(messages, operation)))
+        })
+    }
+
+    /// That an operation can meet the listed messages. It can be numbered as far as results can record.
+    fn sound_messages(&self, messages: &Messages, operation: &Operation) -> Checked {
+        let wires = self.wires_of(operation).len();
+        messages.runs().iter().try_for_each(|run| {
+            require((run.wire as usize) < wires, || format!("wire {} is not one of {wires}", run.wire))?;
+            require(i64::try_from(run.last).is_ok(), || format!("{} is beyond 63 bits", run.last))
         })
     }
 
@@ -254,20 +266,10 @@ impl CampaignPlan {
                 at("runs", at_least_one(*runs))
             }
             Task::Repeat { test, .. } => at("test", self.validate_test(test)),
-            Task::Shrink(Shrinking { test, failing, runs, .. }) => {
-                at("test", self.validate_test(test))?;
-                if let Failing::Violation { requirements, margins } = failing {
-                    at("failing.requirements", filled(requirements))?;
-                    each("failing.requirements", requirements, |&id| self.has_requirement(id))?;
-                    let sound = |&margin: &f64| margin.is_finite() && margin >= 0.0;
-                    if !(margins.is_empty() || margins.len() == requirements.len()) || !margins.iter().all(sound) {
-                        return at(
-                            "failing.margins",
-                            wrong("is not one finite number of at least 0 for each requirement"),
-                        );
-                    }
-                }
-                at("runs", at_least_one(*runs))
+            Task::Shrink(shrinking) => self.sound_shrinking(shrinking),
+            Task::ShrinkEach { each: tests } => {
+                at("each", filled(tests))?;
+                each("each", tests, |shrinking| self.sound_shrinking(shrinking))
             }
             Task::Variations(Variations { name: of, dimension: _, tests }) => {
                 at("name", name(of))?;
@@ -287,6 +289,20 @@ impl CampaignPlan {
                 at("repeats", at_least_one(*repeats))
             }
         }
+    }
+
+    fn sound_shrinking(&self, shrinking: &Shrinking) -> Checked {
+        let Shrinking { test, failing, runs, .. } = shrinking;
+        at("test", self.validate_test(test))?;
+        if let Failing::Violation { requirements, margins } = failing {
+            at("failing.requirements", filled(requirements))?;
+            each("failing.requirements", requirements, |&id| self.has_requirement(id))?;
+            let sound = |&margin: &f64| margin.is_finite() && margin >= 0.0;
+            if !(margins.is_empty() || margins.len() == requirements.len()) || !margins.iter().all(sound) {
+                return at("failing.margins", wrong("is not one finite number of at least 0 for each requirement"));
+            }
+        }
+        at("runs", at_least_one(*runs))
     }
 }
 

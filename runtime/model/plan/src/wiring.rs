@@ -1,7 +1,7 @@
 //! Who is remapped, so that the messages of topics that are cut pass through the relay.
 
 use crate::brokers::BrokerAt;
-use crate::{CampaignPlan, Channel, Dialect, Node, NodeId, Proxy, Topic, TopicId, Wiring};
+use crate::{CampaignPlan, Channel, Dialect, Node, NodeId, Operation, Proxy, Topic, TopicId, Wiring};
 
 /// A name of a topic or service that a node knows under another name.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -53,6 +53,19 @@ impl CampaignPlan {
             remappings.extend(new);
         }
         remappings
+    }
+
+    /// The names of the wires that an operation acts on, in their order: those of its topic, or of the ways to the
+    /// subscribers that it names.
+    pub fn wires_of(&self, operation: &Operation) -> Vec<String> {
+        let Some(id) = operation.topic else { return Vec::new() };
+        let paths = self.topic(id).paths.iter();
+        if operation.to.is_empty() {
+            return paths.cloned().collect();
+        }
+        let distinguished = self.simulator.wiring.get(id.index()).map_or(&[][..], |wiring| &wiring.subscribers);
+        let named = || distinguished.iter().filter(|subscriber| operation.to.contains(subscriber));
+        paths.flat_map(|path| named().map(move |&to| format!("{path}/to/{}", self.node(to).name))).collect()
     }
 
     /// The proxy at which the programs of a node connect, if there is one.

@@ -7,7 +7,8 @@ use rusqlite::types::ValueRef;
 use sesame_plan::{CampaignPlan, Test};
 use sha2::{Digest as _, Sha256};
 
-use crate::{lab_runs, left_out_operations, original_extents, split_operations};
+use crate::monitors::is_in;
+use crate::{altered_messages, lab_runs, left_out_operations, listed_messages, original_extents, split_operations};
 
 /// What is hashed, in this order: a name, and a query whose order of rows depends on nothing but the content. The
 /// meaning of the plan is `?1`.
@@ -91,7 +92,8 @@ const PORTION: usize = 1 << 16;
 ///
 /// Operations that were one operation in an imported file are hashed last, if there are any, then operations that could
 /// not be imported, and windows and ranges of the file that are others in the plan. So are runs of a lab that were
-/// entered by hand: which run of its test each is, but not who made it.
+/// entered by hand: which run of its test each is, but not who made it; and the only messages that operations alter, and
+/// those that runs say they altered.
 ///
 /// Names of columns and verdicts are not hashed.
 pub(super) fn of_connection(connection: &Connection, plan: &CampaignPlan) -> rusqlite::Result<String> {
@@ -108,7 +110,13 @@ pub(super) fn of_connection(connection: &Connection, plan: &CampaignPlan) -> rus
     let extents = extents.then_some((original_extents::TABLE, original_extents::QUERY));
     let entered = lab_runs::are_in(&transaction)?;
     let entered = entered.then_some((lab_runs::TABLE, lab_runs::QUERY));
-    for (name, sql) in CONTENT.iter().copied().chain(split).chain(left_out).chain(extents).chain(entered) {
+    let listed = is_in(&transaction, listed_messages::TABLE)?;
+    let listed = listed.then_some((listed_messages::TABLE, listed_messages::QUERY));
+    let altered = is_in(&transaction, altered_messages::TABLES[0])?;
+    let altered = altered.then(|| altered_messages::TABLES.into_iter().zip(altered_messages::QUERIES));
+    let at_will =
+        [split, left_out, extents, entered, listed].into_iter().flatten().chain(altered.into_iter().flatten());
+    for (name, sql) in CONTENT.iter().copied().chain(at_will) {
         feed(&mut portion, ValueRef::Text(name.as_bytes()));
         let mut statement = transaction.prepare(sql)?;
         let columns = statement.column_count();

@@ -11,6 +11,7 @@
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 mod added_latency;
+mod altered_messages;
 mod columns;
 mod course;
 mod cursor;
@@ -29,6 +30,7 @@ mod folder;
 mod imported;
 mod lab_runs;
 mod left_out_operations;
+mod listed_messages;
 mod lost_requirements;
 mod monitors;
 mod original_extents;

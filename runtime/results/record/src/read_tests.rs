@@ -136,6 +136,7 @@ impl Repository {
         let mut unreached = self.unreached(&numbers)?;
         let mut traffic = self.traffic(&numbers)?;
         let mut courses = self.courses(&numbers)?;
+        let mut altered = self.altered_messages(&numbers)?;
         let rows = self.rows(numbers.clone())?;
         let mut effects = self.effects(&numbers, &rows)?;
         let mut records = Vec::with_capacity(rows.len());
@@ -189,6 +190,7 @@ impl Repository {
                     unreached: unreached.remove(&number).unwrap_or_default(),
                     traffic: traffic.remove(&number).unwrap_or_default(),
                     course: courses.remove(&number),
+                    altered: altered.remove(&number),
                     outcome: row.outcome,
                     end: row.end,
                     metrics,
@@ -244,6 +246,7 @@ impl Repository {
                 .map_err(failed)?;
         let ids = self.operation_ids();
         let left_out = self.left_out_operations(numbers.clone())?;
+        let mut listed = self.listed_messages(&numbers)?;
 
         let mut found = Vec::new();
         let mut rows = tests.query(within).map_err(failed)?;
@@ -276,6 +279,7 @@ impl Repository {
                     activation: self.activation(number, operation, window, conditions)?,
                     parameters,
                     operation_seed: self.seed(&operation_seed)?,
+                    messages: listed.remove(&(number, at)),
                 });
             }
             if !chosen.is_empty() {
@@ -304,6 +308,9 @@ impl Repository {
                 values: measured,
                 left_out: left_out.get(&number).copied().unwrap_or_default(),
             });
+        }
+        if let Some(((test, _), _)) = listed.pop_first() {
+            return Err(damaged(format!("{} lists messages without an operation", TestNumber(test))));
         }
         let orphans = [operations.orphan(), choices.orphan(), values.orphan()];
         match orphans.into_iter().flatten().min() {

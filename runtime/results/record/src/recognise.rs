@@ -15,8 +15,8 @@ use sesame_plan::CampaignPlan;
 
 use crate::schema::{DDL, ROBUSTNESS, TRAFFIC, TRAFFIC_SINCE, has_robustness, wide_views};
 use crate::{
-    RecordError, course, lab_runs, left_out_operations, lost_requirements, monitors, original_extents, relay_latencies,
-    series_views, split_operations,
+    RecordError, altered_messages, course, lab_runs, left_out_operations, listed_messages, lost_requirements, monitors,
+    original_extents, relay_latencies, series_views, split_operations,
 };
 
 /// The objects of a schema by name: the kind of each, and the words of the statement that creates it.
@@ -74,13 +74,15 @@ pub(super) fn tables(connection: &Connection, path: &Path, schema: i64) -> Resul
         (original_extents::TABLE, original_extents::DDL),
         (lab_runs::TABLE, lab_runs::DDL),
         (relay_latencies::TABLE, relay_latencies::DDL),
+        (listed_messages::TABLE, listed_messages::DDL),
         (lost_requirements::TABLE, lost_requirements::DDL),
     ];
     let of_monitors = monitors::OBJECTS.map(|name| (name, monitors::DDL));
     let hazards = if schema >= TRAFFIC_SINCE { monitors::HAZARDS } else { monitors::HAZARDS_7 };
     let of_hazards = monitors::HAZARD_OBJECTS.map(|name| (name, hazards));
     let of_course = course::TABLES.map(|name| (name, course::DDL));
-    for (name, ddl) in at_will.into_iter().chain(of_monitors).chain(of_hazards).chain(of_course) {
+    let of_listings = altered_messages::TABLES.map(|name| (name, altered_messages::DDL));
+    for (name, ddl) in at_will.into_iter().chain(of_monitors).chain(of_hazards).chain(of_course).chain(of_listings) {
         if found.contains_key(name) {
             let mut ours = sound(made_by(&["CREATE TABLE tests (number INTEGER PRIMARY KEY)", ddl]));
             ours.retain(|ours, _| ours == name);

@@ -151,6 +151,7 @@ pub fn conditional_test() -> Test {
         activation,
         parameters,
         operation_seed: 11,
+        messages: None,
     };
     let start = Condition::And(Box::new(near()), Box::new(Condition::Or(Box::new(fast()), Box::new(near()))));
     let offset = Choice::Range { low: -0.1, high: 0.2 };
@@ -239,6 +240,7 @@ pub fn observe(plan: &CampaignPlan, test: &Test, seed: u64) -> Observation {
         unreached: Vec::new(),
         traffic: Vec::new(),
         course: None,
+        altered: None,
         metrics: vec![
             shown(collisions, Some(0.0)),
             MetricObservation::whole(Some(fuzzing), true, vec![]),
@@ -286,6 +288,7 @@ fn random_test(plan: &CampaignPlan, seed: u64, number: u32) -> Test {
                 activation: Activation::Time { start, end: start + length },
                 parameters,
                 operation_seed: stream.bits(),
+                messages: None,
             }
         })
         .collect();
@@ -336,6 +339,7 @@ pub fn records(plan: &CampaignPlan, searched: u32) -> Vec<TestRecord> {
                     unreached: Vec::new(),
                     traffic: Vec::new(),
                     course: None,
+                    altered: None,
                     metrics: vec![],
                     monitors: Vec::new(),
                     messages: 0,

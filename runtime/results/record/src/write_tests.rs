@@ -2,7 +2,7 @@
 
 use rusqlite::{Transaction, params};
 
-use sesame_base::observation::{Observation, Outcome};
+use sesame_base::observation::{AlteredMessages, Observation, Outcome};
 use sesame_base::test_number::TestNumber;
 use sesame_notation as notation;
 use sesame_plan::condition::{Condition, Operand};
@@ -10,7 +10,9 @@ use sesame_plan::{Activation, CampaignPlan, Choice};
 
 use crate::columns::index;
 use crate::series::{self, Pieces};
-use crate::{Event, Origin, TestRecord, course, lost_requirements, monitors, traffic};
+use crate::{
+    Event, Origin, TestRecord, altered_messages, course, listed_messages, lost_requirements, monitors, traffic,
+};
 
 /// What SQLite could not return as it was written: numbers that are not finite, counts beyond 63 bits.
 pub(super) fn unrecordable(record: &TestRecord) -> Option<String> {
@@ -22,6 +24,7 @@ pub(super) fn unrecordable(record: &TestRecord) -> Option<String> {
         unreached,
         traffic,
         course,
+        altered,
         metrics,
         monitors,
         messages,
@@ -88,6 +91,9 @@ pub(super) fn unrecordable(record: &TestRecord) -> Option<String> {
     let stretches = course.iter().flat_map(|course| course.heard.iter().flat_map(|heard| &heard.stretches));
     let heard = stretches.flat_map(|span| [span.start, span.end]);
     numbers.extend(traffic.chain(nearest).chain(heard).map(|time| ("the time of a message", time)));
+    if let Some(AlteredMessages::Listed(messages)) = altered {
+        numbers.extend(messages.iter().map(|message| ("the time of an altered message", message.time)));
+    }
     let happened = course.iter().flat_map(|course| course.signals.iter().flat_map(|signal| &signal.events));
     numbers.extend(happened.map(|event| ("the time of what happened in a message", event.at)));
     if let Some((what, number)) = numbers.into_iter().find(|(_, number)| !number.is_finite()) {
@@ -97,7 +103,11 @@ pub(super) fn unrecordable(record: &TestRecord) -> Option<String> {
         let c = &effect.counters;
         [c.seen, c.changed, c.dropped, c.delayed, c.queued, c.injected, c.side_effects, c.unheard]
     });
-    let count = counts.chain([*messages]).find(|&count| i64::try_from(count).is_err())?;
+    let altered = altered.iter().filter_map(|altered| match altered {
+        AlteredMessages::Listed(messages) => messages.iter().map(|message| message.number).max(),
+        AlteredMessages::TooMany => None,
+    });
+    let count = counts.chain([*messages]).chain(altered).find(|&count| i64::try_from(count).is_err())?;
     Some(format!("the count {count}, which is beyond 63 bits,"))
 }
 
@@ -177,6 +187,10 @@ pub(super) fn write_test(
             .execute(params![number, index(position), parent])?;
     }
     write_operations(transaction, plan, record)?;
+    listed_messages::write(transaction, *number, &record.test)?;
+    if let Some(altered) = &observation.altered {
+        altered_messages::write(transaction, *number, altered)?;
+    }
     for (position, path) in observation.unheard.iter().enumerate() {
         transaction
             .prepare_cached("INSERT INTO unheard (test, position, path) VALUES (?1, ?2, ?3)")?

@@ -92,9 +92,10 @@ pub fn export_causes(repository: &Repository, expected: Expected) -> Result<Vec<
     smallest.into_iter().map(|test| export(repository, &TestNumber(test).to_string(), None, expected)).collect()
 }
 
-/// The block of a test that was made out of another one, `original`, in a campaign of this seed.
-pub(super) fn shrunk_block(plan: &CampaignPlan, seed: u64, record: &TestRecord, original: &str) -> String {
-    let name = free_name(plan, &format!("{}_{original}_shrunk", plan.campaign.name));
+/// The block of a test that was made out of another one, `original`, in a campaign of this seed. `of` tells its name
+/// apart from those of other blocks that were made out of the same test.
+pub(super) fn shrunk_block(plan: &CampaignPlan, seed: u64, record: &TestRecord, original: &str, of: &str) -> String {
+    let name = free_name(plan, &format!("{}_{original}{of}_shrunk", plan.campaign.name));
     block(plan, &found_by(plan, seed, original, ", shrunk"), record, &name, requirements(plan, record))
 }
 
@@ -244,6 +245,7 @@ mod tests {
             activation: Activation::Offline,
             parameters: vec![Choice::Text { text: "hot".to_owned() }],
             operation_seed: 11,
+            messages: None,
         };
         let record = sample::record(&plan, 5, sesame_record::Origin::Search, Test { operations: vec![used] });
         let before = block(&plan, "T5 of `coverage_experiment`, seed 42.", &record, "spoilt", Vec::new());

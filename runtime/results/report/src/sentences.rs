@@ -16,7 +16,7 @@ use crate::facts::coverage::CoverageSummary;
 use crate::facts::readable::short_numbers;
 use crate::facts::repetition::ViolationRate;
 use crate::facts::show::{OperationReport, TestReport, VerdictReport};
-use crate::facts::shrinking::Shrinking;
+use crate::facts::shrinking::{Shrinking, ShrunkMessages};
 use crate::facts::summary::Summary;
 use crate::facts::wording::outcome_words;
 use sesame_base::visible::visible;
@@ -287,12 +287,15 @@ pub(crate) fn outcome_sentence(test: &TestReport) -> String {
     sentence
 }
 
-/// When an operation was to be active: its window, or the conditions that switched it; a dash for an offline one.
+/// When an operation was to be active: its window, or the conditions that switched it; a dash for an offline one. The
+/// only messages that it alters follow, if they are listed.
 pub(crate) fn planned_text(operation: &OperationReport) -> String {
-    match (&operation.conditions, operation.planned) {
+    let when = match (&operation.conditions, operation.planned) {
         (Some(conditions), _) => short_numbers(conditions),
         (None, planned) => spans_text(planned.as_slice()),
-    }
+    };
+    let listed = operation.messages.as_ref().map_or(String::new(), |messages| format!(", only messages {messages}"));
+    format!("{when}{listed}")
 }
 
 /// Spans in seconds, as in `8.00–57.00 s`; a dash for none.
@@ -404,4 +407,15 @@ pub(crate) fn shrinking_sentence(shrinking: &Shrinking) -> String {
             format!("{} {}; {tried}, and more evaluations could perhaps shrink it further", after.test, shrinking.fails)
         }
     }
+}
+
+/// How far a test was reduced to single messages, in a sentence; `None` if that was not asked for.
+pub(crate) fn shrunk_messages_sentence(shrinking: &Shrinking) -> Option<String> {
+    let (after, ShrunkMessages { reduced, text, left }) = (shrinking.after.as_ref()?, shrinking.messages.as_ref()?);
+    Some(match (reduced, left.len()) {
+        (false, _) => format!("{} was not reduced to single messages: {text}", after.test),
+        (true, 1) => format!("What it needs is {text}"),
+        (true, _) if shrinking.minimal => format!("What it needs are {text}: without any single one it does not fail"),
+        (true, _) => format!("What it needs are at most {text}"),
+    })
 }

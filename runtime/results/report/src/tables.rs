@@ -382,6 +382,16 @@ pub(super) fn sizes(shrinking: &Shrinking) -> Table {
     table
 }
 
+/// Where parameters of a smallest test begin to matter.
+pub(super) fn thresholds(shrinking: &Shrinking) -> Table {
+    let mut table =
+        Table::with([Column::heading("operation"), Column::words("still fails"), Column::words("does not fail")]);
+    for threshold in &shrinking.thresholds {
+        table.row([&threshold.operation, &threshold.fails_text, &threshold.passes_text].map(Datum::text));
+    }
+    table
+}
+
 /// The steps by which a test was shrunk.
 pub(super) fn accepted_steps(shrinking: &Shrinking) -> Table {
     let mut table = Table::with([Column::heading("test"), Column::words("tried"), Column::sentence("change")]);

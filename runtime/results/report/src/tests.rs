@@ -98,7 +98,7 @@ fn what_acts_on_nodes_is_shown_with_the_node_or_the_parameter() {
         let parameters = operation.parameters.iter().map(|_| Choice::Value { value: 0.25 }).collect();
         plan.operations.push(operation);
         let activation = Activation::Time { start: 1.0, end: 2.0 };
-        TestOperation { operation: id, parameters, activation, operation_seed: 0 }
+        TestOperation { operation: id, parameters, activation, operation_seed: 0, messages: None }
     });
     let test = Test { operations: used.collect() };
     let folder = tempfile::tempdir().unwrap();

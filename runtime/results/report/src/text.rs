@@ -18,9 +18,9 @@ use crate::facts::show::{TestList, TestReport};
 use crate::facts::shrinking::Shrinking;
 use crate::facts::summary::Summary;
 use crate::sentences::{
-    QUARANTINED, beyond_sentence, causes_sentence, confirmation_sentence, counts_sentence, coverage_sentence, headline,
-    mend_sentence, monitors_run_again, monitors_sentence, once_sentence, outcome_sentence, shrinking_sentence,
-    values_sentence, without_effect_sentence,
+    QUARANTINED, beyond_sentence, causes_sentence, confirmation_sentence, counts_sentence, coverage_sentence,
+    disturbances_text, headline, mend_sentence, monitors_run_again, monitors_sentence, once_sentence, outcome_sentence,
+    shrinking_sentence, shrunk_messages_sentence, values_sentence, without_effect_sentence,
 };
 use crate::tables;
 
@@ -46,7 +46,10 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
     if let Some(found) = &summary.shrinking {
         shrinking(&mut text, found, options);
     }
-    if summary.objectives.is_empty() && summary.shrinking.is_none() {
+    for found in &summary.shrinkings {
+        shrunk_cause(&mut text, found, options);
+    }
+    if summary.objectives.is_empty() && summary.shrunk().next().is_none() {
         section(&mut text, "Values", &tables::spreads(&summary.spreads), options);
     }
     section(&mut text, "Requirements", &tables::requirements(summary), options);
@@ -176,9 +179,35 @@ fn shrinking(text: &mut String, shrinking: &Shrinking, options: TextOptions) {
         text.push_str(&sizes.text(options));
     }
     paragraph(text, &format!("{}.", shrinking_sentence(shrinking)), options);
+    if let Some(sentence) = shrunk_messages_sentence(shrinking) {
+        paragraph(text, &format!("{sentence}."), options);
+    }
     if shrinking.steps.iter().filter(|step| step.kept).count() > 1 {
         section(text, "Accepted steps", &tables::accepted_steps(shrinking), options);
         paragraph(text, "Tests that did not fail are on the page, and in the results as JSON.", options);
+    }
+    section(text, "Thresholds", &tables::thresholds(shrinking), options);
+    if let Some(block) = &shrinking.block {
+        text.push('\n');
+        text.push_str(block);
+    }
+}
+
+/// How the smallest test of a cause was shrunk, in short.
+fn shrunk_cause(text: &mut String, shrinking: &Shrinking, options: TextOptions) {
+    text.push('\n');
+    text.push_str(&options.heading(&format!("{}, which {}", shrinking.test, shrinking.fails)));
+    text.push('\n');
+    paragraph(text, &format!("{}.", shrinking_sentence(shrinking)), options);
+    if !shrinking.operations.is_empty() {
+        paragraph(text, &format!("It does: {}.", disturbances_text(&shrinking.operations)), options);
+    }
+    if let Some(sentence) = shrunk_messages_sentence(shrinking) {
+        paragraph(text, &format!("{sentence}."), options);
+    }
+    let thresholds = tables::thresholds(shrinking);
+    if !thresholds.is_empty() {
+        text.push_str(&thresholds.text(options));
     }
     if let Some(block) = &shrinking.block {
         text.push('\n');

@@ -12,7 +12,7 @@ use crate::files::{NoFiles, SpaceFiles};
 use crate::fuzz::{ChoiceError, OperationEntry};
 use crate::metric::MetricTable;
 use crate::panic_capture;
-use crate::relay::{Listener, Relay};
+use crate::relay::{AlteredList, Listener, Relay};
 use crate::simulator::Progress;
 use crate::transport::{Fault, Transport, TransportError};
 use crate::wire::WireTable;
@@ -35,7 +35,7 @@ pub fn evaluate(
     simulator_seed: u64,
     custom: &mut Custom<'_>,
 ) -> Result<Observation, ChoiceError> {
-    evaluate_tapped(plan, wires, metrics, transport, &Run { test, simulator_seed, withheld: &[] }, custom, None)
+    evaluate_tapped(plan, wires, metrics, transport, &Run { simulator_seed, ..Run::of(test) }, custom, None)
 }
 
 /// The input of a run.
@@ -47,6 +47,15 @@ pub struct Run<'a> {
     pub simulator_seed: u64,
     /// Monitors whose mitigation is not sent.
     pub withheld: &'a [MonitorId],
+    /// Whether the messages that operations alter are listed.
+    pub lists_altered: bool,
+}
+
+impl<'a> Run<'a> {
+    /// A run of a test with the simulator's seed 0, in which monitors mitigate and no messages are listed.
+    pub fn of(test: &'a Test) -> Run<'a> {
+        Run { test, simulator_seed: 0, withheld: &[], lists_altered: false }
+    }
 }
 
 /// As [`evaluate`], with a listener besides the metrics.
@@ -55,16 +64,20 @@ pub fn evaluate_tapped(
     wires: &WireTable,
     metrics: &MetricTable<'_>,
     transport: &mut dyn Transport,
-    &Run { test, simulator_seed, withheld }: &Run<'_>,
+    &Run { test, simulator_seed, withheld, lists_altered }: &Run<'_>,
     custom: &mut Custom<'_>,
     tap: Option<&mut dyn Listener>,
 ) -> Result<Observation, ChoiceError> {
     #[expect(clippy::disallowed_methods, reason = "how long a run took is recorded, and decides nothing")]
     let started = Instant::now();
+    let mut altered = lists_altered.then(|| AlteredList::new(plan, wires, test));
     let relay = Relay::new(plan, wires, test, metrics.start(), custom.hooks)?;
     let mut relay = relay.compensated(plan, test, simulator_seed).withholding(withheld);
     if let Some(tap) = tap {
         relay = relay.tapped(tap);
+    }
+    if let Some(altered) = &mut altered {
+        relay = relay.tapped(altered);
     }
     let until = (SimTime::from_seconds(plan.campaign.end_after), plan.campaign.end_when.as_ref());
     let files = custom.files.as_mut();
@@ -101,6 +114,7 @@ pub fn evaluate_tapped(
         unreached: if ended { finished.unreached } else { Vec::new() },
         traffic: finished.traffic,
         course: finished.course,
+        altered: altered.map(AlteredList::listed),
         metrics: finished.metrics,
         monitors: finished.monitors,
         messages: finished.messages,

@@ -14,6 +14,7 @@
 //! A change of a message is an effect only if its wire has a receiver: a subscriber, or an outbound metric. Changes on
 //! other wires are counted separately.
 
+mod altered;
 mod compensation;
 mod course;
 mod crossings;
@@ -49,6 +50,7 @@ use crate::monitor::Monitors;
 use crate::value::Value;
 use crate::wire::{Wire, WireTable};
 
+pub(crate) use altered::AlteredList;
 pub(crate) use crossings::{beyond, reaching};
 pub use exchange::{Delivery, Exchange};
 pub use finished::Finished;
@@ -160,6 +162,7 @@ impl<'a> Relay<'a> {
                 activity: Activity::new(&choice.activation, operation.within),
                 since: SimTime::ZERO,
                 operation_seed: choice.operation_seed,
+                messages: choice.messages.clone(),
                 timed: operation.timed,
                 tail_since: None,
                 tails: Vec::new(),

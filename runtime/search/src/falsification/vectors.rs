@@ -70,6 +70,7 @@ impl Vectors {
                 activation: Activation::Offline,
                 parameters: kind.parameters.iter().map(choice).collect(),
                 operation_seed: derive_seed(self.seed, "vector", &[number, at]),
+                messages: None,
             });
         }
         Test { operations }

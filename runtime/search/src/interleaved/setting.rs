@@ -68,7 +68,8 @@ impl Setting {
         parameters: Vec<Choice>,
         stream: &mut Stream,
     ) -> TestOperation {
-        TestOperation { operation: self.kind(kind).operation, activation, parameters, operation_seed: stream.bits() }
+        let operation = self.kind(kind).operation;
+        TestOperation { operation, activation, parameters, operation_seed: stream.bits(), messages: None }
     }
 
     /// An activation that covers as much of a stretch of time as is permitted; `None` if no permitted window lies in

@@ -35,7 +35,7 @@ pub(super) fn decoded(test_space: &TestSpace, seed: u64, index: u32, mut number:
             };
             let parameters = (0..kind.parameters.len()).map(|parameter| choice(kind, parameter, &mut value)).collect();
             let operation_seed = derive_seed(seed, "draws", &[u64::from(index), slot as u64]);
-            TestOperation { operation: kind.operation, activation, parameters, operation_seed }
+            TestOperation { operation: kind.operation, activation, parameters, operation_seed, messages: None }
         })
         .collect();
     let mut test = Test { operations };

@@ -312,7 +312,8 @@ impl FullFactorial {
             for activation in kind.activations(copies, next()) {
                 let parameters = kind.parameters.iter().map(|levels| levels.choice(&mut next)).collect();
                 let operation_seed = derive_seed(self.seed, "grid", &[u64::from(index), operations.len() as u64]);
-                operations.push(TestOperation { operation: kind.operation, activation, parameters, operation_seed });
+                let operation = kind.operation;
+                operations.push(TestOperation { operation, activation, parameters, operation_seed, messages: None });
             }
         }
         Test { operations }

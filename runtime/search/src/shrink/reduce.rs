@@ -4,16 +4,39 @@
 //! that have to be run; with their results it starts again from the beginning, and gets further. So it has no state
 //! between two questions, and a resumed reduction is the same reduction.
 
-use sesame_plan::Test;
+use sesame_base::observation::{AlteredMessage, AlteredMessages};
+use sesame_plan::{Messages, Test, TestOperation};
 
 use crate::shrink::Phase;
 use crate::shrink::axis::{self, ShrinkAxis};
 use crate::shrink::space::ShrinkSpace;
 
+/// How many tests with fewer messages are asked for at once, at most. There may be thousands, and the first that fails
+/// makes the others needless.
+const AT_ONCE: usize = 8;
+
 /// Which tests are known to fail.
 pub(super) trait Oracle {
     /// The index of a test that was asked for, and whether it fails.
     fn find(&self, test: &Test) -> Option<(usize, bool)>;
+
+    /// The messages that the operations of a test alter, if that was asked for.
+    fn altered(&self, test: &Test) -> Option<&AlteredMessages>;
+}
+
+/// How the reduction to single messages ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MessagesEnd {
+    /// No message can be left out; or there are no more runs, if the result is not minimal.
+    Reduced,
+    /// The operations alter no messages: they act before the start, after the end, or on nodes.
+    NoneAltered,
+    /// The operations alter more messages than a run lists.
+    TooMany,
+    /// The test does not fail any more if its operations alter exactly the messages that they altered before.
+    NotReproduced,
+    /// There were no runs left to begin with.
+    OutOfRuns,
 }
 
 /// Tests that have to be run before the reduction can go on; all are different, and none is known.
@@ -33,6 +56,8 @@ pub(super) struct Reduced {
     pub(super) accepted: Vec<usize>,
     /// Whether every smaller test that is one step away was run and does not fail.
     pub(super) minimal: bool,
+    /// How the reduction to single messages ended; `None` if it was not asked for, or did not begin.
+    pub(super) messages: Option<MessagesEnd>,
 }
 
 /// A reduction in progress.
@@ -53,15 +78,19 @@ pub(super) fn reduce<A: Oracle>(
     original: &Test,
     oracle: &A,
     exhausted: bool,
+    to_messages: bool,
 ) -> Result<Reduced, Pending> {
     let mut reduction =
         Reduction { space, oracle, exhausted, guessed: false, test: original.clone(), accepted: Vec::new() };
+    let mut messages = None;
     let found = reduction.failing(Phase::Original, std::slice::from_ref(original))?;
     if let Some(index) = found[0] {
         reduction.accepted.push(index);
         reduction.all_the_way()?;
+        messages = if to_messages { Some(reduction.fewer_messages()?) } else { None };
     }
-    Ok(Reduced { minimal: !reduction.guessed && !reduction.accepted.is_empty(), accepted: reduction.accepted })
+    let minimal = !reduction.guessed && !reduction.accepted.is_empty();
+    Ok(Reduced { minimal, accepted: reduction.accepted, messages })
 }
 
 impl<A: Oracle> Reduction<'_, A> {
@@ -111,40 +140,111 @@ impl<A: Oracle> Reduction<'_, A> {
         Ok(Some(at))
     }
 
-    /// Delta debugging (Zeller and Hildebrandt 2002, ddmin): parts of the operations alone, then all but a part, in
-    /// ever smaller parts.
+    /// Leaves out operations as long as the rest fails.
     fn fewer_operations(&mut self) -> Result<(), Pending> {
+        let (operations, fewest) = (self.test.operations.clone(), self.space.fewest);
+        self.fewer(Phase::Operations, operations, usize::MAX, &|kept| {
+            (kept.len() >= fewest).then(|| Test { operations: kept.to_vec() })
+        })
+    }
+
+    /// Leaves out messages that operations alter as long as the rest fails.
+    fn fewer_messages(&mut self) -> Result<MessagesEnd, Pending> {
+        let altered = match self.altered()? {
+            Some(AlteredMessages::Listed(altered)) => altered,
+            Some(AlteredMessages::TooMany) => return Ok(MessagesEnd::TooMany),
+            None => {
+                self.guessed = true;
+                return Ok(MessagesEnd::OutOfRuns);
+            }
+        };
+        if altered.is_empty() {
+            return Ok(MessagesEnd::NoneAltered);
+        }
+        let (whole, fewest) = (self.test.clone(), self.space.fewest);
+        let altering = |place: usize| altered.iter().any(|message| message.operation as usize == place);
+        let altering: Vec<bool> = (0..whole.operations.len()).map(altering).collect();
+        let test_of = |kept: &[AlteredMessage]| {
+            let mut test = Test::default();
+            for (place, used) in whole.operations.iter().enumerate() {
+                let of_this = kept.iter().filter(|message| message.operation as usize == place);
+                let messages = Messages::of(of_this.map(|message| (message.wire, message.number)));
+                match messages {
+                    Some(_) => test.operations.push(TestOperation { messages, ..used.clone() }),
+                    // What altered no message matters otherwise, or not at all: it is left as it is.
+                    None if !altering[place] => test.operations.push(used.clone()),
+                    None => {}
+                }
+            }
+            (test.operations.len() >= fewest).then_some(test)
+        };
+        let begins = test_of(&altered).into_iter().collect();
+        let guessed = self.guessed;
+        if self.first_failing(Phase::Messages, begins)?.is_none() {
+            return Ok(if self.guessed && !guessed { MessagesEnd::OutOfRuns } else { MessagesEnd::NotReproduced });
+        }
+        self.fewer(Phase::Messages, altered, AT_ONCE, &test_of)?;
+        // For the times of those that are left.
+        self.altered()?;
+        Ok(MessagesEnd::Reduced)
+    }
+
+    /// The messages that the operations of the test alter; `None` if that is not known, and no more runs can tell.
+    fn altered(&self) -> Result<Option<AlteredMessages>, Pending> {
+        match self.oracle.altered(&self.test) {
+            None if !self.exhausted => {
+                let (tests, base) = (vec![self.test.clone()], self.accepted.last().copied());
+                Err(Pending { phase: Phase::Listing, tests, base })
+            }
+            known => Ok(known.cloned()),
+        }
+    }
+
+    /// Delta debugging (Zeller and Hildebrandt 2002, ddmin): parts of the items alone, then all but a part, in ever
+    /// smaller parts. Of some items there is no test; of others, so many are asked for at once.
+    fn fewer<T: Clone>(
+        &mut self,
+        phase: Phase,
+        mut items: Vec<T>,
+        at_once: usize,
+        test_of: &dyn Fn(&[T]) -> Option<Test>,
+    ) -> Result<(), Pending> {
         let mut parts = 2;
-        loop {
-            let all = self.test.operations.len();
-            if all <= self.space.fewest {
-                return Ok(());
-            }
+        while items.len() > 1 {
+            let all = items.len();
             parts = parts.min(all);
-            let bounds: Vec<(usize, usize)> =
-                (0..parts).map(|part| (part * all / parts, (part + 1) * all / parts)).collect();
-            let test_of = |keep: &dyn Fn(usize) -> bool| {
-                let kept = self.test.operations.iter().enumerate().filter(|(at, _)| keep(*at));
-                Test { operations: kept.map(|(_, used)| used.clone()).collect() }
+            let bounds = move |part: usize| (part * all / parts, (part + 1) * all / parts);
+            // Of two parts, all but one is the other one.
+            let kept_of = |at: usize| match at.checked_sub(parts) {
+                None => items[bounds(at).0..bounds(at).1].to_vec(),
+                Some(part) => [&items[..bounds(part).0], &items[bounds(part).1..]].concat(),
             };
-            let alone = bounds.iter().map(|&(from, to)| test_of(&|at| from <= at && at < to));
-            let without = bounds.iter().map(|&(from, to)| test_of(&|at| at < from || to <= at));
-            let mut tests: Vec<Test> = alone.collect();
-            if parts > 2 {
-                tests.extend(without);
+            let count = if parts > 2 { 2 * parts } else { 2 };
+            let mut smaller = None;
+            let mut next = 0;
+            while smaller.is_none() && next < count {
+                let end = next.saturating_add(at_once).min(count);
+                let kept = (next..end).map(kept_of).filter_map(|kept| Some((test_of(&kept)?, kept)));
+                let (tests, kept): (Vec<Test>, Vec<Vec<T>>) = kept.unzip();
+                let found = self.first_failing(phase, tests)?;
+                smaller = found.and_then(|at| kept.into_iter().nth(at));
+                next = end;
+                if smaller.is_none() && self.guessed {
+                    // All others are unknown as well.
+                    return Ok(());
+                }
             }
-            tests.retain(|test| test.operations.len() >= self.space.fewest);
-            let before = all;
-            match self.first_failing(Phase::Operations, tests)? {
+            match smaller {
                 // One part of two, or all but one of more: in either case parts of the same size are left.
-                Some(_) => {
-                    let left = self.test.operations.len();
-                    parts = if left * 2 > before { (parts - 1).max(2) } else { 2 };
+                Some(kept) => {
+                    parts = if kept.len() * 2 > all { (parts - 1).max(2) } else { 2 };
+                    items = kept;
                 }
                 None if parts >= all => return Ok(()),
                 None => parts *= 2,
             }
         }
+        Ok(())
     }
 
     /// Turns axes as far as they go, all of them side by side, each by bisection.

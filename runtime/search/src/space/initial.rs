@@ -100,7 +100,7 @@ pub(crate) fn place(value: f64, parts: usize) -> usize {
 pub(crate) fn fresh_operation(kind: &OperationSpace, stream: &mut Stream) -> TestOperation {
     let activation = fresh_activation(kind, stream);
     let parameters = (0..kind.parameters.len()).map(|parameter| fresh_choice(kind, parameter, stream)).collect();
-    TestOperation { operation: kind.operation, activation, parameters, operation_seed: stream.bits() }
+    TestOperation { operation: kind.operation, activation, parameters, operation_seed: stream.bits(), messages: None }
 }
 
 /// A fresh choice for a parameter, by its position.

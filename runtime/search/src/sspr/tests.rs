@@ -142,6 +142,7 @@ fn a_planned_window_is_cut_at_the_end_of_the_campaign() {
             activation: Activation::Time { start, end },
             parameters: Vec::new(),
             operation_seed: 0,
+            messages: None,
         }],
     };
     let cut = planned(&plan, &test(6.0, 9.0)).unwrap();

@@ -20,6 +20,17 @@ pub(crate) struct TestOperation {
     pub(crate) choices: Vec<(Name, Choice)>,
     pub(crate) activation: Activation,
     pub(crate) seed: Option<Count>,
+    pub(crate) messages: Vec<ListedRun>,
+}
+
+/// Messages that follow each other, of those that an operation of a test alters only.
+#[derive(Debug)]
+pub(crate) struct ListedRun {
+    pub(crate) span: Span,
+    pub(crate) first: Count,
+    pub(crate) last: Option<Count>,
+    /// Which wire of the operation, from 1.
+    pub(crate) wire: Option<Count>,
 }
 
 /// When an operation of a test is active.

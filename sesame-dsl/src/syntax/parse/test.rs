@@ -4,7 +4,7 @@ use sesame_grammar::Rule;
 
 use super::reader::{Pair, Reader, child, children, expect_child, first_of};
 use crate::syntax::ast::{
-    Activation, Choice, Count, Expectation, Name, Range, Test, TestOperation, Trigger, TriggerEnd,
+    Activation, Choice, Count, Expectation, ListedRun, Name, Range, Test, TestOperation, Trigger, TriggerEnd,
 };
 
 impl Reader<'_> {
@@ -56,7 +56,17 @@ impl Reader<'_> {
             _ => Activation::Trigger(Box::new(self.trigger(&activation))),
         };
         let seed = child(pair, Rule::draw_seed).map(|seed| self.count(&expect_child(&seed, Rule::number)));
-        TestOperation { operation, choices, activation, seed }
+        let messages = child(pair, Rule::listed_messages).map_or_else(Vec::new, |listed| {
+            children(&listed, Rule::listed_run).map(|run| self.listed_run(&run)).collect()
+        });
+        TestOperation { operation, choices, activation, seed, messages }
+    }
+
+    fn listed_run(&mut self, pair: &Pair<'_>) -> ListedRun {
+        let mut ends = children(pair, Rule::number).map(|end| self.count(&end)).collect::<Vec<_>>().into_iter();
+        let first = ends.next().expect("a run has a first message");
+        let wire = child(pair, Rule::on_wire).map(|wire| self.count(&expect_child(&wire, Rule::number)));
+        ListedRun { span: self.span(pair), first, last: ends.next(), wire }
     }
 
     fn window(&mut self, pair: &Pair<'_>) -> Range {

@@ -156,6 +156,7 @@ fn an_activation_that_does_not_fit_its_operation_is_damage() {
         activation: Activation::Offline,
         parameters: vec![Choice::Text { text: "hot".to_owned() }],
         operation_seed: 1,
+        messages: None,
     };
     let mut test = sample::conditional_test();
     test.operations.push(offline);

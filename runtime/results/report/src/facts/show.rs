@@ -145,6 +145,10 @@ pub struct OperationReport {
     /// What switched it on and off, in the words of the language; `None` where a planned window did, and for one that
     /// acts before the start or after the end.
     pub conditions: Option<String>,
+    /// The only messages that it alters while it is active, as the list of a `test` block: `248..250, 12 on 2`. Left out
+    /// where it alters all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub messages: Option<String>,
     /// When it was seen to be active, in seconds; `None` where the run could not report it.
     pub observed: Option<Vec<Span>>,
     /// What the test chose.
@@ -366,6 +370,7 @@ pub(crate) fn operations(plan: &CampaignPlan, record: &TestRecord) -> Vec<Operat
             resource: notation::resource(plan, operation),
             planned,
             conditions,
+            messages: used.messages.as_ref().map(notation::messages),
             observed: effect.map(|effect| effect.intervals.clone()),
             choices: operation
                 .parameters

@@ -4,16 +4,20 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use sesame_base::observation::{ALTERED_LISTED, AlteredMessage, AlteredMessages};
 use sesame_base::test_number::TestNumber;
 use sesame_notation as notation;
-use sesame_plan::{Activation, CampaignPlan, Dimension, Failing, MetricId, RequirementId, Test, TestOperation};
+use sesame_plan::{
+    Activation, CampaignPlan, Choice, Dimension, Failing, MetricId, RequirementId, Shrinking as Task, Test,
+    TestOperation,
+};
 use sesame_present::number::{self, fixed};
 use sesame_record::{MetricValue, RecordError, Repository, TestRow, fails};
-use sesame_search::shrink::Shrink;
-use sesame_search::shrink::strength;
+use sesame_search::shrink::{MessagesEnd, Phase, Shown, Shrink, ShrinkEach, Threshold, strength};
 use sesame_search::{Strategy as _, sspr};
 
 use crate::export::shrunk_block;
+use crate::facts::show::{OperationReport, operations as operation_reports};
 use crate::facts::wording::{bounds_on, operations, value_text};
 
 /// How a test was shrunk.
@@ -31,10 +35,69 @@ pub struct Shrinking {
     pub before: Option<TestSize>,
     /// The smallest test that still fails; `None` if not even the original failed again.
     pub after: Option<TestSize>,
+    /// The operations of the smallest test.
+    pub operations: Vec<OperationReport>,
+    /// How far the test was reduced to single messages, if that was asked for and there is a smallest test. Left out
+    /// otherwise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub messages: Option<ShrunkMessages>,
+    /// Where parameters of the smallest test begin to matter, before it was reduced to single messages. Parameters that
+    /// may have their mildest values have no threshold.
+    pub thresholds: Vec<ShrinkThreshold>,
     /// The smallest test as a `test` block of the language.
     pub block: Option<String>,
     /// Every test that was tried, in the order in which they were asked for.
     pub steps: Vec<ShrinkStep>,
+}
+
+/// Where a parameter begins to matter: one step further towards its mildest value, the smallest test does not fail.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ShrinkThreshold {
+    /// The operation.
+    pub operation: String,
+    /// The position of the operation in the smallest test, from 0.
+    pub position: usize,
+    /// The parameter.
+    pub parameter: String,
+    /// Its unit; `null` for probabilities and plain numbers.
+    pub unit: Option<String>,
+    /// The mildest choice that was seen to fail.
+    pub fails: Choice,
+    /// The strongest choice that was seen not to fail.
+    pub passes: Choice,
+    /// `fails` in words.
+    pub fails_text: String,
+    /// `passes` in words.
+    pub passes_text: String,
+}
+
+/// How far a test was reduced to single messages.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ShrunkMessages {
+    /// Whether it was; otherwise `text` says why not.
+    pub reduced: bool,
+    /// What the smallest test alters, as in ``three `odom` messages, at 12.40, 12.45 and 12.50 s``, or why the test was
+    /// not reduced to messages.
+    pub text: String,
+    /// The messages that the smallest test alters, by operation; none if it was not reduced to messages.
+    pub left: Vec<LeftMessage>,
+}
+
+/// A message that an operation of the smallest test alters.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LeftMessage {
+    /// The operation.
+    pub operation: String,
+    /// The position of the operation in the test, from 0.
+    pub position: usize,
+    /// The topic that it disturbs.
+    pub topic: String,
+    /// The name of the message on the wire.
+    pub path: String,
+    /// The number of the message among those published there, from 0.
+    pub number: u64,
+    /// When the operation altered it, in seconds of simulation time; `null` if no run was left to tell.
+    pub time: Option<f64>,
 }
 
 /// How large a test is.
@@ -99,21 +162,26 @@ impl Shrinking {
     }
 }
 
-/// How a test was shrunk, if these results are of a shrink: the search is replayed over the recorded tests.
-pub(crate) fn shrinking(repository: &Repository, rows: &[TestRow]) -> Result<Option<Shrinking>, RecordError> {
-    let plan = repository.plan();
-    let Some(shrunk) = repository.task().shrinking() else { return Ok(None) };
-    let (name, failing) = (shrunk.name.clone(), &shrunk.failing);
-    let mut search = Shrink::new(plan, shrunk.clone());
+/// How each test of a shrink was shrunk; none if these results are of no shrink. The search is replayed over the
+/// recorded tests.
+pub(crate) fn shrinkings(repository: &Repository, rows: &[TestRow]) -> Result<Vec<Shrinking>, RecordError> {
+    let (plan, tasks) = (repository.plan(), repository.task().shrinkings());
+    if tasks.is_empty() {
+        return Ok(Vec::new());
+    }
+    let mut search = ShrinkEach::new(plan, tasks);
     let rows: BTreeMap<u32, &TestRow> = rows.iter().map(|row| (row.number, row)).collect();
+    let mut altered = repository.altered_messages(&(0..=u32::MAX))?;
     let mut number = 0;
     loop {
         let asked = search.ask();
+        let failing = &tasks[search.current()].failing;
         let mut results = Vec::with_capacity(asked.len());
         for candidate in &asked {
             number += 1;
             let Some(row) = rows.get(&number).filter(|row| row.test == candidate.test) else { break };
-            results.push((number, fails(plan, failing, &row.outcome, |id| row.value(id))));
+            let failed = fails(plan, failing, &row.outcome, |id| row.value(id));
+            results.push(Shown { number, failed, altered: altered.remove(&number) });
         }
         // Only whole generations of an unfinished run count.
         if asked.is_empty() || results.len() < asked.len() {
@@ -121,6 +189,18 @@ pub(crate) fn shrinking(repository: &Repository, rows: &[TestRow]) -> Result<Opt
         }
         search.learn(&results);
     }
+    tasks.iter().zip(search.each()).map(|(task, search)| shrinking(repository, &rows, task, search)).collect()
+}
+
+/// How one test was shrunk.
+fn shrinking(
+    repository: &Repository,
+    rows: &BTreeMap<u32, &TestRow>,
+    task: &Task,
+    search: &Shrink,
+) -> Result<Shrinking, RecordError> {
+    let plan = repository.plan();
+    let (name, failing) = (&task.name, &task.failing);
     let metrics = metrics(plan, failing);
     let kept = search.accepted();
     let steps = search.tried().iter().enumerate().filter_map(|(at, tried)| {
@@ -130,6 +210,9 @@ pub(crate) fn shrinking(repository: &Repository, rows: &[TestRow]) -> Result<Opt
             base: tried.base.map(|base| TestNumber(search.tried()[base].number)),
             tried: tried.phase.words().to_owned(),
             change: match tried.base {
+                Some(_) if tried.phase == Phase::Listing => {
+                    "unchanged, to list the messages that are altered".to_owned()
+                }
                 Some(base) => change(plan, &search.tried()[base].test, &tried.test),
                 None => format!("{name} unchanged"),
             },
@@ -139,18 +222,146 @@ pub(crate) fn shrinking(repository: &Repository, rows: &[TestRow]) -> Result<Opt
         })
     });
     let steps: Vec<ShrinkStep> = steps.collect();
-    let size = |at: usize| size(repository, &rows, &metrics, search.tried()[at].number);
+    let size = |at: usize| size(repository, rows, &metrics, search.tried()[at].number);
     let before = if steps.is_empty() { None } else { Some(size(0)?) };
     let after = kept.last().map(|&at| size(at)).transpose()?;
-    let block = match &after {
-        Some(after) => {
-            let record = repository.test(after.number)?;
-            Some(shrunk_block(plan, repository.campaign().seed, &record, &name))
+    let (mut block, mut operations) = (None, Vec::new());
+    if let Some(after) = &after {
+        let record = repository.test(after.number)?;
+        // The smallest test of several causes is shrunk for each of them.
+        let of_cause = match failing {
+            Failing::Violation { requirements, .. } if repository.task().shrinkings().len() > 1 => {
+                requirements.iter().map(|&id| format!("_{}", plan.requirement(id).name)).collect()
+            }
+            _ => String::new(),
+        };
+        block = Some(shrunk_block(plan, repository.campaign().seed, &record, name, &of_cause));
+        operations = operation_reports(plan, &record);
+    }
+    Ok(Shrinking {
+        test: name.clone(),
+        fails: words(plan, failing),
+        runs: search.runs(),
+        minimal: search.is_minimal(),
+        before,
+        after,
+        operations,
+        messages: kept.last().and_then(|&smallest| messages(plan, search, smallest)),
+        thresholds: thresholds(plan, search),
+        block,
+        steps,
+    })
+}
+
+/// The most messages whose times are all said.
+const ALL_TIMES: usize = 6;
+
+/// Altered messages with their times, as in ``three `odom` messages, at 12.40, 12.45 and 12.50 s``. Where several
+/// operations alter messages, those of each are said apart.
+fn altered_words(messages: &[LeftMessage]) -> String {
+    let of_each: Vec<&[LeftMessage]> = messages.chunk_by(|a, b| a.position == b.position).collect();
+    let words = of_each.iter().map(|messages| {
+        let of = if of_each.len() > 1 { format!("`{}` alters ", messages[0].operation) } else { String::new() };
+        format!("{of}{}", altered_by_one(messages))
+    });
+    words.collect::<Vec<_>>().join("; ")
+}
+
+/// The messages that one operation alters, of which there is one at least.
+fn altered_by_one(messages: &[LeftMessage]) -> String {
+    let count = match messages.len() {
+        count @ 1..=10 => {
+            ["one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten"][count - 1].to_owned()
         }
-        None => None,
+        count => count.to_string(),
     };
-    let (runs, minimal) = (search.runs(), search.is_minimal());
-    Ok(Some(Shrinking { fails: words(plan, failing), test: name, runs, minimal, before, after, block, steps }))
+    let word = if messages.len() == 1 { "message" } else { "messages" };
+    let what = format!("{count} `{}` {word}", messages[0].topic);
+    let times: Option<Vec<f64>> = messages.iter().map(|message| message.time).collect();
+    let Some(mut times) = times else {
+        let numbers: Vec<String> = messages.iter().map(|message| message.number.to_string()).collect();
+        return match numbers.as_slice() {
+            [one] => format!("{what}, number {one}"),
+            [first, .., last] if numbers.len() > ALL_TIMES => format!("{what}, from number {first} to {last}"),
+            _ => format!("{what}, numbers {}", number::join_words(&numbers)),
+        };
+    };
+    times.sort_by(f64::total_cmp);
+    let in_hundredths = times.iter().all(|time| (libm::rint(time * 100.0) - time * 100.0).abs() < 1e-6);
+    let decimals = if in_hundredths { 2 } else { 3 };
+    let times: Vec<String> = times.iter().map(|&time| number::fixed(time, decimals)).collect();
+    match times.as_slice() {
+        [first, .., last] if times.len() > ALL_TIMES => format!("{what}, from {first} to {last} s"),
+        _ => format!("{what}, at {} s", number::join_words(&times)),
+    }
+}
+
+/// Where parameters of the smallest test begin to matter.
+fn thresholds(plan: &CampaignPlan, search: &Shrink) -> Vec<ShrinkThreshold> {
+    let of = |(at, threshold): (usize, Threshold)| {
+        let Threshold { operation: position, parameter, fails, passes } = threshold;
+        let operation = plan.operation(search.tried()[at].test.operations[position].operation);
+        let declared = &operation.parameters[parameter];
+        let text = |choice: &Choice| number::choice(&operation.kind, declared, choice);
+        ShrinkThreshold {
+            operation: operation.name.clone(),
+            position,
+            parameter: declared.name.clone(),
+            unit: declared.unit.clone(),
+            fails_text: text(&fails),
+            passes_text: text(&passes),
+            fails,
+            passes,
+        }
+    };
+    search.thresholds().into_iter().map(of).collect()
+}
+
+/// How far a test was reduced to messages; `None` if that was not asked for, or the reduction has not come that far.
+fn messages(plan: &CampaignPlan, search: &Shrink, smallest: usize) -> Option<ShrunkMessages> {
+    let not = |text: String| ShrunkMessages { reduced: false, text, left: Vec::new() };
+    Some(match search.messages()? {
+        MessagesEnd::Reduced => {
+            let left = left(plan, &search.tried()[smallest].test, search.altered_by(smallest));
+            ShrunkMessages { reduced: true, text: altered_words(&left), left }
+        }
+        MessagesEnd::NoneAltered => not("its operations alter no messages".to_owned()),
+        MessagesEnd::TooMany => not(format!("its operations alter more than {ALTERED_LISTED} messages")),
+        MessagesEnd::NotReproduced => {
+            not("it does not fail in each run when its operations alter only the messages that they altered".to_owned())
+        }
+        MessagesEnd::OutOfRuns => not("the evaluations were used up".to_owned()),
+    })
+}
+
+/// The messages that a test lists, with the times at which a run altered them.
+fn left(plan: &CampaignPlan, test: &Test, altered: Option<&AlteredMessages>) -> Vec<LeftMessage> {
+    let altered: &[AlteredMessage] = match altered {
+        Some(AlteredMessages::Listed(messages)) => messages,
+        Some(AlteredMessages::TooMany) | None => &[],
+    };
+    let mut left = Vec::new();
+    for (position, used) in test.operations.iter().enumerate() {
+        let operation = plan.operation(used.operation);
+        let (Some(messages), Some(topic)) = (&used.messages, operation.topic) else { continue };
+        let paths = plan.wires_of(operation);
+        for run in messages.runs() {
+            left.extend((run.first..=run.last).map(|number| {
+                let is_it = |message: &&AlteredMessage| {
+                    (message.operation as usize, message.wire, message.number) == (position, run.wire, number)
+                };
+                LeftMessage {
+                    operation: operation.name.clone(),
+                    position,
+                    topic: plan.topic(topic).name.clone(),
+                    path: paths.get(run.wire as usize).cloned().unwrap_or_default(),
+                    number,
+                    time: altered.iter().find(is_it).map(|message| message.time),
+                }
+            }));
+        }
+    }
+    left
 }
 
 fn words(plan: &CampaignPlan, failing: &Failing) -> String {
@@ -212,23 +423,19 @@ fn size(
 /// How a test differs from the one that it was made of.
 fn change(plan: &CampaignPlan, base: &Test, test: &Test) -> String {
     let name = |used: &TestOperation| plan.operation(used.operation).name.as_str();
-    if test.operations.len() < base.operations.len() {
-        let mut left = test.operations.iter().peekable();
-        let mut out: Vec<(&str, usize)> = Vec::new();
-        for used in base.operations.iter().filter(|used| left.next_if(|kept| kept == used).is_none()) {
-            match out.iter_mut().find(|(known, _)| *known == name(used)) {
-                Some((_, times)) => *times += 1,
-                None => out.push((name(used), 1)),
-            }
-        }
-        let words = |(name, times): &(&str, usize)| match times {
-            1 => (*name).to_owned(),
-            times => format!("{name} ×{times}"),
-        };
-        return format!("without {}", number::join_words(&out.iter().map(words).collect::<Vec<_>>()));
-    }
+    let mut kept = test.operations.iter().peekable();
+    let mut out: Vec<(&str, usize)> = Vec::new();
     let mut changes = Vec::new();
-    for (was, used) in base.operations.iter().zip(&test.operations) {
+    for was in &base.operations {
+        let is_it = |used: &TestOperation| TestOperation { messages: was.messages.clone(), ..used.clone() } == *was;
+        let same_number = test.operations.len() == base.operations.len();
+        let Some(used) = kept.next_if(|used| same_number || is_it(used)) else {
+            match out.iter_mut().find(|(known, _)| *known == name(was)) {
+                Some((_, times)) => *times += 1,
+                None => out.push((name(was), 1)),
+            }
+            continue;
+        };
         let kind = plan.operation(used.operation);
         if was.activation != used.activation {
             changes.push(format!("{} {}", name(used), activation(plan, &used.activation)));
@@ -238,6 +445,18 @@ fn change(plan: &CampaignPlan, base: &Test, test: &Test) -> String {
                 changes.push(format!("{} {}", name(used), number::choice(&kind.kind, parameter, choice)));
             }
         }
+        if let Some(messages) = used.messages.as_ref().filter(|_| was.messages != used.messages) {
+            let before = was.messages.as_ref().map_or(String::new(), |before| format!(" of {}", before.count()));
+            changes.push(format!("{} alters only {}{before} messages", name(used), messages.count()));
+        }
+    }
+    let words = |(name, times): &(&str, usize)| match times {
+        1 => (*name).to_owned(),
+        times => format!("{name} ×{times}"),
+    };
+    if !out.is_empty() {
+        let out = number::join_words(&out.iter().map(words).collect::<Vec<_>>());
+        changes.insert(0, format!("without {out}"));
     }
     changes.join("; ")
 }
@@ -281,12 +500,13 @@ mod tests {
             simulator_seed: 9,
             runs: 1,
             evaluations: 200,
+            messages: false,
         });
         let plan = task.plan(&plan);
         let folder = tempfile::tempdir().unwrap();
         let mut recorder = Recorder::create_for(folder.path(), &plan, &task, 42, 1).unwrap();
         recorder.commit(&sample::record(&plan, 0, Origin::Reference, Test::default())).unwrap();
-        let mut search = Shrink::new(&plan, task.shrinking().unwrap().clone());
+        let mut search = Shrink::new(&plan, task.shrinkings()[0].clone());
         let mut number = 0;
         loop {
             let asked = search.ask();
@@ -302,7 +522,7 @@ mod tests {
                 };
                 let failing = fails(&plan, &failing, &record.observation.outcome, value);
                 recorder.commit(&record).unwrap();
-                told.push((number, failing));
+                told.push(Shown { number, failed: failing, altered: None });
                 if number as usize == most {
                     return (folder, recorder.finish("stopped").unwrap());
                 }

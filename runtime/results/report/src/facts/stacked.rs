@@ -159,6 +159,7 @@ mod tests {
             activation: Activation::Time { start: 0.0, end: 1.0 },
             parameters: vec![Choice::Range { low, high }],
             operation_seed: 0,
+            messages: None,
         });
         let spans =
             drawn.iter().map(|disturbance| disturbance.2.iter().map(|&(start, end)| Span { start, end }).collect());

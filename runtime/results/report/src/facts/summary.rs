@@ -10,7 +10,7 @@ use sesame_analysis::confirmed::{
 use sesame_analysis::statistics::Sample;
 use sesame_base::observation::Outcome;
 use sesame_base::test_number::TestNumber;
-use sesame_plan::{Bound, CampaignPlan, Confirmation, Copies, Direction, MetricId, Requirement};
+use sesame_plan::{Bound, CampaignPlan, Confirmation, Copies, Direction, MetricId, Requirement, Task};
 use sesame_present::number;
 use sesame_record::{
     Event, EventKind, Judge, MetricValue, NOT_IMPORTED, Origin, RecordError, Repository, Standing, TestRow, Verdict,
@@ -23,7 +23,7 @@ use crate::facts::certificate::campaign::{MonitorsSummary, monitors_summary};
 use crate::facts::coverage::{CoverageSummary, coverage};
 use crate::facts::readable;
 use crate::facts::repetition::{Repetition, repetition};
-use crate::facts::shrinking::{Shrinking, shrinking};
+use crate::facts::shrinking::{Shrinking, shrinkings};
 use crate::facts::stacked::{Stacked, stacked_in};
 use crate::facts::wording::{operations, tests_not_imported, value_text, violated};
 
@@ -92,6 +92,9 @@ pub struct Summary {
     /// How a test was shrunk, if the campaign does that.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shrinking: Option<Shrinking>,
+    /// How the smallest test of each cause was shrunk, if the campaign does that.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub shrinkings: Vec<Shrinking>,
     /// The values of each metric, in the plan's order; the main result of a campaign without objectives.
     pub spreads: Vec<Spread>,
     /// How much of the space is covered, if the campaign counts coverage.
@@ -102,6 +105,13 @@ pub struct Summary {
     /// Whether all runs are without disturbance by design.
     #[serde(skip)]
     pub(crate) undisturbed: bool,
+}
+
+impl Summary {
+    /// How tests were shrunk, one or several.
+    pub(crate) fn shrunk(&self) -> impl Iterator<Item = &Shrinking> {
+        self.shrinking.iter().chain(&self.shrinkings)
+    }
 }
 
 /// How many tests there are of each kind. Reference runs are not counted.
@@ -331,6 +341,8 @@ pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: &[u3
     });
     let judge = repository.judge()?;
     let confirmed = confirmed_tests(plan, &judge, rows, members);
+    let mut shrinkings = shrinkings(repository, rows)?;
+    let shrinking = if matches!(repository.task(), Task::Shrink(_)) { shrinkings.pop() } else { None };
     Ok(Summary {
         space: plan.space.clone(),
         campaign: plan.campaign.name.clone(),
@@ -348,7 +360,8 @@ pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: &[u3
         mend: None,
         expectations: expectations(plan, rows),
         repetition: repetition(plan, repository.task(), rows),
-        shrinking: shrinking(repository, rows)?,
+        shrinking,
+        shrinkings,
         failures: rows.iter().flat_map(|row| failures(&judge, row)).collect(),
         quarantined: rows.iter().filter_map(|row| quarantined(plan, &judge, row)).collect(),
         not_finite: rows.iter().filter_map(|row| not_finite(plan, row)).collect(),

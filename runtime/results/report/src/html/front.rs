@@ -17,7 +17,7 @@ use crate::tables;
 
 pub(super) fn front(body: &mut Markup, repository: &Repository, summary: &Summary, rows: &[TestRow], drawn: &[u32]) {
     // Tests of a shrink differ in a step or two from each other, so how far metrics went means nothing.
-    if summary.shrinking.is_some() {
+    if summary.shrunk().next().is_some() {
         return;
     }
     body.open("section", &[("id", "front")]);

@@ -52,6 +52,9 @@ pub(super) fn about(body: &mut Markup, repository: &Repository, digest: &str) ->
             format!("{runs} without disturbance{place}, {topics} relayed")
         }
         (Task::Shrink(shrinking), _) => format!("{} at most", budget(&format!("{} shrunk", shrinking.name))),
+        (Task::ShrinkEach { each }, _) => {
+            format!("{} at most", budget(&format!("{} shrunk", plural(each.len(), "cause", "causes"))))
+        }
         (Task::Variations(variations), _) => {
             let count = plural(variations.tests.len(), "variation", "variations");
             format!("{count} of {} along {}", variations.name, variations.dimension.name())

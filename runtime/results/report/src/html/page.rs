@@ -71,7 +71,7 @@ fn page_in(
 
     let mut body = Markup::default();
     body.open("main", &[("id", "main")]);
-    if let Some(shrinking) = &summary.shrinking {
+    for shrinking in summary.shrunk() {
         shrinking::shrinking(&mut body, shrinking, &drawn);
     }
     causes(&mut body, &summary, &drawn);
@@ -170,11 +170,11 @@ fn chosen(summary: &Summary, rows: &[TestRow]) -> Vec<Group> {
     } else {
         MARKS.to_owned()
     };
-    let shrunk = summary.shrinking.as_ref().map_or_else(Vec::new, Shrinking::ends);
+    let shrunk: Vec<u32> = summary.shrunk().flat_map(Shrinking::ends).collect();
     more.retain(|number| !shrunk.contains(number));
     let missed: Vec<u32> =
         missed.into_iter().filter(|number| !shrunk.contains(number) && !reference.contains(number)).collect();
-    let shrunk_caption = "The test before and after it was shrunk.".to_owned();
+    let shrunk_caption = "Tests before and after they were shrunk.".to_owned();
     let mut groups = vec![
         Group { title: "Before and after", caption: shrunk_caption, tests: shrunk },
         Group {

@@ -68,6 +68,7 @@ impl Relay<'_> {
             activity: Activity::new(&activation, always),
             since: SimTime::ZERO,
             operation_seed: seed,
+            messages: None,
             timed: false,
             tail_since: None,
             tails: Vec::new(),

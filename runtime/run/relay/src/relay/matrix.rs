@@ -4,17 +4,18 @@
 //! Messages come every tenth of a second from 0 s to 8 s; the operation is active from 2 s to 5 s, be it by time, by
 //! conditions, or by a condition for a length.
 
+use sesame_base::observation::AlteredMessages;
 use sesame_base::time::SimTime;
 use sesame_plan::condition::{Comparison, Condition, Operand};
-use sesame_plan::testing::{self, plan};
+use sesame_plan::testing::{self, plan, use_of};
 use sesame_plan::{
-    Activation, CampaignPlan, Choice, Distribution, Domain, Drain, FieldRef, MetricId, MetricSource, NotFinite,
-    Operation, OperationId, OperationKind, Span, Step, Test, TestOperation, TopicId, Type, ValueMode, ValuePath,
+    Activation, CampaignPlan, Choice, Distribution, Domain, Drain, FieldRef, Messages, MetricId, MetricSource,
+    NotFinite, Operation, OperationKind, Span, Step, Test, TestOperation, TopicId, Type, ValueMode, ValuePath,
 };
 
 use crate::fuzz::KeyedRng;
 use crate::metric::MetricTable;
-use crate::relay::{Exchange as _, Finished, Relay};
+use crate::relay::{AlteredList, Exchange as _, Finished, Relay};
 use crate::value::{Fields, Record, Value};
 use crate::wire::WireTable;
 
@@ -251,14 +252,26 @@ fn nanos(tenths: u32) -> i64 {
 
 /// What the relay delivers of the payload's messages, with the tenth of a second at which it does.
 fn relayed(payload: Payload, case: &Case, switch: Switch) -> (Vec<(u32, Value)>, Finished) {
+    let (delivered, finished, _) = relayed_listed(payload, case, switch, None);
+    (delivered, finished)
+}
+
+/// The same of an operation that alters only some messages, with the numbers of those that it altered, in rising order.
+fn relayed_listed(
+    payload: Payload,
+    case: &Case,
+    switch: Switch,
+    messages: Option<Messages>,
+) -> (Vec<(u32, Value)>, Finished, Vec<u64>) {
     let plan = plan_of(payload, case);
     let wires = WireTable::new(&plan);
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
     let parameters = case.choices.iter().map(|(_, choice)| choice.clone()).collect();
-    let used =
-        TestOperation { operation: OperationId(0), activation: switch.activation(), parameters, operation_seed: SEED };
+    let used = TestOperation { activation: switch.activation(), messages, ..use_of(0, 0.0, 0.0, parameters, SEED) };
     let test = Test { operations: vec![used] };
-    let mut relay = Relay::new(&plan, &wires, &test, metrics.start(), &[]).unwrap().received_everywhere();
+    let mut altered = AlteredList::new(&plan, &wires, &test);
+    let relay = Relay::new(&plan, &wires, &test, metrics.start(), &[]).unwrap();
+    let mut relay = relay.received_everywhere().tapped(&mut altered);
     let [payload_wire, switch_wire] = ["payload", "switch"].map(|name| wires.find(name).unwrap());
     let mut delivered = Vec::new();
     for tenth in 0..=100 {
@@ -276,7 +289,10 @@ fn relayed(payload: Payload, case: &Case, switch: Switch) -> (Vec<(u32, Value)>,
             out.into_iter().filter(|delivery| delivery.wire == payload_wire).map(|delivery| (tenth, delivery.value)),
         );
     }
-    (delivered, relay.finish(SimTime::from_seconds(10.0)))
+    let finished = relay.finish(SimTime::from_seconds(10.0));
+    let AlteredMessages::Listed(altered) = altered.listed() else { panic!("they are few") };
+    assert!(altered.iter().all(|message| (message.operation, message.wire) == (0, 0) && message.time >= 2.0));
+    (delivered, finished, altered.iter().map(|message| message.number).collect())
 }
 
 /// What a naive model of an operation delivers and counts: changed, dropped, delayed, injected.
@@ -521,4 +537,61 @@ fn every_operation_does_what_it_means_on_every_payload_under_every_activation() 
         }
     }
     assert_eq!(combinations, 837, "the table is as long as it was");
+}
+
+#[test]
+fn an_operation_with_a_list_does_the_same_to_the_listed_messages_and_nothing_to_others() {
+    let equal = |left: &[(u32, Value)], right: &[(u32, Value)]| {
+        left.len() == right.len() && left.iter().zip(right).all(|(a, b)| a.0 == b.0 && close(&a.1, &b.1))
+    };
+    let list = |numbers: &[u64]| Messages::of(numbers.iter().map(|&number| (0, number)));
+    for payload in PAYLOADS {
+        for case in cases(payload) {
+            for switch in SWITCHES {
+                let named = format!("{:?} on {payload:?} by {switch:?}", case.kind);
+                let (whole, _, altered) = relayed_listed(payload, &case, switch, None);
+                let (listed, ..) = relayed_listed(payload, &case, switch, list(&altered));
+                assert!(equal(&whole, &listed), "{named}: all that it altered");
+                // A message behind a delayed one waits, so that those of a latency depend on each other.
+                if matches!(case.kind, OperationKind::Latency { .. }) {
+                    continue;
+                }
+                let some = altered[altered.len() / 2];
+                let (one, finished, again) = relayed_listed(payload, &case, switch, list(&[some]));
+                assert_eq!(again, [some], "{named}");
+                assert_eq!(finished.operations[0].counters.seen, 30, "{named}: it decides on all");
+                // What it delivers without that message is what was published, and the rest is in the whole as well.
+                let published = |at: u32| (at, payload.message(at));
+                let mut rest = one.clone();
+                for at in (0..MESSAGES).filter(|&at| u64::from(at) != some) {
+                    let (time, value) = published(at);
+                    let place = rest.iter().position(|other| other.0 == time && close(&other.1, &value));
+                    rest.remove(place.unwrap_or_else(|| panic!("{named}: message {at} was not left alone")));
+                }
+                for of_this in &rest {
+                    let same = |other: &(u32, Value)| other.0 == of_this.0 && close(&other.1, &of_this.1);
+                    assert!(whole.iter().any(same), "{named}: {of_this:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_copy_is_altered_with_its_message() {
+    let operations = vec![testing::operation(0, OperationKind::Duplicate), testing::operation(0, OperationKind::Bias)];
+    let plan = plan(operations);
+    let wires = WireTable::new(&plan);
+    let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
+    let chosen = |value| vec![Choice::Value { value }];
+    let biased = TestOperation { messages: Messages::of([(0, 1)]), ..use_of(1, 0.0, 9.0, chosen(5.0), 1) };
+    let test = Test { operations: vec![use_of(0, 0.0, 9.0, chosen(1.0), 1), biased] };
+    let mut relay = Relay::new(&plan, &wires, &test, metrics.start(), &[]).unwrap().received_everywhere();
+    let mut out = Vec::new();
+    for at in 0..3u32 {
+        let now = SimTime::from_nanos(nanos(at));
+        relay.message(now, wires.find("arm/command").unwrap(), Value::Real(f64::from(at)), &mut out);
+    }
+    let delivered: Vec<Value> = out.into_iter().map(|delivery| delivery.value).collect();
+    assert_eq!(delivered, [0.0, 0.0, 6.0, 6.0, 2.0, 2.0].map(Value::Real));
 }

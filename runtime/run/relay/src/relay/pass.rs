@@ -6,6 +6,7 @@ use sesame_plan::{NodeId, Side};
 
 use crate::fuzz::{Action, Disturbance, HELD_LIMIT, KeyedRng, MessageContext};
 use crate::relay::release::{Held, Why};
+use crate::relay::stage::Stage;
 use crate::relay::{COPIES_LIMIT, Delivery, Listener as _, OperationEvent, Phase, Relay};
 use crate::value::Value;
 use crate::wire::Wire;
@@ -62,22 +63,25 @@ impl Relay<'_> {
                 continue;
             }
             let queued_until = if stage.holds_order { self.queue.last_release(at, message.wire) } else { None };
-            let active = stage.activity.is_active();
+            let mut active = stage.activity.is_active();
             if active {
                 stage.counters.seen += 1;
             } else if stage.observes_inactive {
                 stage.disturbance.observe(now, member, &message.value);
             }
+            let context = |stage: &Stage| {
+                let draws = KeyedRng::new(stage.operation_seed, member, message.index);
+                MessageContext { now, active: now - stage.since, member, draws }
+            };
+            if active && !stage.alters(member, message.published) {
+                stage.decide_on(self.wires.path(message.wire), context(stage), &message.value);
+                active = false;
+            }
             if active && matches!(stage.disturbance, Disturbance::Custom(_)) {
                 return self.pass_custom(now, at, member, message, deliveries);
             }
-            let action = if active {
-                let draws = KeyedRng::new(stage.operation_seed, member, message.index);
-                let context = MessageContext { now, active: now - stage.since, member, draws };
-                stage.disturbance.apply(context, &mut message.value)
-            } else {
-                Action::Unchanged
-            };
+            let action =
+                if active { stage.disturbance.apply(context(stage), &mut message.value) } else { Action::Unchanged };
             if let Action::Duplicated(copies) = action {
                 return self.pass_copies(now, at, message, copies, deliveries);
             }

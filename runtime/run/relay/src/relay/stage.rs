@@ -5,10 +5,11 @@ use std::collections::BTreeMap;
 use sesame_base::activation::Activity;
 use sesame_base::observation::Counters;
 use sesame_base::time::SimTime;
-use sesame_plan::{NodeId, OperationId};
+use sesame_plan::{Messages, NodeId, OperationId};
 
-use crate::fuzz::Disturbance;
+use crate::fuzz::{Disturbance, MessageContext};
 use crate::relay::release::Why;
+use crate::value::Value;
 use crate::wire::Wire;
 
 /// One operation of the test.
@@ -25,6 +26,8 @@ pub(super) struct Stage {
     /// When it last became active.
     pub(super) since: SimTime,
     pub(super) operation_seed: u64,
+    /// The only messages that it alters; `None` for all.
+    pub(super) messages: Option<Messages>,
     /// Whether it counts in `fuzzing_time()`.
     pub(super) timed: bool,
     /// Since when it holds messages back without being active.
@@ -50,6 +53,20 @@ impl Stage {
     /// Whether it acts on messages of this publisher.
     pub(super) fn concerns(&self, publisher: Option<NodeId>) -> bool {
         self.from.is_empty() || publisher.is_some_and(|publisher| self.from.contains(&publisher))
+    }
+
+    /// Whether it alters a message while it is active, by the position of its wire and its number there.
+    pub(super) fn alters(&self, member: u64, number: u64) -> bool {
+        self.messages.as_ref().is_none_or(|messages| messages.hold(member, number))
+    }
+
+    /// Decides on a message that it does not alter, so that what it does to others does not depend on which it alters.
+    pub(super) fn decide_on(&mut self, path: &str, context: MessageContext, message: &Value) {
+        let mut spared = message.clone();
+        match &mut self.disturbance {
+            Disturbance::Custom(custom) => drop(custom.on_message(context.now, path, context.draws, &mut spared)),
+            disturbance => _ = disturbance.apply(context, &mut spared),
+        }
     }
 
     /// Counts an action on this many messages on a wire with or without a receiver.

@@ -200,7 +200,7 @@ impl Maker {
             let (a, b) = (a.clamp(low, high), b.clamp(low, high));
             Activation::Time { start: a.min(b), end: a.max(b) }
         };
-        TestOperation { operation: id, activation, parameters, operation_seed: self.stream.bits() }
+        TestOperation { operation: id, activation, parameters, operation_seed: self.stream.bits(), messages: None }
     }
 
     fn switch(&mut self, variables: &[MetricId], depth: u32) -> switch::Condition {
