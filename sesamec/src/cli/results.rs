@@ -8,7 +8,7 @@ use anyhow::{Context as _, bail};
 use clap::{Args, Subcommand, ValueEnum};
 
 use sesame_analysis as analysis;
-use sesame_analysis::{GivenFront, Run, Scaling, Selection, Table, causes, regions};
+use sesame_analysis::{GivenFront, Run, Scaling, Selection, Table, causes, pairs, regions};
 use sesame_codegen::input;
 use sesame_plan::{CampaignPlan, Dimension};
 use sesame_record::{DATABASE, Repository};
@@ -52,6 +52,13 @@ pub(super) enum Results {
     },
     /// The causes of violations: for each requirement the smallest sets of operations with which tests violate it.
     Causes {
+        #[command(flatten)]
+        input: Input,
+        #[command(flatten)]
+        output: Output,
+    },
+    /// In how many tests, and in which quarters of the run, each operation and each two of them acted together.
+    Pairs {
         #[command(flatten)]
         input: Input,
         #[command(flatten)]
@@ -250,6 +257,15 @@ pub(super) fn results(shell: Shell, asked: Results) -> anyhow::Result<ExitCode> 
                 shell.warning("none of these tests violates a requirement");
             }
             print(&causes::table(repository.plan(), &found), &output)
+        }
+        Results::Pairs { input, output } => {
+            let (repository, selection) = open(&input)?;
+            let found = pairs::pairs(&repository, &selection)?;
+            match found.sentence() {
+                Some(sentence) => shell.note(sentence),
+                None => shell.note("there are no pairs: tests of this campaign hold at most one operation"),
+            }
+            print(&found.table(repository.plan()), &output)
         }
         Results::Sspr { input, dims, compat, output } => {
             let (repository, selection) = open(&input)?;

@@ -20,6 +20,7 @@ mod distances;
 mod extents;
 pub mod gap;
 mod indicators;
+pub mod pairs;
 mod rank_sum;
 pub mod regions;
 #[cfg(any(test, feature = "testing"))]

@@ -57,6 +57,8 @@ pub struct ScannedOperation {
     pub intervals: Vec<Span>,
     /// Whether it had an effect, or the run cannot tell (it was imported).
     pub acted: bool,
+    /// From its first effect to its last; `None` where it had none, and where the run cannot tell.
+    pub touched: Option<Span>,
     /// The position of the first of the operations that were one with it in the file they were imported from, if it is
     /// not that one.
     pub part_of: Option<usize>,
@@ -152,9 +154,9 @@ fn is_inside(point: &Point, convention: Convention) -> bool {
 /// By how much a share may be beyond its ends, since it is a quotient of rounded numbers.
 const ROUNDING: f64 = 1e-9;
 
-/// A row of `operations`: its position, the operation's name, when it was to be active, and whether it had an effect or
-/// effects were not counted.
-type PlannedRow = (usize, String, Option<Span>, bool);
+/// A row of `operations`: its position, the operation's name, when it was to be active, whether it had an effect or
+/// effects were not counted, and from when to when it had them.
+type PlannedRow = (usize, String, Option<Span>, bool, Option<Span>);
 
 /// A row of `choices`: the position of its operation, and the choice; `None` if it is damaged.
 type ChoiceRow = (usize, Option<Choice>);
@@ -171,8 +173,8 @@ impl Repository {
 
         let mut operations = prepare(
             "SELECT test, position, operation, start_s, end_s, \
-             coalesce(changed + dropped + delayed + queued + injected + side_effects > 0, TRUE) \
-             FROM operations ORDER BY test, position",
+             coalesce(changed + dropped + delayed + queued + injected + side_effects > 0, TRUE), \
+             first_touch_s, last_touch_s FROM operations ORDER BY test, position",
         )?;
         let mut choices = prepare(
             "SELECT test, operation, value, low, high, x, y, z, text FROM choices ORDER BY test, operation, position",
@@ -186,9 +188,11 @@ impl Repository {
         let mut tests = prepare(&format!("SELECT {HEAD} FROM tests ORDER BY number"))?;
         let mut operations =
             Cursor::over(operations.query([]).map_err(failed)?, |row| -> rusqlite::Result<PlannedRow> {
-                let (start, end) = (perhaps_finite(row, 3)?, perhaps_finite(row, 4)?);
-                let planned = start.zip(end).map(|(start, end)| Span { start, end });
-                Ok((position(row, 1)?, row.get(2)?, planned, row.get(5)?))
+                let span = |start, end| -> rusqlite::Result<Option<Span>> {
+                    let ends = perhaps_finite(row, start)?.zip(perhaps_finite(row, end)?);
+                    Ok(ends.map(|(start, end)| Span { start, end }))
+                };
+                Ok((position(row, 1)?, row.get(2)?, span(3, 4)?, row.get(5)?, span(6, 7)?))
             })
             .map_err(failed)?;
         let mut choices = Cursor::over(choices.query([]).map_err(failed)?, |row| -> rusqlite::Result<ChoiceRow> {
@@ -233,7 +237,7 @@ impl Repository {
                 self.in_order(number, "values", metric, test.values.len())?;
                 test.values.push(value);
             }
-            for (at, name, planned, acted) in operations.of(number).map_err(failed)? {
+            for (at, name, planned, acted, touched) in operations.of(number).map_err(failed)? {
                 self.in_order(number, "operations", at, test.operations.len())?;
                 let operation = *ids
                     .get(name.as_str())
@@ -244,6 +248,7 @@ impl Repository {
                     choices: Vec::new(),
                     intervals: Vec::new(),
                     acted,
+                    touched,
                     part_of: None,
                     original: originals.get(&operation).copied(),
                 });
@@ -326,6 +331,9 @@ mod tests {
                         .get(at)
                         .map_or(Vec::new(), |effect| effect.intervals.clone()),
                     acted: record.observation.operations.get(at).is_none_or(|effect| effect.counters.any_effect()),
+                    touched: record.observation.operations.get(at).and_then(|effect| {
+                        effect.first_touch.zip(effect.last_touch).map(|(start, end)| Span { start, end })
+                    }),
                     part_of: None,
                     original: None,
                 })
