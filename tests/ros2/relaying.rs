@@ -194,7 +194,7 @@ impl System {
         let metrics = MetricTable::new(&self.plan, &wires, &[]).expect("the metrics need no hooks");
         self.watch = None;
         let (transport, custom) = (&mut *self.transport, &mut Custom::none());
-        let run = Run { test, simulator_seed: 1, withheld: &[] };
+        let run = Run { test, simulator_seed: 1, withheld: &[], lists_altered: false };
         let run = evaluate_tapped(&self.plan, &wires, &metrics, transport, &run, custom, tap);
         (run.expect("the test fits the plan"), self.transport.incidents().notes)
     }

@@ -69,7 +69,7 @@ fn a_search_stops_at_its_coverage_after_any_interruption() {
 #[test]
 fn analyses_of_a_results_file_say_what_the_campaign_said() {
     let runner = build("analysed");
-    runner.run(&["--results", "analysed", "--evaluations", "30"]).expect(0);
+    let said = runner.run(&["--results", "analysed", "--evaluations", "30"]).expect(0).out;
     let folder = runner.folder.join("analysed/3");
     let repository = Repository::open(&folder).unwrap();
     let counted = *repository.coverage().unwrap().last().unwrap();
@@ -81,6 +81,15 @@ fn analyses_of_a_results_file_say_what_the_campaign_said() {
     let cells = results(&["coverage", "--cells", "--dims", "P1,T1", "--format", "json"], &folder).out;
     let cells: serde_json::Value = serde_json::from_str(&cells).unwrap();
     assert_eq!(cells.as_array().unwrap().len(), 12);
+
+    let pairs = results(&["pairs", "--format", "json"], &folder);
+    let sentence = "1 of 1 pair of operations acted together, 4 of 4 in the same quarter of the run";
+    assert!(pairs.err.contains(&format!("note: {sentence}")), "{}", pairs.err);
+    assert!(said.contains(sentence), "{said}");
+    let pairs: serde_json::Value = serde_json::from_str(&pairs.out).unwrap();
+    let [lift, cut, both] = [0, 1, 2].map(|row| pairs[row]["together"].as_u64().unwrap());
+    assert!(both <= lift.min(cut) && lift + cut - both <= 30, "{pairs}");
+    assert_eq!((pairs[2]["first"].as_str(), pairs[2]["second"].as_str()), (Some("lift"), Some("cut")));
 
     let front = results(&["front", "--format", "json"], &folder).out;
     let front: serde_json::Value = serde_json::from_str(&front).unwrap();

@@ -94,7 +94,8 @@ fn every_cause_is_shrunk_within_one_budget_and_the_same_for_any_number_of_worker
     assert!(causes.len() > 1, "{causes:?}");
     let arguments = |into: &str, workers: &str| -> Vec<String> {
         let more = ["--violations", "--messages", "--budget", "160", "--results", "42", "--into", into];
-        let all = ["shrink"].iter().chain(&CAMPAIGN).chain(&more).chain(&["--workers", workers, "--format", "json"]);
+        let format = ["--workers", workers, "--format", "json"];
+        let all = ["shrink"].iter().chain(&CAMPAIGN).chain(&more).chain(&format);
         all.map(|&argument| argument.to_owned()).collect()
     };
     let shrunk = |into: &str, workers: &str| {

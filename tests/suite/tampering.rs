@@ -103,7 +103,7 @@ fn everybody(runner: &Runner, folder: &Path) -> Vec<(String, Done)> {
         &["shrink", "T2", "--evaluations", "2", "--results", name],
         &["resume", name],
     ];
-    let analyses = ["campaigns", "tests", "front", "sspr", "regions", "coverage", "indicators", "compare"];
+    let analyses = ["campaigns", "tests", "front", "sspr", "regions", "coverage", "pairs", "indicators", "compare"];
     let said_of_runs = runners.map(|arguments| (arguments.join(" "), runner.run(arguments)));
     let said_of_files = analyses.map(|analysis| {
         let mut sesamec = command(sesamec());

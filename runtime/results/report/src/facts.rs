@@ -4,6 +4,7 @@ pub(super) mod causes;
 pub(super) mod certificate;
 pub(super) mod coverage;
 pub(super) mod monitors;
+pub(super) mod pairs;
 pub(super) mod readable;
 pub(super) mod recording;
 pub(super) mod repetition;

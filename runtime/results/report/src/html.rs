@@ -11,6 +11,7 @@ mod header;
 mod legend;
 mod monitors;
 mod page;
+mod pairs;
 mod policy;
 mod published;
 mod regions;

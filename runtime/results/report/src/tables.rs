@@ -4,12 +4,14 @@ pub(super) mod monitors;
 
 use sesame_analysis::causes::Fewer;
 use sesame_analysis::confirmed::{ConfirmedTest, FindingAgain, tally_words};
+use sesame_analysis::pairs::Untried;
 use sesame_analysis::regions::Rule;
 use sesame_present::number::{self, plural, titled};
 use sesame_present::table::{Cell, Column, Datum, Table};
 use sesame_record::{Difference, MetricValue, Verdict};
 
 use crate::facts::causes::CausesSummary;
+use crate::facts::pairs::PairsSummary;
 use crate::facts::readable::short_numbers;
 use crate::facts::recording::{FedMetric, Sameness};
 use crate::facts::repetition::ViolationRate;
@@ -448,6 +450,22 @@ pub(super) fn regions(rules: &[Rule]) -> Table {
             Datum::maybe(share.map(|(share, _)| percent(share))).into(),
             Datum::maybe(interval).into(),
             Cell::from(Datum::Text(rule.sentence())),
+        ]);
+    }
+    table
+}
+
+/// The pairs of operations that did not act together in each quarter of the run in which they may.
+pub(super) fn untried_pairs(pairs: &PairsSummary) -> Table {
+    let columns = [Column::heading("operations"), Column::number("tests"), Column::words("quarters without both")];
+    let mut table = Table::with(columns);
+    for Untried { pair: (first, second), tests, parts } in pairs.found.untried() {
+        let open = (1..).zip(parts).filter(|(_, open)| *open).map(|(quarter, _): (u32, bool)| quarter.to_string());
+        let quarters = open.collect::<Vec<_>>();
+        table.row([
+            Datum::text(format!("{} + {}", pairs.operations[first], pairs.operations[second])),
+            Datum::Whole(i64::from(tests)),
+            Datum::maybe((!quarters.is_empty()).then(|| quarters.join(", "))),
         ]);
     }
     table

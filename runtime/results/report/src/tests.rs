@@ -14,6 +14,7 @@ mod earlier;
 mod environment;
 mod monitors;
 mod page;
+mod pairs;
 mod robustness;
 mod run_again;
 

@@ -80,6 +80,9 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
     if let Some(coverage) = &summary.coverage {
         paragraph(&mut text, &coverage_sentence(coverage), options);
     }
+    if let Some(sentence) = summary.pairs.as_ref().and_then(|pairs| pairs.found.sentence()) {
+        paragraph(&mut text, &sentence, options);
+    }
     paragraph(&mut text, &counts_sentence(summary), options);
     if let Some(sentence) = without_effect_sentence(summary) {
         paragraph(&mut text, &sentence, options);

@@ -158,7 +158,7 @@ fn run<S: Simulator + 'static>(plan: &CampaignPlan, seed: u64, file: &Path) -> O
     let subject = Subject { plan, number: 1, test: &test, simulator_seed: seed };
     let mut writer = TraceWriter::create(&file.with_extension("part"), subject, &wires).unwrap();
     let mut transport = in_process::<S>().transport(plan);
-    let run = Run { test: &test, simulator_seed: seed, withheld: &[] };
+    let run = Run { test: &test, simulator_seed: seed, withheld: &[], lists_altered: false };
     let transport = transport.as_mut();
     let observed =
         evaluate_tapped(plan, &wires, &table, transport, &run, &mut Custom::none(), Some(&mut writer)).unwrap();

@@ -93,6 +93,7 @@ fn record(number: u32, test: &MadeUp) -> TestRecord {
         },
         parameters: choices(used.operation),
         operation_seed: 1,
+        messages: None,
     });
     let effects = test.used.iter().map(|used| {
         let effect = OperationEffect {

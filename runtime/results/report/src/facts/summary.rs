@@ -21,6 +21,7 @@ use crate::facts::causes::{CausesSummary, causes_of_search};
 use crate::facts::certificate::before_after::Mend;
 use crate::facts::certificate::campaign::{MonitorsSummary, monitors_summary};
 use crate::facts::coverage::{CoverageSummary, coverage};
+use crate::facts::pairs::{PairsSummary, pairs_of_search};
 use crate::facts::readable;
 use crate::facts::repetition::{Repetition, repetition};
 use crate::facts::shrinking::{Shrinking, shrinkings};
@@ -100,6 +101,9 @@ pub struct Summary {
     /// How much of the space is covered, if the campaign counts coverage.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coverage: Option<CoverageSummary>,
+    /// Which operations acted together, if the campaign searches and its tests may hold two.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pairs: Option<PairsSummary>,
     /// Warnings for the user.
     pub warnings: Vec<String>,
     /// Whether all runs are without disturbance by design.
@@ -374,6 +378,7 @@ pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: &[u3
             .count(),
         spreads: spreads(plan, rows),
         coverage: coverage(repository)?,
+        pairs: pairs_of_search(repository)?,
         warnings: warnings.chain(tests_not_imported(rows)).collect(),
         undisturbed: repository.task().undisturbed().is_some(),
         confirmation: plan.campaign.confirm,

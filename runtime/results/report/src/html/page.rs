@@ -16,7 +16,7 @@ use crate::html::generations::generations;
 use crate::html::header::{about, header};
 use crate::html::policy::policy;
 use crate::html::test::test;
-use crate::html::{before_after, cells, monitors, regions, shrinking, tree};
+use crate::html::{before_after, cells, monitors, pairs, regions, shrinking, tree};
 use crate::sentences::{QUARANTINED, causes_sentence, once_sentence};
 use crate::tables;
 
@@ -89,6 +89,7 @@ fn page_in(
     if let Some(coverage) = &summary.coverage {
         cells::coverage(&mut body, repository.plan(), coverage, &drawn);
     }
+    pairs::combinations(&mut body, repository.plan(), &summary);
     regions::regions(&mut body, repository)?;
     tree::certificates(&mut body, repository.plan());
     sections(&mut body, &summary, &drawn);

@@ -10,10 +10,12 @@ use std::process::Command;
 use serde_json::Value;
 
 use sesame_present::number;
+use sesame_record::sample;
 
 use super::monitors::monitored_page;
 use super::page::full_page;
-use crate::study;
+use super::pairs::plan_of;
+use crate::{page, study};
 
 /// Whether the browser prefers light or dark pages.
 #[derive(Debug, Clone, Copy)]
@@ -117,6 +119,20 @@ fn a_narrow_screen_shows_the_page_without_scrolling_sideways() {
     assert!(found["width"].as_u64().unwrap() <= 500, "{found}");
     assert_eq!(found["beyond"], Value::Array(Vec::new()), "what is wider than the screen");
     assert!(found["tallest"].as_f64().unwrap() < 110.0, "rows of the front are not tall: {found}");
+}
+
+#[test]
+fn pairs_of_many_operations_can_be_read_on_any_screen() {
+    let Some(browser) = browser() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let html = page(&sample::campaign(folder.path(), &plan_of(24), 30)).unwrap();
+    let found = findings(browser, &html, include_str!("browser/narrow.js"), 390, Scheme::Light);
+    assert_eq!(found["beyond"], Value::Array(Vec::new()), "what is wider than the screen");
+    for scheme in [Scheme::Light, Scheme::Dark] {
+        let found = findings(browser, &html, include_str!("browser/contrast.js"), 1280, scheme);
+        let low = found["low"].as_array().unwrap();
+        assert!(low.is_empty(), "{scheme:?}: {low:#?}");
+    }
 }
 
 /// Runs a script that uses the page and says of each of its checks whether it holds.

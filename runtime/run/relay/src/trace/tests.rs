@@ -81,7 +81,7 @@ fn traced(folder: &Path, plan: &CampaignPlan, test: &Test) -> Observation {
     let subject = Subject { plan, number: 1, test, simulator_seed: u64::MAX };
     let mut writer = TraceWriter::create(&folder.join("unfinished"), subject, &wires).unwrap();
     let mut transport = Awkward(SimTime::ZERO);
-    let run = Run { test, simulator_seed: 1, withheld: &[] };
+    let run = Run { test, simulator_seed: 1, withheld: &[], lists_altered: false };
     let mut custom = Custom { hooks: &[], files: Box::new(NoFiles) };
     let observed = evaluate_tapped(plan, &wires, &table, &mut transport, &run, &mut custom, Some(&mut writer)).unwrap();
     assert!(!folder.join("T1.mcap").exists(), "it has its name only when it is complete");

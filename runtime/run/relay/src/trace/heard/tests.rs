@@ -110,7 +110,7 @@ fn recorded(
     let subject = Subject { plan, number: 1, test, simulator_seed: 1 };
     let mut writer = TraceWriter::create(&folder.join("unfinished"), subject, &wires).unwrap();
     let mut transport = Script { now: SimTime::ZERO, messages: script, next: 0 };
-    let run = Run { test, simulator_seed: 1, withheld: &[] };
+    let run = Run { test, simulator_seed: 1, withheld: &[], lists_altered: false };
     let tap = Some(&mut writer as &mut dyn crate::relay::Listener);
     let seen = evaluate_tapped(plan, &wires, &table, &mut transport, &run, &mut Custom::none(), tap).unwrap();
     writer.keep(&seen, &folder.join(name)).unwrap();

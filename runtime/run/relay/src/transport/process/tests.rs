@@ -624,7 +624,7 @@ fn what_a_slow_listener_adds_is_measured_on_the_wire_of_each_message_and_handed_
     let wires = WireTable::new(&plan);
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
     let test = test_of(Vec::new());
-    let run = Run { test: &test, simulator_seed: 1, withheld: &[] };
+    let run = Run { test: &test, simulator_seed: 1, withheld: &[], lists_altered: false };
     for _ in 0..2 {
         let mut custom = Custom::none();
         let observed = evaluate_tapped(&plan, &wires, &metrics, transport.as_mut(), &run, &mut custom, Some(&mut Slow));
