@@ -274,16 +274,17 @@ impl<'a> Resolver<'a> {
         if !self.fits_lengths(test, index, &operation, &activation) {
             return None;
         }
-        let messages = self.listed_messages(test, &operation)?;
+        let messages = Messages::of_runs(self.listed_messages(test, &operation)?);
         Some((OperationId::from_index(index), choices?, activation, messages))
     }
 
-    /// The only messages that an operation alters; the inner `None` where the test lists none, the outer one after an
-    /// error.
-    fn listed_messages(&mut self, test: &ast::TestOperation, operation: &model::Operation) -> Option<Option<Messages>> {
+    /// The only messages that an operation alters: none where the test lists none; `None` after an error.
+    fn listed_messages(&mut self, test: &ast::TestOperation, operation: &model::Operation) -> Option<Vec<MessageRun>> {
         /// Results record numbers up to this one.
         const GREATEST: u64 = i64::MAX.unsigned_abs();
-        let (Some(first), Some(last)) = (test.messages.first(), test.messages.last()) else { return Some(None) };
+        let (Some(first), Some(last)) = (test.messages.first(), test.messages.last()) else {
+            return Some(Vec::new());
+        };
         let name = &test.operation.text;
         let Some(topic) = operation.topic() else {
             let title = format!("`{name}` acts on no messages");
@@ -318,7 +319,7 @@ impl<'a> Resolver<'a> {
             let wire = u32::try_from(wire - 1).ok()?;
             runs.push(MessageRun { wire, first: from, last: to });
         }
-        Some(Messages::of_runs(runs))
+        Some(runs)
     }
 
     fn test_window(&mut self, window: &ast::Range) -> Option<Range> {

@@ -9,6 +9,7 @@
 //! a requirement that a reference run violates is left out: no operation is needed to violate it.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
 
 use sesame_plan::{CampaignPlan, OperationId, RequirementId, Span};
 use sesame_present::number::plural;
@@ -64,7 +65,7 @@ pub struct Pairs {
     /// The requirements whose violations are counted: those that no reference run violates.
     pub requirements: Vec<RequirementId>,
     /// Whether there are pairs: tests of the campaign may hold two operations, or a recorded one did.
-    has_pairs: bool,
+    may_combine: bool,
     /// For each operation the parts of the run in which it may be active.
     reach: Vec<[bool; PARTS]>,
     /// For each operation what is known of it with each one before it; the last is that of the operation itself.
@@ -166,10 +167,10 @@ fn count(
     let nothing = || Acted { of_requirements: vec![0; requirements.len()], ..Acted::default() };
     let mut acted: Vec<Vec<Acted>> =
         (1..=operations.len()).map(|others| std::iter::repeat_with(nothing).take(others).collect()).collect();
-    let mut has_pairs = operations.len() > 1 && plan.campaign.count.max > 1;
+    let mut may_combine = operations.len() > 1 && plan.campaign.count.max > 1;
     for Trial { acting, violates } in trials {
         let violates: Vec<bool> = requirements.iter().map(|id| violates.contains(id)).collect();
-        has_pairs |= acting.len() > 1;
+        may_combine |= acting.len() > 1;
         for (&second, of_second) in acting {
             for (&first, of_first) in acting.range(..=second) {
                 let Acted { tests, parts, violating, of_requirements } = &mut acted[second][first];
@@ -181,7 +182,7 @@ fn count(
             }
         }
     }
-    Pairs { reach: reach.collect(), operations, requirements, has_pairs, acted }
+    Pairs { reach: reach.collect(), operations, requirements, may_combine, acted }
 }
 
 impl Pairs {
@@ -192,7 +193,7 @@ impl Pairs {
 
     /// Each two operations, the lower one first. There are none where tests hold one operation each.
     pub fn pairs(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
-        let count = if self.has_pairs { self.operations.len() } else { 0 };
+        let count = if self.may_combine { self.operations.len() } else { 0 };
         (0..count).flat_map(move |first| (first + 1..count).map(move |second| (first, second)))
     }
 
@@ -235,7 +236,7 @@ impl Pairs {
         let PairCounts { pairs, together, in_parts, together_in_parts } = self.counts();
         let mut sentence = format!("{together} of {} of operations acted together", plural(pairs, "pair", "pairs"));
         if in_parts > 0 {
-            sentence.push_str(&format!(", {together_in_parts} of {in_parts} in the same quarter of the run"));
+            let _ = write!(sentence, ", {together_in_parts} of {in_parts} in the same quarter of the run");
         }
         (pairs > 0).then_some(sentence)
     }

@@ -56,7 +56,9 @@ impl Strategy for ShrinkEach {
         loop {
             let mut asked = self.each[self.current].ask();
             if !asked.is_empty() {
-                asked.iter_mut().for_each(|candidate| candidate.generation = self.generation);
+                for candidate in &mut asked {
+                    candidate.generation = self.generation;
+                }
                 return asked;
             }
             let spare = self.each[self.current].take_left();

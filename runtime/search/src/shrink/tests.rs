@@ -571,7 +571,7 @@ mod messages {
                 let subset = |chosen: u32| -> BTreeSet<Altered> {
                     all.iter().enumerate().filter(|(at, _)| chosen >> at & 1 == 1).map(|(_, message)| *message).collect()
                 };
-                let failing: Vec<_> = (1..1u32 << all.len()).map(subset).filter(|set| fails(set)).collect();
+                let failing: Vec<_> = (1..1u32 << all.len()).map(subset).filter(&fails).collect();
                 let mut smallest = failing.iter().filter(|set| {
                     !failing.iter().any(|other| other.len() < set.len() && other.is_subset(set))
                 });

@@ -231,7 +231,8 @@ fn shrinking(
         // The smallest test of several causes is shrunk for each of them.
         let of_cause = match failing {
             Failing::Violation { requirements, .. } if repository.task().shrinkings().len() > 1 => {
-                requirements.iter().map(|&id| format!("_{}", plan.requirement(id).name)).collect()
+                let names = requirements.iter().flat_map(|&id| ["_", plan.requirement(id).name.as_str()]);
+                names.collect()
             }
             _ => String::new(),
         };

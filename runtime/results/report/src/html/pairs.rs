@@ -186,9 +186,10 @@ impl Square<'_> {
         let Square { pairs, first, second, cause_of } = self;
         let (found, is_alone) = (&pairs.found, first == second);
         let acted = found.of(*first, *second);
-        let name = match is_alone {
-            true => pairs.operations[*first].clone(),
-            false => format!("{} + {}", pairs.operations[*first], pairs.operations[*second]),
+        let name = if is_alone {
+            pairs.operations[*first].clone()
+        } else {
+            format!("{} + {}", pairs.operations[*first], pairs.operations[*second])
         };
         let how = if is_alone { "acted" } else { "acted together" };
         if acted.tests == 0 {
