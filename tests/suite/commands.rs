@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::Path;
 
-use sesame_record::{DATABASE, Repository};
+use sesame_record::{DATABASE, Origin, Repository, TestRow, Verdict};
 use sesame_tests::{Done, Project, Runner};
 
 /// A known test that does not come out as expected, in addition to the example's own.
@@ -127,35 +127,43 @@ fn a_repetition_has_seeds_of_its_own_and_says_how_often_requirements_were_violat
 #[test]
 fn an_exported_test_reproduces_its_values_in_the_space_it_is_written_into() {
     let (project, runner) = run_once("kuka_cell_exported");
-    let block = runner.run(&["export", "T4", "--results", "r/5"]).expect(0).out;
-    assert!(block.contains("test coverage_experiment_T4 {"), "{block}");
-    let named = runner.run(&["export", "T5", "--results", "r/5", "--name", "five", "--format", "json"]).expect(0);
-    let named = json(&named);
-    assert_eq!((&named["name"], &named["test"]), (&"five".into(), &"T5".into()));
-    runner.run(&["export", "T5", "--results", "r/5", "--name", "5"]).expect(2);
+    // Two tests that keep all requirements, so that each of them is expected again.
+    let found = Repository::open(&runner.folder.join("r/5")).unwrap();
+    let requirements = &found.plan().requirements;
+    let keeps_all = |row: &&TestRow| requirements.iter().all(|one| row.verdict(one) == Verdict::Satisfied);
+    let rows = found.tests().unwrap();
+    let mut kept = rows.iter().filter(|row| row.origin == Origin::Search).filter(keeps_all).map(|row| row.number);
+    let (first, second) = (kept.next().unwrap(), kept.next().unwrap());
+    let [first_test, second_test] = [first, second].map(|number| format!("T{number}"));
+    let first_name = format!("coverage_experiment_{first_test}");
+    let block = runner.run(&["export", &first_test, "--results", "r/5"]).expect(0).out;
+    assert!(block.contains(&format!("test {first_name} {{")), "{block}");
+    let named = runner.run(&["export", &second_test, "--results", "r/5", "--name", "five", "--format", "json"]);
+    let named = json(&named.expect(0));
+    assert_eq!((&named["name"], &named["test"]), (&"five".into(), &second_test.as_str().into()));
+    runner.run(&["export", &second_test, "--results", "r/5", "--name", "5"]).expect(2);
 
     let text = fs::read_to_string(&project.space).unwrap();
     let described = format!("// A remark.\n{}", text.replace("/// ", "/// Corrected: "));
     fs::write(&project.space, format!("{described}\n{block}\n{}", named["block"].as_str().unwrap())).unwrap();
     let runner = project.build("coverage_experiment");
-    let kept = runner.run(&["known", "coverage_experiment_T4", "five", "--results", "r"]).expect(0);
+    let kept = runner.run(&["known", &first_name, "five", "--results", "r"]).expect(0);
     assert!(kept.out.contains("8 expectations satisfied"), "four requirements each: {}", kept.out);
-    let found = Repository::open(&runner.folder.join("r/5")).unwrap();
     let again = Repository::open(&runner.folder.join("r/known")).unwrap();
-    for (number, known) in [(4, "coverage_experiment_T4"), (5, "five")] {
+    for (number, known) in [(first, first_name.as_str()), (second, "five")] {
         let (found, again) = (found.test(number).unwrap(), again.test(again.find(known).unwrap()).unwrap());
         assert_eq!(again.test, found.test);
         assert_eq!(again.observation.metrics, found.observation.metrics, "the series as well");
     }
     // More known tests and other comments are not another model: what was found before can still be replayed.
-    runner.run(&["replay", "T4", "--results", "r/5"]).expect(0);
+    runner.run(&["replay", &first_test, "--results", "r/5"]).expect(0);
 
     let text = fs::read_to_string(&project.space).unwrap();
     fs::write(&project.space, text.replace("cycle_time <= 70s", "cycle_time <= 69s")).unwrap();
-    let changed = project.build("coverage_experiment").run(&["replay", "T4", "--results", "r/5"]).expect(1);
+    let changed = project.build("coverage_experiment").run(&["replay", &first_test, "--results", "r/5"]).expect(1);
     assert!(changed.err.contains("the model has changed"), "{}", changed.err);
     assert!(changed.err.contains("(requirement `"), "{}", changed.err);
-    assert!(changed.err.contains(" export T4 --results r/5"), "{}", changed.err);
+    assert!(changed.err.contains(&format!(" export {first_test} --results r/5")), "{}", changed.err);
 }
 
 #[test]
