@@ -130,9 +130,10 @@ fn violates(repository: &Repository, row: &TestRow) -> bool {
 fn a_violation_that_only_fresh_runs_show_closes_the_gate() {
     let runner = gusty("surprising", "confirming");
     let junit = runner.folder.join("junit.xml");
-    // Seeds differ in what the first runs, which share a seed of the simulator, happen to keep.
+    // Seeds differ in what the first runs, which share a seed of the simulator, happen to keep; of many tests, nearly
+    // always one violates at once.
     for seed in (1..=60).map(|seed| seed.to_string()) {
-        let options = ["--seed", &seed, "--evaluations", "12", "--results", "r", "--fail-on", "violation"];
+        let options = ["--seed", &seed, "--evaluations", "3", "--results", "r", "--fail-on", "violation"];
         let done = runner.run(&[&options[..], &["--junit", junit.to_str().unwrap()]].concat());
         let repository = Repository::open(&runner.folder.join("r").join(&seed)).unwrap();
         if repository.tests().unwrap().iter().any(|row| violates(&repository, row)) {

@@ -34,6 +34,7 @@ fn a_violation_is_reduced_to_messages_of_which_none_can_be_left_out() {
     of(&project, "known", &["silent_departure"]).expect(0);
     let shrunk = |into: &str, workers: &str| {
         let more = ["T1", "--results", "known", "--messages", "--into", into, "--workers", workers, "--format", "json"];
+        let more = [&more[..], &["--evaluations", "400"]].concat();
         json(&of(&project, "shrink", &more).expect(0))
     };
     let said = shrunk("one", "1");
@@ -41,7 +42,8 @@ fn a_violation_is_reduced_to_messages_of_which_none_can_be_left_out() {
     assert_eq!((way["minimal"].as_bool(), way["messages"]["reduced"].as_bool()), (Some(true), Some(true)), "{way}");
     let left = way["messages"]["left"].as_array().unwrap();
     let numbers: Vec<u64> = left.iter().map(|message| message["number"].as_u64().unwrap()).collect();
-    assert!(!left.is_empty() && left.len() < 20, "{left:?}");
+    // Without poses for as long as it takes to cross; of the 120 in the test's window less than half are needed.
+    assert!(!left.is_empty() && left.len() < 60, "{left:?}");
     for message in left {
         let text = |name: &str| message[name].as_str().unwrap();
         assert_eq!([text("operation"), text("topic"), text("path")], ["cut_east", "east", "robots/east/pose"]);
