@@ -31,8 +31,8 @@ pub struct ShrinkArgs {
     /// Shrink the smallest test of each cause, one after the other
     #[arg(long, conflicts_with_all = ["test", "evaluations"])]
     violations: bool,
-    /// The maximum number of simulator runs with `--violations`: each cause first gets an equal share, and runs that one
-    /// does not need go on to the others; by default 200 for each cause
+    /// The maximum number of simulator runs with `--violations`: each cause first gets an equal share, and runs that
+    /// one does not need go on to the others; by default 200 for each cause
     #[arg(long, value_name = "N", requires = "violations", value_parser = clap::value_parser!(u32).range(1..))]
     budget: Option<u32>,
     /// Folder of the run that recorded the test, for example `results/42`; by default the latest
@@ -42,7 +42,7 @@ pub struct ShrinkArgs {
     #[arg(long, value_name = "DIR")]
     into: Option<PathBuf>,
     /// The requirement that a smaller test must violate; may be repeated. By default it must violate every requirement
-    /// that the test violates, or crash or time out as the test did; with `--violations`, the causes of all requirements
+    /// that the test violates, or crash or time out as the test did; with `--violations`, causes of all requirements
     #[arg(long, value_name = "NAME")]
     requirement: Vec<String>,
     /// In how many runs a smaller test must fail, for noisy simulators: the first has the test's simulator seed, the

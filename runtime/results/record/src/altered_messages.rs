@@ -3,17 +3,12 @@
 //! They are only there if a run was asked, as a shrink asks before it goes on to single messages. Which tests it tries
 //! next follows from them, so they are part of the digest.
 
-use std::collections::BTreeMap;
-use std::ops::RangeInclusive;
-
 use rusqlite::{Transaction, params};
 
-use sesame_base::observation::{ALTERED_LISTED, AlteredMessage, AlteredMessages};
-use sesame_base::test_number::TestNumber;
+use sesame_base::observation::{AlteredMessage, AlteredMessages};
 
-use crate::columns::{finite, index, unsigned};
+use crate::columns::index;
 use crate::monitors::is_in;
-use crate::{RecordError, Repository};
 
 pub(super) const TABLES: [&str; 2] = ["listings", "altered_messages"];
 
@@ -64,47 +59,4 @@ pub(super) fn write(transaction: &Transaction<'_>, test: u32, altered: &AlteredM
             .execute(params![test, index(position), operation, wire, number, time])?;
     }
     Ok(())
-}
-
-impl Repository {
-    /// Which messages operations altered in the tests whose numbers lie in this range, where their runs list them.
-    pub fn altered_messages(
-        &self,
-        numbers: &RangeInclusive<u32>,
-    ) -> Result<BTreeMap<u32, AlteredMessages>, RecordError> {
-        let failed = |error| RecordError::database("read the results", &self.path, error);
-        if !is_in(&self.connection, TABLES[0]).map_err(failed)? {
-            return Ok(BTreeMap::new());
-        }
-        let within = params![numbers.start(), numbers.end()];
-        let listings =
-            self.read("SELECT test, too_many FROM listings WHERE test BETWEEN ?1 AND ?2", within, |row| {
-                Ok((row.get(0)?, row.get::<_, bool>(1)?))
-            })?;
-        let nothing = |too_many| if too_many { AlteredMessages::TooMany } else { AlteredMessages::Listed(Vec::new()) };
-        let mut found: BTreeMap<u32, AlteredMessages> =
-            listings.into_iter().map(|(test, too_many)| (test, nothing(too_many))).collect();
-        let rows = self.read(
-            "SELECT test, position, operation, wire, number, time_s FROM altered_messages \
-             WHERE test BETWEEN ?1 AND ?2 ORDER BY test, position",
-            within,
-            |row| {
-                let (operation, wire, number) = (row.get(2)?, row.get(3)?, unsigned(row, 4)?);
-                let message = AlteredMessage { operation, wire, number, time: finite(row, 5)? };
-                Ok((row.get::<_, u32>(0)?, crate::columns::position(row, 1)?, message))
-            },
-        )?;
-        for (test, position, message) in rows {
-            let listed = match found.get_mut(&test) {
-                Some(AlteredMessages::Listed(listed)) if listed.len() < ALTERED_LISTED => listed,
-                _ => {
-                    let this = TestNumber(test);
-                    return Err(RecordError::damaged(&self.path, format!("{this} lists messages that it cannot list")));
-                }
-            };
-            self.in_order(test, "altered messages", position, listed.len())?;
-            listed.push(message);
-        }
-        Ok(found)
-    }
 }

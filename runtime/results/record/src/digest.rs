@@ -92,8 +92,8 @@ const PORTION: usize = 1 << 16;
 ///
 /// Operations that were one operation in an imported file are hashed last, if there are any, then operations that could
 /// not be imported, and windows and ranges of the file that are others in the plan. So are runs of a lab that were
-/// entered by hand: which run of its test each is, but not who made it; and the only messages that operations alter, and
-/// those that runs say they altered.
+/// entered by hand: which run of its test each is, but not who made it; and the only messages that operations alter,
+/// and those that runs say they altered.
 ///
 /// Names of columns and verdicts are not hashed.
 pub(super) fn of_connection(connection: &Connection, plan: &CampaignPlan) -> rusqlite::Result<String> {

@@ -37,6 +37,7 @@ mod original_extents;
 mod plan;
 mod quarantine;
 mod read_courses;
+mod read_messages;
 mod read_monitors;
 mod read_tests;
 mod recognise;

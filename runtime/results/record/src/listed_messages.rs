@@ -2,17 +2,12 @@
 //!
 //! It is only there if a test has such an operation, as a shrink that goes on to single messages makes them.
 
-use std::collections::BTreeMap;
-use std::ops::RangeInclusive;
-
 use rusqlite::{Transaction, params};
 
-use sesame_base::test_number::TestNumber;
 use sesame_plan::{MessageRun, Messages, Test};
 
-use crate::columns::{index, position, unsigned};
+use crate::columns::index;
 use crate::monitors::is_in;
-use crate::{RecordError, Repository};
 
 pub(super) const TABLE: &str = "listed_messages";
 
@@ -52,38 +47,4 @@ pub(super) fn write(transaction: &Transaction<'_>, number: u32, test: &Test) -> 
         }
     }
     Ok(())
-}
-
-impl Repository {
-    /// The lists of tests whose numbers lie in this range, by test and position of the operation.
-    pub(super) fn listed_messages(
-        &self,
-        numbers: &RangeInclusive<u32>,
-    ) -> Result<BTreeMap<(u32, usize), Messages>, RecordError> {
-        let failed = |error| RecordError::database("read the results", &self.path, error);
-        if !is_in(&self.connection, TABLE).map_err(failed)? {
-            return Ok(BTreeMap::new());
-        }
-        let rows = self.read(
-            "SELECT test, operation, wire, first, last FROM listed_messages WHERE test BETWEEN ?1 AND ?2 \
-             ORDER BY test, operation, position",
-            params![numbers.start(), numbers.end()],
-            |row| {
-                let run = MessageRun { wire: row.get(2)?, first: unsigned(row, 3)?, last: unsigned(row, 4)? };
-                Ok(((row.get::<_, u32>(0)?, position(row, 1)?), run))
-            },
-        )?;
-        let mut lists: BTreeMap<(u32, usize), Vec<MessageRun>> = BTreeMap::new();
-        for (operation, run) in rows {
-            lists.entry(operation).or_default().push(run);
-        }
-        let list = |((test, operation), runs)| {
-            let messages = Messages::try_from(runs).map_err(|problem| {
-                let this = TestNumber(test);
-                RecordError::damaged(&self.path, format!("the listed messages of {this} {problem}"))
-            })?;
-            Ok(((test, operation), messages))
-        };
-        lists.into_iter().map(list).collect()
-    }
 }

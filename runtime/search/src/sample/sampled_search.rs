@@ -10,7 +10,8 @@ const GENERATION: u32 = 50;
 
 /// Tests that are there before any is run.
 pub(crate) trait Sampling: Send {
-    /// The test of an index; asked for in order, from 0. It depends on the index and the reference run alone. `None` after the last one.
+    /// The test of an index; asked for in order, from 0. It depends on the index and the reference run alone. `None`
+    /// after the last one.
     fn test(&mut self, index: u32) -> Option<Test>;
 
     /// Takes the reference run, before the first test is asked for.

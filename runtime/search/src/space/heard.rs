@@ -49,8 +49,8 @@ impl Heard {
         stretches.iter().take_while(|span| span.start < end).any(|span| span.end >= start)
     }
 
-    /// A window of this length that meets a message, at any place in what is permitted; `None` if there is no message, or
-    /// nothing is known.
+    /// A window of this length that meets a message, at any place in what is permitted; `None` if there is no message,
+    /// or nothing is known.
     pub(crate) fn around_a_message(&self, range: Range, length: f64, stream: &mut Stream) -> Option<(f64, f64)> {
         let inside = |span: &Span| (span.start.max(range.low), span.end.min(range.high));
         let stretches = self.stretches.iter().flatten().map(inside);

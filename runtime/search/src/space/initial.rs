@@ -12,8 +12,8 @@
 //! Windows and sub-ranges are uniform over all feasible pairs of ends, values uniform over their range; windows of
 //! copies that must not overlap are uniform over all [disjoint ones](crate::space::separation). But a tenth of the
 //! windows are as long as is permitted, and a tenth of the choices are a [strongest one][Strongest]: uniform draws are
-//! nearly always of middling length and strength, and what is dangerous is at the ends. Windows in which the undisturbed
-//! system has no message to disturb are drawn again. The order of the list is random. Where conditions
+//! nearly always of middling length and strength, and what is dangerous is at the ends. Windows in which the
+//! undisturbed system has no message to disturb are drawn again. The order of the list is random. Where conditions
 //! switch, start and end are grown independently, and lengths are uniform, with a tenth at the greatest one.
 //!
 //! [Strongest]: crate::space::Strongest

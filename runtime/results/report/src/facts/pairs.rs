@@ -6,8 +6,8 @@ use sesame_analysis::Selection;
 use sesame_analysis::pairs::{Acted, PairCounts, Pairs, pairs};
 use sesame_record::{RecordError, Repository};
 
-/// Which operations of a campaign acted together, and in the same quarter of the run. The lists of lists have a list for
-/// each operation: a number for each operation before it, of tests in which both acted, then one for the operation
+/// Which operations of a campaign acted together, and in the same quarter of the run. The lists of lists have a list
+/// for each operation: a number for each operation before it, of tests in which both acted, then one for the operation
 /// itself.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PairsSummary {

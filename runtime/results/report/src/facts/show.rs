@@ -145,8 +145,8 @@ pub struct OperationReport {
     /// What switched it on and off, in the words of the language; `None` where a planned window did, and for one that
     /// acts before the start or after the end.
     pub conditions: Option<String>,
-    /// The only messages that it alters while it is active, as the list of a `test` block: `248..250, 12 on 2`. Left out
-    /// where it alters all.
+    /// The only messages that it alters while it is active, as the list of a `test` block: `248..250, 12 on 2`. Left
+    /// out where it alters all.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub messages: Option<String>,
     /// When it was seen to be active, in seconds; `None` where the run could not report it.
