@@ -71,24 +71,12 @@ impl<'a> Evaluator<'a> {
     ) -> Result<Self, RecordError> {
         let repository = recorder.repository();
         let recorded = repository.numbers()?.into_iter().collect();
-        let repetitions = repository.repetitions()?;
         let traces = match plan.campaign.record {
             Some(keep) => Some(Traces { folder: repository.make_trace_folder()?, keep }),
             None => None,
         };
-        let reference = None;
-        Ok(Evaluator {
-            plan,
-            reference,
-            recorder,
-            executor,
-            recorded,
-            repetitions,
-            traces,
-            series,
-            lists_altered: false,
-            interrupted,
-        })
+        let idle = Evaluator::without_tests(plan, recorder, executor, interrupted)?;
+        Ok(Evaluator { recorded, traces, series, ..idle })
     }
 
     /// One that only repeats tests that are recorded.
@@ -98,18 +86,28 @@ impl<'a> Evaluator<'a> {
         executor: &'a mut dyn Executor,
         interrupted: &'a AtomicBool,
     ) -> Result<Self, RecordError> {
-        let repetitions = recorder.repository().repetitions()?;
         let reference = recorder.repository().reference_run()?.map(|record| record.observation);
-        let (recorded, traces, series) = (BTreeSet::new(), None, false);
+        let idle = Evaluator::without_tests(plan, recorder, executor, interrupted)?;
+        Ok(Evaluator { reference, ..idle })
+    }
+
+    /// One that knows of no tests but their repetitions.
+    fn without_tests(
+        plan: &'a CampaignPlan,
+        recorder: &'a mut Recorder,
+        executor: &'a mut dyn Executor,
+        interrupted: &'a AtomicBool,
+    ) -> Result<Self, RecordError> {
+        let repetitions = recorder.repository().repetitions()?;
         Ok(Evaluator {
             plan,
-            reference,
+            reference: None,
             recorder,
             executor,
-            recorded,
+            recorded: BTreeSet::new(),
             repetitions,
-            traces,
-            series,
+            traces: None,
+            series: false,
             lists_altered: false,
             interrupted,
         })

@@ -231,7 +231,7 @@ impl Pairs {
     }
 
     /// How many pairs acted together, as in `44 of 45 pairs of operations acted together, 97 of 180 in the same quarter
-    /// of the run`; `None` if there are no pairs.
+    /// of the run`; `None` without pairs.
     pub fn sentence(&self) -> Option<String> {
         let PairCounts { pairs, together, in_parts, together_in_parts } = self.counts();
         let mut sentence = format!("{together} of {} of operations acted together", plural(pairs, "pair", "pairs"));

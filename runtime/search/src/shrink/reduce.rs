@@ -201,7 +201,8 @@ impl<A: Oracle> Reduction<'_, A> {
     }
 
     /// Delta debugging (Zeller and Hildebrandt 2002, ddmin): parts of the items alone, then all but a part, in ever
-    /// smaller parts. Of some items there is no test; of others, so many are asked for at once.
+    /// smaller parts. `test_of` gives no test where the campaign permits none, and at most `at_once` are asked for
+    /// together.
     fn fewer<T: Clone>(
         &mut self,
         phase: Phase,
@@ -214,7 +215,7 @@ impl<A: Oracle> Reduction<'_, A> {
             let all = items.len();
             parts = parts.min(all);
             let bounds = move |part: usize| (part * all / parts, (part + 1) * all / parts);
-            // Of two parts, all but one is the other one.
+            // With two parts, leaving one out gives the other.
             let kept_of = |at: usize| match at.checked_sub(parts) {
                 None => items[bounds(at).0..bounds(at).1].to_vec(),
                 Some(part) => [&items[..bounds(part).0], &items[bounds(part).1..]].concat(),

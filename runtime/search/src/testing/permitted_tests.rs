@@ -151,7 +151,7 @@ fn fresh_tests_contain_copies_equally_often_with_each_strategy() {
     }
 }
 
-/// A strategy that is told of another reference run than the synthetic robots'.
+/// A strategy that begins with another reference run than the synthetic robots'.
 struct Begun(Box<dyn crate::Strategy>, Observation);
 
 impl crate::Strategy for Begun {

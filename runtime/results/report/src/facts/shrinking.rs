@@ -258,7 +258,7 @@ fn shrinking(
 const ALL_TIMES: usize = 6;
 
 /// Altered messages with their times, as in ``three `odom` messages, at 12.40, 12.45 and 12.50 s``. Where several
-/// operations alter messages, those of each are said apart.
+/// operations alter messages, each of them has a part of its own.
 fn altered_words(messages: &[LeftMessage]) -> String {
     let of_each: Vec<&[LeftMessage]> = messages.chunk_by(|a, b| a.position == b.position).collect();
     let words = of_each.iter().map(|messages| {
