@@ -16,7 +16,8 @@ exit codes:
   0    done
   1    failed: the last line says why
   2    wrong usage
-  3    done, but in some tests the values that Sesame recorded differ from those of the judge
+  3    done, but values that Sesame recorded differ from those of the judge, or causes that it names from what its
+       tests bear out
   130  stopped by Ctrl-C; the same command continues
 """
 
@@ -257,7 +258,7 @@ def show(records: list[Record], cases: list[Case], options: argparse.Namespace) 
             ending = {"text": "txt"}.get(name, name)
             (options.out / f"table.{ending}").write_text(text, encoding="utf-8")
     print(texts[options.format], end="")
-    return 3 if any(row.differing for row in table) else 0
+    return 3 if any(row.differing or row.named_otherwise for row in table) else 0
 
 
 if __name__ == "__main__":

@@ -27,6 +27,7 @@ from bugs.campaign import Job, Record, agrees, record_from, run
 from bugs.case import PROBLEMS as PROBLEMS_FOLDER
 from bugs.case import Case, TrueCause, cause, load_cases
 from bugs.judge import Judge, minimal
+from bugs.named import Named
 from bugs.protocol import Bus, serve
 from bugs.sesamec import CAMPAIGN, plan_of, search
 from bugs.space import Metric, Operation, Parameter, Requirement, Space, Test, Topic, Use, check_permitted, space_of
@@ -350,19 +351,59 @@ class Strategies(unittest.TestCase):
 OWN = f"{Path(__file__).resolve().parent / 'own_strategy.py'}:StrongestFirst"
 
 
+class WhatIsNamed(unittest.TestCase):
+    def test_each_cause_that_is_named_is_one_by_the_judge_of_a_test_that_ran(self):
+        several = 0
+        for case in CASES[::4]:
+            with self.subTest(case.name):
+                judge, named, judged = Judge(case.world()), Named(case.space), set()
+                strategy = strategy_class("combinatorial")(Problem(case.space, judge.world.run((), keep_messages=True), 40), 1)
+                for _ in range(40):
+                    # What attributes a violation: the test without each of its operations.
+                    test = strategy.ask()
+                    parts = [tuple(use for use in test if use.operation != left_out.operation) for left_out in test]
+                    for each in [test, *(part for part in parts if part)]:
+                        named.add(each, judge.outcome(each))
+                        judged |= judge.causes(each)
+                    self.assertLessEqual(named.causes(), judged)
+                several += sum(len(each.operations) > 1 for each in named.causes())
+        self.assertGreater(several, 0)
+
+    def test_a_set_of_which_fewer_were_not_tried_is_not_named(self):
+        case, _ = _case_with("a", {"b", "c"})
+        operations = list(case.space.operations)[:2]
+        both = tuple(Use(name, 0.0, 1.0, (), 1) for name in operations)
+        requirement = next(iter(case.space.requirements))
+        named, whole = Named(case.space), cause(requirement, set(operations))
+
+        def outcome(test: Test, violated: set[str]) -> Outcome:
+            return Outcome({}, {}, frozenset(violated), tuple(1 for _ in test), 1.0)
+
+        named.add(both, outcome(both, {requirement}))
+        self.assertEqual(named.causes(), set())
+        named.add(both[:1], outcome(both[:1], set()))
+        self.assertEqual(named.causes(), set())
+        elsewhere = (replace(both[1], start=0.5),)
+        named.add(elsewhere, outcome(elsewhere, set()))
+        self.assertEqual(named.causes(), set(), "in another window it says nothing about this one")
+        named.add(both[1:], outcome(both[1:], set()))
+        self.assertEqual(named.causes(), {whole})
+
+
 class Table(unittest.TestCase):
-    def test_it_counts_true_causes_and_what_a_reader_sees(self):
+    def test_it_counts_true_causes_and_those_that_tests_bear_out(self):
         case, known = _case_with("a", {"b", "c"})
         record = Record(
             "mine", case.name, 1, 120, "", "", violating=[30, 50, 90], without_effect=[1, 2, 3],
             found=[("R1", ("a",), 30), ("R1", ("b", "c"), 90), ("R1", ("b", "d"), 95)],
-            observed=[("R1", ("a", "d"), 30), ("R1", ("a",), 50), ("R1", ("b", "c", "d"), 90)],
-            differing=[], seconds=1.0,
+            named=[("R1", ("a", "d"), 30, 50), ("R1", ("a",), 50, 121), ("R1", ("b", "c", "d"), 90, 121)],
+            differing=[], named_otherwise=[], seconds=1.0,
         )  # fmt: skip
         (row,) = rows([record], [case], early=40)
         self.assertEqual((row.true_causes, row.causes_early, row.causes, row.unlisted), (2, 1.0, 2.0, 1.0))
         self.assertEqual((row.any_early, row.any, row.first, row.without_effect), (1.0, 1.0, 30.0, 3 / 120))
-        self.assertEqual(row.precision, 0.5, "`a` is seen alone, `b` and `c` with a passenger")
+        self.assertEqual((row.named_early, row.named), (0.0, 1.0))
+        self.assertEqual(row.precision, 0.5, "`a` alone is true, and with `b` and `c` a third one is named")
         self.assertEqual(row.causes_interval, (2.0, 2.0))
         self.assertIn("mine", as_text([row], [case]))
         self.assertEqual(json.loads(as_json([row]))[0]["causes"], 2.0)
@@ -371,7 +412,7 @@ class Table(unittest.TestCase):
     def test_of_problems_it_shows_the_first_violation_in_the_median(self):
         problem = PROBLEMS[0]
         records = [
-            Record("mine", problem.name, seed, 120, "", "", violating, [], [], [], [], 1.0)
+            Record("mine", problem.name, seed, 120, "", "", violating, [], [], [], [], [], 1.0)
             for seed, violating in enumerate([[7, 9], [30], [50], []])
         ]
         table = rows(records, [problem], early=40)
@@ -418,7 +459,7 @@ class WithSesame(unittest.TestCase):
     def test_recorded_values_and_verdicts_are_those_of_the_world(self):
         for case in ALL:
             with self.subTest(case.name):
-                for recorded in search(Path(SESAMEC), case.space_file, case.space, 1, 40, "random"):
+                for recorded in search(Path(SESAMEC), case.space_file, case.space, 1, 40, "random").tests:
                     outcome = case.world(recorded.simulator_seed).run(recorded.test)
                     self.assertTrue(agrees(recorded, outcome), f"T{recorded.number} {recorded}, {outcome.values}")
                     violated = {name for name, verdict in recorded.verdicts.items() if verdict == "violated"}

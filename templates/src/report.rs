@@ -24,11 +24,16 @@ const STYLE: &str = include_str!("../report/page.css");
 const STUDY_STYLE: &str = include_str!("../report/study.css");
 
 /// The parts of the script of a study's page.
-const STUDY_SCRIPT: [&str; 2] = [include_str!("../report/script/marks.js"), include_str!("../report/script/space.js")];
+const STUDY_SCRIPT: [&str; 3] = [
+    include_str!("../report/script/marks.js"),
+    include_str!("../report/script/save.js"),
+    include_str!("../report/script/space.js"),
+];
 
 /// The parts of the script, in one scope: later ones use what earlier ones define.
-const SCRIPT: [&str; 7] = [
+const SCRIPT: [&str; 8] = [
     include_str!("../report/script/marks.js"),
+    include_str!("../report/script/save.js"),
     include_str!("../report/script/tests.js"),
     include_str!("../report/script/table.js"),
     include_str!("../report/script/parallel.js"),

@@ -3,14 +3,13 @@
 use std::path::Path;
 use std::time::Instant;
 
-use sesame_base::time::SimTime;
 use sesame_patience::{LIMIT, Watch};
 use sesame_plan::{CampaignPlan, Test};
 use sesame_relay::metric::MetricTable;
 use sesame_relay::relay::Relay;
 use sesame_relay::transport::Transport;
 use sesame_relay::wire::WireTable;
-use sesame_tests::{Port, fresh_folder};
+use sesame_tests::{Port, fresh_folder, relay_for_a_moment};
 use sesamec::frontend::{Look, SESAME};
 
 use crate::peers::{Peer, common, python};
@@ -93,10 +92,7 @@ fn run(test: &str, done: impl Fn(&mut Peer, &mut Peer) -> bool) -> Option<Run> {
     while !done(&mut vehicle, &mut station) {
         watch.goes_on();
         assert!(Instant::now() < limit, "nothing came of it: {:?}", transport.incidents().notes);
-        let until = transport.now() + SimTime::from_nanos(5_000_000);
-        while transport.now() < until {
-            transport.advance(until, &mut relay).unwrap_or_else(|error| panic!("{error}"));
-        }
+        relay_for_a_moment(&mut *transport, &mut relay).unwrap_or_else(|error| panic!("{error}"));
     }
     let notes = transport.incidents().notes;
     transport.close();

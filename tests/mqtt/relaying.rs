@@ -4,14 +4,13 @@ use std::cell::RefCell;
 use std::path::Path;
 use std::time::Instant;
 
-use sesame_base::time::SimTime;
 use sesame_patience::Watch;
 use sesame_plan::{CampaignPlan, Test};
 use sesame_relay::metric::MetricTable;
 use sesame_relay::relay::Relay;
 use sesame_relay::transport::Transport;
 use sesame_relay::wire::WireTable;
-use sesame_tests::fresh_folder;
+use sesame_tests::{fresh_folder, relay_for_a_moment};
 use sesamec::frontend::{Look, SESAME};
 
 use crate::peers::{Broker, Client, LIMIT, packages};
@@ -76,10 +75,7 @@ impl System {
         while !done() {
             watch.goes_on();
             assert!(Instant::now() < limit, "nothing came of it: {:?}", self.notes());
-            let until = self.transport.now() + SimTime::from_nanos(5_000_000);
-            while self.transport.now() < until {
-                self.transport.advance(until, &mut relay).map_err(|error| error.to_string())?;
-            }
+            relay_for_a_moment(&mut *self.transport, &mut relay).map_err(|error| error.to_string())?;
         }
         Ok(())
     }

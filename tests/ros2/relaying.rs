@@ -4,7 +4,6 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use sesame_base::observation::Observation;
-use sesame_base::time::SimTime;
 use sesame_patience::Watch;
 use sesame_plan::{CampaignPlan, Test};
 use sesame_relay::evaluate::{Custom, Run, evaluate_tapped};
@@ -13,7 +12,7 @@ use sesame_relay::relay::{Exchange as _, Finished, Listener, Relay};
 use sesame_relay::transport::Transport;
 use sesame_relay::transport::relay_latency::AddedOnWire;
 use sesame_relay::wire::{Wire, WireTable};
-use sesame_tests::workspace;
+use sesame_tests::{relay_for_a_moment, workspace};
 use sesamec::frontend::{Look, SESAME};
 
 use crate::environment::Domain;
@@ -294,10 +293,7 @@ impl System {
             if done(seen, &mut *self.transport) {
                 return relay.finish(self.transport.now());
             }
-            let until = self.transport.now() + SimTime::from_nanos(5_000_000);
-            while self.transport.now() < until {
-                self.transport.advance(until, &mut relay).unwrap_or_else(|error| panic!("{error}"));
-            }
+            relay_for_a_moment(&mut *self.transport, &mut relay).unwrap_or_else(|error| panic!("{error}"));
         }
     }
 

@@ -10,6 +10,7 @@ pub mod optimisers;
 mod port;
 mod python;
 pub mod python_mcap;
+mod relaying;
 pub mod rtamt;
 pub mod selecting;
 
@@ -20,6 +21,7 @@ use std::sync::OnceLock;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 pub use port::{Port, from_own_place};
+pub use relaying::relay_for_a_moment;
 
 /// The root of the workspace.
 pub fn workspace() -> &'static Path {

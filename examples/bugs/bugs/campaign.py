@@ -8,7 +8,8 @@ from functools import cache
 from pathlib import Path
 
 from bugs.case import Case, Cause, cause, file_hash, load_case
-from bugs.judge import VERSION, Judge, observed
+from bugs.judge import VERSION, Judge
+from bugs.named import Named
 from bugs.sesamec import Recorded, search
 from bugs.space import Test
 from bugs.strategies import Problem, Unavailable, strategy_class
@@ -38,8 +39,11 @@ class Record:
     violating: list[int]  # tests that violate a requirement
     without_effect: list[int]  # tests in which no operation had an effect
     found: list[tuple[str, tuple[str, ...], int]]  # causes by the judge, each with the first test that has it
-    observed: list[tuple[str, tuple[str, ...], int]]  # sets of operations that a reader sees violate, likewise
+    # Causes that the tests bear out, each with the test from which on, and the test before which: later tests may show
+    # that fewer operations suffice.
+    named: list[tuple[str, tuple[str, ...], int, int]]
     differing: list[int]  # tests whose recorded values differ from the judge's; only of the real program
+    named_otherwise: list[tuple[str, tuple[str, ...]]]  # causes that only the real program names, or does not name
     seconds: float  # of wall time
 
     @property
@@ -50,9 +54,9 @@ class Record:
         """Causes that the judge found in the tests up to this one."""
         return {cause(requirement, operations) for requirement, operations, first in self.found if first <= test}
 
-    def observed_by(self, test: int) -> set[Cause]:
-        """What a reader of the tests up to this one sees violate."""
-        return {cause(requirement, operations) for requirement, operations, first in self.observed if first <= test}
+    def named_by(self, test: int) -> set[Cause]:
+        """The causes that the tests up to this one bear out."""
+        return {cause(requirement, operations) for requirement, operations, since, until in self.named if since <= test < until}
 
     def as_json(self) -> dict:
         return asdict(self)
@@ -64,7 +68,8 @@ def record_from(facts: dict) -> Record:
         **{
             **facts,
             "found": [(requirement, tuple(names), first) for requirement, names, first in facts["found"]],
-            "observed": [(requirement, tuple(names), first) for requirement, names, first in facts["observed"]],
+            "named": [(requirement, tuple(names), since, until) for requirement, names, since, until in facts["named"]],
+            "named_otherwise": [(requirement, tuple(names)) for requirement, names in facts["named_otherwise"]],
         }
     )
 
@@ -88,8 +93,9 @@ def run(job: Job, folder: Path, sesamec: Path | None) -> Record:
     case, judge = _case(folder), _judge(folder)
     violating, without_effect, differing = [], [], []
     found: dict[Cause, int] = {}
-    seen: dict[Cause, int] = {}
-    for number, (test, outcome, agrees) in enumerate(_tests(job, case, judge, sesamec), start=1):
+    named, spans = Named(case.space), _Spans()
+    tests = _tests(job, case, judge, sesamec)
+    for number, (test, outcome, agrees) in enumerate(tests.each, start=1):
         if outcome.violated:
             violating.append(number)
         if outcome.no_effect:
@@ -98,8 +104,9 @@ def run(job: Job, folder: Path, sesamec: Path | None) -> Record:
             differing.append(number)
         for each in judge.causes(test):
             found.setdefault(each, number)
-        for each in observed(test, outcome):
-            seen.setdefault(each, number)
+        named.add(test, outcome)
+        spans.add(named.causes(), number)
+    otherwise = set() if tests.causes is None else tests.causes ^ named.causes()
     return Record(
         strategy=job.strategy,
         case=job.case,
@@ -110,10 +117,29 @@ def run(job: Job, folder: Path, sesamec: Path | None) -> Record:
         violating=violating,
         without_effect=without_effect,
         found=[(each.requirement, each.operations, first) for each, first in sorted(found.items())],
-        observed=[(each.requirement, each.operations, first) for each, first in sorted(seen.items())],
+        named=spans.up_to(job.tests),
         differing=differing,
+        named_otherwise=[(each.requirement, each.operations) for each in sorted(otherwise)],
         seconds=round(time.monotonic() - began, 3),
     )
+
+
+class _Spans:
+    """From which test to which causes are named."""
+
+    def __init__(self) -> None:
+        self._since: dict[Cause, int] = {}
+        self._ended: list[tuple[Cause, int, int]] = []
+
+    def add(self, named: set[Cause], number: int) -> None:
+        for each in [each for each in self._since if each not in named]:
+            self._ended.append((each, self._since.pop(each), number))
+        for each in named:
+            self._since.setdefault(each, number)
+
+    def up_to(self, tests: int) -> list[tuple[str, tuple[str, ...], int, int]]:
+        spans = self._ended + [(each, since, tests + 1) for each, since in self._since.items()]
+        return [(each.requirement, each.operations, since, until) for each, since, until in sorted(spans)]
 
 
 # A worker process runs many jobs; their cases are read, and parts of tests kept, once.
@@ -125,16 +151,27 @@ def _judge(folder: Path) -> Judge:
     return Judge(_case(folder).world())
 
 
-def _tests(job: Job, case: Case, judge: Judge, sesamec: Path | None) -> Iterator[tuple[Test, Outcome, bool]]:
+@dataclass(frozen=True)
+class _Tests:
     """The tests of a job, each with its outcome and whether values that were recorded agree with it."""
+
+    each: Iterator[tuple[Test, Outcome, bool]]
+    causes: set[Cause] | None  # those that the real program names in the end
+
+
+def _tests(job: Job, case: Case, judge: Judge, sesamec: Path | None) -> _Tests:
     name, _, of_sesame = job.strategy.partition(":")
-    if name == "sesamec":
-        if sesamec is None:
-            raise Unavailable("`sesamec` needs the program: name it with --sesamec, or in the variable SESAMEC")
-        for recorded in search(sesamec, case.space_file, case.space, job.seed, job.tests, of_sesame or None):
-            outcome = judge.outcome(recorded.test)
-            yield recorded.test, outcome, agrees(recorded, outcome)
-        return
+    if name != "sesamec":
+        return _Tests(_asked(job, case, judge), None)
+    if sesamec is None:
+        raise Unavailable("`sesamec` needs the program: name it with --sesamec, or in the variable SESAMEC")
+    searched = search(sesamec, case.space_file, case.space, job.seed, job.tests, of_sesame or None)
+    outcomes = ((recorded, judge.outcome(recorded.test)) for recorded in searched.tests)
+    each = ((recorded.test, outcome, agrees(recorded, outcome)) for recorded, outcome in outcomes)
+    return _Tests(each, searched.causes)
+
+
+def _asked(job: Job, case: Case, judge: Judge) -> Iterator[tuple[Test, Outcome, bool]]:
     problem = Problem(case.space, judge.world.run((), keep_messages=True), job.tests)
     strategy = strategy_class(job.strategy)(problem, job.seed)
     for _ in range(job.tests):

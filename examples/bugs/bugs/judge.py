@@ -48,9 +48,3 @@ def _explained(candidate: Cause, found: set[Cause]) -> bool:
 def minimal(causes: set[Cause]) -> set[Cause]:
     """Those that contain no other one of them."""
     return {each for each in causes if not any(other != each and each.contains(other) for other in causes)}
-
-
-def observed(test: Test, outcome: Outcome) -> set[Cause]:
-    """What a reader of a single violating test would blame: all of its operations that had an effect."""
-    acting = {use.operation for use, effects in zip(test, outcome.effects) if effects}
-    return {cause(requirement, acting) for requirement in outcome.violated} if acting else set()

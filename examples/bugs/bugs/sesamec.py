@@ -13,6 +13,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
+from bugs.case import Cause, cause
 from bugs.space import Choice, Space, Test, Use
 
 CAMPAIGN = "find_causes"
@@ -36,6 +37,14 @@ class Recorded:
     simulator_seed: int
 
 
+@dataclass(frozen=True)
+class Searched:
+    """What Sesame did in a search, and what it concludes from that."""
+
+    tests: list[Recorded]  # in order
+    causes: set[Cause]  # those that it names: not those of which it says that fewer operations were not tried
+
+
 def plan_of(sesamec: Path, space_file: Path) -> dict:
     """The plan of a space's campaign `find_causes`."""
     with tempfile.TemporaryDirectory() as folder:
@@ -45,8 +54,8 @@ def plan_of(sesamec: Path, space_file: Path) -> dict:
 
 def search(
     sesamec: Path, space_file: Path, space: Space, seed: int, tests: int, strategy: str | None = None
-) -> list[Recorded]:
-    """Runs the campaign `find_causes`, or the same campaign with another strategy, and returns its tests in order."""
+) -> Searched:
+    """Runs the campaign `find_causes`, or the same campaign with another strategy."""
     with tempfile.TemporaryDirectory() as name:
         folder, file, campaign = Path(name), space_file.resolve(), CAMPAIGN
         if strategy is not None:
@@ -56,7 +65,15 @@ def search(
             "--", "--seed", str(seed), "--evaluations", str(tests), "--workers", "1",
             "--results", str(folder / "results"), "--fail-on", "nothing",
         )  # fmt: skip
-        return read_results(folder / "results" / str(seed) / "results.sqlite", space)
+        results = folder / "results" / str(seed) / "results.sqlite"
+        return Searched(read_results(results, space), causes_of(sesamec, results))
+
+
+def causes_of(sesamec: Path, results: Path) -> set[Cause]:
+    """The causes that Sesame names for the tests in a results file."""
+    rows = json.loads(_run(sesamec, "results", "causes", str(results), "--format", "json"))
+    named = [row for row in rows if row["fewer"] != "not tried"]
+    return {cause(row["requirement"], tuple(row["operations"].split(" + "))) for row in named}
 
 
 def read_results(file: Path, space: Space) -> list[Recorded]:
@@ -125,8 +142,10 @@ def _with_strategy(space_file: Path, strategy: str, tests: int, folder: Path) ->
     return file
 
 
-def _run(sesamec: Path, *arguments: str) -> None:
+def _run(sesamec: Path, *arguments: str) -> str:
+    """What the program prints."""
     done = subprocess.run([sesamec, *arguments], stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         last = "\n".join(done.stderr.strip().splitlines()[-15:])
         raise SesamecFailed(f"`{sesamec} {' '.join(arguments)}` ended with {done.returncode}:\n{last}")
+    return done.stdout

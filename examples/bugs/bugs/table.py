@@ -13,8 +13,7 @@ from random import Random
 from statistics import fmean, median
 
 from bugs.campaign import Record
-from bugs.case import MOST_OPERATIONS, Case
-from bugs.judge import minimal
+from bugs.case import MOST_OPERATIONS, Case, Cause
 
 RESAMPLES = 2000
 
@@ -35,16 +34,21 @@ class Row:
     causes_early_interval: Interval
     causes: float
     causes_interval: Interval
+    named_early: float  # true causes that the tests bear out
+    named_early_interval: Interval
+    named: float
+    named_interval: Interval
     any_early: float  # share of searches with a violation
     any: float
     first: float  # first violating test; `tests + 1` for a search without any
     first_interval: Interval
     first_median: float  # of all searches
     without_effect: float  # share of tests
-    precision: float | None  # share of what a reader sees violate; `None` if nobody saw anything
+    precision: float | None  # share of the causes that tests bear out; `None` if they bear out none
     precision_interval: Interval | None
     unlisted: float  # causes of few operations by the judge that contain no true one
     differing: int  # tests whose recorded values differ from the judge's
+    named_otherwise: int  # causes that only the real program names, or does not name
 
 
 def rows(records: Sequence[Record], cases: Sequence[Case], early: int) -> list[Row]:
@@ -69,6 +73,9 @@ def _row(strategy: str, name: str, groups: list[tuple[Case, list[Record]]], earl
     def causes_by(budget: int) -> Callable[[Record], float]:
         return lambda record: len(record.found_by(budget) & known[record.case])
 
+    def named_by(budget: int) -> Callable[[Record], float]:
+        return lambda record: len(record.named_by(budget) & known[record.case])
+
     def any_by(budget: int) -> Callable[[Record], float]:
         return lambda record: bool(record.violating and record.violating[0] <= budget)
 
@@ -76,8 +83,8 @@ def _row(strategy: str, name: str, groups: list[tuple[Case, list[Record]]], earl
         return record.violating[0] if record.violating else tests + 1
 
     def precision(record: Record) -> float | None:
-        seen = minimal(record.observed_by(tests))
-        return len(seen & known[record.case]) / len(seen) if seen else None
+        named = record.named_by(tests)
+        return fmean(_is_right(each, known[record.case]) for each in named) if named else None
 
     def unlisted(record: Record) -> float:
         listed = known[record.case]
@@ -98,6 +105,10 @@ def _row(strategy: str, name: str, groups: list[tuple[Case, list[Record]]], earl
         causes_early_interval=bootstrap(samples, causes_by(early), sum),
         causes=sum(_means(samples, causes_by(tests))),
         causes_interval=bootstrap(samples, causes_by(tests), sum),
+        named_early=sum(_means(samples, named_by(early))),
+        named_early_interval=bootstrap(samples, named_by(early), sum),
+        named=sum(_means(samples, named_by(tests))),
+        named_interval=bootstrap(samples, named_by(tests), sum),
         any_early=fmean(_means(samples, any_by(early))),
         any=fmean(_means(samples, any_by(tests))),
         first=fmean(_means(samples, first)),
@@ -108,7 +119,16 @@ def _row(strategy: str, name: str, groups: list[tuple[Case, list[Record]]], earl
         precision_interval=bootstrap(precise, precision, fmean) if precise else None,
         unlisted=sum(_means(samples, unlisted)),
         differing=sum(len(record.differing) for some in samples for record in some),
+        named_otherwise=sum(len(record.named_otherwise) for some in samples for record in some),
     )
+
+
+def _is_right(named: Cause, known: set[Cause]) -> bool:
+    """Whether a cause that tests bear out is true. Of many operations none is listed, but it must not hold a true one:
+    that some of its operations were needed in one test does not make it smallest."""
+    if len(named.operations) <= MOST_OPERATIONS:
+        return named in known
+    return not any(named.contains(one) for one in known)
 
 
 def _means(samples: list[list[Record]], value: Callable[[Record], float]) -> list[float]:
@@ -132,8 +152,8 @@ def as_text(table: list[Row], cases: Sequence[Case]) -> str:
     overall = [row for row in table if row.case == "all"] or table
     early, tests = table[0].early, table[0].tests
     head = [
-        "strategy", f"causes by {early}", f"causes by {tests}", f"any by {early}", f"any by {tests}",
-        "first violation", "no effect", "precision",
+        "strategy", f"causes by {early}", f"causes by {tests}", f"named by {early}", f"named by {tests}",
+        f"any by {early}", f"any by {tests}", "first violation", "no effect", "precision",
     ]  # fmt: skip
     lines = [[_subject(row), *_cells(row)] for row in overall]
     parts = [_heading(overall, cases), _aligned([head, *lines])]
@@ -184,6 +204,8 @@ def _cells(row: Row) -> list[str]:
     return [
         f"{row.causes_early:.1f} {_numbers(row.causes_early_interval)}",
         f"{row.causes:.1f} {_numbers(row.causes_interval)}",
+        f"{row.named_early:.1f} {_numbers(row.named_early_interval)}",
+        f"{row.named:.1f} {_numbers(row.named_interval)}",
         f"{row.any_early:.0%}",
         f"{row.any:.0%}",
         f"{row.first:.1f} {_numbers(row.first_interval)}",
@@ -222,6 +244,8 @@ def _notes(row: Row) -> list[str]:
         )
     if row.differing:
         notes.append(f"{_subject(row)}: in {row.differing} tests, recorded values differ from those of the judge.")
+    if row.named_otherwise:
+        notes.append(f"{_subject(row)}: {row.named_otherwise} causes are named by the program or by its tests, not by both.")
     return notes
 
 

@@ -42,6 +42,7 @@ use crate::falsification::TestDomain;
 use crate::margin::{evaluated_margins, margins};
 use crate::space::initial::fresh_test;
 use crate::space::test_space::TestSpace;
+use crate::test_key::TestKey;
 use crate::{Candidate, Evaluated, Strategy};
 
 /// Tests of a generation: a constant, so that the number of workers decides nothing.
@@ -259,24 +260,44 @@ impl Interleaved {
             let fewest = self.setting.space.fewest();
             self.attributions.push(Attribution::new(test, kinds, requirement, result.number, fewest));
         }
-        self.ran.push(Ran { number: result.number, test: asked.test, held, margins, violated, had_effect });
+        let key = TestKey::of_disturbance(plan, &asked.test);
+        self.ran.push(Ran { number: result.number, test: asked.test, key, held, margins, violated, had_effect });
+    }
+
+    /// Whether a test violates a requirement, if one that disturbs the same was run.
+    fn known(&self, test: &Test, requirement: usize) -> Option<bool> {
+        let key = TestKey::of_disturbance(&self.setting.plan, test);
+        self.ran.iter().find(|ran| ran.key == key).map(|ran| ran.violated[requirement])
     }
 
     /// Ends the attributions that have no more questions, and returns those of the others: first those about the
-    /// requirements of which the fewest causes are known.
+    /// requirements of which the fewest causes are known. What a test that was run answers is not asked.
     fn questions(&mut self) -> Vec<(usize, BTreeSet<usize>)> {
         let mut questions = Vec::new();
         let mut open = Vec::new();
-        for attribution in std::mem::take(&mut self.attributions) {
-            match attribution.next(&self.causes) {
-                Next::Ask(sets) => {
-                    questions.extend(sets.into_iter().map(|positions| (open.len(), positions)));
-                    open.push(attribution);
-                }
-                Next::Done(found) => {
-                    for kinds in found {
-                        self.causes.add(Cause { requirement: attribution.requirement, kinds });
+        for mut attribution in std::mem::take(&mut self.attributions) {
+            let requirement = attribution.requirement;
+            loop {
+                let sets = match attribution.next(&self.causes) {
+                    Next::Ask(sets) => sets,
+                    Next::Done(found) => {
+                        for kinds in found {
+                            self.causes.add(Cause { requirement, kinds });
+                        }
+                        break;
                     }
+                };
+                let mut unknown = Vec::new();
+                for positions in sets {
+                    match self.known(&attribution.subset(&positions), requirement) {
+                        Some(violates) => attribution.answer(positions, violates),
+                        None => unknown.push(positions),
+                    }
+                }
+                if !unknown.is_empty() {
+                    questions.extend(unknown.into_iter().map(|positions| (open.len(), positions)));
+                    open.push(attribution);
+                    break;
                 }
             }
         }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use sesame_plan::{Activation, Choice, Messages, Test};
+use sesame_plan::{Activation, CampaignPlan, Choice, Messages, Test, TestOperation};
 use sesame_rng::derive_seed;
 
 use crate::space::condition;
@@ -28,6 +28,17 @@ impl TestKey {
         TestKey::of(operations.flat_map(|numbers| [vec![numbers.len() as u64], numbers].concat()))
     }
 
+    /// A hash of what a test disturbs: its operations in any order, with the seeds of those that draw. Without
+    /// randomness of the simulator, tests with equal ones come to the same.
+    pub fn of_disturbance(plan: &CampaignPlan, test: &Test) -> TestKey {
+        let seed = |used: &TestOperation| plan.operation(used.operation).kind.draws().then_some(used.operation_seed);
+        let operations = test.operations.iter().map(|used| (numbers_of(used), seed(used)));
+        let mut operations: Vec<Vec<u64>> =
+            operations.map(|(numbers, seed)| [numbers, seed.into_iter().collect()].concat()).collect();
+        operations.sort_unstable();
+        TestKey::of(operations.into_iter().flat_map(|numbers| [vec![numbers.len() as u64], numbers].concat()))
+    }
+
     fn of(numbers: impl Iterator<Item = u64>) -> TestKey {
         let numbers: Vec<u64> = numbers.collect();
         TestKey(["one half of a key", "the other half"].map(|half| derive_seed(0, half, &numbers)))
@@ -48,43 +59,42 @@ impl SeenTests {
 
 /// What tells two tests apart: their operations in any order, without operation seeds.
 pub(crate) fn identity(test: &Test) -> Vec<Vec<u64>> {
-    let mut operations: Vec<Vec<u64>> = test
-        .operations
-        .iter()
-        .map(|operation| {
-            let mut numbers = vec![u64::from(operation.operation.0)];
-            match &operation.activation {
-                Activation::Time { start, end } => numbers.extend([0, start.to_bits(), end.to_bits()]),
-                Activation::Condition { start, end, times } => {
-                    numbers.extend([1, u64::from(*times)]);
-                    numbers.extend(condition::identity(start));
-                    numbers.extend(condition::identity(end));
-                }
-                Activation::ConditionFor { start, length, times } => {
-                    numbers.extend([2, u64::from(*times), length.to_bits()]);
-                    numbers.extend(condition::identity(start));
-                }
-                Activation::Offline => numbers.push(3),
-            }
-            for choice in &operation.parameters {
-                match choice {
-                    Choice::Value { value } => numbers.push(value.to_bits()),
-                    Choice::Range { low, high } => numbers.extend([low.to_bits(), high.to_bits()]),
-                    Choice::Point { point } => numbers.extend(point.map(f64::to_bits)),
-                    Choice::Text { text } => {
-                        numbers.push(text.len() as u64);
-                        numbers.extend(text.bytes().map(u64::from));
-                    }
-                }
-            }
-            for run in operation.messages.iter().flat_map(Messages::runs) {
-                numbers.extend([u64::from(run.wire), run.first, run.last]);
-            }
-            numbers
-        })
-        .collect();
+    let mut operations: Vec<Vec<u64>> = test.operations.iter().map(numbers_of).collect();
     operations.sort_unstable();
     operations
+}
+
+/// What tells two operations apart, without their seeds.
+fn numbers_of(operation: &TestOperation) -> Vec<u64> {
+    let mut numbers = vec![u64::from(operation.operation.0)];
+    match &operation.activation {
+        Activation::Time { start, end } => numbers.extend([0, start.to_bits(), end.to_bits()]),
+        Activation::Condition { start, end, times } => {
+            numbers.extend([1, u64::from(*times)]);
+            numbers.extend(condition::identity(start));
+            numbers.extend(condition::identity(end));
+        }
+        Activation::ConditionFor { start, length, times } => {
+            numbers.extend([2, u64::from(*times), length.to_bits()]);
+            numbers.extend(condition::identity(start));
+        }
+        Activation::Offline => numbers.push(3),
+    }
+    for choice in &operation.parameters {
+        match choice {
+            Choice::Value { value } => numbers.push(value.to_bits()),
+            Choice::Range { low, high } => numbers.extend([low.to_bits(), high.to_bits()]),
+            Choice::Point { point } => numbers.extend(point.map(f64::to_bits)),
+            Choice::Text { text } => {
+                numbers.push(text.len() as u64);
+                numbers.extend(text.bytes().map(u64::from));
+            }
+        }
+    }
+    for run in operation.messages.iter().flat_map(Messages::runs) {
+        numbers.extend([u64::from(run.wire), run.first, run.last]);
+    }
+    numbers
 }
 
 #[cfg(test)]
@@ -114,6 +124,9 @@ mod tests {
             }
             prop_assert_ne!(TestKey::exact(&test), TestKey::exact(&drawn_otherwise));
             prop_assert_eq!(TestKey::without_seeds(&test), TestKey::without_seeds(&drawn_otherwise));
+            let draws = test.operations.iter().any(|used| plan.operation(used.operation).kind.draws());
+            let disturb = [&test, &drawn_otherwise].map(|test| TestKey::of_disturbance(&plan, test));
+            prop_assert_eq!(disturb[0] == disturb[1], !draws);
             let mut seen = SeenTests::default();
             prop_assert_eq!(seen.first_equal(&test, 1), None);
             prop_assert_eq!(seen.first_equal(&drawn_otherwise, 2), None);

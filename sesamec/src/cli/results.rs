@@ -171,6 +171,9 @@ pub(super) struct Input {
     /// Only the tests of this result set; `campaigns` lists them.
     #[arg(long, value_name = "NAME")]
     set: Option<String>,
+    /// Only the tests up to this number: what was known once so many had run.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    until: Option<u32>,
 }
 
 /// How the answer is printed.
@@ -423,7 +426,7 @@ fn gathered(path: &Path) -> anyhow::Result<Vec<PathBuf>> {
 
 fn open(input: &Input) -> anyhow::Result<(Repository, Selection)> {
     let repository = Repository::open(&input.file)?;
-    let selection = Selection::of(&repository, input.set.as_deref())?;
+    let selection = Selection::of(&repository, input.set.as_deref())?.until(input.until);
     Ok((repository, selection))
 }
 

@@ -162,6 +162,37 @@ impl OperationKind {
         matches!(self, OperationKind::PacketLoss | OperationKind::BurstLoss | OperationKind::Slow { .. })
     }
 
+    /// Whether it draws numbers, so that the seed of a test's operation makes a difference. Of the user's code that is
+    /// not known, so it counts as drawing.
+    pub fn draws(&self) -> bool {
+        match self {
+            OperationKind::RandomValue { .. }
+            | OperationKind::RandomText { .. }
+            | OperationKind::Noise
+            | OperationKind::RandomWalk
+            | OperationKind::PacketLoss
+            | OperationKind::BurstLoss
+            | OperationKind::Reorder { .. }
+            | OperationKind::Custom { .. } => true,
+            OperationKind::Latency { distribution, .. } => *distribution != Distribution::Fixed,
+            OperationKind::StuckAt { .. }
+            | OperationKind::Bias
+            | OperationKind::Drift
+            | OperationKind::Scale
+            | OperationKind::NotFinite { .. }
+            | OperationKind::Freeze
+            | OperationKind::Stale
+            | OperationKind::ClockSkew
+            | OperationKind::RateLimit
+            | OperationKind::Duplicate
+            | OperationKind::Blackhole
+            | OperationKind::Set { .. }
+            | OperationKind::Pause { .. }
+            | OperationKind::Slow { .. }
+            | OperationKind::Kill { .. } => false,
+        }
+    }
+
     /// What it does to messages, as far as the dimensions O1 to O3 of the reduced space distinguish it.
     pub fn class(&self) -> Class {
         match self {

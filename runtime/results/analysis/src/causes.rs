@@ -1,16 +1,18 @@
 //! The causes of violations: for each requirement, the smallest sets of operations with which tests violate it.
 //!
 //! They follow from the recorded tests of any campaign, whatever its strategy. A set is smallest as far as tests were
-//! run: no recorded test with fewer of its operations violates the requirement. Whether smaller sets were tried at all
-//! is part of each cause. Operations that are known to have had no effect are not part of any.
+//! run: no recorded test with fewer of its operations violates the requirement. Whether a violating test was run again
+//! without each of its operations is part of each cause. Operations that are known to have had no effect are not part
+//! of any.
 
 use std::collections::BTreeSet;
 
 use serde::Serialize;
-use sesame_plan::{Activation, CampaignPlan, OperationId, RequirementId, Test};
+use sesame_plan::{Activation, CampaignPlan, OperationId, RequirementId, Test, TestOperation};
 use sesame_record::{Judge, Origin, RecordError, Repository, TestRow, Verdict};
 use sesame_search::discovery_at_most;
 use sesame_search::shrink::strength;
+use sesame_search::test_key::TestKey;
 
 use crate::{Datum, Selection, Table};
 
@@ -40,9 +42,10 @@ pub struct Cause {
 pub enum Fewer {
     /// It has a single operation.
     Single,
-    /// Without any one of them a test with all others does not violate the requirement.
+    /// There is a test with only these operations that violates the requirement and, whichever of them is left out, no
+    /// longer does: all those tests were run.
     NoViolation,
-    /// That was not tried, or not for each of them.
+    /// That was not tried, or not for each of them: what is to blame may be fewer of them.
     NotTried,
 }
 
@@ -85,6 +88,35 @@ struct Judged<'a> {
     row: &'a TestRow,
     operations: BTreeSet<OperationId>,
     violates: bool,
+}
+
+/// What tests disturb that are conclusive about a requirement, do not violate it, and hold fewer operations than one of
+/// its causes.
+struct Harmless<'a> {
+    plan: &'a CampaignPlan,
+    keys: BTreeSet<TestKey>,
+}
+
+impl<'a> Harmless<'a> {
+    fn of(plan: &'a CampaignPlan, judged: &[Judged<'_>], smallest: &[&BTreeSet<OperationId>]) -> Self {
+        let is_part = |held: &BTreeSet<OperationId>| {
+            smallest.iter().any(|set| held.len() < set.len() && held.is_subset(set))
+        };
+        let harmless = judged.iter().filter(|test| !test.violates && is_part(&test.operations));
+        // Operations without effect make no difference: a test stands for the one without them, too.
+        let keys = harmless.flat_map(|test| [test.row.test.clone(), acting_test(test.row)]);
+        Harmless { plan, keys: keys.map(|test| TestKey::of_disturbance(plan, &test)).collect() }
+    }
+
+    /// Whether a violating test was run without each one of its operations, and did not violate the requirement then.
+    fn without_each_of(&self, test: &Judged<'_>) -> bool {
+        let acting = acting_test(test.row);
+        test.operations.iter().all(|&left_out| {
+            let others = acting.operations.iter().filter(|used| used.operation != left_out);
+            let fewer = Test { operations: others.cloned().collect() };
+            self.keys.contains(&TestKey::of_disturbance(self.plan, &fewer))
+        })
+    }
 }
 
 /// The causes in the tests of a selection: by requirement, those with few operations first, then those that were found
@@ -179,20 +211,31 @@ fn of_requirement(plan: &CampaignPlan, judged: &[Judged<'_>], requirement: Requi
             smallest.push(set);
         }
     }
-    let mut causes: Vec<Cause> = smallest.iter().map(|set| cause(plan, judged, requirement, set, &smallest)).collect();
+    let harmless = Harmless::of(plan, judged, &smallest);
+    let mut causes: Vec<Cause> =
+        smallest.iter().map(|set| cause(&harmless, judged, requirement, set, &smallest)).collect();
     causes.sort_by_key(|cause| (cause.operations.len(), cause.violating.first().copied()));
     causes
 }
 
 /// The operations of a test, without those that are known to have had no effect.
 fn acting(row: &TestRow) -> BTreeSet<OperationId> {
+    acting_uses(row).map(|used| used.operation).collect()
+}
+
+/// A test without the operations that are known to have had no effect.
+fn acting_test(row: &TestRow) -> Test {
+    Test { operations: acting_uses(row).cloned().collect() }
+}
+
+fn acting_uses(row: &TestRow) -> impl Iterator<Item = &TestOperation> {
     let idle = |at: usize| row.idle.get(at).copied().unwrap_or(false);
-    row.test.operations.iter().enumerate().filter(|(at, _)| !idle(*at)).map(|(_, used)| used.operation).collect()
+    row.test.operations.iter().enumerate().filter(move |(at, _)| !idle(*at)).map(|(_, used)| used)
 }
 
 /// The cause with a set of operations; `all` are the sets of all causes of the requirement.
 fn cause(
-    plan: &CampaignPlan,
+    harmless: &Harmless<'_>,
     judged: &[Judged<'_>],
     requirement: RequirementId,
     set: &BTreeSet<OperationId>,
@@ -200,10 +243,10 @@ fn cause(
 ) -> Cause {
     let holding = || judged.iter().filter(|test| set.is_subset(&test.operations));
     let violating: Vec<u32> = holding().filter(|test| test.violates).map(|test| test.row.number).collect();
-    let only = judged.iter().filter(|test| test.violates && test.operations == *set);
-    let smallest = only.min_by(|a, b| {
+    let only = || judged.iter().filter(|test| test.violates && test.operations == *set);
+    let smallest = only().min_by(|a, b| {
         let size = |test: &Judged<'_>| {
-            (test.row.test.operations.len(), length(&test.row.test), strength(plan, &test.row.test))
+            (test.row.test.operations.len(), length(&test.row.test), strength(harmless.plan, &test.row.test))
         };
         let ((a_uses, a_length, a_strength), (b_uses, b_length, b_strength)) = (size(a), size(b));
         let by_size = a_uses.cmp(&b_uses).then(a_length.total_cmp(&b_length)).then(a_strength.total_cmp(&b_strength));
@@ -211,10 +254,6 @@ fn cause(
     });
     let is_alone = |test: &&Judged<'_>| all.iter().filter(|other| other.is_subset(&test.operations)).count() == 1;
     let shown = holding().filter(|test| test.violates).filter(is_alone).count();
-    let was_tried = |left_out: &OperationId| {
-        let fewer: BTreeSet<OperationId> = set.iter().copied().filter(|id| id != left_out).collect();
-        judged.iter().any(|test| test.operations == fewer)
-    };
     Cause {
         requirement,
         operations: set.clone(),
@@ -224,7 +263,7 @@ fn cause(
         shown: u32::try_from(shown).unwrap_or(u32::MAX),
         fewer: match set.len() {
             1 => Fewer::Single,
-            _ if set.iter().all(was_tried) => Fewer::NoViolation,
+            _ if only().any(|test| harmless.without_each_of(test)) => Fewer::NoViolation,
             _ => Fewer::NotTried,
         },
     }

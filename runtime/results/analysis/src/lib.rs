@@ -58,6 +58,8 @@ pub use sesame_present::table::{Datum, Table, TextOptions};
 pub struct Selection {
     /// Numbers of tests; all for `None`.
     tests: Option<BTreeSet<u32>>,
+    /// The last test that counts; all do for `None`.
+    until: Option<u32>,
 }
 
 impl Selection {
@@ -66,7 +68,8 @@ impl Selection {
         let Some(name) = set else { return Ok(Selection::default()) };
         let sets = repository.result_set_sizes()?;
         if sets.iter().any(|(set, _)| set.name == name) {
-            return Ok(Selection { tests: Some(repository.members(name)?.into_iter().collect()) });
+            let members = repository.members(name)?.into_iter().collect();
+            return Ok(Selection { tests: Some(members), until: None });
         }
         Err(RecordError::NoSuchSet {
             name: name.to_owned(),
@@ -75,8 +78,14 @@ impl Selection {
         })
     }
 
+    /// Of these tests the ones up to a number: what was known once so many tests had run.
+    #[must_use]
+    pub fn until(self, last: Option<u32>) -> Selection {
+        Selection { until: last, ..self }
+    }
+
     fn holds(&self, number: u32) -> bool {
-        self.tests.as_ref().is_none_or(|tests| tests.contains(&number))
+        self.until.is_none_or(|last| number <= last) && self.tests.as_ref().is_none_or(|tests| tests.contains(&number))
     }
 }
 

@@ -16,6 +16,7 @@ use super::setting::Setting;
 use crate::evolve::variation::{Rates, mutate};
 use crate::falsification::TestDomain;
 use crate::space::range::{Range, StepSizes};
+use crate::test_key::TestKey;
 
 /// From how many of the best tests of a requirement steps are made.
 const BEST: usize = 6;
@@ -30,6 +31,8 @@ pub(super) struct Ran {
     /// The caller's number.
     pub(super) number: u32,
     pub(super) test: Test,
+    /// What tells its disturbance apart from others.
+    pub(super) key: TestKey,
     /// The operations of the test space that it holds.
     pub(super) held: BTreeSet<usize>,
     /// Per requirement of the search the margin, as a share of the reference run's; `None` where it is not known.

@@ -46,7 +46,7 @@ pub(super) fn combinations(body: &mut Markup, plan: &CampaignPlan, summary: &Sum
         let caption = "A square stands for the operation of its row with that of its column, the last square of a row for \
                        that operation in any company. Its columns are the quarters of the run: the stronger the blue, the \
                        more tests in which both acted then; grey: they may not be active then. A square is blank if no \
-                       test had both act. Red dot: a test with both violates a requirement that no reference run \
+                       test had both act, and pale where both acted, but not in the same quarter. Red dot: a test with both violates a requirement that no reference run \
                        violates; red frame: just these operations are a cause.";
         body.element("p", &[("class", "quiet")], caption);
     }

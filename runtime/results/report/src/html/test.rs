@@ -6,6 +6,7 @@ use sesame_base::gathered::gathered;
 use sesame_present::markup::Markup;
 use sesame_record::{MetricValue, RecordError, Repository, Verdict, trace_file};
 
+use crate::export::{ExportError, Expected, export};
 use crate::facts::show::{TestReport, report_on};
 use crate::facts::summary::Summary;
 use crate::facts::wording::value_text;
@@ -33,7 +34,12 @@ pub(super) fn test(
     heading(body, summary, &report);
     timeline(body, repository.plan(), &record, &report);
     let (before, after) = command::show(repository.plan(), repository.folder());
-    figures(body, &report, &format!("{before}{}{after}", report.test));
+    let block = match export(repository, &report.test.to_string(), None, Expected::Requirements) {
+        Ok(exported) => Some(exported.block),
+        Err(ExportError::NotWhole(_) | ExportError::Undisturbed(_)) => None,
+        Err(ExportError::Record(error)) => return Err(error),
+    };
+    figures(body, &report, block.as_deref(), &format!("{before}{}{after}", report.test));
     if repository.trace(number, record.duplicate_of).is_some() {
         trace_link(body, &trace_file(folder, ran));
     }
@@ -73,8 +79,9 @@ fn heading(body: &mut Markup, summary: &Summary, report: &TestReport) {
     body.element("p", &[("class", "values")], &values.join(" · "));
 }
 
-/// Everything on a test as tables, folded away, and the command that prints it.
-fn figures(body: &mut Markup, report: &TestReport, command: &str) {
+/// Everything on a test as tables, folded away, with the test in the words of the language, and the command that prints
+/// it.
+fn figures(body: &mut Markup, report: &TestReport, block: Option<&str>, command: &str) {
     body.open("details", &[]);
     body.element("summary", &[], "Figures");
     body.element(
@@ -112,6 +119,10 @@ fn figures(body: &mut Markup, report: &TestReport, command: &str) {
         body.open("p", &[("class", "warning")]);
         body.prose(&format!("Warning: {warning}"));
         body.close();
+    }
+    if let Some(block) = block {
+        body.element("p", &[("class", "quiet")], "As a regression test, for the space:");
+        body.element("pre", &[], block);
     }
     body.open("p", &[("class", "quiet command")]);
     body.text("In a terminal: ");

@@ -242,3 +242,9 @@ fn the_script_writes_numbers_as_the_rest_of_the_page_does() {
     let found = findings(browser, &full_page(), &script, 1280, Scheme::Light);
     assert_eq!(found, serde_json::to_value(expected).unwrap());
 }
+
+#[test]
+fn pictures_tables_tests_and_commands_can_be_taken_along() {
+    let Some(browser) = browser() else { return };
+    assert_checks(browser, include_str!("browser/save.js"), 11);
+}
