@@ -96,9 +96,11 @@ fn measured(test: &Value) -> String {
 
 const WORKERS: [&str; 3] = ["--", "--workers", "2"];
 
-/// Four tests instead of eighteen.
-const SHORT: [(&str, &str); 1] =
-    [("nsga2 { population 6  evaluations 18  seed 42 }", "nsga2 { population 4  evaluations 4  seed 42 }")];
+/// Four tests instead of eighteen, of eight seconds: as long as each arm takes for a part.
+const SHORT: [(&str, &str); 1] = [(
+    "nsga2 { population 6  evaluations 18  seed 42 }",
+    "nsga2 { population 4  evaluations 4  seed 42 }\n  end after 8s",
+)];
 
 #[test]
 fn a_campaign_has_one_digest_interpreted_compiled_and_after_an_interruption_and_leaves_no_process() {

@@ -14,6 +14,16 @@ use sesame_tests::{command, done, optimised_sesamec, workspace};
 use crate::environment::Vendor;
 use crate::examples::Example;
 
+/// How many tests a campaign has, and of how many seconds.
+#[derive(Debug, Clone, Copy)]
+struct Size {
+    evaluations: u32,
+    seconds: u32,
+}
+
+/// In eight seconds each arm delivers a part.
+const SMALL: Size = Size { evaluations: 4, seconds: 8 };
+
 /// Topics that operations act on, with all that has to be said about them over SimlogAPI.
 struct Disturbed {
     operations: [&'static str; 3],
@@ -47,7 +57,7 @@ impl Disturbed {
     }
 
     /// Metrics, requirements and those operations of the example, and a campaign with them.
-    fn campaign(&self, example: &str, evaluations: u32) -> String {
+    fn campaign(&self, example: &str, Size { evaluations, seconds }: Size) -> String {
         let lines = lines_between(example, "/// How close the arms came.", "/// The parts are heavier");
         let names = self.names();
         let kept = lines.filter(|line| {
@@ -62,7 +72,7 @@ impl Disturbed {
              observes   left_cycle, right_cycle, zone_breaches, closeness\n  operations {}   1..3 per test\n\
              activate   by time\n\
              search     nsga2 {{ population {population}  evaluations {evaluations}  seed 42 }}\n\
-             end        after 10s\n}}\n",
+             end        after {seconds}s\n}}\n",
             names.join(", ")
         )
     }
@@ -114,13 +124,14 @@ fn change(example: &Example, changes: &[(&str, &str, &str)]) {
 }
 
 /// Copies of the example with a campaign over each protocol: that of ROS 2, and that of SimlogAPI.
-fn cells(name: &str, disturbed: &Disturbed, evaluations: u32) -> Option<[Example; 2]> {
+fn cells(name: &str, disturbed: &Disturbed, size: Size) -> Option<[Example; 2]> {
     let simlog = Vendor::Simlog.python()?;
-    let shorter = [("within [0s, 14s]", "within [0s, 10s]")];
+    let within = format!("within [0s, {}s]", size.seconds);
+    let shorter = [("within [0s, 14s]", within.as_str())];
     let copy = |protocol: &str| Example::new("iiwa_cell", Vendor::Kilted, &format!("{name}_{protocol}"), &shorter);
     let [ros2, grpc] = [copy("ros2")?, copy("grpc")?];
     let text = fs::read_to_string(&ros2.space).expect("the example can be read");
-    let campaign = disturbed.campaign(&text, evaluations);
+    let campaign = disturbed.campaign(&text, size);
     let (system, _) = text.split_once("/// How close the arms came.").expect("metrics follow the system");
     fs::write(&ros2.space, format!("{system}{campaign}")).expect("a space can be written");
     // The joints of an arm are a message of the protocol, whose field has another name.
@@ -161,14 +172,14 @@ fn assert_alike(of_ros2: &Value, of_grpc: &Value, part: f64) {
 }
 
 /// Runs a campaign over each protocol and compares all tests; what operations do must show.
-fn compare(name: &str, disturbed: &Disturbed, evaluations: u32) {
-    let Some(cells) = cells(name, disturbed, evaluations) else { return };
+fn compare(name: &str, disturbed: &Disturbed) {
+    let Some(cells) = cells(name, disturbed, SMALL) else { return };
     let [ros2, grpc] = cells.each_ref().map(|cell| {
         cell.sesamec("run", "both", &["--", "--workers", "2"]).expect(0);
         cell.tests("both")
     });
     assert_eq!(ros2.len(), grpc.len());
-    assert_eq!(ros2.iter().filter(|test| test["origin"] == "search").count(), evaluations as usize, "{ros2:?}");
+    assert_eq!(ros2.iter().filter(|test| test["origin"] == "search").count(), SMALL.evaluations as usize, "{ros2:?}");
     for (of_ros2, of_grpc) in ros2.iter().zip(&grpc) {
         assert_alike(of_ros2, of_grpc, 1e-5);
     }
@@ -178,12 +189,12 @@ fn compare(name: &str, disturbed: &Disturbed, evaluations: u32) {
 
 #[test]
 fn disturbances_of_what_controllers_hear_come_to_the_same_over_simlog_as_over_ros2() {
-    compare("iiwa_heard", &HEARD, 6);
+    compare("iiwa_heard", &HEARD);
 }
 
 #[test]
 fn disturbances_of_what_controllers_say_and_are_granted_come_to_the_same_over_simlog_as_over_ros2() {
-    compare("iiwa_said", &SAID, 6);
+    compare("iiwa_said", &SAID);
 }
 
 /// Forty tests of ten seconds of the cell, which are to take less than 40 s; twice as much on a machine with something
@@ -193,7 +204,7 @@ fn disturbances_of_what_controllers_say_and_are_granted_come_to_the_same_over_si
 #[test]
 #[ignore = "takes three minutes, and builds an optimised sesamec"]
 fn forty_tests_over_simlog_are_quick_and_come_to_the_same_as_over_ros2() {
-    let Some(cells) = cells("iiwa_forty", &HEARD, 40) else { return };
+    let Some(cells) = cells("iiwa_forty", &HEARD, Size { evaluations: 40, seconds: 10 }) else { return };
     change(&cells[0], &OF_32_BITS);
     let [ros2, grpc] = cells.each_ref().map(|cell| {
         let mut run = command(optimised_sesamec());

@@ -113,6 +113,8 @@ pub fn command(program: impl AsRef<Path>) -> Command {
 const SETTINGS: &str = "\
 [profile.dev]
 opt-level = 0
+debug-assertions = false
+overflow-checks = true
 
 [profile.dev.package]
 kuka_cell_sim = { opt-level = 2 }

@@ -157,9 +157,14 @@ pub(super) fn command_for(name: &str, file: &Path) -> String {
 pub(super) fn command() -> &'static str {
     let by_cargo = std::env::var_os("CARGO").is_some()
         && std::env::var_os("CARGO_PKG_NAME").is_some_and(|name| name == env!("CARGO_PKG_NAME"));
-    match (by_cargo, cfg!(debug_assertions)) {
-        (false, _) => "sesamec",
-        (true, false) => "cargo run --release --",
-        (true, true) => "cargo run --",
+    // Cargo puts a program into a folder that is called after its profile.
+    let is_release =
+        || std::env::current_exe().is_ok_and(|program| program.parent().is_some_and(|it| it.ends_with("release")));
+    if !by_cargo {
+        "sesamec"
+    } else if is_release() {
+        "cargo run --release --"
+    } else {
+        "cargo run --"
     }
 }

@@ -99,9 +99,8 @@ struct Harmless<'a> {
 
 impl<'a> Harmless<'a> {
     fn of(plan: &'a CampaignPlan, judged: &[Judged<'_>], smallest: &[&BTreeSet<OperationId>]) -> Self {
-        let is_part = |held: &BTreeSet<OperationId>| {
-            smallest.iter().any(|set| held.len() < set.len() && held.is_subset(set))
-        };
+        let is_part =
+            |held: &BTreeSet<OperationId>| smallest.iter().any(|set| held.len() < set.len() && held.is_subset(set));
         let harmless = judged.iter().filter(|test| !test.violates && is_part(&test.operations));
         // Operations without effect make no difference: a test stands for the one without them, too.
         let keys = harmless.flat_map(|test| [test.row.test.clone(), acting_test(test.row)]);

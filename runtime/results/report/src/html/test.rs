@@ -6,7 +6,7 @@ use sesame_base::gathered::gathered;
 use sesame_present::markup::Markup;
 use sesame_record::{MetricValue, RecordError, Repository, Verdict, trace_file};
 
-use crate::export::{ExportError, Expected, export};
+use crate::export::{Expected, ExportError, export};
 use crate::facts::show::{TestReport, report_on};
 use crate::facts::summary::Summary;
 use crate::facts::wording::value_text;
