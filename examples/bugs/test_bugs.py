@@ -357,11 +357,13 @@ class WhatIsNamed(unittest.TestCase):
         for case in CASES[::4]:
             with self.subTest(case.name):
                 judge, named, judged = Judge(case.world()), Named(case.space), set()
-                strategy = strategy_class("combinatorial")(Problem(case.space, judge.world.run((), keep_messages=True), 40), 1)
+                reference = judge.world.run((), keep_messages=True)
+                strategy = strategy_class("combinatorial")(Problem(case.space, reference, 40), 1)
                 for _ in range(40):
                     # What attributes a violation: the test without each of its operations.
                     test = strategy.ask()
-                    parts = [tuple(use for use in test if use.operation != left_out.operation) for left_out in test]
+                    names = {use.operation for use in test}
+                    parts = [tuple(use for use in test if use.operation != left_out) for left_out in names]
                     for each in [test, *(part for part in parts if part)]:
                         named.add(each, judge.outcome(each))
                         judged |= judge.causes(each)

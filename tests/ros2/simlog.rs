@@ -21,8 +21,8 @@ struct Size {
     seconds: u32,
 }
 
-/// In eight seconds each arm delivers a part.
-const SMALL: Size = Size { evaluations: 4, seconds: 8 };
+/// In ten seconds each arm delivers a part.
+const SMALL: Size = Size { evaluations: 4, seconds: 10 };
 
 /// Topics that operations act on, with all that has to be said about them over SimlogAPI.
 struct Disturbed {

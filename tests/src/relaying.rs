@@ -11,8 +11,8 @@ const MOMENT: Duration = Duration::from_millis(5);
 
 /// Relays for a moment of real time.
 ///
-/// The run itself ends later than any test. A transport notes no time past the end that it is given, so with an end only
-/// a moment away, a message that arrives while this process waits for its turn would be noted earlier than it arrived.
+/// The run itself ends later than any test. A transport notes no time past the end that it is given. With an end only
+/// a moment away, a message that arrives while this process waits for its turn would be noted before it arrived.
 pub fn relay_for_a_moment(transport: &mut dyn Transport, relay: &mut dyn Exchange) -> Result<(), TransportError> {
     let begun = Instant::now();
     loop {

@@ -2,8 +2,8 @@
 
 import math
 import time
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -56,7 +56,8 @@ class Record:
 
     def named_by(self, test: int) -> set[Cause]:
         """The causes that the tests up to this one bear out."""
-        return {cause(requirement, operations) for requirement, operations, since, until in self.named if since <= test < until}
+        named = [(requirement, names) for requirement, names, since, until in self.named if since <= test < until]
+        return {cause(requirement, names) for requirement, names in named}
 
     def as_json(self) -> dict:
         return asdict(self)
@@ -106,7 +107,6 @@ def run(job: Job, folder: Path, sesamec: Path | None) -> Record:
             found.setdefault(each, number)
         named.add(test, outcome)
         spans.add(named.causes(), number)
-    otherwise = set() if tests.causes is None else tests.causes ^ named.causes()
     return Record(
         strategy=job.strategy,
         case=job.case,
@@ -119,7 +119,7 @@ def run(job: Job, folder: Path, sesamec: Path | None) -> Record:
         found=[(each.requirement, each.operations, first) for each, first in sorted(found.items())],
         named=spans.up_to(job.tests),
         differing=differing,
-        named_otherwise=[(each.requirement, each.operations) for each in sorted(otherwise)],
+        named_otherwise=[(each.requirement, each.operations) for each in sorted(tests.named_otherwise)],
         seconds=round(time.monotonic() - began, 3),
     )
 
@@ -155,20 +155,28 @@ def _judge(folder: Path) -> Judge:
 class _Tests:
     """The tests of a job, each with its outcome and whether values that were recorded agree with it."""
 
-    each: Iterator[tuple[Test, Outcome, bool]]
-    causes: set[Cause] | None  # those that the real program names in the end
+    each: Iterable[tuple[Test, Outcome, bool]]
+    named_otherwise: set[Cause]  # causes that only the real program names, or does not name
 
 
 def _tests(job: Job, case: Case, judge: Judge, sesamec: Path | None) -> _Tests:
     name, _, of_sesame = job.strategy.partition(":")
     if name != "sesamec":
-        return _Tests(_asked(job, case, judge), None)
+        return _Tests(_asked(job, case, judge), set())
     if sesamec is None:
         raise Unavailable("`sesamec` needs the program: name it with --sesamec, or in the variable SESAMEC")
     searched = search(sesamec, case.space_file, case.space, job.seed, job.tests, of_sesame or None)
-    outcomes = ((recorded, judge.outcome(recorded.test)) for recorded in searched.tests)
-    each = ((recorded.test, outcome, agrees(recorded, outcome)) for recorded, outcome in outcomes)
-    return _Tests(each, searched.causes)
+    outcomes = [judge.outcome(recorded.test) for recorded in searched.tests]
+    named = Named(case.space)
+    for recorded, outcome in zip(searched.tests, outcomes, strict=True):
+        # With its own verdicts: a value that misses a bound by rounding violates it for Sesame.
+        violated = frozenset(name for name, verdict in recorded.verdicts.items() if verdict == "violated")
+        named.add(recorded.test, replace(outcome, violated=violated))
+    each = [
+        (recorded.test, outcome, agrees(recorded, outcome))
+        for recorded, outcome in zip(searched.tests, outcomes, strict=True)
+    ]
+    return _Tests(each, searched.causes ^ named.causes())
 
 
 def _asked(job: Job, case: Case, judge: Judge) -> Iterator[tuple[Test, Outcome, bool]]:

@@ -45,6 +45,26 @@ class Searched:
     causes: set[Cause]  # those that it names: not those of which it says that fewer operations were not tried
 
 
+@dataclass(frozen=True)
+class ShrunkThreshold:
+    """Where a parameter of a shrunk test begins to matter, by what Sesame saw."""
+
+    operation: str
+    position: int  # of the operation in the test
+    parameter: str
+    fails: float  # the mildest value that violates the requirement
+    passes: float  # the strongest one that does not
+
+
+@dataclass(frozen=True)
+class Shrunk:
+    """The smallest test of a cause, shrunk."""
+
+    requirement: str
+    test: Test
+    thresholds: list[ShrunkThreshold]  # of parameters that are single numbers
+
+
 def plan_of(sesamec: Path, space_file: Path) -> dict:
     """The plan of a space's campaign `find_causes`."""
     with tempfile.TemporaryDirectory() as folder:
@@ -67,6 +87,37 @@ def search(
         )  # fmt: skip
         results = folder / "results" / str(seed) / "results.sqlite"
         return Searched(read_results(results, space), causes_of(sesamec, results))
+
+
+def shrunk_causes(sesamec: Path, space_file: Path, space: Space, seed: int, tests: int) -> list[Shrunk]:
+    """Runs the campaign `find_causes` and shrinks the smallest test of each cause."""
+    with tempfile.TemporaryDirectory() as name:
+        folder, file = Path(name), str(space_file.resolve())
+        results, runners = folder / "results", ("--campaign", CAMPAIGN, "--out", str(folder / "runners"))
+        _run(
+            sesamec, "run", file, *runners, "--", "--seed", str(seed), "--evaluations", str(tests), "--workers", "1",
+            "--results", str(results), "--fail-on", "nothing",
+        )  # fmt: skip
+        if not causes_of(sesamec, results / str(seed) / "results.sqlite"):
+            return []
+        said = _run(
+            sesamec, "shrink", file, *runners, "--violations", "--results", str(results / str(seed)),
+            "--into", str(results), "--workers", "1", "--format", "json",
+        )  # fmt: skip
+        ran = {test.number: test for test in read_results(results / "shrink-violations" / "results.sqlite", space)}
+        shrinkings = [each for each in json.loads(said)["shrinkings"] if each["after"] is not None]
+        return [_shrunk(each, ran[each["after"]["number"]].test) for each in shrinkings]
+
+
+def _shrunk(said: Mapping, test: Test) -> Shrunk:
+    thresholds = [
+        ShrunkThreshold(
+            each["operation"], each["position"], each["parameter"], each["fails"]["value"], each["passes"]["value"]
+        )
+        for each in said["thresholds"]
+        if each["fails"]["kind"] == "value"
+    ]
+    return Shrunk(said["fails"].removeprefix("violates "), test, thresholds)
 
 
 def causes_of(sesamec: Path, results: Path) -> set[Cause]:

@@ -245,7 +245,8 @@ def _notes(row: Row) -> list[str]:
     if row.differing:
         notes.append(f"{_subject(row)}: in {row.differing} tests, recorded values differ from those of the judge.")
     if row.named_otherwise:
-        notes.append(f"{_subject(row)}: {row.named_otherwise} causes are named by the program or by its tests, not by both.")
+        otherwise = f"{row.named_otherwise} causes are named by the program or by its tests, not by both"
+        notes.append(f"{_subject(row)}: {otherwise}.")
     return notes
 
 

@@ -3,18 +3,21 @@
 //!
 //! What is dangerous lies at the ends of ranges and at events, and uniform draws seldom do. So each operation is tried
 //! alone first, as strong and as long as it may be ([opening]); then each two together ([pairs]), over the whole run
-//! and over parts of it. Meanwhile and afterwards tests come from windows that are [aligned] with the moments of the
-//! reference run ([moments]), from the [near misses](near_misses) so far, and from uniform draws.
+//! and over parts of it; then copies [in a row](in_a_row). Meanwhile and afterwards tests come from windows that are
+//! [aligned] with the moments of the reference run ([moments]), from the [near misses](near_misses) so far, and from
+//! uniform draws.
 //!
 //! A test that violates a requirement is reduced to the operations that are to blame ([causes]); each question is a
-//! test of the campaign. Operations that are known to be dangerous alone are drawn seldom from then on, so that one
-//! loud cause does not hide the others.
+//! test of the campaign. If they are several, each of them is tried [alone] in other ways. Operations that are known to
+//! be dangerous alone are drawn seldom from then on, so that one loud cause does not hide the others.
 //!
 //! A generation always has the same size, and a stream of its own decides its tests. So the tests are the same for any
 //! number of workers, and a search resumes once it has the recorded results.
 
 mod aligned;
+mod alone;
 mod causes;
+mod in_a_row;
 mod moments;
 mod near_misses;
 mod opening;
@@ -56,6 +59,8 @@ const AT_THE_END: [usize; 2] = [1, 2];
 /// The shares of the sources of tests once the opening is over and each two operations were tried together; the rest is
 /// aligned.
 const PAIRWISE: f64 = 0.15;
+/// How often a test of copies in a row comes then, as long as there is one.
+const IN_A_ROW: f64 = 0.3;
 const UNIFORM: f64 = 0.20;
 const NEAR_MISSES: f64 = 0.25;
 
@@ -84,6 +89,10 @@ pub(crate) struct Interleaved {
     tried: Tried,
     causes: Causes,
     attributions: Vec<Attribution>,
+    /// Tests of single operations out of causes of several.
+    alone: VecDeque<Test>,
+    /// Tests of copies in a row that were not asked for yet, each with its operation.
+    rows: VecDeque<(usize, Test)>,
     ran: Vec<Ran>,
     asked: Vec<Asked>,
     generation: u32,
@@ -116,6 +125,8 @@ impl Interleaved {
             tried: Tried::default(),
             causes: Causes::default(),
             attributions: Vec::new(),
+            alone: VecDeque::new(),
+            rows: VecDeque::new(),
             ran: Vec::new(),
             asked: Vec::new(),
             generation: 0,
@@ -128,6 +139,15 @@ impl Interleaved {
     fn open(&mut self) {
         let mut stream = Stream::derive(self.seed, "interleaved opening", &[]);
         self.opening = opening::opening(&self.setting, &mut stream).into();
+        let usable = self.setting.usable();
+        let mut rows: Vec<(usize, usize, Test)> = Vec::new();
+        for kind in usable {
+            let tests = in_a_row::in_a_row(&self.setting, kind, &mut stream);
+            rows.extend(tests.into_iter().enumerate().map(|(rank, test)| (rank, kind, test)));
+        }
+        // The weightiest moments of each operation first.
+        rows.sort_by_key(|(rank, kind, _)| (*rank, *kind));
+        self.rows = rows.into_iter().map(|(_, kind, test)| (kind, test)).collect();
     }
 
     /// Whether an operation alone is a cause of every requirement.
@@ -172,12 +192,27 @@ impl Interleaved {
                 return (test, Vec::new());
             }
         }
+        while let Some(test) = self.alone.pop_front() {
+            let is_known = |requirement| self.known(&test, requirement).is_some();
+            if !(0..self.requirements.len()).any(is_known) && !self.is_explained(&self.setting.held(&test)) {
+                return (test, Vec::new());
+            }
+        }
         let paired: Vec<usize> =
             self.setting.usable().into_iter().filter(|&kind| !self.is_always_a_cause(kind)).collect();
         let mut pairs = std::mem::take(&mut self.pairs);
-        let is_known = |first: usize, second: usize| self.is_explained(&BTreeSet::from([first, second]));
         let share = stream.unit();
-        let source = if pairs.first_level_is_complete(&self.setting, &paired, &is_known) { share } else { 0.0 };
+        let is_known = |first: usize, second: usize| self.is_explained(&BTreeSet::from([first, second]));
+        let is_complete = pairs.first_level_is_complete(&self.setting, &paired, &is_known);
+        if is_complete
+            && stream.chance(IN_A_ROW)
+            && let Some(test) = self.next_in_a_row()
+        {
+            self.pairs = pairs;
+            return (test, Vec::new());
+        }
+        let is_known = |first: usize, second: usize| self.is_explained(&BTreeSet::from([first, second]));
+        let source = if is_complete { share } else { 0.0 };
         let found = if source < PAIRWISE {
             pairs.next(&self.setting, &paired, &is_known, stream).map(|test| (test, Vec::new()))
         } else if source < PAIRWISE + UNIFORM {
@@ -199,6 +234,17 @@ impl Interleaved {
             let pool = |stream: &mut Stream| self.pool(stream);
             (aligned::aligned(&self.setting, &self.tried, pool, stream), Vec::new())
         })
+    }
+
+    /// The next test of copies in a row that could show something new.
+    fn next_in_a_row(&mut self) -> Option<Test> {
+        while let Some((kind, test)) = self.rows.pop_front() {
+            let is_new = (0..self.requirements.len()).any(|requirement| self.known(&test, requirement).is_none());
+            if is_new && !self.is_always_a_cause(kind) {
+                return Some(test);
+            }
+        }
+        None
     }
 
     /// A test with no more different operations than this, if there is a limit and the campaign permits so few.
@@ -272,7 +318,7 @@ impl Interleaved {
 
     /// Ends the attributions that have no more questions, and returns those of the others: first those about the
     /// requirements of which the fewest causes are known. What a test that was run answers is not asked.
-    fn questions(&mut self) -> Vec<(usize, BTreeSet<usize>)> {
+    fn questions(&mut self, stream: &mut Stream) -> Vec<(usize, BTreeSet<usize>)> {
         let mut questions = Vec::new();
         let mut open = Vec::new();
         for mut attribution in std::mem::take(&mut self.attributions) {
@@ -282,7 +328,11 @@ impl Interleaved {
                     Next::Ask(sets) => sets,
                     Next::Done(found) => {
                         for kinds in found {
-                            self.causes.add(Cause { requirement, kinds });
+                            let test = attribution.test_of(&kinds);
+                            let several = kinds.len() > 1;
+                            if self.causes.add(Cause { requirement, kinds }) && several {
+                                self.alone.extend(alone::alone(&self.setting, &test, stream));
+                            }
                         }
                         break;
                     }
@@ -347,7 +397,7 @@ impl Strategy for Interleaved {
         let later = (self.left as usize - size).div_ceil(GENERATION);
         let at_the_end = AT_THE_END.get(later).copied();
         let room = if at_the_end.is_some() { size } else { QUESTIONS.min(size) };
-        for (at, positions) in self.questions().into_iter().take(room) {
+        for (at, positions) in self.questions(&mut stream).into_iter().take(room) {
             let attribution = &self.attributions[at];
             let test = attribution.subset(&positions);
             candidates.push(candidate(test.clone(), vec![attribution.number]));

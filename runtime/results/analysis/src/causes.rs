@@ -314,6 +314,54 @@ mod tests {
         }
         assert!(explained > 0, "some tests violate a requirement");
     }
+
+    /// A test of these operations, all of them active from a time on.
+    fn row(number: u32, operations: &[u32], start: f64) -> TestRow {
+        let used = |&operation: &u32| TestOperation {
+            operation: OperationId(operation),
+            activation: Activation::Time { start, end: start + 5.0 },
+            parameters: Vec::new(),
+            operation_seed: u64::from(operation),
+            messages: None,
+        };
+        TestRow {
+            number,
+            origin: Origin::Search,
+            generation: None,
+            test: Test { operations: operations.iter().map(used).collect() },
+            idle: vec![false; operations.len()],
+            outcome: sesame_base::observation::Outcome::Completed,
+            end: 60.0,
+            duplicate_of: None,
+            values: Vec::new(),
+            left_out: 0,
+        }
+    }
+
+    #[test]
+    fn fewer_operations_were_tried_if_the_same_test_ran_without_each() {
+        let plan = sample::plan();
+        let both = row(1, &[0, 1], 10.0);
+        let known = |others: &[TestRow]| {
+            let violating = Judged { row: &both, operations: acting(&both), violates: true };
+            let others = others.iter().map(|row| Judged { row, operations: acting(row), violates: false });
+            let judged: Vec<Judged<'_>> = std::iter::once(violating).chain(others).collect();
+            let found = of_requirement(&plan, &judged, RequirementId(0));
+            assert_eq!(found.len(), 1);
+            found[0].fewer
+        };
+        let (first, second) = (row(2, &[0], 10.0), row(3, &[1], 10.0));
+        assert_eq!(known(&[]), Fewer::NotTried);
+        assert_eq!(known(std::slice::from_ref(&first)), Fewer::NotTried);
+        let elsewhere = row(3, &[1], 20.0);
+        assert_eq!(known(&[first.clone(), elsewhere]), Fewer::NotTried, "at another time it is another test");
+        assert_eq!(known(&[first.clone(), second.clone()]), Fewer::NoViolation);
+        // What had no effect makes no difference.
+        let mut with_idle = row(3, &[1, 2], 10.0);
+        with_idle.idle[1] = true;
+        assert_eq!(known(&[first, with_idle]), Fewer::NoViolation);
+    }
+
     #[test]
     fn what_the_undisturbed_system_violates_has_no_cause() {
         let folder = tempfile::tempdir().unwrap();

@@ -97,6 +97,11 @@ impl Attribution {
         Test { operations: positions.iter().map(|&at| self.test.operations[at].clone()).collect() }
     }
 
+    /// The test of only the operations of these kinds.
+    pub(super) fn test_of(&self, kinds: &BTreeSet<usize>) -> Test {
+        self.subset(&(0..self.kinds.len()).filter(|&at| kinds.contains(&self.kinds[at])).collect())
+    }
+
     /// What comes next, by what is known.
     pub(super) fn next(&self, causes: &Causes) -> Next {
         self.reduced(causes).unwrap_or_else(Next::Ask)

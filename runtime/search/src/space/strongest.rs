@@ -52,6 +52,15 @@ impl Strongest {
         self.way(way, stream)
     }
 
+    /// The strongest choices that are nearest to these.
+    pub(crate) fn closest_to(&self, chosen: &[Choice]) -> Vec<Choice> {
+        let nearest = |(choices, chosen): (&Vec<Choice>, &Choice)| {
+            let nearest = choices.iter().min_by(|a, b| distance(a, chosen).total_cmp(&distance(b, chosen)));
+            nearest.unwrap_or(chosen).clone()
+        };
+        self.parameters.iter().zip(chosen).map(nearest).collect()
+    }
+
     /// The strongest choices of a parameter, at least one.
     pub(crate) fn choices(&self, parameter: usize) -> &[Choice] {
         &self.parameters[parameter]
@@ -72,6 +81,19 @@ impl Strongest {
             .map(|(choices, chosen)| choices.iter().position(|choice| choice == chosen));
         let first = places.next().unwrap_or(Some(0))?;
         places.all(|place| place.is_some()).then_some(first)
+    }
+}
+
+/// How far two choices of a parameter are from each other; those of texts are or are not the same.
+fn distance(a: &Choice, b: &Choice) -> f64 {
+    let square = |x: f64, y: f64| (x - y) * (x - y);
+    match (a, b) {
+        (Choice::Value { value: a }, Choice::Value { value: b }) => square(*a, *b),
+        (Choice::Range { low, high }, Choice::Range { low: other_low, high: other_high }) => {
+            square(*low, *other_low) + square(*high, *other_high)
+        }
+        (Choice::Point { point: a }, Choice::Point { point: b }) => a.iter().zip(b).map(|(&x, &y)| square(x, y)).sum(),
+        _ => f64::from(u8::from(a != b)),
     }
 }
 
