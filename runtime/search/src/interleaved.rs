@@ -59,10 +59,11 @@ const AT_THE_END: [usize; 2] = [1, 2];
 /// The shares of the sources of tests once the opening is over and each two operations were tried together; the rest is
 /// aligned.
 const PAIRWISE: f64 = 0.15;
-/// How often a test of copies in a row comes then, as long as there is one.
-const IN_A_ROW: f64 = 0.3;
 const UNIFORM: f64 = 0.20;
 const NEAR_MISSES: f64 = 0.25;
+
+/// How often a test of copies in a row takes the place of one of these, as long as there is one.
+const IN_A_ROW: f64 = 0.3;
 
 /// How often an operation is drawn that is a cause of every requirement alone, or of one.
 const DRAWN_IF_ALWAYS_A_CAUSE: f64 = 0.1;
