@@ -194,8 +194,7 @@ impl Interleaved {
             }
         }
         while let Some(test) = self.alone.pop_front() {
-            let is_known = |requirement| self.known(&test, requirement).is_some();
-            if !(0..self.requirements.len()).any(is_known) && !self.is_explained(&self.setting.held(&test)) {
+            if self.like(&test).is_none() && !self.is_explained(&self.setting.held(&test)) {
                 return (test, Vec::new());
             }
         }
@@ -240,8 +239,8 @@ impl Interleaved {
     /// The next test of copies in a row that could show something new.
     fn next_in_a_row(&mut self) -> Option<Test> {
         while let Some((kind, test)) = self.rows.pop_front() {
-            let is_new = (0..self.requirements.len()).any(|requirement| self.known(&test, requirement).is_none());
-            if is_new && !self.is_always_a_cause(kind) {
+            let shows_something = !self.requirements.is_empty() && self.like(&test).is_none();
+            if shows_something && !self.is_always_a_cause(kind) {
                 return Some(test);
             }
         }
@@ -311,10 +310,10 @@ impl Interleaved {
         self.ran.push(Ran { number: result.number, test: asked.test, key, held, margins, violated, had_effect });
     }
 
-    /// Whether a test violates a requirement, if one that disturbs the same was run.
-    fn known(&self, test: &Test, requirement: usize) -> Option<bool> {
+    /// What was run that disturbs the same as a test.
+    fn like(&self, test: &Test) -> Option<&Ran> {
         let key = TestKey::of_disturbance(&self.setting.plan, test);
-        self.ran.iter().find(|ran| ran.key == key).map(|ran| ran.violated[requirement])
+        self.ran.iter().find(|ran| ran.key == key)
     }
 
     /// Ends the attributions that have no more questions, and returns those of the others: first those about the
@@ -340,8 +339,8 @@ impl Interleaved {
                 };
                 let mut unknown = Vec::new();
                 for positions in sets {
-                    match self.known(&attribution.subset(&positions), requirement) {
-                        Some(violates) => attribution.answer(positions, violates),
+                    match self.like(&attribution.subset(&positions)) {
+                        Some(ran) => attribution.answer(positions, ran.violated[requirement]),
                         None => unknown.push(positions),
                     }
                 }

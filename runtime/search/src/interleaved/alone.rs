@@ -15,9 +15,7 @@ use super::setting::Setting;
 /// Tests of single operations of a test that shows a cause.
 pub(super) fn alone(setting: &Setting, test: &Test, stream: &mut Stream) -> Vec<Test> {
     let kinds = setting.kinds_of(test);
-    let windows: Vec<(f64, f64)> = test.operations.iter().filter_map(window).collect();
-    let start = windows.iter().map(|window| window.0).fold(f64::INFINITY, f64::min);
-    let end = windows.iter().map(|window| window.1).fold(f64::NEG_INFINITY, f64::max);
+    let (start, end) = from_first_to_last(&test.operations);
     let mut tests = Vec::new();
     for kind in kinds.iter().copied().collect::<BTreeSet<usize>>() {
         let strongest = &setting.kind(kind).strongest;
@@ -29,7 +27,7 @@ pub(super) fn alone(setting: &Setting, test: &Test, stream: &mut Stream) -> Vec<
             .map(|used| TestOperation { parameters: strongest.closest_to(&used.parameters), ..used.clone() })
             .collect();
         let parameters = own[0].parameters.clone();
-        let mut at = |setting: &Setting, start: f64, end: f64| {
+        let mut at = |start: f64, end: f64| {
             let range = setting.window(kind)?;
             let start = start.max(range.low);
             let end = end.min(range.high).min(start + range.longest);
@@ -37,10 +35,9 @@ pub(super) fn alone(setting: &Setting, test: &Test, stream: &mut Stream) -> Vec<
                 .then(|| setting.operation(kind, Activation::Time { start, end }, parameters.clone(), stream))
         };
         // For as long as all of them together.
-        let longer = at(setting, start, end).map(|used| vec![used]);
+        let longer = at(start, end).map(|used| vec![used]);
         // Where the others acted, too; where they acted at the same time, right before or afterwards.
-        let own_start = own.iter().filter_map(window).map(|own| own.0).fold(f64::INFINITY, f64::min);
-        let own_end = own.iter().filter_map(window).map(|own| own.1).fold(f64::NEG_INFINITY, f64::max);
+        let (own_start, own_end) = from_first_to_last(&own);
         let apart = |other: &TestOperation| {
             let (from, to) = window(other)?;
             if !own.iter().filter_map(window).any(|own| own.0 < to && from < own.1) {
@@ -54,14 +51,19 @@ pub(super) fn alone(setting: &Setting, test: &Test, stream: &mut Stream) -> Vec<
                 (own_start - length >= room.low).then_some((own_start - length, own_start))
             }
         };
-        let again: Vec<(f64, f64)> = of(false).filter_map(apart).take(1).collect();
-        let again: Vec<TestOperation> = again.into_iter().filter_map(|(from, to)| at(setting, from, to)).collect();
-        let twice = (!again.is_empty()).then(|| [own.clone(), again].concat());
+        let again = of(false).find_map(apart).and_then(|(from, to)| at(from, to));
+        let twice = again.map(|again| [own.clone(), vec![again]].concat());
         tests.extend([Some(own), longer, twice].into_iter().flatten().map(|operations| Test { operations }));
         tests.extend(in_a_row(setting, kind, stream));
     }
     tests.retain(|test| is_permitted(setting, test));
     tests
+}
+
+/// From the first start to the last end of windows.
+fn from_first_to_last(operations: &[TestOperation]) -> (f64, f64) {
+    let windows = operations.iter().filter_map(window);
+    windows.fold((f64::INFINITY, f64::NEG_INFINITY), |(start, end), window| (start.min(window.0), end.max(window.1)))
 }
 
 fn window(used: &TestOperation) -> Option<(f64, f64)> {
