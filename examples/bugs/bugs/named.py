@@ -1,7 +1,7 @@
 """Which causes the tests of a search bear out, by the rule of Sesame's reports, written anew.
 
 A smallest set of operations that was seen to violate a requirement is named if it is a single operation, or if one of
-the tests that show it was run again without each of its operations, and violated the requirement no more. Other sets
+the tests that show it was run again without each of its operations, and no longer violated the requirement. Other sets
 may hold passengers, so nobody should believe them.
 """
 
@@ -49,9 +49,9 @@ class Named:
 
     def _key(self, uses: Iterable[Use]) -> Hashable:
         """Equal for tests that disturb the same."""
-        return tuple(sorted(repr(self._without_idle_seed(use)) for use in uses))
+        return tuple(sorted(repr(self._as_it_disturbs(use)) for use in uses))
 
-    def _without_idle_seed(self, use: Use) -> tuple:
+    def _as_it_disturbs(self, use: Use) -> tuple:
         seed = use.seed if _draws(self.space.operations[use.operation]) else None
         return use.operation, use.start, use.end, use.choices, seed
 

@@ -80,31 +80,34 @@ def search(
         folder, file, campaign = Path(name), space_file.resolve(), CAMPAIGN
         if strategy is not None:
             file, campaign = _with_strategy(file, strategy, tests, folder), f"{CAMPAIGN}_by_{strategy}"
-        _run(
-            sesamec, "run", str(file), "--campaign", campaign, "--out", str(folder / "runners"),
-            "--", "--seed", str(seed), "--evaluations", str(tests), "--workers", "1",
-            "--results", str(folder / "results"), "--fail-on", "nothing",
-        )  # fmt: skip
-        results = folder / "results" / str(seed) / "results.sqlite"
+        results = _searched(sesamec, file, campaign, seed, tests, folder)
         return Searched(read_results(results, space), causes_of(sesamec, results))
+
+
+def _searched(sesamec: Path, file: Path, campaign: str, seed: int, tests: int, folder: Path) -> Path:
+    """Runs a campaign, with everything that it writes in a folder, and returns its results file."""
+    _run(
+        sesamec, "run", str(file), "--campaign", campaign, "--out", str(folder / "runners"),
+        "--", "--seed", str(seed), "--evaluations", str(tests), "--workers", "1",
+        "--results", str(folder / "results"), "--fail-on", "nothing",
+    )  # fmt: skip
+    return folder / "results" / str(seed) / "results.sqlite"
 
 
 def shrunk_causes(sesamec: Path, space_file: Path, space: Space, seed: int, tests: int) -> list[Shrunk]:
     """Runs the campaign `find_causes` and shrinks the smallest test of each cause."""
     with tempfile.TemporaryDirectory() as name:
-        folder, file = Path(name), str(space_file.resolve())
-        results, runners = folder / "results", ("--campaign", CAMPAIGN, "--out", str(folder / "runners"))
-        _run(
-            sesamec, "run", file, *runners, "--", "--seed", str(seed), "--evaluations", str(tests), "--workers", "1",
-            "--results", str(results), "--fail-on", "nothing",
-        )  # fmt: skip
-        if not causes_of(sesamec, results / str(seed) / "results.sqlite"):
+        folder, file = Path(name), space_file.resolve()
+        results = _searched(sesamec, file, CAMPAIGN, seed, tests, folder)
+        if not causes_of(sesamec, results):
             return []
+        run = results.parent
         said = _run(
-            sesamec, "shrink", file, *runners, "--violations", "--results", str(results / str(seed)),
-            "--into", str(results), "--workers", "1", "--format", "json",
+            sesamec, "shrink", str(file), "--campaign", CAMPAIGN, "--out", str(folder / "runners"), "--violations",
+            "--results", str(run), "--into", str(run.parent), "--workers", "1", "--format", "json",
         )  # fmt: skip
-        ran = {test.number: test for test in read_results(results / "shrink-violations" / "results.sqlite", space)}
+        shrunk = read_results(run.parent / "shrink-violations" / "results.sqlite", space)
+        ran = {test.number: test for test in shrunk}
         shrinkings = [each for each in json.loads(said)["shrinkings"] if each["after"] is not None]
         return [_shrunk(each, ran[each["after"]["number"]].test) for each in shrinkings]
 

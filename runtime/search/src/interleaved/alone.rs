@@ -1,8 +1,9 @@
 //! Whether an operation of a cause of several does it alone.
 //!
-//! That a test violates a requirement no more without one of its operations says little about other tests: what is left
-//! may do it alone if it is stronger, longer, or happens twice. So each operation of such a cause is tried alone in
-//! these ways, near where the cause was seen. If one of them violates the requirement, the cause is the smaller one.
+//! If a test no longer violates a requirement without one of its operations, that says little about other tests. What
+//! is left may do it alone if it is stronger, longer, or happens twice. So each operation of such a cause is tried
+//! alone in these ways, near where the cause was seen. If one of them violates the requirement, the cause is the
+//! smaller one.
 
 use std::collections::BTreeSet;
 
