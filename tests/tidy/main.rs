@@ -45,11 +45,14 @@ fn crates() -> Vec<Crate> {
     let members = root["workspace"]["members"].as_array().expect("a workspace has members");
     let member = |member: &toml::Value| {
         let manifest = format!("{}/Cargo.toml", member.as_str().expect("a member is a path"));
-        let package = &parsed(&manifest)["package"];
+        let table = parsed(&manifest);
+        let package = &table["package"];
         let name = package["name"].as_str().expect("a package has a name").to_owned();
         let described =
             package.get("description").and_then(toml::Value::as_str).is_some_and(|text| !text.trim().is_empty());
-        Crate { name, manifest, described }
+        let library = workspace().join(&manifest).with_file_name("src/lib.rs").is_file();
+        let doctest = table.get("lib").and_then(|lib| lib.get("doctest")?.as_bool()).unwrap_or(true);
+        Crate { name, manifest, described, tests_examples: library.then_some(doctest) }
     };
     members.iter().map(member).collect()
 }
@@ -64,6 +67,7 @@ fn the_tree_is_tidy() {
         rules::not_ignored(&text(".gitignore")),
         rules::wide_comments(&files),
         rules::not_on_the_map(&crates, &text("ARCHITECTURE.md")),
+        rules::untested_examples(&crates, &files),
         rules::mod_files(&files),
         rules::without_purpose(&files),
         rules::not_in_the_index(&files),

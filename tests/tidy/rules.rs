@@ -36,6 +36,8 @@ pub(crate) struct Crate {
     pub(crate) manifest: String,
     /// Whether the manifest says what it is for.
     pub(crate) described: bool,
+    /// Whether the examples in the documentation of its code are tested; `None` without a library.
+    pub(crate) tests_examples: Option<bool>,
 }
 
 /// Files that some program left behind.
@@ -92,6 +94,30 @@ pub(crate) fn not_on_the_map(crates: &[Crate], architecture: &str) -> Vec<String
         }
     }
     complaints
+}
+
+/// Crates whose examples in documentation are not tested, and crates in which rustdoc looks for examples in vain, which
+/// takes about a second each.
+pub(crate) fn untested_examples(crates: &[Crate], files: &[File]) -> Vec<String> {
+    let begins_example = |line: &str| {
+        let line = line.trim_start();
+        line.starts_with("/// ```") || line.starts_with("//! ```") || line.starts_with("#![doc = include_str!")
+    };
+    let complaint = |of: &Crate| {
+        let sources = format!("{}src/", of.manifest.strip_suffix("Cargo.toml")?);
+        let mut sources = files.iter().filter(|file| file.path.starts_with(&sources) && file.ending() == Some("rs"));
+        let example = sources.find(|file| file.text.lines().any(begins_example));
+        match (example, of.tests_examples?) {
+            (Some(file), false) => {
+                Some(format!("{}: remove `doctest = false`: {} has an example", of.manifest, file.path))
+            }
+            (None, true) => {
+                Some(format!("{}: add `doctest = false` below `[lib]`: there are no examples", of.manifest))
+            }
+            _ => None,
+        }
+    };
+    crates.iter().filter_map(complaint).collect()
 }
 
 /// Modules in files called `mod.rs`. What tests of a crate share is one by need: `tests/shared.rs` would be a test.
@@ -181,6 +207,11 @@ pub(crate) fn exit_codes(files: &[File]) -> Vec<String> {
 mod tests {
     use super::*;
 
+    fn crate_named(name: &str) -> Crate {
+        let manifest = format!("{name}/Cargo.toml");
+        Crate { name: name.to_owned(), manifest, described: true, tests_examples: None }
+    }
+
     fn file(path: &str, text: &str) -> File {
         File { path: path.to_owned(), text: text.to_owned() }
     }
@@ -218,8 +249,7 @@ mod tests {
 
     #[test]
     fn a_crate_needs_a_description_and_a_row() {
-        let of =
-            |name: &str, described| Crate { name: name.to_owned(), manifest: format!("{name}/Cargo.toml"), described };
+        let of = |name: &str, described| Crate { described, ..crate_named(name) };
         let page =
             "# Architecture\n\n## The map\n\n| `a/` | `a` | one |\n\nAlso `b`.\n\n## Other\n\n| `c/` | `c` | |\n";
         assert_eq!(not_on_the_map(&[of("a", true)], page), [""; 0]);
@@ -231,6 +261,22 @@ mod tests {
                 "ARCHITECTURE.md: add a row for `b` (b/Cargo.toml) to the table under `The map`",
                 "ARCHITECTURE.md: add a row for `c` (c/Cargo.toml) to the table under `The map`",
             ]
+        );
+    }
+
+    #[test]
+    fn examples_are_tested_and_looked_for_where_there_are_some() {
+        let crates = [Some(true), Some(false), None].map(|tests_examples| Crate { tests_examples, ..crate_named("a") });
+        let with = [file("a/src/b.rs", "/// Sums.\n///\n/// ```\n/// assert_eq!(1 + 1, 2);\n/// ```\n")];
+        let without =
+            [file("a/src/b.rs", "/// Sums.\n"), file("b/src/lib.rs", "//! ```\n"), file("a/README.md", "```")];
+        assert_eq!(
+            untested_examples(&crates, &with),
+            ["a/Cargo.toml: remove `doctest = false`: a/src/b.rs has an example"]
+        );
+        assert_eq!(
+            untested_examples(&crates, &without),
+            ["a/Cargo.toml: add `doctest = false` below `[lib]`: there are no examples"]
         );
     }
 
