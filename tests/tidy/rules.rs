@@ -84,7 +84,7 @@ pub(crate) fn not_on_the_map(crates: &[Crate], architecture: &str) -> Vec<String
     let map = architecture.split("\n## ").find(|section| section.starts_with("The map\n")).unwrap_or_default();
     let rows: Vec<&str> = map.lines().filter(|line| line.starts_with('|')).collect();
     let mut complaints = Vec::new();
-    for Crate { name, manifest, described } in crates {
+    for Crate { name, manifest, described, .. } in crates {
         if !described {
             complaints.push(format!("{manifest}: add a `description`: what {name} is, in one sentence"));
         }
