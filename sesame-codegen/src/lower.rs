@@ -119,6 +119,7 @@ fn for_as_long_as_can_be(name: &str) -> plan::Campaign {
         end_after: LONGEST,
         end_when: None,
         record: None,
+        describes_when: false,
     }
 }
 

@@ -106,6 +106,32 @@ fn a_violation_is_reduced_to_messages_of_which_none_can_be_left_out() {
 }
 
 #[test]
+fn when_an_operation_has_to_act_is_described_and_held_against_fresh_windows() {
+    let project = two_meetings("when_it_has_to_act");
+    of(&project, "known", &["silent_departure"]).expect(0);
+    let shrunk = |into: &str, more: &[&str]| {
+        let arguments = ["T1", "--results", "known", "--when", "--into", into];
+        of(&project, "shrink", &[&arguments[..], more].concat()).expect(0)
+    };
+    let said = json(&shrunk("one", &["--workers", "1", "--format", "json"]));
+    let when = &said["shrinking"]["when"][0];
+    assert_eq!(when["operation"], "cut_east", "{said}");
+    let count = |of: &str, what: &str| when[of][what].as_u64().unwrap();
+    // All variations, and the smallest test itself.
+    assert_eq!((count("made_of", "of"), count("fresh", "of")), (25, 12), "{when}");
+    assert!(count("fresh", "right") >= 9, "{when}");
+    let steps = said["shrinking"]["steps"].as_array().unwrap();
+    assert_eq!(steps.iter().filter(|step| step["tried"] == "variations").count(), 36);
+    let told = shrunk("two", &["--workers", "2"]);
+    assert_eq!(said["digest"].as_str().unwrap(), told.digest(), "the same for any number of workers");
+    let sentence = format!("cut_east {}: so it was", when["text"].as_str().unwrap());
+    let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>().join(" ");
+    assert!(words(&told.out).contains(&words(&sentence)), "{sentence}: {}", told.out);
+    let page = fs::read_to_string(project.folder.join("two/shrink-T1/report.html")).unwrap();
+    assert!(page.contains(": so it was with "), "{sentence}");
+}
+
+#[test]
 fn every_cause_is_shrunk_within_one_budget_and_the_same_for_any_number_of_workers() {
     let project = two_meetings("causes_shrunk");
     of(&project, "run", &[]).expect(0);

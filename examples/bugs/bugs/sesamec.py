@@ -8,7 +8,7 @@ import json
 import sqlite3
 import subprocess
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -57,12 +57,41 @@ class ShrunkThreshold:
 
 
 @dataclass(frozen=True)
+class Trigger:
+    """When an operation of a shrunk test has to act, by what Sesame saw."""
+
+    operation: str
+    position: int  # of the operation in the test
+    text: str | None  # in words; `None` if Sesame does not describe it
+    decides: Mapping | None  # the same without words
+
+    def violates(self, start: float, end: float) -> bool:
+        """Whether the test violates the requirement with this window, as the description has it."""
+        spans = [(span["start"], span["end"]) for span in self.decides["spans"]]
+        match self.decides["rule"]:
+            case "always":
+                return True
+            case "contains":
+                return any(start <= a + 1e-9 and (end >= b - 1e-9 if a < b else end > b) for a, b in spans)
+            case "overlaps":
+                least = self.decides["least"]
+                return any(min(end, b) - max(start, a) > max(least - 1e-9, 0) for a, b in spans)
+            case "begins":
+                return any(a - 1e-9 <= start < b for a, b in spans)
+            case "ends":
+                return any(a < end <= b + 1e-9 for a, b in spans)
+            case other:
+                raise SesamecFailed(f"nobody knows what `{other}` means")
+
+
+@dataclass(frozen=True)
 class Shrunk:
     """The smallest test of a cause, shrunk."""
 
     requirement: str
     test: Test
     thresholds: list[ShrunkThreshold]  # of parameters that are single numbers
+    triggers: list[Trigger]  # if they were asked for
 
 
 def plan_of(sesamec: Path, space_file: Path) -> dict:
@@ -94,8 +123,10 @@ def _searched(sesamec: Path, file: Path, campaign: str, seed: int, tests: int, f
     return folder / "results" / str(seed) / "results.sqlite"
 
 
-def shrunk_causes(sesamec: Path, space_file: Path, space: Space, seed: int, tests: int) -> list[Shrunk]:
-    """Runs the campaign `find_causes` and shrinks the smallest test of each cause."""
+def shrunk_causes(
+    sesamec: Path, space_file: Path, space: Space, seed: int, tests: int, options: Sequence[str] = ()
+) -> list[Shrunk]:
+    """Runs the campaign `find_causes` and shrinks the smallest test of each cause, with further options of `shrink`."""
     with tempfile.TemporaryDirectory() as name:
         folder, file = Path(name), space_file.resolve()
         results = _searched(sesamec, file, CAMPAIGN, seed, tests, folder)
@@ -104,7 +135,7 @@ def shrunk_causes(sesamec: Path, space_file: Path, space: Space, seed: int, test
         run = results.parent
         said = _run(
             sesamec, "shrink", str(file), "--campaign", CAMPAIGN, "--out", str(folder / "runners"), "--violations",
-            "--results", str(run), "--into", str(run.parent), "--workers", "1", "--format", "json",
+            "--results", str(run), "--into", str(run.parent), "--workers", "1", "--format", "json", *options,
         )  # fmt: skip
         shrunk = read_results(run.parent / "shrink-violations" / "results.sqlite", space)
         ran = {test.number: test for test in shrunk}
@@ -120,7 +151,10 @@ def _shrunk(said: Mapping, test: Test) -> Shrunk:
         for each in said["thresholds"]
         if each["fails"]["kind"] == "value"
     ]
-    return Shrunk(said["fails"].removeprefix("violates "), test, thresholds)
+    triggers = [
+        Trigger(each["operation"], each["position"], each["text"], each["decides"]) for each in said.get("when", ())
+    ]
+    return Shrunk(said["fails"].removeprefix("violates "), test, thresholds, triggers)
 
 
 def causes_of(sesamec: Path, results: Path) -> set[Cause]:

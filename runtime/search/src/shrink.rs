@@ -1,5 +1,6 @@
 //! Shrinking a failing test: the fewest operations, then the shortest windows, then the simplest conditions, then the
-//! mildest parameters with which it still fails in the same way; and if that is asked for, the fewest messages.
+//! mildest parameters with which it still fails in the same way; and if that is asked for, the fewest messages, and
+//! variations of the windows that show when the operations have to act.
 //!
 //! Guarantees: the result fails, or is the original test; it is permitted if the original is; it keeps the operation
 //! seeds, so that the rest of a disturbance is what it was; no single step can shrink it further, unless the
@@ -15,16 +16,18 @@ mod reduce;
 mod space;
 #[cfg(test)]
 mod tests;
+mod variations;
 
 use std::collections::BTreeMap;
 
 pub use reduce::MessagesEnd;
 use reduce::{Oracle, Pending, Reduced, reduce};
 use space::ShrinkSpace;
+use variations::{Variation, variations};
 
 use sesame_base::observation::AlteredMessages;
 use sesame_base::verdict::fails;
-use sesame_plan::{CampaignPlan, Choice, Failing, Shrinking, Test};
+use sesame_plan::{CampaignPlan, Choice, Failing, Shrinking, Span, Test};
 use sesame_rng::derive_seed;
 
 use crate::test_key::TestKey;
@@ -52,6 +55,8 @@ pub enum Phase {
     Listing,
     /// Fewer messages are altered.
     Messages,
+    /// Windows lie elsewhere.
+    Variations,
 }
 
 impl Phase {
@@ -66,6 +71,7 @@ impl Phase {
             Phase::LocalMinimality => "last steps",
             Phase::Listing => "list of messages",
             Phase::Messages => "messages",
+            Phase::Variations => "variations",
         }
     }
 }
@@ -116,6 +122,10 @@ pub struct Shrink {
     listings: BTreeMap<TestKey, usize>,
     /// Whether the reduction goes on to single messages.
     to_messages: bool,
+    /// Whether windows of the smallest test are varied.
+    varies: bool,
+    /// How many of the variations were asked for.
+    varied: usize,
     /// Position of the first test of the generation asked last.
     asked: usize,
     generation: u32,
@@ -131,7 +141,7 @@ impl Shrink {
     }
 
     fn with_resolution(plan: &CampaignPlan, shrinking: Shrinking, resolution: f64) -> Shrink {
-        let Shrinking { test, failing, simulator_seed, runs, evaluations, messages, name: _ } = shrinking;
+        let Shrinking { test, failing, simulator_seed, runs, evaluations, messages, when, name: _ } = shrinking;
         let runs = runs.max(1);
         Shrink {
             space: ShrinkSpace::from_plan(plan, resolution),
@@ -145,6 +155,8 @@ impl Shrink {
             known: BTreeMap::new(),
             listings: BTreeMap::new(),
             to_messages: messages,
+            varies: when,
+            varied: 0,
             asked: 0,
             generation: 0,
             awaited: 0,
@@ -217,9 +229,7 @@ impl Shrink {
     /// The thresholds of the smallest test, before it was reduced to messages; with each the position of the test among
     /// those tried. None of parameters that can be as mild as is permitted, or whose next step was not tried.
     pub fn thresholds(&self) -> Vec<(usize, Threshold)> {
-        let accepted = self.accepted();
-        let of_messages = |&&at: &&usize| self.tried[at].phase == Phase::Messages;
-        let Some(&smallest) = accepted.iter().rev().find(|at| !of_messages(at)) else { return Vec::new() };
+        let Some(smallest) = self.smallest_of_all_messages() else { return Vec::new() };
         let test = &self.tried[smallest].test;
         let mut found = Vec::new();
         for axis in axis::parameters(test) {
@@ -258,7 +268,64 @@ impl Shrink {
 
     /// Whether it is over for want of runs.
     fn wants_more(&self) -> bool {
-        self.reduced.as_ref().is_some_and(|reduced| !reduced.accepted.is_empty() && !reduced.minimal)
+        let reduced = self.reduced.as_ref();
+        reduced.is_some_and(|reduced| !reduced.accepted.is_empty() && !reduced.minimal)
+            || self.varied < self.planned_variations().len()
+    }
+}
+
+/// A variation of the smallest test: one of its windows lies elsewhere.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Varied {
+    /// The position of the operation in the smallest test.
+    pub operation: usize,
+    /// Its window.
+    pub window: Span,
+    /// Whether the test with this window failed.
+    pub fails: bool,
+    /// Whether a description of when it fails is held against this one, rather than made of it.
+    pub fresh: bool,
+}
+
+impl Shrink {
+    /// The smallest test, before it was reduced to messages: its position among those tried.
+    pub fn smallest_of_all_messages(&self) -> Option<usize> {
+        self.accepted().into_iter().rev().find(|&at| self.tried[at].phase != Phase::Messages)
+    }
+
+    /// The variations of the smallest test that were run.
+    pub fn variations(&self) -> Vec<Varied> {
+        let planned = self.planned_variations().into_iter().take(self.varied);
+        let ran = planned.filter_map(|Variation { operation, window, fresh, test }| {
+            let (_, fails) = self.find(&test)?;
+            Some(Varied { operation, window, fails, fresh })
+        });
+        ran.collect()
+    }
+
+    /// All variations that there may be. None until nothing can be left out of the smallest test.
+    fn planned_variations(&self) -> Vec<Variation> {
+        let minimal = self.varies && self.is_minimal();
+        let smallest = if minimal { self.smallest_of_all_messages() } else { None };
+        smallest.map_or_else(Vec::new, |at| variations(&self.space, &self.tried[at].test, self.simulator_seed))
+    }
+
+    /// Asks for as many further variations as can be run.
+    fn ask_variations(&mut self) -> Vec<Candidate> {
+        let planned = self.planned_variations();
+        let mut tests: Vec<Test> = Vec::new();
+        for Variation { test, .. } in planned.into_iter().skip(self.varied) {
+            let known = self.find(&test).is_some() || tests.contains(&test);
+            if !known && tests.len() == self.left as usize {
+                break;
+            }
+            if !known {
+                tests.push(test);
+            }
+            self.varied += 1;
+        }
+        let base = self.smallest_of_all_messages();
+        if tests.is_empty() { Vec::new() } else { self.asked(Pending { phase: Phase::Variations, tests, base }) }
     }
 }
 
@@ -278,17 +345,18 @@ impl Shrink {
     /// The tests to run next; none when the shrink is over.
     pub fn ask(&mut self) -> Vec<Candidate> {
         assert!(self.awaited == 0, "a generation is told before the next is asked");
-        if self.reduced.is_some() {
-            return Vec::new();
-        }
-        let Pending { phase, mut tests, base } =
+        if self.reduced.is_none() {
             match reduce(&self.space, &self.test, self, self.left == 0, self.to_messages) {
-                Ok(reduced) => {
-                    self.reduced = Some(reduced);
-                    return Vec::new();
-                }
-                Err(asked) => asked,
-            };
+                Ok(reduced) => self.reduced = Some(reduced),
+                Err(pending) => return self.asked(pending),
+            }
+        }
+        self.ask_variations()
+    }
+
+    /// The runs of tests that have to be run, as far as they can be.
+    fn asked(&mut self, pending: Pending) -> Vec<Candidate> {
+        let Pending { phase, mut tests, base } = pending;
         tests.truncate(self.left as usize);
         self.asked = self.tried.len();
         let parents: Vec<u32> = base.map(|base| self.tried[base].number).into_iter().collect();

@@ -56,6 +56,10 @@ pub struct ShrinkArgs {
     /// at least 2
     #[arg(long)]
     messages: bool,
+    /// Find out when the operations of the smallest test have to act: vary their windows, and describe by what happens
+    /// in the undisturbed run with which of them the test fails. Takes 36 tests for each operation by time
+    #[arg(long)]
+    when: bool,
     #[command(flatten)]
     world: World,
     #[command(flatten)]
@@ -168,6 +172,7 @@ fn shrinking(record: TestRecord, failing: Failing, args: &ShrinkArgs, evaluation
         runs: args.runs,
         evaluations,
         messages: args.messages,
+        when: args.when,
     }
 }
 

@@ -154,6 +154,7 @@ pub(super) fn wholes() -> Vec<Whole> {
             runs: 1,
             evaluations: 12,
             messages: false,
+            when: false,
         });
         plan = task.plan(&plan);
         let mut recorder = Recorder::create_for(folder.path(), &plan, &task, 1, 0).unwrap();

@@ -151,6 +151,7 @@ impl Selection {
             end_after: campaign.end_after,
             end_when: campaign.end_when.as_ref().map(|condition| self.condition(condition)),
             record: campaign.record,
+            describes_when: false,
         }
     }
 }

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use sesame_plan::{RequirementId, Span, Trend};
 
 pub use altered::{ALTERED_LISTED, AlteredMessage, AlteredMessages};
-pub use course::{Course, Happening, Heard, RARE, Signal, SignalEvent};
+pub use course::{Course, Entered, Happening, Heard, RARE, Signal, SignalEvent, States};
 pub use monitor::{CHANGES_KEPT, ChangeCause, EvidenceChange, MonitorDecision, MonitorHazard, MonitorObservation};
 pub use traffic::{Traffic, Unreached};
 

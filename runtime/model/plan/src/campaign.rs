@@ -52,6 +52,10 @@ pub struct Campaign {
     /// The tests whose messages and activity of operations are recorded; `None` for none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub record: Option<Recorded>,
+    /// Whether reference runs record everything that happens in them, as is needed to describe when operations have to
+    /// act, whatever the search reads.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub describes_when: bool,
 }
 
 /// The tests whose messages and activity of operations are recorded.

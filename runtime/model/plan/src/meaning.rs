@@ -164,6 +164,7 @@ fn forget_what_is_for_people(plan: &mut CampaignPlan) {
         end_after: _,
         end_when: _,
         record: _,
+        describes_when: _,
     } = campaign;
     doc.clear();
 }
@@ -206,6 +207,7 @@ fn align_what_no_test_depends_on(one: &mut CampaignPlan, other: &mut CampaignPla
         end_after: _,
         end_when: _,
         record,
+        describes_when,
     } = &mut one.campaign;
     let campaign = &other.campaign;
     objectives.clone_from(&campaign.objectives);
@@ -217,6 +219,7 @@ fn align_what_no_test_depends_on(one: &mut CampaignPlan, other: &mut CampaignPla
     stop.clone_from(&campaign.stop);
     *seed = campaign.seed;
     *record = campaign.record;
+    *describes_when = campaign.describes_when;
 }
 
 #[cfg(test)]

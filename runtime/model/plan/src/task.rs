@@ -122,6 +122,9 @@ pub struct Shrinking {
     /// Whether the reduction goes on to single messages.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub messages: bool,
+    /// Whether windows of the smallest test are varied, to describe when its operations have to act.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub when: bool,
 }
 
 /// How a test fails.
@@ -184,6 +187,7 @@ impl Task {
             campaign.confirm = None;
             campaign.neighbours = None;
             campaign.stop.clear();
+            campaign.describes_when = self.shrinkings().iter().any(|shrinking| shrinking.when);
             // What is compared with a simulation is compared in its traces too.
             if self.of_lab().is_some() || matches!(self, Task::Variations(_)) {
                 campaign.record = Some(Recorded::All);

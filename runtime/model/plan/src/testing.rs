@@ -59,6 +59,7 @@ pub fn campaign(name: &str, operations: usize) -> Campaign {
         end_after: 10.0,
         end_when: None,
         record: None,
+        describes_when: false,
     }
 }
 

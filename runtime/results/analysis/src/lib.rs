@@ -29,6 +29,7 @@ pub mod statistics;
 #[cfg(test)]
 mod tests;
 pub mod traces;
+pub mod trigger;
 
 use std::collections::{BTreeMap, BTreeSet};
 

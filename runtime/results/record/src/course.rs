@@ -5,7 +5,7 @@
 
 use rusqlite::{Transaction, params};
 
-use sesame_base::observation::{Course, Heard, Signal, SignalEvent};
+use sesame_base::observation::{Course, Entered, Heard, Signal, SignalEvent, States};
 use sesame_base::silence::wires;
 use sesame_plan::{CampaignPlan, Span};
 
@@ -13,6 +13,8 @@ use crate::columns::index;
 use crate::monitors::is_in;
 
 pub(super) const TABLES: [&str; 2] = ["heard", "happenings"];
+/// A table of its own, since files of before have only the others.
+pub(super) const STATES: &str = "states";
 
 pub(super) const DDL: &str = "
 -- When messages were published on a wire in a reference run: from the first to the last message of each stretch, which
@@ -35,6 +37,21 @@ CREATE TABLE happenings (
     field           TEXT NOT NULL,  -- from the message inwards; empty for the messages as such
     kind            TEXT NOT NULL,  -- 'message', 'begins', 'ends', 'changes', 'jumps', 'sets_out', 'rests', …
     at_s            REAL NOT NULL,
+    PRIMARY KEY (test, position)
+) STRICT, WITHOUT ROWID;
+";
+
+pub(super) const STATES_DDL: &str = "
+-- Which value a field had when in a reference run, where it took few.
+CREATE TABLE states (
+    test            INTEGER NOT NULL REFERENCES tests,
+    position        INTEGER NOT NULL,
+    wire            INTEGER NOT NULL, -- position of the path among those of all topics
+    topic           TEXT NOT NULL,
+    path            TEXT NOT NULL,
+    field           TEXT NOT NULL,  -- from the message inwards; empty for a message that is a single value
+    at_s            REAL NOT NULL,  -- when a message had the value first, until the next row of the field
+    value           TEXT NOT NULL,
     PRIMARY KEY (test, position)
 ) STRICT, WITHOUT ROWID;
 ";
@@ -66,6 +83,22 @@ pub(super) fn write(
         let Some((topic, path)) = wires.get(*wire as usize) else { continue };
         let topic = &plan.topic(*topic).name;
         happened.execute(params![test, index(position), wire, topic, path, field, what.word(), at])?;
+    }
+    if course.states.is_empty() {
+        return Ok(());
+    }
+    if !is_in(transaction, STATES)? {
+        transaction.execute_batch(STATES_DDL)?;
+    }
+    let mut entering = transaction.prepare_cached(
+        "INSERT INTO states (test, position, wire, topic, path, field, at_s, value) \
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+    )?;
+    let entered = course.states.iter().flat_map(|states| states.entered.iter().map(move |entered| (states, entered)));
+    for (position, (States { wire, field, .. }, Entered { at, value })) in entered.enumerate() {
+        let Some((topic, path)) = wires.get(*wire as usize) else { continue };
+        let topic = &plan.topic(*topic).name;
+        entering.execute(params![test, index(position), wire, topic, path, field, at, value])?;
     }
     Ok(())
 }

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
-use sesame_base::observation::{Course, Happening, Heard, Signal, SignalEvent};
+use sesame_base::observation::{Course, Entered, Happening, Heard, Signal, SignalEvent, States};
 use sesame_plan::Span;
 
 use crate::columns::finite;
-use crate::course::TABLES;
+use crate::course::{STATES, TABLES};
 use crate::monitors::is_in;
 use crate::{RecordError, Repository};
 
@@ -53,6 +53,26 @@ impl Repository {
                 match of.last_mut().filter(same) {
                     Some(last) => last.events.push(event),
                     None => of.push(Signal { wire, field, events: vec![event] }),
+                }
+            }
+        }
+        if !is_in(&self.connection, STATES).map_err(failed)? {
+            return Ok(courses);
+        }
+        let entered = self.by_test(
+            "SELECT test, wire, field, at_s, value FROM states WHERE test BETWEEN ?1 AND ?2 ORDER BY test, position",
+            numbers,
+            |row| {
+                let entered = Entered { at: finite(row, 3)?, value: row.get(4)? };
+                Ok((row.get::<_, u32>(1)?, row.get::<_, String>(2)?, entered))
+            },
+        )?;
+        for (test, states) in entered {
+            let of = &mut courses.entry(test).or_default().states;
+            for (wire, field, entered) in states {
+                match of.last_mut().filter(|last| last.wire == wire && last.field == field) {
+                    Some(last) => last.entered.push(entered),
+                    None => of.push(States { wire, field, entered: vec![entered] }),
                 }
             }
         }

@@ -76,6 +76,7 @@ pub(super) fn tables(connection: &Connection, path: &Path, schema: i64) -> Resul
         (relay_latencies::TABLE, relay_latencies::DDL),
         (listed_messages::TABLE, listed_messages::DDL),
         (lost_requirements::TABLE, lost_requirements::DDL),
+        (course::STATES, course::STATES_DDL),
     ];
     let of_monitors = monitors::OBJECTS.map(|name| (name, monitors::DDL));
     let hazards = if schema >= TRAFFIC_SINCE { monitors::HAZARDS } else { monitors::HAZARDS_7 };

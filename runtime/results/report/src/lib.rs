@@ -44,7 +44,9 @@ pub use facts::show::{
     ChoiceReport, FreshVerdicts, ListedTest, MetricReport, OperationReport, TestList, TestReport, VerdictReport, list,
     show,
 };
-pub use facts::shrinking::{LeftMessage, ShrinkStep, ShrinkThreshold, Shrinking, ShrunkMessages, TestSize};
+pub use facts::shrinking::{
+    LeftMessage, Share, ShrinkStep, ShrinkThreshold, ShrinkTrigger, Shrinking, ShrunkMessages, TestSize,
+};
 pub use facts::stacked::{Stacked, StackedSum};
 pub use facts::summary::{
     CLOSING_RUN_DIFFERS, Counts, ExpectationSummary, Failure, FrontTest, NotFinite, Objective, Quarantined,

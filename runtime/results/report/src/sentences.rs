@@ -16,7 +16,7 @@ use crate::facts::coverage::CoverageSummary;
 use crate::facts::readable::short_numbers;
 use crate::facts::repetition::ViolationRate;
 use crate::facts::show::{OperationReport, TestReport, VerdictReport};
-use crate::facts::shrinking::{Shrinking, ShrunkMessages};
+use crate::facts::shrinking::{Share, ShrinkTrigger, Shrinking, ShrunkMessages};
 use crate::facts::summary::Summary;
 use crate::facts::wording::outcome_words;
 use sesame_base::visible::visible;
@@ -409,8 +409,27 @@ pub(crate) fn shrinking_sentence(shrinking: &Shrinking) -> String {
     }
 }
 
+/// What a smallest test needs, in sentences: which messages, and when its operations have to act, as far as that was
+/// asked for.
+pub(crate) fn needs_sentences(shrinking: &Shrinking) -> Vec<String> {
+    let messages = shrunk_messages_sentence(shrinking);
+    messages.into_iter().chain(trigger_sentences(shrinking)).collect()
+}
+
+/// When the operations of a smallest test have to act, a sentence for each; none if that was not asked for.
+fn trigger_sentences(shrinking: &Shrinking) -> Vec<String> {
+    let of = |ShrinkTrigger { operation, text, fresh, .. }: &ShrinkTrigger| match text {
+        Some(text) => {
+            let Share { right, of } = fresh;
+            format!("{operation} {text}: so it was with {right} of {of} fresh windows")
+        }
+        None => format!("When {operation} has to act is not known: too few variations were run"),
+    };
+    shrinking.when.iter().flatten().map(of).collect()
+}
+
 /// How far a test was reduced to single messages, in a sentence; `None` if that was not asked for.
-pub(crate) fn shrunk_messages_sentence(shrinking: &Shrinking) -> Option<String> {
+fn shrunk_messages_sentence(shrinking: &Shrinking) -> Option<String> {
     let (after, ShrunkMessages { reduced, text, left }) = (shrinking.after.as_ref()?, shrinking.messages.as_ref()?);
     Some(match (reduced, left.len()) {
         (false, _) => format!("{} was not reduced to single messages: {text}", after.test),

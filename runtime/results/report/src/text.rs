@@ -19,8 +19,8 @@ use crate::facts::shrinking::Shrinking;
 use crate::facts::summary::Summary;
 use crate::sentences::{
     QUARANTINED, beyond_sentence, causes_sentence, confirmation_sentence, counts_sentence, coverage_sentence,
-    disturbances_text, headline, mend_sentence, monitors_run_again, monitors_sentence, once_sentence, outcome_sentence,
-    shrinking_sentence, shrunk_messages_sentence, values_sentence, without_effect_sentence,
+    disturbances_text, headline, mend_sentence, monitors_run_again, monitors_sentence, needs_sentences, once_sentence,
+    outcome_sentence, shrinking_sentence, values_sentence, without_effect_sentence,
 };
 use crate::tables;
 
@@ -182,7 +182,7 @@ fn shrinking(text: &mut String, shrinking: &Shrinking, options: TextOptions) {
         text.push_str(&sizes.text(options));
     }
     paragraph(text, &format!("{}.", shrinking_sentence(shrinking)), options);
-    if let Some(sentence) = shrunk_messages_sentence(shrinking) {
+    for sentence in needs_sentences(shrinking) {
         paragraph(text, &format!("{sentence}."), options);
     }
     if shrinking.steps.iter().filter(|step| step.kept).count() > 1 {
@@ -205,7 +205,7 @@ fn shrunk_cause(text: &mut String, shrinking: &Shrinking, options: TextOptions) 
     if !shrinking.operations.is_empty() {
         paragraph(text, &format!("It does: {}.", disturbances_text(&shrinking.operations)), options);
     }
-    if let Some(sentence) = shrunk_messages_sentence(shrinking) {
+    for sentence in needs_sentences(shrinking) {
         paragraph(text, &format!("{sentence}."), options);
     }
     let thresholds = tables::thresholds(shrinking);

@@ -117,6 +117,7 @@ mod tests {
             runs: 1,
             evaluations,
             messages: false,
+            when: false,
         }
     }
 
@@ -157,7 +158,9 @@ mod tests {
         fn runs_that_one_does_not_need_go_on_to_the_others(
             tests in proptest::collection::vec(1u64..6, 1..5),
             share in 1u32..120,
+            when: bool,
         ) {
+            let shrinking = |operations, evaluations| Shrinking { when, ..shrinking(operations, evaluations) };
             let needed: Vec<usize> = tests.iter().map(|&size| shrunk(&[shrinking(size, 10_000)]).1[0]).collect();
             let each: Vec<Shrinking> = tests.iter().map(|&size| shrinking(size, share)).collect();
             let (search, tried) = shrunk(&each);
@@ -166,6 +169,7 @@ mod tests {
             prop_assert!(tried.iter().sum::<usize>() <= budget);
             let minimal = search.each().iter().all(Shrink::is_minimal);
             prop_assert!(minimal || !enough, "{:?} of {}", &needed, budget);
+            prop_assert!(tried == needed || !enough, "{:?} of {:?}", &tried, &needed);
             for (tried, needed) in tried.iter().zip(&needed) {
                 prop_assert!(*tried >= (share as usize).min(*needed), "each has its share");
                 prop_assert!(tried <= needed);

@@ -2,7 +2,8 @@
 
 use sesame_plan::condition::{Condition, ConditionSpace};
 use sesame_plan::{
-    Activation, ActivationMode, CampaignPlan, Choice, ChoiceKind, Domain, Lengths, OperationId, Test, TestOperation,
+    Activation, ActivationMode, CampaignPlan, Choice, ChoiceKind, Copies, Domain, Lengths, OperationId, Test,
+    TestOperation,
 };
 
 use crate::space::condition::is_allowed;
@@ -18,6 +19,8 @@ pub const RESOLUTION: f64 = 0.01;
 pub(super) struct ShrinkSpace {
     /// Operations that a test holds at least.
     pub(super) fewest: usize,
+    /// Whether windows of copies of an operation must not overlap.
+    pub(super) apart: bool,
     resolution: f64,
     operations: Vec<Bounds>,
     conditions: Option<ConditionSpace>,
@@ -91,6 +94,7 @@ impl ShrinkSpace {
         });
         ShrinkSpace {
             fewest: campaign.count.min.max(1) as usize,
+            apart: campaign.copies != Copies::MayOverlap,
             resolution,
             operations: operations.collect(),
             conditions,
@@ -99,6 +103,11 @@ impl ShrinkSpace {
 
     fn bounds(&self, operation: OperationId) -> &Bounds {
         &self.operations[operation.index()]
+    }
+
+    /// The windows that an operation may have.
+    pub(super) fn window(&self, operation: OperationId) -> Range {
+        self.bounds(operation).window
     }
 
     /// The shortest window of an operation, in seconds.

@@ -28,6 +28,7 @@ fn shrinking(test: Test, runs: u32, evaluations: u32) -> Shrinking {
         runs,
         evaluations,
         messages: false,
+        when: false,
     }
 }
 
@@ -145,8 +146,9 @@ fn is_smallest(plan: &CampaignPlan, seed: u64, share: f64) -> TestCaseResult {
     let fails = |test: &Test, _| *test == original || scattered(test, seed) < share;
     let mut asked = BTreeSet::new();
     let mut repeated = false;
-    let shrink = Shrink::with_resolution(plan, shrinking(original.clone(), 1, 100_000), 0.1);
-    let shrink = shrunk(shrink, |test, run| {
+    // Whatever is asked for is permitted, windows of the smallest test that lie elsewhere too.
+    let when = Shrinking { when: true, ..shrinking(original.clone(), 1, 100_000) };
+    let shrink = shrunk(Shrink::with_resolution(plan, when, 0.1), |test, run| {
         repeated |= !asked.insert(content(test));
         fails(test, run)
     });
@@ -171,6 +173,14 @@ fn is_smallest(plan: &CampaignPlan, seed: u64, share: f64) -> TestCaseResult {
     };
     for tried in shrink.tried() {
         prop_assert_eq!(broken_rule(plan, &with_all_times(tried.test.clone())), None);
+    }
+    let by_time = |used: &&TestOperation| matches!(used.activation, Activation::Time { .. });
+    let varied = shrink.variations();
+    prop_assert!(varied.len() <= 36 * found.operations.iter().filter(by_time).count());
+    for Varied { operation, window, fails: failed, fresh: _ } in varied {
+        let mut test = found.clone();
+        test.operations[operation].activation = Activation::Time { start: window.start, end: window.end };
+        prop_assert_eq!(failed, fails(&test, 7));
     }
     for dial in axis::times(found).into_iter().chain(axis::parameters(found)) {
         let round = dial.rounded(&shrink.space, found);
@@ -323,6 +333,43 @@ fn a_made_up_robot_shows_what_of_a_test_mattered() {
     assert!(end - start < 0.9 && 29.0 < start && end < 33.7, "{start} to {end}");
     assert!(f64::midpoint(low, high) > 0.2 && high - low < 0.02 && high < 0.215, "{low} to {high}");
     assert!(shrink.is_minimal() && shrink.tried().len() < 80, "{} tests", shrink.tried().len());
+}
+
+#[test]
+fn windows_of_the_smallest_test_lie_elsewhere_to_show_when_it_fails() {
+    let plan = losses();
+    let original = Test {
+        operations: vec![TestOperation {
+            operation: OperationId(0),
+            activation: Activation::Time { start: 10.0, end: 50.0 },
+            parameters: vec![Choice::Value { value: 1.0 }],
+            operation_seed: 1,
+            messages: None,
+        }],
+    };
+    // Only what is lost at 30 s matters.
+    let fails = |test: &Test, _| match test.operations[0].activation {
+        Activation::Time { start, end } => start <= 30.0 && 30.0 < end,
+        _ => false,
+    };
+    let with = |when, evaluations| {
+        shrunk(Shrink::new(&plan, Shrinking { when, ..shrinking(original.clone(), 1, evaluations) }), fails)
+    };
+    let (without, whole) = (with(false, 500), with(true, 500));
+    assert_eq!((without.variations(), smallest(&without)), (Vec::new(), smallest(&whole)));
+    let varied = whole.variations();
+    assert_eq!(varied.len(), 36);
+    assert_eq!(whole.tried().len(), without.tried().len() + 36, "all of them after the others");
+    assert_eq!(varied.iter().filter(|varied| varied.fresh).count(), 12);
+    for fresh in [false, true] {
+        let of = varied.iter().filter(|varied| varied.fresh == fresh);
+        let fail = of.clone().filter(|varied| varied.fails).count();
+        assert!((3..of.count() - 3).contains(&fail), "both kinds are among them: {varied:?}");
+    }
+    // With few runs left there are fewer.
+    let needed = u32::try_from(without.tried().len()).unwrap();
+    assert_eq!(with(true, needed + 10).variations(), varied[..10]);
+    assert_eq!(with(true, needed - 1).variations(), []);
 }
 
 #[test]

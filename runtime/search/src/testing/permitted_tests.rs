@@ -194,7 +194,7 @@ fn no_strategy_but_a_grid_spends_tests_on_windows_without_a_message() {
             let constructs = matches!(plan.campaign.exploration, Some(Exploration::Construct { .. }));
             let stretches: Vec<Span> = times.iter().map(|&at| Span { start: at, end: at }).collect();
             let heard = (0..).zip(wires(&plan)).map(|(wire, _)| Heard { wire, stretches: stretches.clone() });
-            let course = Course { heard: heard.collect(), signals: Vec::new() };
+            let course = Course { heard: heard.collect(), ..Course::default() };
             let mut reference = SyntheticRobot::without_disturbance(&plan);
             reference.course = Some(course);
             let mut strategy = Begun(strategy(&plan, 4).unwrap(), reference);

@@ -14,6 +14,9 @@ pub struct Course {
     pub heard: Vec<Heard>,
     /// Per wire and field in which something happened, in order of declaration.
     pub signals: Vec<Signal>,
+    /// Per wire and field that took few values, in order of declaration: which one it had when.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub states: Vec<States>,
 }
 
 /// When messages were published on a wire.
@@ -36,6 +39,26 @@ pub struct Signal {
     pub field: String,
     /// What happened, in order of time, at least one. Of a great many an even selection.
     pub events: Vec<SignalEvent>,
+}
+
+/// The values of a field that took few of them, at least two.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct States {
+    /// The position of the wire.
+    pub wire: u32,
+    /// The field from the message inwards; empty for a message that is a single value.
+    pub field: String,
+    /// The values in order of time, each until the next one; neighbours differ.
+    pub entered: Vec<Entered>,
+}
+
+/// A value that a field took.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Entered {
+    /// When a message had it first, in seconds of simulation time.
+    pub at: f64,
+    /// The value as the language writes it: a number, `true`, `false`, or a text without its quotes.
+    pub value: String,
 }
 
 impl Signal {

@@ -1,6 +1,6 @@
 //! The course of reference runs: a resumed search has to read what an unbroken one saw.
 
-use sesame_base::observation::{Course, Happening, Heard, Signal, SignalEvent};
+use sesame_base::observation::{Course, Entered, Happening, Heard, Signal, SignalEvent, States};
 use sesame_plan::Span;
 
 use super::{commit_all, folder};
@@ -9,6 +9,8 @@ use crate::{Origin, Repository, sample};
 #[test]
 fn a_course_is_read_as_it_was_observed() {
     let event = |at, what| SignalEvent { at, what };
+    let entered = |at, value: &str| Entered { at, value: value.to_owned() };
+    let states = |wire, field: &str, entered| States { wire, field: field.to_owned(), entered };
     let signal = |wire, field: &str, events| Signal { wire, field: field.to_owned(), events };
     let course = Course {
         heard: vec![
@@ -22,6 +24,10 @@ fn a_course_is_read_as_it_was_observed() {
             signal(1, "", vec![event(90.0, Happening::Ends)]),
             signal(1, "mode", vec![event(5.0, Happening::Changes)]),
             signal(1, "pose.x", vec![event(5.0, Happening::SetsOut), event(6.0, Happening::Turns)]),
+        ],
+        states: vec![
+            states(0, "", vec![entered(2.0, "1"), entered(7.0, "2")]),
+            states(1, "mode", vec![entered(0.0, "IDLE"), entered(5.0, "CHARGE"), entered(9.0, "")]),
         ],
     };
     let folder = folder();

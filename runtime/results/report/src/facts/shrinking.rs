@@ -1,10 +1,12 @@
 //! How a test was shrunk: the test before and after, and every test that was tried on the way.
 
+mod triggers;
+
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use sesame_base::observation::{ALTERED_LISTED, AlteredMessage, AlteredMessages};
+use sesame_base::observation::{ALTERED_LISTED, AlteredMessage, AlteredMessages, Course};
 use sesame_base::test_number::TestNumber;
 use sesame_notation as notation;
 use sesame_plan::{
@@ -12,13 +14,16 @@ use sesame_plan::{
     TestOperation,
 };
 use sesame_present::number::{self, fixed};
-use sesame_record::{MetricValue, RecordError, Repository, TestRow, fails};
+use sesame_record::{MetricValue, Origin, RecordError, Repository, TestRow, fails};
 use sesame_search::shrink::{MessagesEnd, Phase, Shown, Shrink, ShrinkEach, Threshold, strength};
 use sesame_search::{Strategy as _, sspr};
 
 use crate::export::shrunk_block;
 use crate::facts::show::{OperationReport, operations as operation_reports};
 use crate::facts::wording::{bounds_on, operations, value_text};
+
+use triggers::triggers;
+pub use triggers::{Share, ShrinkTrigger};
 
 /// How a test was shrunk.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -41,6 +46,9 @@ pub struct Shrinking {
     /// otherwise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub messages: Option<ShrunkMessages>,
+    /// When its operations have to act, if that was asked for. Left out otherwise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub when: Option<Vec<ShrinkTrigger>>,
     /// Where parameters of the smallest test begin to matter, before it was reduced to single messages. Parameters that
     /// may have their mildest values have no threshold.
     pub thresholds: Vec<ShrinkThreshold>,
@@ -189,13 +197,23 @@ pub(crate) fn shrinkings(repository: &Repository, rows: &[TestRow]) -> Result<Ve
         }
         search.learn(&results);
     }
-    tasks.iter().zip(search.each()).map(|(task, search)| shrinking(repository, &rows, task, search)).collect()
+    let course = course(repository, rows.values())?;
+    let each = tasks.iter().zip(search.each());
+    each.map(|(task, search)| shrinking(repository, &rows, &course, task, search)).collect()
+}
+
+/// What happened in the undisturbed run; nothing, if there is none.
+fn course<'r>(repository: &Repository, mut rows: impl Iterator<Item = &'r &'r TestRow>) -> Result<Course, RecordError> {
+    let reference = rows.find(|row| row.origin == Origin::Reference);
+    let record = reference.map(|row| repository.test(row.number)).transpose()?;
+    Ok(record.and_then(|record| record.observation.course).unwrap_or_default())
 }
 
 /// How one test was shrunk.
 fn shrinking(
     repository: &Repository,
     rows: &BTreeMap<u32, &TestRow>,
+    course: &Course,
     task: &Task,
     search: &Shrink,
 ) -> Result<Shrinking, RecordError> {
@@ -248,6 +266,7 @@ fn shrinking(
         after,
         operations,
         messages: kept.last().and_then(|&smallest| messages(plan, search, smallest)),
+        when: task.when.then(|| triggers(plan, course, search)),
         thresholds: thresholds(plan, search),
         block,
         steps,
@@ -480,7 +499,7 @@ fn activation(plan: &CampaignPlan, activation: &Activation) -> String {
 #[cfg(test)]
 mod tests {
     use sesame_plan::Task;
-    use sesame_record::{Origin, Recorder, TestRecord, sample};
+    use sesame_record::{Recorder, TestRecord, sample};
 
     use super::*;
     use crate::{TextOptions, page, summary, summary_text};
@@ -502,6 +521,7 @@ mod tests {
             runs: 1,
             evaluations: 200,
             messages: false,
+            when: false,
         });
         let plan = task.plan(&plan);
         let folder = tempfile::tempdir().unwrap();

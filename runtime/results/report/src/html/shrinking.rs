@@ -3,7 +3,7 @@
 use sesame_present::markup::Markup;
 
 use crate::facts::shrinking::Shrinking;
-use crate::sentences::{shrinking_sentence, shrunk_messages_sentence};
+use crate::sentences::{needs_sentences, shrinking_sentence};
 use crate::tables;
 
 /// Before and after, the block, and every test that was tried.
@@ -11,7 +11,7 @@ pub(super) fn shrinking(body: &mut Markup, shrinking: &Shrinking, drawn: &[u32])
     body.open("section", &[("class", "shrinking")]);
     body.heading(&format!("{} shrunk", shrinking.test));
     body.element("p", &[], &format!("{}.", shrinking_sentence(shrinking)));
-    if let Some(sentence) = shrunk_messages_sentence(shrinking) {
+    for sentence in needs_sentences(shrinking) {
         body.element("p", &[], &format!("{sentence}."));
     }
     tables::sizes(shrinking).html(body, drawn);

@@ -7,7 +7,7 @@
 mod happenings;
 mod stretches;
 
-use sesame_base::observation::{Course, Heard, Signal};
+use sesame_base::observation::{Course, Heard, Signal, States};
 use sesame_base::time::SimTime;
 use sesame_plan::{CampaignPlan, CourseRead, Test};
 
@@ -22,11 +22,13 @@ const FIELDS: usize = 400;
 const NUMBERS: usize = 8;
 
 /// What is recorded of the course of a run: something of one without operations, for a search that places windows by
-/// it.
+/// it, or a description of when operations have to act.
 pub(super) fn read(plan: &CampaignPlan, test: &Test) -> CourseRead {
     match plan.campaign.search.strategy() {
-        Some(strategy) if test.operations.is_empty() => strategy.kind().properties().course,
-        _ => CourseRead::Nothing,
+        _ if !test.operations.is_empty() => CourseRead::Nothing,
+        _ if plan.campaign.describes_when => CourseRead::Happenings,
+        Some(strategy) => strategy.kind().properties().course,
+        None => CourseRead::Nothing,
     }
 }
 
@@ -98,6 +100,11 @@ impl Recorder {
             let happened = std::iter::once(messages).chain(fields).filter(|(_, events)| !events.is_empty());
             let signals = happened.map(|(field, events)| Signal { wire, field: field.to_owned(), events });
             course.signals.extend(signals);
+            let states = of
+                .fields
+                .iter()
+                .filter_map(|field| Some(States { wire, field: field.name.clone(), entered: field.states()? }));
+            course.states.extend(states);
         }
         course
     }
@@ -166,7 +173,7 @@ impl Layout {
 
 #[cfg(test)]
 mod tests {
-    use sesame_base::observation::{Happening, SignalEvent};
+    use sesame_base::observation::{Entered, Happening, SignalEvent};
     use sesame_plan::testing::{field, message, minimal, topic};
     use sesame_plan::testing::{test_of, use_of};
     use sesame_plan::{MessageId, Search, Strategy, Type};
@@ -225,6 +232,8 @@ mod tests {
         assert_eq!(of("", 0)[..2], [(2.0, Happening::Message), (7.0, Happening::Message)]);
         assert_eq!(of("", 1), [(8.0, Happening::Ends)]);
         assert_eq!(of("mode", 1), [(3.0, Happening::Changes)]);
+        let entered = [(0.1, "rest"), (3.0, "drive")].map(|(at, value)| Entered { at, value: value.to_owned() });
+        assert_eq!(course.states, [States { wire: 1, field: "mode".to_owned(), entered: entered.to_vec() }]);
         assert_eq!(of("pose.x", 1), [(3.1, Happening::SetsOut), (6.0, Happening::Rests)]);
         assert_eq!(of("pose.y", 1), []);
     }

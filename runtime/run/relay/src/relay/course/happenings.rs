@@ -1,6 +1,6 @@
 //! What a field of messages does: it changes, jumps, turns, sets out, comes to rest.
 
-use sesame_base::observation::{Happening, SignalEvent};
+use sesame_base::observation::{Entered, Happening, SignalEvent};
 use sesame_base::time::SimTime;
 
 use crate::value::{Text, Value};
@@ -11,6 +11,8 @@ const STATES: usize = 6;
 const SAMPLES: usize = 4096;
 /// How many events of a field are kept.
 const EVENTS: usize = 400;
+/// The longest text that is a state, in bytes.
+const STATE_TEXT: usize = 64;
 
 /// A jump is a change from one value to the next by more than this share of the range.
 const JUMP: f64 = 0.2;
@@ -30,6 +32,8 @@ pub(super) struct Field {
     last: Option<State>,
     /// When it changed.
     changes: Evenly<SimTime>,
+    /// When it took which value; `None` if that happened too often, or with too long a text.
+    entered: Option<Vec<(SimTime, State)>>,
     /// The numbers that it took, as long as they are at most [`STATES`], or one more.
     numbers: Vec<f64>,
     /// The numbers that it took over time.
@@ -40,7 +44,25 @@ pub(super) struct Field {
 #[derive(Debug, Clone, PartialEq)]
 enum State {
     Name(Text),
+    Truth(bool),
     Number(f64),
+}
+
+impl State {
+    fn is_short(&self) -> bool {
+        match self {
+            State::Name(text) => text.len() <= STATE_TEXT,
+            State::Truth(_) | State::Number(_) => true,
+        }
+    }
+
+    fn words(&self) -> String {
+        match self {
+            State::Name(text) => text.to_string(),
+            State::Truth(truth) => truth.to_string(),
+            State::Number(number) => number.to_string(),
+        }
+    }
 }
 
 /// An even selection of items: every `stride`th.
@@ -54,13 +76,15 @@ struct Evenly<T> {
 impl Field {
     pub(super) fn new(name: String) -> Self {
         let (changes, samples) = (Evenly::at_most(EVENTS), Evenly::at_most(SAMPLES));
-        Field { name, last: None, changes, numbers: Vec::new(), samples }
+        Field { name, last: None, changes, entered: Some(Vec::new()), numbers: Vec::new(), samples }
     }
 
     /// A message has this value in the field.
     pub(super) fn take(&mut self, now: SimTime, value: &Value) {
         if let Value::Text(text) = value {
             self.take_state(now, State::Name(text.clone()));
+        } else if let Value::Bool(truth) = value {
+            self.take_state(now, State::Truth(*truth));
         } else if let Some(number) = value.number() {
             self.take_number(now, number);
         }
@@ -86,10 +110,24 @@ impl Field {
     }
 
     fn take_state(&mut self, now: SimTime, state: State) {
-        if self.last.as_ref().is_some_and(|last| *last != state) {
+        if self.last.as_ref() == Some(&state) {
+            return;
+        }
+        if self.last.is_some() {
             self.changes.take(now);
         }
+        let room = |entered: &Vec<(SimTime, State)>| entered.len() < EVENTS && state.is_short();
+        self.entered = self.entered.take().filter(room);
+        if let Some(entered) = &mut self.entered {
+            entered.push((now, state.clone()));
+        }
         self.last = Some(state);
+    }
+
+    /// Which value it had when, if it took few, at least two.
+    pub(super) fn states(&self) -> Option<Vec<Entered>> {
+        let entered = self.entered.as_ref().filter(|entered| self.is_state() && entered.len() > 1)?;
+        Some(entered.iter().map(|(at, state)| Entered { at: at.seconds(), value: state.words() }).collect())
     }
 
     /// What happened in it, in order of time.
@@ -228,6 +266,32 @@ mod tests {
     fn a_number_sets_out_and_comes_to_rest() {
         let moved = (0..60).map(|at: i32| 5.0 + f64::from(at.clamp(20, 40)));
         assert_eq!(events(moved), [(2.1, Happening::SetsOut), (4.0, Happening::Rests)]);
+    }
+
+    #[test]
+    fn what_takes_few_values_has_states_and_what_moves_or_never_changes_has_none() {
+        let states = |values: &[Value]| {
+            let mut field = Field::new(String::new());
+            for (second, value) in (0..).zip(values) {
+                field.take(SimTime::from_nanos(second * 1_000_000_000), value);
+            }
+            field
+                .states()
+                .map(|states| states.into_iter().map(|entered| (entered.at, entered.value)).collect::<Vec<_>>())
+        };
+        let entered = |states: &[(f64, &str)]| Some(states.iter().map(|&(at, value)| (at, value.to_owned())).collect());
+        let text = |text: &str| Value::Text(text.into());
+        assert_eq!(
+            states(&[text("IDLE"), text("IDLE"), text("CHARGE"), text("IDLE")]),
+            entered(&[(0.0, "IDLE"), (2.0, "CHARGE"), (3.0, "IDLE")])
+        );
+        assert_eq!(states(&[false, true, true].map(Value::Bool)), entered(&[(0.0, "false"), (1.0, "true")]));
+        assert_eq!(states(&[1, 1, 2].map(Value::Int)), entered(&[(0.0, "1"), (2.0, "2")]));
+        assert_eq!(states(&[0.5, 0.5].map(Value::Real)), None, "it says nothing about when");
+        assert_eq!(states(&[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0].map(Value::Real)), None, "too many values");
+        assert_eq!(states(&[text("a"), text(&"long".repeat(20)), text("a")]), None);
+        let often: Vec<Value> = (0..1000).map(|at| Value::Bool(at % 2 == 0)).collect();
+        assert_eq!(states(&often), None, "too many changes to tell them all");
     }
 
     #[test]
