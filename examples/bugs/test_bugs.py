@@ -23,13 +23,14 @@ from random import Random
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import run as command
+import when
 from bugs.campaign import Job, Record, agrees, record_from, run
 from bugs.case import PROBLEMS as PROBLEMS_FOLDER
 from bugs.case import Case, TrueCause, cause, load_cases
 from bugs.judge import Judge, minimal
 from bugs.named import Named
 from bugs.protocol import Bus, serve
-from bugs.sesamec import CAMPAIGN, plan_of, search
+from bugs.sesamec import CAMPAIGN, Trigger, plan_of, search
 from bugs.space import Metric, Operation, Parameter, Requirement, Space, Test, Topic, Use, check_permitted, space_of
 from bugs.strategies import MODULES, Problem, strategy_class
 from bugs.table import as_csv, as_json, as_text, as_text_of_problems, rows
@@ -390,6 +391,31 @@ class WhatIsNamed(unittest.TestCase):
         self.assertEqual(named.causes(), set(), "in another window it says nothing about this one")
         named.add(both[1:], outcome(both[1:], set()))
         self.assertEqual(named.causes(), {whole})
+
+
+class WhenOperationsHaveToAct(unittest.TestCase):
+    def test_a_description_decides_by_the_times_of_the_run(self):
+        def deciding(rule: str, *spans: tuple[float, float], least: float = 0.0) -> list[bool]:
+            decides = {"rule": rule, "least": least, "spans": [{"start": a, "end": b} for a, b in spans]}
+            trigger = Trigger("late", 0, "has to act", decides)
+            return [trigger.violates(*window) for window in [(1.0, 2.0), (1.5, 3.0), (2.0, 6.0)]]
+
+        self.assertEqual(deciding("always"), [True, True, True])
+        self.assertEqual(deciding("contains", (2.0, 2.0)), [False, True, True], "a window ends before its end")
+        self.assertEqual(deciding("contains", (1.0, 2.0), (4.0, 5.0)), [True, False, True])
+        self.assertEqual(deciding("overlaps", (0.0, 1.75)), [True, True, False])
+        self.assertEqual(deciding("overlaps", (0.0, 1.75), least=0.5), [True, False, False])
+        self.assertEqual(deciding("begins", (1.5, 2.0)), [False, True, False])
+        self.assertEqual(deciding("ends", (2.5, 6.0)), [False, True, True])
+
+    def test_the_windows_of_the_judge_are_permitted(self):
+        for case in CASES:
+            with self.subTest(case.name):
+                for use in {use.operation: use for true in case.causes for use in true.witness}.values():
+                    tried = when.windows(case, (use,), use, Random(1))
+                    self.assertEqual(len(tried), when.WINDOWS)
+                    for start, end in tried:
+                        check_permitted(replace(use, start=start, end=end), case.space.operations[use.operation])
 
 
 class Table(unittest.TestCase):

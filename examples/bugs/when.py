@@ -4,7 +4,8 @@
 For each cause that a search finds, Sesame shrinks the smallest test and describes with which windows of its operations
 it violates the requirement. The judge draws windows of its own, tries them in its own world, and compares. A
 description is right if it says what comes out for at least 90 % of the windows. Windows that violate and windows that
-do not count half each, unless there are hardly any of one kind. What the case states is printed next to it, so that you can read whether it is the reason,
+do not count half each, unless there are hardly any of one kind. An operation without a description is counted apart.
+What the case states is printed next to each, so that you can read whether it is the reason,
 too.
 
 exit codes:
@@ -25,10 +26,10 @@ import run as command
 from bugs.case import BadCase, Case, cause, load_cases
 from bugs.judge import Judge
 from bugs.sesamec import SesamecFailed, Shrunk, Trigger, shrunk_causes
-from bugs.space import Use
+from bugs.space import Test, Use
 
-# How many windows the judge tries for each operation.
-WINDOWS = 60
+# How many windows the judge draws for each operation.
+WINDOWS = 90
 # The share of windows of which a right description says what comes out.
 RIGHT = 0.9
 # Where one of both outcomes is rarer than this, windows count alike.
@@ -39,7 +40,7 @@ ENOUGH = 0.8
 
 def main(arguments: list[str]) -> int:
     options = parsed(arguments)
-    right = count = 0
+    right = count = missing = 0
     try:
         for case in load_cases(options.cases):
             judge = Judge(case.world())
@@ -47,6 +48,9 @@ def main(arguments: list[str]) -> int:
                 of = (options.sesamec, case.space_file, case.space, seed, options.tests)
                 for shrunk in shrunk_causes(*of, ["--when"]):
                     for trigger in shrunk.triggers:
+                        if trigger.text is None:
+                            missing += 1
+                            continue
                         agreement = agreement_of(judge, case, shrunk, trigger, seed)
                         count += 1
                         right += agreement >= RIGHT
@@ -54,7 +58,7 @@ def main(arguments: list[str]) -> int:
     except (BadCase, SesamecFailed) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
-    print(f"{right} of {count} descriptions are right")
+    print(f"{right} of {count} descriptions are right; {missing} operations have none")
     return 0 if right >= ENOUGH * count else 3
 
 
@@ -68,25 +72,28 @@ def parsed(arguments: list[str]) -> argparse.Namespace:
 
 
 def agreement_of(judge: Judge, case: Case, shrunk: Shrunk, trigger: Trigger, seed: int) -> float:
-    """The share of windows of which a description says what comes out; 0 if there is none."""
-    if trigger.text is None:
-        return 0.0
+    """The share of windows of which a description says what comes out."""
     use = shrunk.test[trigger.position]
     said: dict[bool, list[bool]] = {True: [], False: []}
-    for start, end in windows(case, use, random.Random(f"{case.name} {seed} {use.operation}")):
+    for start, end in windows(case, shrunk.test, use, random.Random(f"{case.name} {seed} {use.operation}")):
         test = list(shrunk.test)
         test[trigger.position] = replace(use, start=start, end=end)
         violates = shrunk.requirement in judge.outcome(tuple(test)).violated
         said[violates].append(trigger.violates(start, end))
     right = {violates: sum(saying == violates for saying in sayings) for violates, sayings in said.items()}
-    if min(map(len, said.values())) < RARE * WINDOWS:
-        return sum(right.values()) / WINDOWS
+    tried = sum(map(len, said.values()))
+    if min(map(len, said.values())) < RARE * tried:
+        return sum(right.values()) / tried
     return sum(right[violates] / len(sayings) for violates, sayings in said.items()) / len(said)
 
 
-def windows(case: Case, use: Use, draws: random.Random) -> list[tuple[float, float]]:
-    """Windows that are permitted: in turn one around that of the test, one of its length, and one of any length."""
+def windows(case: Case, test: Test, use: Use, draws: random.Random) -> list[tuple[float, float]]:
+    """Windows that are permitted: in turn one around that of the test, one of its length, and one of any length.
+
+    Copies of an operation are never active together, so windows that meet one of a copy are left out.
+    """
     operation = case.space.operations[use.operation]
+    copies = [other for other in test if other.operation == use.operation and other != use]
     most = min(operation.longest, operation.end - operation.start)
     least = max(operation.shortest, most * 1e-3)
     own = use.end - use.start
@@ -99,14 +106,16 @@ def windows(case: Case, use: Use, draws: random.Random) -> list[tuple[float, flo
             length = own if number % 3 == 1 else math.exp(draws.uniform(math.log(least), math.log(most)))
             first, last = operation.start, operation.end - length
         start = draws.uniform(first, max(first, last))
-        found.append((start, min(start + length, operation.end)))
+        end = min(start + length, operation.end)
+        if not any(start < copy.end and copy.start < end for copy in copies):
+            found.append((start, end))
     return found
 
 
 def row(case: Case, seed: int, shrunk: Shrunk, trigger: Trigger, agreement: float) -> str:
     shrunk_cause = cause(shrunk.requirement, tuple({use.operation for use in shrunk.test}))
     stated = "; ".join(true.when for true in case.causes if true.cause == shrunk_cause)
-    said = f"{trigger.operation}: {trigger.text or 'not described'}"
+    said = f"{trigger.operation} {trigger.text}"
     lines = [f"{case.name}, seed {seed}, {shrunk_cause}", said, f"the case: {stated or 'no such cause'}"]
     return f"{agreement:4.0%}  " + "\n      ".join(lines)
 

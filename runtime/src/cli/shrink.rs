@@ -57,7 +57,7 @@ pub struct ShrinkArgs {
     #[arg(long)]
     messages: bool,
     /// Find out when the operations of the smallest test have to act: vary their windows, and describe by what happens
-    /// in the undisturbed run with which of them the test fails. Takes 36 tests for each operation by time
+    /// in the undisturbed run with which of them the test fails. Takes 48 tests for each operation by time
     #[arg(long)]
     when: bool,
     #[command(flatten)]

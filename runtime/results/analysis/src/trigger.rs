@@ -231,17 +231,19 @@ impl Trigger {
                 2 + usize::from(moment.which != Which::Any) + times
             }
             Trigger::While { least, .. } => 2 + usize::from(*least > 0.0),
-            Trigger::Edge { within: Within::State(_), .. } => 3,
-            Trigger::Edge { within: Within::Around { moment, .. }, .. } => 4 + usize::from(moment.which != Which::Any),
-            Trigger::Edge { within: Within::Times { .. }, .. } | Trigger::Between { .. } => 6,
+            Trigger::Edge { within: Within::State(_), .. } => 4,
+            Trigger::Edge { within: Within::Around { moment, .. }, .. } => 6 + usize::from(moment.which != Which::Any),
+            Trigger::Edge { within: Within::Times { .. }, .. } => 8,
+            Trigger::Between { .. } => 6,
         }
     }
 }
 
 /// Describes when an operation has to act.
 ///
-/// The run ends at `end`; `smallest` is the smallest window with which the test fails; `own` are the wires that the operation disturbs: of
-/// descriptions that are equally good, one by their messages is taken. `None` if too few windows were tried.
+/// The run ends at `end`; `smallest` is the smallest window with which the test fails; `own` are the wires that the
+/// operation disturbs: of descriptions that are equally good, one by their messages is taken. `None` if too few windows
+/// were tried.
 pub fn describe(
     course: &Course,
     end: f64,

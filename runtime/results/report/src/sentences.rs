@@ -418,11 +418,12 @@ pub(crate) fn needs_sentences(shrinking: &Shrinking) -> Vec<String> {
 
 /// When the operations of a smallest test have to act, a sentence for each; none if that was not asked for.
 fn trigger_sentences(shrinking: &Shrinking) -> Vec<String> {
-    let of = |ShrinkTrigger { operation, text, fresh, .. }: &ShrinkTrigger| match text {
-        Some(text) => {
-            let Share { right, of } = fresh;
-            format!("{operation} {text}: so it was with {right} of {of} fresh windows")
-        }
+    let of = |ShrinkTrigger { operation, text, fresh: Share { right, of }, .. }: &ShrinkTrigger| match text {
+        Some(text) => format!("{operation} {text}: so it was with {right} of {of} fresh windows"),
+        None if *of > 0 => format!(
+            "When {operation} has to act is not described by what happens in the undisturbed run: the best description \
+             holds for only {right} of {of} fresh windows"
+        ),
         None => format!("When {operation} has to act is not known: too few variations were run"),
     };
     shrinking.when.iter().flatten().map(of).collect()

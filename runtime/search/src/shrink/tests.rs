@@ -176,7 +176,7 @@ fn is_smallest(plan: &CampaignPlan, seed: u64, share: f64) -> TestCaseResult {
     }
     let by_time = |used: &&TestOperation| matches!(used.activation, Activation::Time { .. });
     let varied = shrink.variations();
-    prop_assert!(varied.len() <= 36 * found.operations.iter().filter(by_time).count());
+    prop_assert!(varied.len() <= variations::OF_EACH * found.operations.iter().filter(by_time).count());
     for Varied { operation, window, fails: failed, fresh: _ } in varied {
         let mut test = found.clone();
         test.operations[operation].activation = Activation::Time { start: window.start, end: window.end };
@@ -358,9 +358,9 @@ fn windows_of_the_smallest_test_lie_elsewhere_to_show_when_it_fails() {
     let (without, whole) = (with(false, 500), with(true, 500));
     assert_eq!((without.variations(), smallest(&without)), (Vec::new(), smallest(&whole)));
     let varied = whole.variations();
-    assert_eq!(varied.len(), 36);
-    assert_eq!(whole.tried().len(), without.tried().len() + 36, "all of them after the others");
-    assert_eq!(varied.iter().filter(|varied| varied.fresh).count(), 12);
+    assert_eq!(varied.len(), 48);
+    assert_eq!(whole.tried().len(), without.tried().len() + 48, "all of them after the others");
+    assert_eq!(varied.iter().filter(|varied| varied.fresh).count(), 16);
     for fresh in [false, true] {
         let of = varied.iter().filter(|varied| varied.fresh == fresh);
         let fail = of.clone().filter(|varied| varied.fails).count();

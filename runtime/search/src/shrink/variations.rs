@@ -12,11 +12,13 @@ use crate::shrink::space::ShrinkSpace;
 use crate::space::range::Range;
 
 /// How many variations there are of each operation.
-const OF_EACH: usize = 36;
+pub(super) const OF_EACH: usize = 48;
 /// The sorts of windows.
 const SORTS: usize = 3;
 /// How much longer than that of the smallest test windows of the second sort are.
 const LITTLE_LONGER: f64 = 1.5;
+/// How often a window is drawn until it meets no copy that it must not meet.
+const ATTEMPTS: usize = 30;
 
 /// A variation of a test.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,8 +32,8 @@ pub(super) struct Variation {
     pub(super) test: Test,
 }
 
-/// The variations of a test, those of all operations in turn. Where copies of an operation must not overlap, there are
-/// fewer than [`OF_EACH`].
+/// The variations of a test, those of all operations in turn. Where copies of an operation must not overlap and leave
+/// no room, there are fewer than [`OF_EACH`].
 pub(super) fn variations(space: &ShrinkSpace, test: &Test, seed: u64) -> Vec<Variation> {
     let mut of_each: Vec<Vec<Variation>> = Vec::new();
     for (operation, used) in test.operations.iter().enumerate() {
@@ -47,8 +49,8 @@ pub(super) fn variations(space: &ShrinkSpace, test: &Test, seed: u64) -> Vec<Var
             });
             space.apart && windows.any(|other| window.start < other.end && other.start < window.end)
         };
-        let windows = windows(range, Span { start, end }, &mut stream).into_iter().enumerate();
-        let varied = windows.filter(|(_, window)| !meets(window)).map(|(at, window)| {
+        let windows = windows(range, Span { start, end }, &meets, &mut stream);
+        let varied = windows.into_iter().map(|(at, window)| {
             let mut test = test.clone();
             test.operations[operation].activation = Activation::Time { start: window.start, end: window.end };
             // Each sort has fresh ones: at first of one, then of the next.
@@ -61,13 +63,17 @@ pub(super) fn variations(space: &ShrinkSpace, test: &Test, seed: u64) -> Vec<Var
     in_turn.collect()
 }
 
-/// Windows in a permitted range, those of each sort spread evenly over it in a random order.
-fn windows(range: Range, smallest: Span, stream: &mut Stream) -> Vec<Span> {
+/// Windows in a permitted range with their numbers, those of each sort spread evenly over it in a random order. Those
+/// that meet something are drawn again.
+fn windows(range: Range, smallest: Span, meets: &dyn Fn(&Span) -> bool, stream: &mut Stream) -> Vec<(usize, Span)> {
     let (shortest, longest) = (range.shortest, range.greatest_length());
     let rounds = OF_EACH / SORTS;
     let places = [(); SORTS].map(|()| stream.permutation(rounds));
-    let mut window = |sort: usize, round: usize| {
-        let place = (places[sort][round] as f64 + stream.unit()) / rounds as f64;
+    let mut window = |sort: usize, round: usize, attempt: usize| {
+        let place = match attempt {
+            0 => (places[sort][round] as f64 + stream.unit()) / rounds as f64,
+            _ => stream.unit(),
+        };
         let length = match sort {
             0 => stream.uniform(smallest.length(), longest.max(smallest.length())),
             1 => (smallest.length() * LITTLE_LONGER).min(longest),
@@ -80,7 +86,12 @@ fn windows(range: Range, smallest: Span, stream: &mut Stream) -> Vec<Span> {
         let start = first + (last - first).max(0.0) * place;
         Span { start, end: (start + length).min(range.high) }
     };
-    (0..OF_EACH).map(|at| window(at % SORTS, at / SORTS)).collect()
+    let drawn = (0..OF_EACH).filter_map(|at| {
+        let window =
+            (0..ATTEMPTS).map(|attempt| window(at % SORTS, at / SORTS, attempt)).find(|window| !meets(window))?;
+        Some((at, window))
+    });
+    drawn.collect()
 }
 
 #[cfg(test)]
@@ -103,10 +114,10 @@ mod tests {
             let length = shortest + (longest - shortest) * place.0;
             let start = low + (size - length) * place.1;
             let smallest = Span { start, end: start + length };
-            let windows = windows(range, smallest, &mut Stream::derive(seed, "test", &[]));
+            let windows = windows(range, smallest, &|_| false, &mut Stream::derive(seed, "test", &[]));
             prop_assert_eq!(windows.len(), OF_EACH);
             let near = 1e-9 * (low + size);
-            for (at, window) in windows.iter().enumerate() {
+            for (at, window) in windows {
                 prop_assert!(window.start >= low - near && window.end <= low + size + near, "{:?} of {:?}", window, range);
                 let length = window.length();
                 prop_assert!((shortest - near..=longest + near).contains(&length), "{} of {:?}", length, range);
@@ -120,9 +131,7 @@ mod tests {
     #[test]
     fn a_third_of_each_sort_is_fresh() {
         let fresh = |at: usize| (at / SORTS + at % SORTS).is_multiple_of(3);
-        for sort in 0..SORTS {
-            let of_sort = (0..OF_EACH).filter(|at| at % SORTS == sort && fresh(*at)).count();
-            assert_eq!(of_sort, OF_EACH / SORTS / 3);
-        }
+        let of_sort = |sort| (0..OF_EACH).filter(|at| at % SORTS == sort && fresh(*at)).count();
+        assert_eq!([0, 1, 2].map(of_sort), [6, 5, 5]);
     }
 }

@@ -11,6 +11,9 @@ use sesame_plan::{Activation, CampaignPlan, Span};
 use sesame_present::number::fixed;
 use sesame_search::shrink::{Shrink, Varied};
 
+/// The share of fresh windows for which a description has to hold: so many of so many.
+const HOLDS: (usize, usize) = (4, 5);
+
 /// When an operation of the smallest test has to act.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ShrinkTrigger {
@@ -18,7 +21,8 @@ pub struct ShrinkTrigger {
     pub operation: String,
     /// The position of the operation in the smallest test, from 0.
     pub position: usize,
-    /// When it has to act, as in ``has to act while `mode` is CHARGE``; `null` if there were no runs left to find that out.
+    /// When it has to act, as in ``has to act while `mode` is CHARGE``; `null` if nothing was found that holds for four
+    /// fifths of fresh windows, or too few were tried.
     pub text: Option<String>,
     /// The same by times of the undisturbed run, for programs; `null` like `text`.
     pub decides: Option<Decides>,
@@ -63,14 +67,15 @@ pub(super) fn triggers(plan: &CampaignPlan, course: &Course, search: &Shrink) ->
         });
         let own: Vec<u32> =
             (0..).zip(&wires).filter(|(_, (of, _))| Some(*of) == operation.topic).map(|(at, _)| at).collect();
+        let holds = |of: Agreement| of.right * HOLDS.1 >= of.of * HOLDS.0;
         let described = describe(course, plan.campaign.end_after, &own, window, &made_of, &fresh);
         let name = operation.name.clone();
         match described {
             Some(Description { trigger, decides, made_of, fresh }) => ShrinkTrigger {
                 operation: name,
                 position,
-                text: Some(words(plan, &trigger)),
-                decides: Some(decides),
+                text: holds(fresh).then(|| words(plan, &trigger)),
+                decides: holds(fresh).then_some(decides),
                 made_of: made_of.into(),
                 fresh: fresh.into(),
             },
