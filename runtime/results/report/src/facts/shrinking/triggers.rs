@@ -118,7 +118,8 @@ fn words(plan: &CampaignPlan, trigger: &Trigger) -> String {
 }
 
 fn times(Span { start, end }: Span) -> String {
-    format!("from {} s to {} s", fixed(start, 2), fixed(end, 2))
+    let digits = if end - start < 0.1 { 3 } else { 2 };
+    format!("from {} s to {} s", fixed(start, digits), fixed(end, digits))
 }
 
 fn around(plan: &CampaignPlan, moment: &Moment, from: f64, to: f64) -> String {
