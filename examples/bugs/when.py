@@ -4,9 +4,8 @@
 For each cause that a search finds, Sesame shrinks the smallest test and describes with which windows of its operations
 it violates the requirement. The judge draws windows of its own, tries them in its own world, and compares. A
 description is right if it says what comes out for at least 90 % of the windows. Windows that violate and windows that
-do not count half each, unless there are hardly any of one kind. An operation without a description is counted apart.
-What the case states is printed next to each, so that you can read whether it is the reason,
-too.
+do not count half each, unless there are hardly any of one kind. Operations without a description are
+counted separately. What the case states is printed next to each, so that you can read whether it is the reason, too.
 
 exit codes:
   0    at least 80 % of the descriptions are right

@@ -215,7 +215,7 @@ struct InTheHall {
     arm_distance: [f64; 2],
     /// By how much a worker is closer to a tool in the hall.
     closer: f64,
-    /// How far the heights of a tool are apart, in the root of the mean square over the run.
+    /// The difference in the height of a tool: its root mean square over the run.
     apart: f64,
 }
 

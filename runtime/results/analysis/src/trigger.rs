@@ -242,8 +242,8 @@ impl Trigger {
 /// Describes when an operation has to act.
 ///
 /// The run ends at `end`; `smallest` is the smallest window with which the test fails; `own` are the wires that the
-/// operation disturbs: of descriptions that are equally good, one by their messages is taken. `None` if too few windows
-/// were tried.
+/// operation disturbs: if several descriptions are equally good, one by their messages is taken. `None` if too few
+/// windows were tried.
 pub fn describe(
     course: &Course,
     end: f64,

@@ -48,8 +48,8 @@ impl Decides {
 }
 
 /// All that may be said. `smallest` is a smallest window with which the test fails: it decides which one of several
-/// moments is meant, and from when to when around it. The run ends at `end`. Where only the begin of a window matters,
-/// or its end, the windows that were tried say from when to when it may be.
+/// moments is meant, and from when to when around it. The run ends at `end`. Where it only matters when a window
+/// begins, or when it ends, the windows that were tried show from when to when that may be.
 pub(super) fn candidates(course: &Course, end: f64, smallest: Span, tried: &[TriedWindow]) -> Vec<Candidate> {
     let mut found = vec![
         Candidate { trigger: Trigger::Always, wire: None, decides: Decides::new(Rule::Always, Vec::new()) },
