@@ -91,15 +91,29 @@ impl Publication {
         Ok(Publication { offer: Some(offer), by_space: true, ..Publication::new(topic) })
     }
 
-    /// The nodes that listen.
-    pub(crate) fn connected(&self) -> impl Iterator<Item = &str> {
-        self.links.iter().filter(|link| !link.gone.load(Ordering::Relaxed)).map(|link| link.node.as_str())
+    /// The nodes that listen, each of them once: rospy connects twice if it hears of a publisher from the master's
+    /// answer and from an update at the same time.
+    pub(crate) fn connected(&self) -> BTreeSet<&str> {
+        self.links.iter().filter(|link| !link.gone.load(Ordering::Relaxed)).map(|link| link.node.as_str()).collect()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_node_that_is_connected_twice_listens_once() {
+        let link = |node: &str, gone| {
+            let (waiting, filled) = (Mutex::default(), Condvar::new());
+            Arc::new(Link { node: node.to_owned(), waiting, filled, gone: AtomicBool::new(gone) })
+        };
+        let mut publication = Publication::new("/peer");
+        publication.links = vec![link("/near", false), link("/near", false), link("/far", true)];
+        assert_eq!(publication.connected(), BTreeSet::from(["/near"]));
+        publication.links.push(link("/far", false));
+        assert_eq!(publication.connected(), BTreeSet::from(["/far", "/near"]));
+    }
 
     #[test]
     fn a_slow_subscriber_loses_the_oldest_messages_only() {

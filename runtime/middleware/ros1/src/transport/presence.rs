@@ -62,7 +62,7 @@ fn sinks(bus: &Ros1Bus, node: &Node, wired: &Wired, missing: &mut Vec<String>) {
             })
             .map(|(_, node)| format!("`{}`", node.name))
             .collect();
-        let there = node.with_publication(at, |publication| publication.connected().count());
+        let there = node.with_publication(at, |publication| publication.connected().len());
         if there < expected.len() {
             let all = expected.join(", ");
             missing.push(format!("{there} of {} subscribe to `{}`: {all}", expected.len(), sink.path));
@@ -99,7 +99,7 @@ pub(super) fn is_heard(bus: &Ros1Bus, line: usize) -> bool {
         return wired
             .sinks
             .iter()
-            .any(|&at| node.with_publication(at, |publication| publication.connected().next().is_some()));
+            .any(|&at| !node.with_publication(at, |publication| publication.connected().is_empty()));
     }
     let state = node.state().unwrap_or_default();
     nodes(&state.subscribers, &wired.line.path).iter().any(|other| *other != node.name)
