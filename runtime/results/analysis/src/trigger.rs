@@ -213,7 +213,7 @@ pub struct Description {
 }
 
 /// How many windows a description gets right.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Agreement {
     /// Windows of which it says what came out.
     pub right: usize,

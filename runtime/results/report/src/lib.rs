@@ -45,7 +45,7 @@ pub use facts::show::{
     show,
 };
 pub use facts::shrinking::{
-    LeftMessage, Share, ShrinkStep, ShrinkThreshold, ShrinkTrigger, Shrinking, ShrunkMessages, TestSize,
+    LeftMessage, ShrinkStep, ShrinkThreshold, ShrinkTrigger, Shrinking, ShrunkMessages, TestSize,
 };
 pub use facts::stacked::{Stacked, StackedSum};
 pub use facts::summary::{

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use sesame_analysis::confirmed::ConfirmedTest;
+use sesame_analysis::trigger::Agreement;
 use sesame_base::observation::Counters;
 use sesame_base::test_number::TestNumber;
 use sesame_plan::{Confirmation, Span, Statistic};
@@ -16,7 +17,7 @@ use crate::facts::coverage::CoverageSummary;
 use crate::facts::readable::short_numbers;
 use crate::facts::repetition::ViolationRate;
 use crate::facts::show::{OperationReport, TestReport, VerdictReport};
-use crate::facts::shrinking::{Share, ShrinkTrigger, Shrinking, ShrunkMessages};
+use crate::facts::shrinking::{ShrinkTrigger, Shrinking, ShrunkMessages};
 use crate::facts::summary::Summary;
 use crate::facts::wording::outcome_words;
 use sesame_base::visible::visible;
@@ -418,7 +419,7 @@ pub(crate) fn needs_sentences(shrinking: &Shrinking) -> Vec<String> {
 
 /// When the operations of a smallest test have to act, a sentence for each; none if that was not asked for.
 fn trigger_sentences(shrinking: &Shrinking) -> Vec<String> {
-    let of = |ShrinkTrigger { operation, text, fresh: Share { right, of }, .. }: &ShrinkTrigger| match text {
+    let of = |ShrinkTrigger { operation, text, fresh: Agreement { right, of }, .. }: &ShrinkTrigger| match text {
         Some(text) => format!("{operation} {text}: so it was with {right} of {of} fresh windows"),
         None if *of > 0 => format!(
             "When {operation} has to act is not described by what happens in the undisturbed run: the best description \

@@ -22,8 +22,8 @@ use crate::export::shrunk_block;
 use crate::facts::show::{OperationReport, operations as operation_reports};
 use crate::facts::wording::{bounds_on, operations, value_text};
 
+pub use triggers::ShrinkTrigger;
 use triggers::triggers;
-pub use triggers::{Share, ShrinkTrigger};
 
 /// How a test was shrunk.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use sesame_analysis::trigger::{
-    Agreement, Decides, Description, Edge, Event, Holds, Moment, State, TriedWindow, Trigger, Which, Within, describe,
+    Agreement, Decides, Edge, Event, Holds, Moment, State, TriedWindow, Trigger, Which, Within, describe,
 };
 use sesame_base::observation::{Course, Happening};
 use sesame_base::silence::wires;
@@ -27,24 +27,9 @@ pub struct ShrinkTrigger {
     /// The same by times of the undisturbed run, for programs; `null` like `text`.
     pub decides: Option<Decides>,
     /// How many windows the description was made of, and how many of them it gets right.
-    pub made_of: Share,
+    pub made_of: Agreement,
     /// The same of fresh windows, which it was not made of.
-    pub fresh: Share,
-}
-
-/// How many of some windows a description gets right.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
-pub struct Share {
-    /// So many.
-    pub right: usize,
-    /// Of so many.
-    pub of: usize,
-}
-
-impl From<Agreement> for Share {
-    fn from(Agreement { right, of }: Agreement) -> Self {
-        Share { right, of }
-    }
+    pub fresh: Agreement,
 }
 
 /// When each operation by time of the smallest test has to act, as far as variations of its window were run.
@@ -69,24 +54,15 @@ pub(super) fn triggers(plan: &CampaignPlan, course: &Course, search: &Shrink) ->
             (0..).zip(&wires).filter(|(_, (of, _))| Some(*of) == operation.topic).map(|(at, _)| at).collect();
         let holds = |of: Agreement| of.right * HOLDS.1 >= of.of * HOLDS.0;
         let described = describe(course, plan.campaign.end_after, &own, window, &made_of, &fresh);
-        let name = operation.name.clone();
-        match described {
-            Some(Description { trigger, decides, made_of, fresh }) => ShrinkTrigger {
-                operation: name,
-                position,
-                text: holds(fresh).then(|| words(plan, &trigger)),
-                decides: holds(fresh).then_some(decides),
-                made_of: made_of.into(),
-                fresh: fresh.into(),
-            },
-            None => ShrinkTrigger {
-                operation: name,
-                position,
-                text: None,
-                decides: None,
-                made_of: Share::default(),
-                fresh: Share::default(),
-            },
+        let (made_of, fresh) = described.as_ref().map(|found| (found.made_of, found.fresh)).unwrap_or_default();
+        let shown = described.filter(|found| holds(found.fresh));
+        ShrinkTrigger {
+            operation: operation.name.clone(),
+            position,
+            text: shown.as_ref().map(|found| words(plan, &found.trigger)),
+            decides: shown.map(|found| found.decides),
+            made_of,
+            fresh,
         }
     });
     of.collect()
@@ -191,9 +167,20 @@ fn signal(plan: &CampaignPlan, wire: u32, field: &str) -> String {
 
 fn ordinal(number: usize) -> String {
     match number {
-        1 => "first".to_owned(),
-        2 => "second".to_owned(),
-        3 => "third".to_owned(),
-        number => format!("{number}th"),
+        1 => return "first".to_owned(),
+        2 => return "second".to_owned(),
+        3 => return "third".to_owned(),
+        _ => {}
     }
+    let suffix = match (number % 100, number % 10) {
+        (11..=13, _) => "th",
+        (_, 1) => "st",
+        (_, 2) => "nd",
+        (_, 3) => "rd",
+        _ => "th",
+    };
+    format!("{number}{suffix}")
 }
+
+#[cfg(test)]
+mod tests;
