@@ -62,12 +62,14 @@ pub(super) fn read_all(folder: &Path) -> Read {
     ask!(front(&repository, &all), shown);
     ask!(sspr(&repository, &all, &Dimension::ALL, Convention::Ours), shown);
     ask!(indicators(&repository, None), |analysis: analysis::IndicatorAnalysis| shown(analysis.dataset()));
-    ask!(regions::regions(&repository, &all, None, 3), |found: Vec<regions::Regions>| {
+    let drawn = |found: Vec<regions::Regions>| {
         shown(regions::table(&found));
         for of in &found {
             drop(of.svg(plan));
         }
-    });
+    };
+    ask!(regions::regions(&repository, &all, None, 3), drawn);
+    ask!(regions::regions_by_cause(&repository, &all, None, 3), drawn);
     if let Some(goal) = &plan.campaign.coverage {
         match Grid::new(goal.axes.clone()) {
             Ok(grid) => ask!(

@@ -84,6 +84,10 @@ pub(super) enum Results {
         /// Only this requirement, or `crash` or `timeout`; if omitted, everything by which tests fail.
         #[arg(long, value_name = "NAME")]
         requirement: Option<String>,
+        /// A tree for each cause, of the tests that hold its operations and no other cause of the requirement, in the
+        /// units of what these operations do.
+        #[arg(long)]
+        by_cause: bool,
         /// The maximum number of conditions in a rule.
         #[arg(long, value_name = "N", default_value_t = regions::DEPTH, value_parser = clap::value_parser!(u32).range(1..=8))]
         depth: u32,
@@ -276,16 +280,18 @@ pub(super) fn results(shell: Shell, asked: Results) -> anyhow::Result<ExitCode> 
             say_without_point(shell, &repository, &selection, compat.convention())?;
             print(&analysis::sspr(&repository, &selection, &dimensions, compat.convention())?, &output)
         }
-        Results::Regions { input, requirement, depth, svg, output } => {
+        Results::Regions { input, requirement, by_cause, depth, svg, output } => {
             let (repository, selection) = open(&input)?;
-            let found = regions::regions(&repository, &selection, requirement.as_deref(), depth)?;
+            let look = if by_cause { regions::regions_by_cause } else { regions::regions };
+            let found = look(&repository, &selection, requirement.as_deref(), depth)?;
             if found.is_empty() {
                 shell.warning("none of these tests violates a requirement, crashes or times out");
             }
             if let Some(folder) = svg {
                 std::fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
                 for of in &found {
-                    let file = folder.join(format!("regions-{}.svg", of.target));
+                    let file =
+                        folder.join(format!("regions-{}.svg", of.title().replace(", ", "-").replace(" + ", "+")));
                     std::fs::write(&file, of.svg(repository.plan()))
                         .with_context(|| format!("cannot write {}", file.display()))?;
                 }

@@ -5,7 +5,7 @@
 //! without each of its operations is part of each cause. Operations that are known to have had no effect are not part
 //! of any.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 use sesame_plan::{Activation, CampaignPlan, OperationId, RequirementId, Test, TestOperation};
@@ -128,6 +128,32 @@ pub fn causes(repository: &Repository, selection: &Selection) -> Result<Vec<Caus
     let counts = |row: &&TestRow| row.origin == Origin::Reference || selection.holds(row.number);
     let rows: Vec<&TestRow> = rows.iter().filter(counts).collect();
     Ok(causes_in(plan, &judge, &rows).found)
+}
+
+/// The causes in the tests of a selection, each with the conclusive tests that hold its operations and no other cause of
+/// its requirement: by their numbers, whether they violate it.
+pub(crate) fn causes_with_tests(
+    repository: &Repository,
+    selection: &Selection,
+) -> Result<Vec<(Cause, BTreeMap<u32, bool>)>, RecordError> {
+    let (plan, judge, rows) = (repository.plan(), repository.judge()?, repository.tests()?);
+    let counts = |row: &&TestRow| row.origin == Origin::Reference || selection.holds(row.number);
+    let rows: Vec<&TestRow> = rows.iter().filter(counts).collect();
+    let found = causes_in(plan, &judge, &rows).found;
+    let is_test = |row: &&TestRow| row.origin != Origin::Reference && row.duplicate_of.is_none();
+    let tests: Vec<&TestRow> = rows.into_iter().filter(is_test).collect();
+    let of = found.iter().map(|cause| {
+        let of_requirement = found.iter().filter(|other| other.requirement == cause.requirement);
+        let others: Vec<_> =
+            of_requirement.map(|other| &other.operations).filter(|other| **other != cause.operations).collect();
+        let holds_it_alone = |test: &Judged<'_>| {
+            cause.operations.is_subset(&test.operations) && !others.iter().any(|set| set.is_subset(&test.operations))
+        };
+        let judged = judged(plan, &judge, &tests, cause.requirement);
+        let holding = judged.iter().filter(|test| holds_it_alone(test));
+        (cause.clone(), holding.map(|test| (test.row.number, test.violates)).collect())
+    });
+    Ok(of.collect())
 }
 
 /// The causes in these tests, and what they say about others. A requirement that a reference run among them violates

@@ -4,6 +4,9 @@
 //! tests into regions, and says of each how many of its tests fail. The regions of a tree do not overlap, and together
 //! they hold every test that is conclusive about the requirement; tests without effect are among them, duplicates and
 //! reference runs are not.
+//!
+//! By cause there is a tree for each [cause](crate::causes), of the tests that hold its operations and no other cause of
+//! the requirement. It asks for what these operations do, in units: when, for how long, how often and with which values.
 
 mod feature;
 mod picture;
@@ -11,12 +14,13 @@ mod picture;
 mod tests;
 mod tree;
 
-use feature::{Feature, features, numbers};
+use feature::{Feature, features, features_in_units, numbers};
 use tree::{Columns, Growth, Question, TreeNode};
 
 use sesame_plan::{CampaignPlan, RequirementId};
 use sesame_record::{Judge, Origin, RecordError, Repository, ScannedTest, Verdict};
 
+use crate::causes::causes_with_tests;
 use crate::confirmed::{failed, failed_tally};
 use crate::{Datum, Selection, Table};
 
@@ -42,6 +46,8 @@ enum Target {
 pub struct Regions {
     /// The requirement that they violate, or `crash` or `timeout`.
     pub target: String,
+    /// The names of the operations of the cause to whose tests this is limited; `None` for all tests.
+    pub cause: Option<Vec<String>>,
     /// All tests that say anything about it.
     pub all: Tally,
     /// The regions, those with the largest share of failing tests first.
@@ -84,12 +90,19 @@ pub enum RegionsError {
         /// The requirements there are.
         known: Vec<String>,
     },
+    /// Only requirements have causes.
+    #[error("`{name}` has no causes: only requirements have")]
+    NoCauses {
+        /// What was asked for.
+        name: String,
+    },
 }
 
 /// The numbers of tests, and what they fail in.
 struct Gathered {
     features: Vec<Feature>,
-    columns: Columns,
+    /// Per feature the number of each test.
+    values: Vec<Vec<f64>>,
     /// Per target whether each test fails; `None` for a test that is inconclusive.
     labels: Vec<(Target, Vec<Option<bool>>)>,
 }
@@ -114,6 +127,45 @@ pub fn all_regions(repository: &Repository, selection: &Selection) -> Result<Vec
     found(repository, selection, Vec::new(), DEPTH)
 }
 
+/// Where the tests of each cause violate its requirement, of all requirements or of this one, in the order of causes.
+pub fn regions_by_cause(
+    repository: &Repository,
+    selection: &Selection,
+    requirement: Option<&str>,
+    depth: u32,
+) -> Result<Vec<Regions>, RegionsError> {
+    let plan = repository.plan();
+    let asked = match requirement.map(|name| target(plan, name)).transpose()? {
+        None => None,
+        Some(Target::Requirement(id)) => Some(id),
+        Some(other) => return Err(RegionsError::NoCauses { name: name(plan, other) }),
+    };
+    let mut causes = causes_with_tests(repository, selection)?;
+    causes.retain(|(cause, _)| asked.is_none_or(|asked| asked == cause.requirement));
+    let mut gathered: Vec<Gathered> = causes
+        .iter()
+        .map(|(cause, _)| {
+            Gathered::empty(features_in_units(plan, &cause.operations), [Target::Requirement(cause.requirement)])
+        })
+        .collect();
+    repository.scan(&mut |test| {
+        for ((_, tests), gathered) in causes.iter().zip(&mut gathered) {
+            if let Some(&violates) = tests.get(&test.number) {
+                gathered.push(plan, &test, |_| Some(violates));
+            }
+        }
+    })?;
+    let found = causes.iter().zip(&gathered).flat_map(|((cause, _), gathered)| {
+        let names: Vec<String> = cause.operations.iter().map(|&id| plan.operation(id).name.clone()).collect();
+        let mut of = trees(plan, gathered, depth, |_| true);
+        for regions in &mut of {
+            regions.cause = Some(names.clone());
+        }
+        of
+    });
+    Ok(found.collect())
+}
+
 /// Where tests fail in these respects; without any, in all in which some do.
 fn found(
     repository: &Repository,
@@ -124,12 +176,23 @@ fn found(
     let plan = repository.plan();
     let any = asked.is_empty();
     let gathered = gather(repository, selection, if any { targets(plan) } else { asked })?;
-    let found = gathered.labels.iter().filter(|(_, labels)| !any || labels.contains(&Some(true)));
+    Ok(trees(plan, &gathered, depth, |labels| !any || labels.contains(&Some(true))))
+}
+
+/// The regions of each target of which the labels are wanted.
+fn trees(
+    plan: &CampaignPlan,
+    gathered: &Gathered,
+    depth: u32,
+    wanted: impl Fn(&[Option<bool>]) -> bool,
+) -> Vec<Regions> {
+    let columns = Columns::new(gathered.values.clone());
+    let found = gathered.labels.iter().filter(|(_, labels)| wanted(labels));
     let found = found.map(|(target, labels)| {
         let count = labels.iter().flatten().count();
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
         let least = LEAST.max((LEAST_SHARE * count as f64) as usize);
-        let root = gathered.columns.tree(labels, Growth { depth, least });
+        let root = columns.tree(labels, Growth { depth, least });
         let mut rules = Vec::new();
         leaves(&root, &mut Vec::new(), &mut |path, tally| {
             let conditions = simplified(path)
@@ -145,9 +208,10 @@ fn found(
             let share = |of: &Rule, other: &Rule| of.tally.failing as u128 * other.tally.tests as u128;
             share(b, a).cmp(&share(a, b)).then(b.tally.tests.cmp(&a.tally.tests))
         });
-        Regions { target: name(plan, *target), all: root.tally, rules, root, plan_features: gathered.features.clone() }
+        let target = name(plan, *target);
+        Regions { target, cause: None, all: root.tally, rules, root, plan_features: gathered.features.clone() }
     });
-    Ok(found.collect())
+    found.collect()
 }
 
 fn targets(plan: &CampaignPlan) -> Vec<Target> {
@@ -173,22 +237,30 @@ fn name(plan: &CampaignPlan, target: Target) -> String {
 
 fn gather(repository: &Repository, selection: &Selection, targets: Vec<Target>) -> Result<Gathered, RecordError> {
     let plan = repository.plan();
-    let features = features(plan);
-    let mut values: Vec<Vec<f64>> = vec![Vec::new(); features.len()];
-    let mut labels: Vec<(Target, Vec<Option<bool>>)> = targets.into_iter().map(|target| (target, Vec::new())).collect();
+    let mut gathered = Gathered::empty(features(plan), targets);
     let judge = repository.judge()?;
     repository.scan(&mut |test| {
-        if !is_counted(&test, selection) {
-            return;
-        }
-        for (column, number) in values.iter_mut().zip(numbers(plan, &features, &test)) {
-            column.push(number);
-        }
-        for (target, labels) in &mut labels {
-            labels.push(fails(plan, &judge, *target, &test));
+        if is_counted(&test, selection) {
+            gathered.push(plan, &test, |target| fails(plan, &judge, target, &test));
         }
     })?;
-    Ok(Gathered { features, columns: Columns::new(values), labels })
+    Ok(gathered)
+}
+
+impl Gathered {
+    fn empty(features: Vec<Feature>, targets: impl IntoIterator<Item = Target>) -> Gathered {
+        let labels = targets.into_iter().map(|target| (target, Vec::new())).collect();
+        Gathered { values: vec![Vec::new(); features.len()], features, labels }
+    }
+
+    fn push(&mut self, plan: &CampaignPlan, test: &ScannedTest, fails: impl Fn(Target) -> Option<bool>) {
+        for (column, number) in self.values.iter_mut().zip(numbers(plan, &self.features, test)) {
+            column.push(number);
+        }
+        for (target, labels) in &mut self.labels {
+            labels.push(fails(*target));
+        }
+    }
 }
 
 fn is_counted(test: &ScannedTest, selection: &Selection) -> bool {
@@ -243,6 +315,14 @@ impl Rule {
 }
 
 impl Regions {
+    /// What it is about in one word: the requirement, or `crash` or `timeout`, and the operations of the cause.
+    pub fn title(&self) -> String {
+        match &self.cause {
+            None => self.target.clone(),
+            Some(names) => format!("{}, {}", self.target, names.join(" + ")),
+        }
+    }
+
     /// The tree as a picture: a file of its own (SVG).
     pub fn svg(&self, plan: &CampaignPlan) -> String {
         picture::file(self, plan)
@@ -256,20 +336,24 @@ impl Regions {
 
 /// Regions as a table: a row for each.
 pub fn table(regions: &[Regions]) -> Table {
-    let columns = ["fails", "region", "failing", "tests", "share", "share_low", "share_high"];
-    let mut dataset = Table::new(columns.map(str::to_owned));
+    let by_cause = regions.iter().any(|of| of.cause.is_some());
+    let columns = ["fails", "operations", "region", "failing", "tests", "share", "share_low", "share_high"];
+    let mut dataset =
+        Table::new(columns.into_iter().filter(|&name| by_cause || name != "operations").map(str::to_owned));
     for of in regions {
         for rule in &of.rules {
             let share = rule.tally.share();
-            dataset.row([
-                Datum::Text(of.target.clone()),
+            let fails = Datum::Text(of.target.clone());
+            let operations = of.cause.as_ref().map(|names| Datum::Text(names.join(" + ")));
+            let numbers = [
                 Datum::Text(rule.sentence()),
                 Datum::count(rule.tally.failing),
                 Datum::count(rule.tally.tests),
                 Datum::real(share.map(|(share, _)| share)),
                 Datum::real(share.map(|(_, [low, _])| low)),
                 Datum::real(share.map(|(_, [_, high])| high)),
-            ]);
+            ];
+            dataset.row([fails].into_iter().chain(operations).chain(numbers));
         }
     }
     dataset

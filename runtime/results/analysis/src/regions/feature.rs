@@ -1,7 +1,9 @@
 //! What is known of a test that may tell whether it fails, in numbers: its point in the reduced space, and of each
 //! operation how often, when, how long and how strong.
 
-use sesame_plan::{CampaignPlan, ChoiceKind, Dimension, Domain, OperationId, Span};
+use std::collections::BTreeSet;
+
+use sesame_plan::{CampaignPlan, Choice, ChoiceKind, Dimension, Domain, OperationId, Span};
 use sesame_present::number;
 use sesame_record::ScannedTest;
 use sesame_search::sspr::{Convention, disturbance};
@@ -21,6 +23,19 @@ pub(super) enum Feature {
     Length(OperationId),
     /// The mean of an operation's parameters, as shares of what is permitted (as P1 has them).
     Share(OperationId),
+    /// The mean of one of its parameters, by its position, in the unit in which it is written.
+    Parameter(OperationId, usize, Part),
+}
+
+/// What of a parameter is a number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Part {
+    /// Its value.
+    Value,
+    /// The middle of a sub-range.
+    Middle,
+    /// The width of a sub-range.
+    Width,
 }
 
 /// All numbers of tests of a plan, in the order in which they are preferred.
@@ -35,6 +50,24 @@ pub(super) fn features(plan: &CampaignPlan) -> Vec<Feature> {
         [Feature::Count(id)].into_iter().chain(timed.into_iter().flatten()).chain(strong)
     };
     dimensions.into_iter().chain(used.into_iter().flat_map(of_operation)).collect()
+}
+
+/// The numbers of what these operations do in a test: when, for how long, how often, and each parameter that is a number.
+pub(super) fn features_in_units(plan: &CampaignPlan, operations: &BTreeSet<OperationId>) -> Vec<Feature> {
+    let of_operation = |&id: &OperationId| {
+        let operation = plan.operation(id);
+        let timed = (!operation.kind.is_offline()).then_some([Feature::Start(id), Feature::Length(id)]);
+        let parts = operation.parameters.iter().enumerate().flat_map(move |(at, parameter)| {
+            let parts: &[Part] = match &parameter.domain {
+                Domain::Number { shape: ChoiceKind::Value, .. } => &[Part::Value],
+                Domain::Number { shape: ChoiceKind::Range, .. } => &[Part::Middle, Part::Width],
+                _ => &[],
+            };
+            parts.iter().map(move |&part| Feature::Parameter(id, at, part))
+        });
+        parts.chain(timed.into_iter().flatten()).chain([Feature::Count(id)]).collect::<Vec<_>>()
+    };
+    operations.iter().flat_map(of_operation).collect()
 }
 
 /// The numbers of a test, a NaN for one that it does not have.
@@ -60,6 +93,10 @@ pub(super) fn numbers(plan: &CampaignPlan, features: &[Feature], test: &ScannedT
                 .into_iter()
                 .filter_map(move |parameter| parameter.normalised(class, Convention::Ours))
         })),
+        Feature::Parameter(id, at, part) => {
+            let factor = written(plan, id, at).0;
+            mean(of(id).filter_map(|operation| part.of(operation.choices.get(at)?)).map(|number| number * factor))
+        }
     };
     features.iter().map(|feature| number(feature).unwrap_or(f64::NAN)).collect()
 }
@@ -67,6 +104,28 @@ pub(super) fn numbers(plan: &CampaignPlan, features: &[Feature], test: &ScannedT
 fn mean(numbers: impl Iterator<Item = f64>) -> Option<f64> {
     let (sum, count) = numbers.fold((0.0, 0u32), |(sum, count), number| (sum + number, count + 1));
     (count > 0).then(|| sum / f64::from(count))
+}
+
+impl Part {
+    fn of(self, choice: &Choice) -> Option<f64> {
+        match (self, choice) {
+            (Part::Value, Choice::Value { value }) => Some(*value),
+            (Part::Middle, Choice::Range { low, high }) => Some(f64::midpoint(*low, *high)),
+            (Part::Width, Choice::Range { low, high }) => Some(high - low),
+            _ => None,
+        }
+    }
+}
+
+/// The unit in which a parameter is written, and by what its values are multiplied for that.
+fn written(plan: &CampaignPlan, id: OperationId, at: usize) -> (f64, Option<&str>) {
+    let operation = plan.operation(id);
+    let parameter = &operation.parameters[at];
+    let highest = match parameter.domain {
+        Domain::Number { high, .. } => high,
+        _ => f64::INFINITY,
+    };
+    number::scale(&operation.kind, parameter, highest)
 }
 
 /// How strong an operation is, in the name and the unit of its parameter: `skew above 0.2 s`; for a sub-range, how
@@ -124,6 +183,16 @@ impl Feature {
                 missing,
             ),
             Feature::Share(id) => self.of_operation(plan, id, &strength(plan, id, question.threshold, way), missing),
+            Feature::Parameter(id, at, part) => {
+                let name = &plan.operation(id).parameters[at].name;
+                let threshold = number::with_unit(number::exact(question.threshold), written(plan, id, at).1);
+                let what = match part {
+                    Part::Value => format!("{name} {way} {threshold}"),
+                    Part::Middle => format!("middle of {name} {way} {threshold}"),
+                    Part::Width => format!("{name} {way} {threshold} wide"),
+                };
+                self.of_operation(plan, id, &what, missing)
+            }
         }
     }
 
@@ -131,7 +200,7 @@ impl Feature {
         let name = &plan.operation(id).name;
         match (missing, self) {
             (false, _) => format!("{name} {what}"),
-            (true, Feature::Share(_)) => format!("{name} {what} or there is none"),
+            (true, Feature::Share(_) | Feature::Parameter(..)) => format!("{name} {what} or there is none"),
             (true, _) => format!("{name} {what} or never"),
         }
     }
@@ -143,6 +212,27 @@ mod tests {
     use sesame_plan::{OperationKind, Parameter};
 
     use super::*;
+
+    #[test]
+    fn parameters_are_asked_for_in_the_units_in_which_they_are_written() {
+        let said = |kind, parameters: Vec<Parameter>| {
+            let plan = plan(vec![operation_with("o", 0, kind, parameters)]);
+            let features = features_in_units(&plan, &BTreeSet::from([OperationId(0)]));
+            let question = Question { column: 0, threshold: 2.5, at_most: true };
+            let words = |feature: &Feature| feature.words(&plan, question, false, false);
+            features.iter().map(words).collect::<Vec<_>>().join(", ")
+        };
+        let seconds = |parameter: Parameter| Parameter { unit: Some("s".to_owned()), ..parameter };
+        let times = "o starts after 2.5 s, o lasts over 2.5 s, o at least 3.5×";
+        let stale = said(OperationKind::Stale, vec![seconds(value("delay", 0.0, 0.4))]);
+        assert_eq!(stale, format!("o delay above 2.5 ms, {times}"));
+        let bias = said(OperationKind::Bias, vec![seconds(range("offset", -0.4, 0.4))]);
+        assert_eq!(bias, format!("o middle of offset above 2.5 s, o offset above 2.5 s wide, {times}"));
+        let several = said(OperationKind::BurstLoss, vec![value("enter", 0.0, 0.1), value("leave", 0.2, 0.8)]);
+        assert_eq!(several, format!("o enter above 2.5 %, o leave above 2.5 %, {times}"));
+        let point = parameter("bias", Domain::Point { low: [0.0; 3], high: [1.0; 3] });
+        assert_eq!(said(OperationKind::Bias, vec![point]), times, "a point is no number");
+    }
 
     #[test]
     fn how_strong_an_operation_is_is_said_in_the_names_and_units_of_its_parameters() {

@@ -33,7 +33,7 @@ pub(super) fn file(regions: &Regions, plan: &CampaignPlan) -> String {
     let attributes = [("xmlns", "http://www.w3.org/2000/svg"), ("width", "1000"), ("height", height.as_str())];
     markup.open("svg", &attributes);
     markup.element("style", &[], STYLE);
-    let title = format!("Where tests fail: {} ({})", regions.target, tally(regions.all));
+    let title = format!("Where tests fail: {} ({})", regions.title(), tally(regions.all));
     markup.element("text", &[("class", "words"), ("x", "8"), ("y", "28")], &title);
     markup.open("svg", &[("y", &pixels(BAND))]);
     bars(regions, plan, &mut markup, &IN_FILE);
@@ -44,7 +44,7 @@ pub(super) fn file(regions: &Regions, plan: &CampaignPlan) -> String {
 
 /// The picture on a page.
 pub(super) fn draw(regions: &Regions, plan: &CampaignPlan, markup: &mut Markup) {
-    let label = format!("where tests fail: {}, {} regions", regions.target, regions.rules.len());
+    let label = format!("where tests fail: {}, {} regions", regions.title(), regions.rules.len());
     let height = pixels(height(regions));
     markup.open("svg", &[("class", "regions"), ("role", "img"), ("aria-label", &label), ("height", &height)]);
     bars(regions, plan, markup, &ON_PAGE);

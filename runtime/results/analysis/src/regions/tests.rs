@@ -1,10 +1,14 @@
+use std::collections::BTreeSet;
+
 use proptest::prelude::*;
 
 use sesame_base::observation::Outcome;
+use sesame_plan::OperationId;
 use sesame_present::table::TextOptions;
-use sesame_record::sample;
+use sesame_record::{TestRow, sample};
 
 use super::*;
+use crate::regions::feature::Part;
 use crate::regions::tree::simplest_between;
 
 /// Rows of a tree's node: those for which each question of the path is answered so.
@@ -180,7 +184,7 @@ fn naive_number(repository: &Repository, number: u32, feature: Feature) -> Optio
     let plan = repository.plan();
     let record = repository.test(number).unwrap();
     let point = sesame_search::sspr::observed_point(plan, &record.test, &record.observation);
-    let windows = |id: sesame_plan::OperationId| -> Vec<(f64, f64)> {
+    let windows = |id: OperationId| -> Vec<(f64, f64)> {
         let of = record.test.operations.iter().filter(|used| used.operation == id);
         of.map(|used| match used.activation {
             sesame_plan::Activation::Time { start, end } => (start, end),
@@ -205,7 +209,49 @@ fn naive_number(repository: &Repository, number: u32, feature: Feature) -> Optio
                 .collect(),
             )
         }
+        Feature::Parameter(id, at, part) => {
+            let of = record.test.operations.iter().filter(|used| used.operation == id);
+            mean(
+                of.map(|used| match (&used.parameters[at], part) {
+                    (sesame_plan::Choice::Range { low, high }, Part::Middle) => (low + high) / 2.0,
+                    (sesame_plan::Choice::Range { low, high }, Part::Width) => high - low,
+                    (sesame_plan::Choice::Value { value }, Part::Value) => *value,
+                    _ => panic!("numbers"),
+                })
+                .collect(),
+            )
+        }
     }
+}
+
+/// Counts the tests of each rule anew: a label says whether a test fails, `None` for one that does not count.
+fn assert_counted(repository: &Repository, regions: &Regions, label: impl Fn(&TestRow) -> Option<bool>) {
+    let rows = repository.tests().unwrap();
+    let mut seen = 0;
+    for rule in &regions.rules {
+        let mut tally = Tally::default();
+        for row in rows.iter().filter(|row| row.origin != Origin::Reference && row.duplicate_of.is_none()) {
+            let here = rule.path.iter().all(|step| {
+                let number = naive_number(repository, row.number, regions.plan_features[step.question.column]);
+                let answer = number.is_some_and(|number| {
+                    if step.question.at_most {
+                        number <= step.question.threshold + 1e-12
+                    } else {
+                        number > step.question.threshold + 1e-12
+                    }
+                });
+                answer == step.holds
+            });
+            if let Some(fails) = label(row).filter(|_| here) {
+                tally.tests += 1;
+                tally.failing += usize::from(fails);
+            }
+        }
+        assert_eq!(rule.tally, tally, "{}: {}", regions.title(), rule.sentence());
+        seen += tally.tests;
+    }
+    assert_eq!(seen, regions.all.tests);
+    assert!(regions.rules[0].tally.share() >= regions.rules.last().unwrap().tally.share());
 }
 
 #[test]
@@ -214,51 +260,56 @@ fn the_counts_of_each_rule_are_those_of_the_tests_that_it_describes() {
     let found = regions(&repository, &Selection::default(), None, 3).unwrap();
     let targets: Vec<&str> = found.iter().map(|regions| regions.target.as_str()).collect();
     assert_eq!(targets, ["R1", "R2", "R3", "R4", "crash", "timeout"]);
-    let rows = repository.tests().unwrap();
     for regions in &found {
-        let mut seen = 0;
-        for rule in &regions.rules {
-            let mut tally = Tally::default();
-            for row in rows.iter().filter(|row| row.origin != Origin::Reference && row.duplicate_of.is_none()) {
-                let here = rule.path.iter().all(|step| {
-                    let number = naive_number(&repository, row.number, regions.plan_features[step.question.column]);
-                    let answer = number.is_some_and(|number| {
-                        if step.question.at_most {
-                            number <= step.question.threshold + 1e-12
-                        } else {
-                            number > step.question.threshold + 1e-12
-                        }
-                    });
-                    answer == step.holds
-                });
-                let label = match regions.target.as_str() {
-                    "crash" => Some(matches!(row.outcome, Outcome::Crash { .. })),
-                    "timeout" => Some(matches!(row.outcome, Outcome::Timeout { .. })),
-                    name => {
-                        let requirement =
-                            repository.plan().requirements.iter().find(|requirement| requirement.name == name).unwrap();
-                        match row.verdict(requirement) {
-                            Verdict::Violated => Some(true),
-                            Verdict::Satisfied => Some(false),
-                            Verdict::Inconclusive => None,
-                        }
-                    }
-                };
-                if let Some(fails) = label.filter(|_| here) {
-                    tally.tests += 1;
-                    tally.failing += usize::from(fails);
-                }
-            }
-            assert_eq!(rule.tally, tally, "{}: {}", regions.target, rule.sentence());
-            seen += tally.tests;
-        }
-        assert_eq!(seen, regions.all.tests);
-        assert!(regions.rules[0].tally.share() >= regions.rules.last().unwrap().tally.share());
+        assert_counted(&repository, regions, |row| match regions.target.as_str() {
+            "crash" => Some(matches!(row.outcome, Outcome::Crash { .. })),
+            "timeout" => Some(matches!(row.outcome, Outcome::Timeout { .. })),
+            name => violates(&repository, name, row),
+        });
     }
     insta::assert_snapshot!("regions", table(&found).text(TextOptions { width: None, colour: false }));
     let svg = found[0].svg(repository.plan());
     assert!(roxmltree::Document::parse(&svg).is_ok());
     insta::assert_snapshot!("regions_svg", svg.replace("><", ">\n<"));
+}
+
+/// Whether a test violates the requirement of this name; `None` if it is inconclusive.
+fn violates(repository: &Repository, name: &str, row: &TestRow) -> Option<bool> {
+    let requirement = repository.plan().requirements.iter().find(|requirement| requirement.name == name).unwrap();
+    match row.verdict(requirement) {
+        Verdict::Violated => Some(true),
+        Verdict::Satisfied => Some(false),
+        Verdict::Inconclusive => None,
+    }
+}
+
+#[test]
+fn by_cause_the_tests_that_hold_no_other_cause_are_divided_in_units() {
+    let (_folder, repository) = repository();
+    let all = Selection::default();
+    let causes = crate::causes::causes(&repository, &all).unwrap();
+    let found = regions_by_cause(&repository, &all, None, 3).unwrap();
+    assert_eq!(found.len(), causes.len());
+    for (cause, regions) in causes.iter().zip(&found) {
+        let plan = repository.plan();
+        let names: Vec<String> = cause.operations.iter().map(|&id| plan.operation(id).name.clone()).collect();
+        assert_eq!(regions.cause.as_ref(), Some(&names));
+        assert_eq!(regions.target, plan.requirement(cause.requirement).name);
+        let others = causes.iter().filter(|other| other.requirement == cause.requirement && *other != cause);
+        let others: Vec<_> = others.map(|other| &other.operations).collect();
+        assert_counted(&repository, regions, |row| {
+            let acts = row.test.operations.iter().zip(&row.idle).filter(|(_, idle)| !**idle);
+            let acts: BTreeSet<OperationId> = acts.map(|(used, _)| used.operation).collect();
+            let holds = cause.operations.is_subset(&acts) && !others.iter().any(|set| set.is_subset(&acts));
+            holds.then(|| violates(&repository, &regions.target, row)).flatten()
+        });
+    }
+    insta::assert_snapshot!("regions_by_cause", table(&found).text(TextOptions { width: None, colour: false }));
+
+    let of_one = regions_by_cause(&repository, &all, Some("R4"), 3).unwrap();
+    assert!(!of_one.is_empty() && of_one.iter().all(|regions| regions.target == "R4"));
+    let error = regions_by_cause(&repository, &all, Some("crash"), 3).unwrap_err().to_string();
+    assert_eq!(error, "`crash` has no causes: only requirements have");
 }
 
 #[test]
