@@ -115,7 +115,7 @@ fn rushed(count: u64, limit: Duration) -> Vec<u64> {
             |_| {
                 let heard = heard.load(Ordering::Acquire);
                 let part = memories.len() as u64;
-                if part < PARTS && heard >= WARM + (count - WARM) / PARTS * part {
+                if part < PARTS && heard >= WARM + count.saturating_sub(WARM) / PARTS * part {
                     memories.push(memory());
                 }
                 heard >= count || begin.elapsed() > limit
@@ -135,7 +135,15 @@ fn assert_stays(memories: &[u64]) {
     assert!(growth.is_some_and(|growth| growth < SLACK_OF_PART), "{memories:?} kB");
 }
 
+/// Fewer than fill the caches, so nothing is known of memory: the long suite measures that, and the test of twenty
+/// thousand messages of ROS.
 #[test]
+fn sixty_thousand_messages_pass_in_their_order_as_fast_as_they_can() {
+    rushed(60_000, Duration::from_secs(900));
+}
+
+#[test]
+#[ignore = "long: half a million messages"]
 fn two_hundred_thousand_messages_pass_after_caches_are_full_and_memory_stays() {
     assert_stays(&rushed(WARM + 200_000, Duration::from_secs(900)));
 }

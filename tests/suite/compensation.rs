@@ -137,7 +137,7 @@ fn noise_is_fitted_by_how_much_runs_differ_and_varied_from_run_to_run() {
     // The model has torque noise; without it, noise on targets has to stand for it.
     let study = Study::new(
         "compensation_noise",
-        8,
+        5,
         "\"--as-modelled\" \"--noise\" \"8\"",
         "relay noise on link1 [0rad, 0.2rad]",
     );

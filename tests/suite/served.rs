@@ -22,14 +22,14 @@ fn project(name: &str) -> Project {
          metric nearest minimise default 5000mm = min(zones.level)\n\
          metric disturbed minimise = fuzzing_time()\n\
          requirement R1 \"It stays away\" = nearest >= 1mm\n\
-         operation jitter on link0 = random offset [-0.3rad, 0.3rad] within [0s, 20s]\n\
+         operation jitter on link0 = random offset [-0.3rad, 0.3rad] within [0s, 8s]\n\
          test leaning {{ jitter offset [0.3rad, 0.3rad] from 0s to 5s  expect disturbed >= 4s }}\n\
          campaign close {{\n\
            objectives nearest, disturbed\n\
            operations jitter 1 per test\n\
            activate by time\n\
            search random {{ evaluations 4 }}\n\
-           end after 20s\n\
+           end after 8s\n\
          }}\n",
         kuka_cell_simlog().display()
     );

@@ -51,7 +51,7 @@ fn violations_that_were_found_get_smaller_and_stay_violations() {
         "| test | violates | operations | active | intensity P1 | strength | tests tried |\n|---|---|---:|---:|---:|---:|---:|\n",
     );
     let mut block = String::new();
-    for test in violations(&runner, 5) {
+    for test in violations(&runner, 3) {
         let said = shrunk(&runner, test, "smaller", &[]);
         let way = &said["shrinking"];
         let (before, after) = (&way["before"], &way["after"]);
@@ -102,7 +102,7 @@ fn violations_that_were_found_get_smaller_and_stay_violations() {
     assert!(!expected.is_empty() && expected.iter().all(|line| line.ends_with("  no")), "{}", known.out);
 
     // The same for any number of workers, and after any interruption.
-    let some = violations(&runner, 5)[1];
+    let some = violations(&runner, 3)[1];
     let digest = |said: &Value| said["digest"].as_str().unwrap().to_owned();
     let one = digest(&shrunk(&runner, some, "one", &["--workers", "1"]));
     assert_eq!(one, digest(&shrunk(&runner, some, "three", &["--workers", "3"])));
