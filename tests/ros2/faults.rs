@@ -56,6 +56,7 @@ fn observed(fault: &Fault) -> Option<(String, Duration)> {
         ("publisher.py", "--topic /peer/undisturbed --rate 50 --count 100000"),
         ("subscriber.py", "--count 100000"),
     ];
+    healthy.extend(fault.nodes.contains("second").then_some(("subscriber.py", "--count 100000")));
     healthy.extend(fault.nodes.contains("clock").then_some(("faulty.py", "clock-stops --after 1000")));
     let peers: Vec<Peer> = healthy.iter().map(start).collect();
     peers.iter().for_each(Peer::await_up);
@@ -105,7 +106,19 @@ fn a_system_that_never_becomes_complete_says_what_is_missing() {
         expected: &["launch_failed: the launch failed: the system is not complete after 30 s: nobody \
                    publishes on `/peer/undisturbed`; 0 of 1 subscribe to `/peer`: `listener`"],
     };
-    check(&[nobody]);
+    let twice = Fault {
+        name: "a node that subscribes twice",
+        nodes: "node listener { subscribes peer }\nnode second { subscribes peer }",
+        seconds: 2,
+        kind: POINT,
+        peers: &[
+            ("publisher.py", "--topic /peer/undisturbed --rate 50 --count 100000"),
+            ("subscriber.py", "--count 100000 --subscriptions 2"),
+        ],
+        expected: &["launch_failed: the launch failed: the system is not complete after 30 s: 1 of 2 subscribe to \
+                   `/peer`: `listener`, `second`"],
+    };
+    check(&[nobody, twice]);
 }
 
 /// Systems that will never become complete, or be cut: how long the longest of the runs took.

@@ -31,6 +31,7 @@ def main() -> None:
     parser.add_argument("--slow", type=float, default=0.0, help="seconds to sleep after each sample: a slow consumer")
     parser.add_argument("--tell", type=int, help="say `count` after every so many samples")
     parser.add_argument("--until-told", action="store_true", help="until a line comes in, however many samples came")
+    parser.add_argument("--subscriptions", type=int, default=1, help="how many of one node (default: 1)")
     options = parser.parse_args()
     rclpy.init()
     node = rclpy.create_node("peer_subscriber")
@@ -66,7 +67,8 @@ def main() -> None:
 
     events = SubscriptionEventCallbacks(matched=matched)
     quality = common.quality(options)
-    node.create_subscription(kind, options.topic, take, quality, raw=True, event_callbacks=events)
+    for _ in range(options.subscriptions):
+        node.create_subscription(kind, options.topic, take, quality, raw=True, event_callbacks=events)
     common.say(up=True)
     told = threading.Event()
     if options.until_told:

@@ -114,6 +114,14 @@ impl Session {
         self.nodes.name(guid).is_none() && self.publishers().iter().any(of_ros)
     }
 
+    /// What is equal for endpoints of one node, which may subscribe to a topic more than once: its participant with its
+    /// name. Until a name is known that is yet to come, it is the participant; of what never has a name, each endpoint
+    /// stands for a node.
+    fn one_node(&self, guid: GUID) -> impl Ord {
+        let name = self.nodes.name(guid);
+        (guid.prefix, name, (name.is_none() && !self.will_be_named(guid)).then_some(guid))
+    }
+
     /// Why the system will not become complete as long as the same nodes are there.
     pub(super) fn hopeless(&self, name: Name<'_>) -> Option<TransportError> {
         if let Some(not_cut) = self.not_cut(name) {
@@ -155,7 +163,8 @@ impl Session {
                     .map(|(_, node)| format!("`{}`", node.name))
                     .collect();
                 let dds_topic = names::topic(&sink.path);
-                let there = subscribers.iter().filter(|endpoint| endpoint.topic == dds_topic).count();
+                let here = subscribers.iter().filter(|endpoint| endpoint.topic == dds_topic);
+                let there = here.map(|endpoint| self.one_node(endpoint.guid)).collect::<BTreeSet<_>>().len();
                 if there < expected.len() {
                     missing.push(format!(
                         "{there} of {} subscribe to `{}`: {}",
