@@ -130,18 +130,26 @@ pub fn causes(repository: &Repository, selection: &Selection) -> Result<Vec<Caus
     Ok(causes_in(plan, &judge, &rows).found)
 }
 
-/// The causes in the tests of a selection, each with the conclusive tests that hold its operations and no other cause of
-/// its requirement: by their numbers, whether they violate it.
-pub(crate) fn causes_with_tests(
-    repository: &Repository,
-    selection: &Selection,
-) -> Result<Vec<(Cause, BTreeMap<u32, bool>)>, RecordError> {
+/// A cause with the conclusive tests that hold its operations and no other cause of its requirement.
+pub(crate) struct CauseAlone {
+    pub(crate) cause: Cause,
+    /// By the number of a test, whether it violates the requirement.
+    pub(crate) tests: BTreeMap<u32, bool>,
+}
+
+/// The causes in the tests of a selection, each with the tests that hold no other one.
+pub(crate) fn causes_alone(repository: &Repository, selection: &Selection) -> Result<Vec<CauseAlone>, RecordError> {
     let (plan, judge, rows) = (repository.plan(), repository.judge()?, repository.tests()?);
     let counts = |row: &&TestRow| row.origin == Origin::Reference || selection.holds(row.number);
     let rows: Vec<&TestRow> = rows.iter().filter(counts).collect();
     let found = causes_in(plan, &judge, &rows).found;
     let is_test = |row: &&TestRow| row.origin != Origin::Reference && row.duplicate_of.is_none();
     let tests: Vec<&TestRow> = rows.into_iter().filter(is_test).collect();
+    let mut by_requirement: BTreeMap<RequirementId, Vec<Judged<'_>>> = BTreeMap::new();
+    for cause in &found {
+        let judge_all = || judged(plan, &judge, &tests, cause.requirement);
+        by_requirement.entry(cause.requirement).or_insert_with(judge_all);
+    }
     let of = found.iter().map(|cause| {
         let of_requirement = found.iter().filter(|other| other.requirement == cause.requirement);
         let others: Vec<_> =
@@ -149,9 +157,9 @@ pub(crate) fn causes_with_tests(
         let holds_it_alone = |test: &Judged<'_>| {
             cause.operations.is_subset(&test.operations) && !others.iter().any(|set| set.is_subset(&test.operations))
         };
-        let judged = judged(plan, &judge, &tests, cause.requirement);
-        let holding = judged.iter().filter(|test| holds_it_alone(test));
-        (cause.clone(), holding.map(|test| (test.row.number, test.violates)).collect())
+        let holding = by_requirement[&cause.requirement].iter().filter(|test| holds_it_alone(test));
+        let tests = holding.map(|test| (test.row.number, test.violates)).collect();
+        CauseAlone { cause: cause.clone(), tests }
     });
     Ok(of.collect())
 }

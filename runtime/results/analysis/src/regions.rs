@@ -20,7 +20,7 @@ use tree::{Columns, Growth, Question, TreeNode};
 use sesame_plan::{CampaignPlan, RequirementId};
 use sesame_record::{Judge, Origin, RecordError, Repository, ScannedTest, Verdict};
 
-use crate::causes::causes_with_tests;
+use crate::causes::{CauseAlone, causes_alone};
 use crate::confirmed::{failed, failed_tally};
 use crate::{Datum, Selection, Table};
 
@@ -140,22 +140,37 @@ pub fn regions_by_cause(
         Some(Target::Requirement(id)) => Some(id),
         Some(other) => return Err(RegionsError::NoCauses { name: name(plan, other) }),
     };
-    let mut causes = causes_with_tests(repository, selection)?;
-    causes.retain(|(cause, _)| asked.is_none_or(|asked| asked == cause.requirement));
+    Ok(found_by_cause(repository, selection, asked, depth)?)
+}
+
+/// Where the tests of each cause violate its requirement, of all requirements, in the order of causes.
+pub fn all_regions_by_cause(repository: &Repository, selection: &Selection) -> Result<Vec<Regions>, RecordError> {
+    found_by_cause(repository, selection, None, DEPTH)
+}
+
+fn found_by_cause(
+    repository: &Repository,
+    selection: &Selection,
+    asked: Option<RequirementId>,
+    depth: u32,
+) -> Result<Vec<Regions>, RecordError> {
+    let plan = repository.plan();
+    let mut causes = causes_alone(repository, selection)?;
+    causes.retain(|CauseAlone { cause, .. }| asked.is_none_or(|asked| asked == cause.requirement));
     let mut gathered: Vec<Gathered> = causes
         .iter()
-        .map(|(cause, _)| {
+        .map(|CauseAlone { cause, .. }| {
             Gathered::empty(features_in_units(plan, &cause.operations), [Target::Requirement(cause.requirement)])
         })
         .collect();
     repository.scan(&mut |test| {
-        for ((_, tests), gathered) in causes.iter().zip(&mut gathered) {
+        for (CauseAlone { tests, .. }, gathered) in causes.iter().zip(&mut gathered) {
             if let Some(&violates) = tests.get(&test.number) {
                 gathered.push(plan, &test, |_| Some(violates));
             }
         }
     })?;
-    let found = causes.iter().zip(&gathered).flat_map(|((cause, _), gathered)| {
+    let found = causes.iter().zip(&gathered).flat_map(|(CauseAlone { cause, .. }, gathered)| {
         let names: Vec<String> = cause.operations.iter().map(|&id| plan.operation(id).name.clone()).collect();
         let mut of = trees(plan, gathered, depth, |_| true);
         for regions in &mut of {

@@ -1,7 +1,7 @@
 //! Where tests fail, as a section of the page.
 
 use sesame_analysis::Selection;
-use sesame_analysis::regions::{Regions, all_regions};
+use sesame_analysis::regions::{Regions, all_regions, all_regions_by_cause};
 use sesame_plan::Dimension;
 use sesame_present::markup::Markup;
 use sesame_present::number;
@@ -20,7 +20,16 @@ pub(super) fn regions(body: &mut Markup, repository: &Repository) -> Result<(), 
     if !repository.task().searches(plan) {
         return Ok(());
     }
-    let mut found = all_regions(repository, &Selection::default())?;
+    let all = Selection::default();
+    let mut found = all_regions(repository, &all)?;
+    // With a single cause, its tree would say what that of the requirement says.
+    let by_cause = all_regions_by_cause(repository, &all)?;
+    let has_several = |name: &str| by_cause.iter().filter(|regions| regions.target == name).count() > 1;
+    found.extend(by_cause.iter().filter(|regions| has_several(&regions.target)).cloned());
+    // Each requirement is followed by its causes; the sort keeps their order.
+    let order: Vec<String> = plan.requirements.iter().map(|requirement| requirement.name.clone()).collect();
+    let place = |regions: &Regions| order.iter().position(|name| *name == regions.target).unwrap_or(order.len());
+    found.sort_by_key(place);
     found.retain(|regions| regions.rules.len() > 1 && regions.all.tests >= FEWEST);
     if found.is_empty() {
         return Ok(());
@@ -28,8 +37,9 @@ pub(super) fn regions(body: &mut Markup, repository: &Repository) -> Result<(), 
     body.open("section", &[("id", "regions")]);
     body.heading("Where tests fail");
     let caption = "Regions of tests that a small decision tree separates, by the reduced space (T1 to O3) and the \
-                   operations; the redder, the more fail. Rules describe these tests; only further tests can show \
-                   whether they hold for others.";
+                   operations; the redder, the more fail. Where a requirement has several causes, the tests of each of \
+                   them are divided too: those that hold its operations and no other cause. Rules describe these \
+                   tests; only further tests can show whether they hold for others.";
     body.element("p", &[("class", "quiet")], caption);
     for regions in &found {
         of_one(body, regions, repository);
@@ -41,7 +51,7 @@ pub(super) fn regions(body: &mut Markup, repository: &Repository) -> Result<(), 
 
 fn of_one(body: &mut Markup, regions: &Regions, repository: &Repository) {
     let tests = number::plural(regions.all.tests, "test fails", "tests fail");
-    body.element("h3", &[], &format!("{}: {} of {tests}", regions.target, regions.all.failing));
+    body.element("h3", &[], &format!("{}: {} of {tests}", regions.title(), regions.all.failing));
     regions.draw(body, repository.plan());
     tables::regions(&regions.rules).html(body, &[]);
 }

@@ -258,3 +258,20 @@ fn the_page_permits_its_own_style_and_script_and_nothing_else() {
         }
     }
 }
+
+#[test]
+fn where_tests_fail_is_shown_by_requirement_and_for_each_of_its_causes() {
+    let folder = tempfile::tempdir().unwrap();
+    let html = page(&sample::campaign(folder.path(), &sample::plan(), 300)).unwrap();
+    let (_, section) = html.split_once("<section id=\"regions\">").unwrap();
+    let (section, _) = section.split_once("</section>").unwrap();
+    let headings = section.split("<h3>").skip(1).filter_map(|rest| rest.split_once("</h3>"));
+    let headings: Vec<&str> = headings.map(|(heading, _)| heading).collect();
+    let expected = [
+        "R1: 150 of 298 tests fail",
+        "R1, jitter_link1: 12 of 46 tests fail",
+        "R1, lose_link0: 6 of 24 tests fail",
+        "R3: 23 of 297 tests fail",
+    ];
+    assert_eq!(headings, expected, "trees without a question are left out");
+}
