@@ -5,8 +5,9 @@
 //! they hold every test that is conclusive about the requirement; tests without effect are among them, duplicates and
 //! reference runs are not.
 //!
-//! By cause there is a tree for each [cause](crate::causes), of the tests that hold its operations and no other cause of
-//! the requirement. It asks for what these operations do, in units: when, for how long, how often and with which values.
+//! By cause there is a tree for each [cause](crate::causes), of the tests that hold its operations and no other cause
+//! of the requirement. Its questions are about what these operations do, in units: when, for how long, how often and
+//! with which values.
 
 mod feature;
 mod picture;

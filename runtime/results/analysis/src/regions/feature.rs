@@ -52,7 +52,8 @@ pub(super) fn features(plan: &CampaignPlan) -> Vec<Feature> {
     dimensions.into_iter().chain(used.into_iter().flat_map(of_operation)).collect()
 }
 
-/// The numbers of what these operations do in a test: when, for how long, how often, and each parameter that is a number.
+/// The numbers of what these operations do in a test: each parameter that is a number, when, for how long, and how
+/// often.
 pub(super) fn features_in_units(plan: &CampaignPlan, operations: &BTreeSet<OperationId>) -> Vec<Feature> {
     let of_operation = |&id: &OperationId| {
         let operation = plan.operation(id);
