@@ -171,7 +171,7 @@ fn found_by_cause(
             }
         }
     })?;
-    let found = causes.iter().zip(&gathered).flat_map(|(CauseAlone { cause, .. }, gathered)| {
+    let found = causes.iter().zip(gathered).flat_map(|(CauseAlone { cause, .. }, gathered)| {
         let names: Vec<String> = cause.operations.iter().map(|&id| plan.operation(id).name.clone()).collect();
         let mut of = trees(plan, gathered, depth, |_| true);
         for regions in &mut of {
@@ -192,18 +192,18 @@ fn found(
     let plan = repository.plan();
     let any = asked.is_empty();
     let gathered = gather(repository, selection, if any { targets(plan) } else { asked })?;
-    Ok(trees(plan, &gathered, depth, |labels| !any || labels.contains(&Some(true))))
+    Ok(trees(plan, gathered, depth, |labels| !any || labels.contains(&Some(true))))
 }
 
 /// The regions of each target of which the labels are wanted.
 fn trees(
     plan: &CampaignPlan,
-    gathered: &Gathered,
+    Gathered { features, values, labels }: Gathered,
     depth: u32,
     wanted: impl Fn(&[Option<bool>]) -> bool,
 ) -> Vec<Regions> {
-    let columns = Columns::new(gathered.values.clone());
-    let found = gathered.labels.iter().filter(|(_, labels)| wanted(labels));
+    let columns = Columns::new(values);
+    let found = labels.iter().filter(|(_, labels)| wanted(labels));
     let found = found.map(|(target, labels)| {
         let count = labels.iter().flatten().count();
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
@@ -213,9 +213,7 @@ fn trees(
         leaves(&root, &mut Vec::new(), &mut |path, tally| {
             let conditions = simplified(path)
                 .iter()
-                .map(|step| {
-                    gathered.features[step.question.column].words(plan, step.question, step.holds, step.missing)
-                })
+                .map(|step| features[step.question.column].words(plan, step.question, step.holds, step.missing))
                 .collect();
             rules.push(Rule { conditions, tally, path: path.to_vec() });
         });
@@ -225,7 +223,7 @@ fn trees(
             share(b, a).cmp(&share(a, b)).then(b.tally.tests.cmp(&a.tally.tests))
         });
         let target = name(plan, *target);
-        Regions { target, cause: None, all: root.tally, rules, root, plan_features: gathered.features.clone() }
+        Regions { target, cause: None, all: root.tally, rules, root, plan_features: features.clone() }
     });
     found.collect()
 }
@@ -331,7 +329,7 @@ impl Rule {
 }
 
 impl Regions {
-    /// What it is about in one word: the requirement, or `crash` or `timeout`, and the operations of the cause.
+    /// What it is about: the requirement, or `crash` or `timeout`, and the operations of the cause.
     pub fn title(&self) -> String {
         match &self.cause {
             None => self.target.clone(),
