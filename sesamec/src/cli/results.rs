@@ -18,6 +18,9 @@ use sesame_search::sspr::Convention;
 
 use super::shell::{self, Shell};
 
+/// Tests may violate a requirement all the same: what the reference run violates has no cause.
+const NO_CAUSE: &str = "these tests show no cause of a violation";
+
 /// What is asked of results files.
 #[derive(Debug, Subcommand)]
 pub(super) enum Results {
@@ -261,7 +264,7 @@ pub(super) fn results(shell: Shell, asked: Results) -> anyhow::Result<ExitCode> 
             let (repository, selection) = open(&input)?;
             let found = causes::causes(&repository, &selection)?;
             if found.is_empty() {
-                shell.warning("none of these tests violates a requirement");
+                shell.warning(NO_CAUSE);
             }
             print(&causes::table(repository.plan(), &found), &output)
         }
@@ -285,13 +288,16 @@ pub(super) fn results(shell: Shell, asked: Results) -> anyhow::Result<ExitCode> 
             let look = if by_cause { regions::regions_by_cause } else { regions::regions };
             let found = look(&repository, &selection, requirement.as_deref(), depth)?;
             if found.is_empty() {
-                shell.warning("none of these tests violates a requirement, crashes or times out");
+                shell.warning(if by_cause {
+                    NO_CAUSE
+                } else {
+                    "none of these tests violates a requirement, crashes or times out"
+                });
             }
             if let Some(folder) = svg {
                 std::fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
                 for of in &found {
-                    let file =
-                        folder.join(format!("regions-{}.svg", of.title().replace(", ", "-").replace(" + ", "+")));
+                    let file = folder.join(format!("regions-{}.svg", of.file_stem()));
                     std::fs::write(&file, of.svg(repository.plan()))
                         .with_context(|| format!("cannot write {}", file.display()))?;
                 }

@@ -125,9 +125,12 @@ impl<'a> Harmless<'a> {
 /// first.
 pub fn causes(repository: &Repository, selection: &Selection) -> Result<Vec<Cause>, RecordError> {
     let (plan, judge, rows) = (repository.plan(), repository.judge()?, repository.tests()?);
-    let counts = |row: &&TestRow| row.origin == Origin::Reference || selection.holds(row.number);
-    let rows: Vec<&TestRow> = rows.iter().filter(counts).collect();
-    Ok(causes_in(plan, &judge, &rows).found)
+    Ok(causes_in(plan, &judge, &selected(&rows, selection)).found)
+}
+
+/// The tests of a selection with the reference runs, which belong to each.
+fn selected<'a>(rows: &'a [TestRow], selection: &Selection) -> Vec<&'a TestRow> {
+    rows.iter().filter(|row| row.origin == Origin::Reference || selection.holds(row.number)).collect()
 }
 
 /// A cause with the conclusive tests that hold its operations and no other cause of its requirement.
@@ -140,11 +143,9 @@ pub(crate) struct CauseAlone {
 /// The causes in the tests of a selection, each with the tests that hold no other one.
 pub(crate) fn causes_alone(repository: &Repository, selection: &Selection) -> Result<Vec<CauseAlone>, RecordError> {
     let (plan, judge, rows) = (repository.plan(), repository.judge()?, repository.tests()?);
-    let counts = |row: &&TestRow| row.origin == Origin::Reference || selection.holds(row.number);
-    let rows: Vec<&TestRow> = rows.iter().filter(counts).collect();
+    let rows = selected(&rows, selection);
     let found = causes_in(plan, &judge, &rows).found;
-    let is_test = |row: &&TestRow| row.origin != Origin::Reference && row.duplicate_of.is_none();
-    let tests: Vec<&TestRow> = rows.into_iter().filter(is_test).collect();
+    let (_, tests) = references_and_tests(&rows);
     let mut by_requirement: BTreeMap<RequirementId, Vec<Judged<'_>>> = BTreeMap::new();
     for cause in &found {
         let judge_all = || judged(plan, &judge, &tests, cause.requirement);
@@ -167,9 +168,7 @@ pub(crate) fn causes_alone(repository: &Repository, selection: &Selection) -> Re
 /// The causes in these tests, and what they say about others. A requirement that a reference run among them violates
 /// has none: no operation is needed to violate it.
 pub fn causes_in(plan: &CampaignPlan, judge: &Judge<'_>, rows: &[&TestRow]) -> Causes {
-    let (references, tests): (Vec<&TestRow>, Vec<&TestRow>) =
-        rows.iter().copied().partition(|row| row.origin == Origin::Reference);
-    let rows: Vec<&TestRow> = tests.into_iter().filter(|row| row.duplicate_of.is_none()).collect();
+    let (references, rows) = references_and_tests(rows);
     let mut found = Vec::new();
     let mut conclusive = BTreeSet::new();
     for requirement in (0..).map(RequirementId).take(plan.requirements.len()) {
@@ -191,6 +190,14 @@ pub fn causes_in(plan: &CampaignPlan, judge: &Judge<'_>, rows: &[&TestRow]) -> C
         independent: strategy.is_some_and(|strategy| strategy.kind().properties().independent),
     });
     Causes { found, unseen }
+}
+
+/// The reference runs, and the tests without duplicates.
+fn references_and_tests<'a>(rows: &[&'a TestRow]) -> (Vec<&'a TestRow>, Vec<&'a TestRow>) {
+    let (references, mut tests): (Vec<&TestRow>, Vec<&TestRow>) =
+        rows.iter().copied().partition(|row| row.origin == Origin::Reference);
+    tests.retain(|row| row.duplicate_of.is_none());
+    (references, tests)
 }
 
 /// The causes as a table.

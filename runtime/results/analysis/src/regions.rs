@@ -101,6 +101,8 @@ pub enum RegionsError {
 
 /// The numbers of tests, and what they fail in.
 struct Gathered {
+    /// The names of the operations of the cause of which these are the tests.
+    cause: Option<Vec<String>>,
     features: Vec<Feature>,
     /// Per feature the number of each test.
     values: Vec<Vec<f64>>,
@@ -161,7 +163,10 @@ fn found_by_cause(
     let mut gathered: Vec<Gathered> = causes
         .iter()
         .map(|CauseAlone { cause, .. }| {
-            Gathered::empty(features_in_units(plan, &cause.operations), [Target::Requirement(cause.requirement)])
+            let features = features_in_units(plan, &cause.operations);
+            let names = cause.operations.iter().map(|&id| plan.operation(id).name.clone()).collect();
+            let targets = [Target::Requirement(cause.requirement)];
+            Gathered { cause: Some(names), ..Gathered::empty(features, targets) }
         })
         .collect();
     repository.scan(&mut |test| {
@@ -171,15 +176,7 @@ fn found_by_cause(
             }
         }
     })?;
-    let found = causes.iter().zip(gathered).flat_map(|(CauseAlone { cause, .. }, gathered)| {
-        let names: Vec<String> = cause.operations.iter().map(|&id| plan.operation(id).name.clone()).collect();
-        let mut of = trees(plan, gathered, depth, |_| true);
-        for regions in &mut of {
-            regions.cause = Some(names.clone());
-        }
-        of
-    });
-    Ok(found.collect())
+    Ok(gathered.into_iter().flat_map(|gathered| trees(plan, gathered, depth, |_| true)).collect())
 }
 
 /// Where tests fail in these respects; without any, in all in which some do.
@@ -198,7 +195,7 @@ fn found(
 /// The regions of each target of which the labels are wanted.
 fn trees(
     plan: &CampaignPlan,
-    Gathered { features, values, labels }: Gathered,
+    Gathered { cause, features, values, labels }: Gathered,
     depth: u32,
     wanted: impl Fn(&[Option<bool>]) -> bool,
 ) -> Vec<Regions> {
@@ -222,8 +219,8 @@ fn trees(
             let share = |of: &Rule, other: &Rule| of.tally.failing as u128 * other.tally.tests as u128;
             share(b, a).cmp(&share(a, b)).then(b.tally.tests.cmp(&a.tally.tests))
         });
-        let target = name(plan, *target);
-        Regions { target, cause: None, all: root.tally, rules, root, plan_features: features.clone() }
+        let (target, cause) = (name(plan, *target), cause.clone());
+        Regions { target, cause, all: root.tally, rules, root, plan_features: features.clone() }
     });
     found.collect()
 }
@@ -264,7 +261,7 @@ fn gather(repository: &Repository, selection: &Selection, targets: Vec<Target>) 
 impl Gathered {
     fn empty(features: Vec<Feature>, targets: impl IntoIterator<Item = Target>) -> Gathered {
         let labels = targets.into_iter().map(|target| (target, Vec::new())).collect();
-        Gathered { values: vec![Vec::new(); features.len()], features, labels }
+        Gathered { cause: None, values: vec![Vec::new(); features.len()], features, labels }
     }
 
     fn push(&mut self, plan: &CampaignPlan, test: &ScannedTest, fails: impl Fn(Target) -> Option<bool>) {
@@ -334,6 +331,14 @@ impl Regions {
         match &self.cause {
             None => self.target.clone(),
             Some(names) => format!("{}, {}", self.target, names.join(" + ")),
+        }
+    }
+
+    /// What a file of it is called: `R1`, or `R1-lag+loss` for a cause.
+    pub fn file_stem(&self) -> String {
+        match &self.cause {
+            None => self.target.clone(),
+            Some(names) => format!("{}-{}", self.target, names.join("+")),
         }
     }
 

@@ -91,8 +91,8 @@ impl Publication {
         Ok(Publication { offer: Some(offer), by_space: true, ..Publication::new(topic) })
     }
 
-    /// The nodes that listen, each of them once: rospy connects twice if it hears of a publisher from the master's
-    /// answer and from an update at the same time.
+    /// The nodes that listen, each of them once: rospy may connect anew before it drops an earlier connection to the
+    /// same publisher.
     pub(crate) fn connected(&self) -> BTreeSet<&str> {
         self.links.iter().filter(|link| !link.gone.load(Ordering::Relaxed)).map(|link| link.node.as_str()).collect()
     }

@@ -41,7 +41,7 @@ pub struct Signal {
     pub events: Vec<SignalEvent>,
 }
 
-/// The values of a field that took at least two, and few.
+/// Which value a field had when, for fields that took at least two values, but few.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct States {
     /// The position of the wire.

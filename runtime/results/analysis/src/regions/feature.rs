@@ -137,11 +137,11 @@ fn strength(plan: &CampaignPlan, id: OperationId, share: f64, way: &str) -> Stri
     if let [parameter] = &operation.parameters[..]
         && let Domain::Number { low, high, shape, .. } = parameter.domain
     {
-        let (factor, unit) = number::scale(&operation.kind, parameter, high);
-        let written = |value: f64| number::with_unit(number::number(value * factor), unit);
+        let (factor, unit) = written(plan, id, 0);
+        let text = |value: f64| number::with_unit(number::number(value * factor), unit);
         return match shape {
-            ChoiceKind::Value => format!("{} {way} {}", parameter.name, written(low + share * (high - low))),
-            ChoiceKind::Range => format!("{} {way} {} wide", parameter.name, written(share * (high - low))),
+            ChoiceKind::Value => format!("{} {way} {}", parameter.name, text(low + share * (high - low))),
+            ChoiceKind::Range => format!("{} {way} {} wide", parameter.name, text(share * (high - low))),
         };
     }
     let names: Vec<&str> = operation.parameters.iter().map(|parameter| parameter.name.as_str()).collect();
@@ -232,7 +232,7 @@ mod tests {
         let several = said(OperationKind::BurstLoss, vec![value("enter", 0.0, 0.1), value("leave", 0.2, 0.8)]);
         assert_eq!(several, format!("o enter above 2.5 %, o leave above 2.5 %, {times}"));
         let point = parameter("bias", Domain::Point { low: [0.0; 3], high: [1.0; 3] });
-        assert_eq!(said(OperationKind::Bias, vec![point]), times, "a point is no number");
+        assert_eq!(said(OperationKind::Bias, vec![point]), times, "a point is not a number");
     }
 
     #[test]

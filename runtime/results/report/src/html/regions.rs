@@ -23,13 +23,16 @@ pub(super) fn regions(body: &mut Markup, repository: &Repository) -> Result<(), 
     let all = Selection::default();
     let mut found = all_regions(repository, &all)?;
     // With a single cause, its tree would say what that of the requirement says.
-    let by_cause = all_regions_by_cause(repository, &all)?;
-    let has_several = |name: &str| by_cause.iter().filter(|regions| regions.target == name).count() > 1;
-    found.extend(by_cause.iter().filter(|regions| has_several(&regions.target)).cloned());
-    // Each requirement is followed by its causes; the sort keeps their order.
-    let order: Vec<String> = plan.requirements.iter().map(|requirement| requirement.name.clone()).collect();
-    let place = |regions: &Regions| order.iter().position(|name| *name == regions.target).unwrap_or(order.len());
-    found.sort_by_key(place);
+    for causes in all_regions_by_cause(repository, &all)?.chunk_by(|a, b| a.target == b.target) {
+        if causes.len() > 1 {
+            found.extend_from_slice(causes);
+        }
+    }
+    // Each requirement is followed by its causes; the sort keeps their order. Crashes and timeouts come last.
+    found.sort_by_key(|regions| {
+        let place = plan.requirements.iter().position(|requirement| requirement.name == regions.target);
+        place.unwrap_or(plan.requirements.len())
+    });
     found.retain(|regions| regions.rules.len() > 1 && regions.all.tests >= FEWEST);
     if found.is_empty() {
         return Ok(());
