@@ -198,9 +198,9 @@ fn disturbances_of_what_controllers_say_and_are_granted_come_to_the_same_over_si
 }
 
 #[test]
-#[ignore = "long: ten tests over each protocol"]
-fn ten_disturbances_of_what_controllers_say_come_to_the_same_over_simlog_as_over_ros2() {
-    compare("iiwa_said_ten", &SAID, Size { evaluations: 10, seconds: 10 });
+#[ignore = "long: four tests over each protocol"]
+fn four_disturbances_of_what_controllers_say_come_to_the_same_over_simlog_as_over_ros2() {
+    compare("iiwa_said_four", &SAID, Size { evaluations: 4, seconds: 10 });
 }
 
 /// Forty tests of ten seconds of the cell, which are to take less than 40 s; twice as much on a machine with something
