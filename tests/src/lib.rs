@@ -109,7 +109,7 @@ pub fn command(program: impl AsRef<Path>) -> Command {
 
 /// The profile with which the suite compiles runners. The suite compiles the runtime several times, so it optimises
 /// only the crates in which campaigns spend their time. The zeros overrule what a runner's manifest says of these
-/// crates.
+/// crates. Crates of others are compiled as for the tests themselves, so that runners can use what is there.
 const SETTINGS: &str = "\
 [profile.dev]
 opt-level = 0
@@ -119,6 +119,7 @@ overflow-checks = true
 [profile.dev.package]
 kuka_cell_sim = { opt-level = 2 }
 libm = { opt-level = 1 }
+serde_core = { opt-level = 1 }
 serde_json = { opt-level = 1 }
 sesame-analysis = { opt-level = 0 }
 sesame-base = { opt-level = 1 }
@@ -134,6 +135,7 @@ sesame-runtime = { opt-level = 0 }
 sesame-search = { opt-level = 1 }
 sesame-stl = { opt-level = 1 }
 sha2 = { opt-level = 1 }
+zmij = { opt-level = 1 }
 ";
 
 /// Writes these settings where cargo looks for them. The long suite measures runners as users build them.
@@ -381,7 +383,45 @@ pub fn turn(what: &str) -> Turn {
     fs::create_dir_all(scratch()).expect("a folder can be made");
     let file = File::create(scratch().join(what).with_extension("lock")).expect("a lock can be made");
     file.lock().expect("the file system has locks");
-    Turn { _locked: file }
+    let turn = Turn { _locked: file };
+    if what == "build" {
+        take_over(&turn);
+    }
+    turn
+}
+
+/// Begins an empty target folder with the libraries that cargo has compiled for these tests. Where a runner needs one
+/// of them with the same features and settings, which holds for most crates of others, it is not compiled again.
+fn take_over(_: &Turn) {
+    let (from, to) = (scratch().with_file_name("debug"), target().join("debug"));
+    if from.exists() && !to.exists() {
+        let new = target().with_extension("new");
+        let _ = fs::remove_dir_all(&new);
+        for folder in ["deps", "build", ".fingerprint"] {
+            take_over_folder(&from.join(folder), &new.join(folder)).expect("what was built can be taken over");
+        }
+        fs::create_dir_all(target()).expect("a folder can be made");
+        fs::rename(new, to).expect("a folder can be renamed");
+    }
+}
+
+fn take_over_folder(from: &Path, to: &Path) -> std::io::Result<()> {
+    fs::create_dir_all(to)?;
+    for entry in fs::read_dir(from)? {
+        let entry = entry?;
+        let (old, new) = (entry.path(), to.join(entry.file_name()));
+        if entry.file_type()?.is_dir() {
+            take_over_folder(&old, &new)?;
+        } else if old.extension().is_some_and(|kind| kind == "rlib" || kind == "rmeta" || kind == "so") {
+            // Nothing writes into a library that exists: a new one takes its place.
+            fs::hard_link(old, new)?;
+        } else if from.file_name() != Some("deps".as_ref()) || old.extension().is_some_and(|kind| kind == "d") {
+            // Cargo compares times. What else is in `deps` are the programs of tests.
+            fs::copy(&old, &new)?;
+            File::options().append(true).open(&new)?.set_modified(entry.metadata()?.modified()?)?;
+        }
+    }
+    Ok(())
 }
 
 /// A built runner.
