@@ -312,6 +312,22 @@ fn containing_itself() -> MessageType {
     message("Loop", vec![field("again", ty)])
 }
 
+/// JSON has no such numbers, so only code could make these plans.
+#[test]
+fn bounds_of_a_variable_are_finite_and_in_order() {
+    for (low, high, words) in [
+        (Some(f64::NAN), None, "activation.space.variables[0].low: NaN is not finite"),
+        (None, Some(f64::INFINITY), "activation.space.variables[0].high: inf is not finite"),
+        (Some(2.0), Some(1.0), "activation.space.variables[0]: runs from 2 to 1"),
+    ] {
+        let mut plan = sample::offline_plan(ConditionEnd::Condition);
+        let variable = &mut space_of(&mut plan).variables[0];
+        (variable.low, variable.high) = (low, high);
+        let said = plan.validate().unwrap_err().to_string();
+        assert!(said.contains(words), "{said:?} does not say {words:?}");
+    }
+}
+
 fn space_of(plan: &mut CampaignPlan) -> &mut ConditionSpace {
     match &mut plan.campaign.activation {
         ActivationMode::Condition { space } => space,

@@ -44,6 +44,20 @@ pub(crate) fn at(test: &ScannedTest, repository: &Repository, convention: Conven
 }
 
 #[test]
+fn variables_of_one_name_are_one_topic() {
+    let link = "<variables xmi:id=\"_v0\" name=\"arm/link0\" type=\"_t0\"/>";
+    let again = link.replace("_v0", "_again");
+    let text = with(&[
+        (link, &format!("{link}{again}")),
+        ("name=\"lose\" variableToAffect=\"_v0\" inclusion", "name=\"lose\" variableToAffect=\"_again\" inclusion"),
+    ]);
+    let imported = imported(&text);
+    let paths = imported.text().matches("\"arm/link0\"").count();
+    assert_eq!(paths, 1, "{}", imported.text());
+    assert!(imported.text().contains("operation lose on arm_link0 "), "{}", imported.text());
+}
+
+#[test]
 fn values_that_refer_to_no_metric_are_found_by_name() {
     let text = with(&[
         ("<metrics metric=\"_m0\"><result name=\"times\"", "<metrics><result name=\"times\""),

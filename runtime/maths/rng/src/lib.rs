@@ -125,6 +125,14 @@ mod tests {
     }
 
     #[test]
+    fn every_order_comes_equally_often() {
+        let mut stream = Stream::derive(1, "test", &[]);
+        let mut counts = std::collections::BTreeMap::new();
+        (0..24_000).for_each(|_| *counts.entry(stream.permutation(4)).or_insert(0) += 1);
+        assert!(counts.len() == 24 && counts.values().all(|n| (850..1_150).contains(n)), "{counts:?}");
+    }
+
+    #[test]
     fn normal_has_mean_zero_and_variance_one() {
         let mut stream = Stream::derive(1, "test", &[]);
         let xs: Vec<f64> = (0..100_000).map(|_| stream.normal()).collect();

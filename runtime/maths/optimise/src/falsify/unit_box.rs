@@ -54,3 +54,33 @@ impl SearchDomain for UnitBox {
         squares.extend(a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Falsifier, Margin, Settings};
+    use super::*;
+
+    /// The first of 50 evaluations that violates a requirement, which a hundredth of a square does.
+    fn first_violation(seed: u64) -> Option<usize> {
+        let settings = Settings { requirements: 1, evaluations: 50, batch: 1, seed };
+        let mut search = Falsifier::new(UnitBox::new(2, seed), settings);
+        let mut margins: Vec<f64> = Vec::new();
+        while margins.len() < 50 && margins.iter().all(|&margin| margin >= 0.0) {
+            let asked = search.ask();
+            let told = asked.into_iter().map(|point| {
+                let value = point.iter().map(|x| (x - 0.8) * (x - 0.8)).sum::<f64>() - 0.003;
+                margins.push(value);
+                (point, vec![Margin { value: Some(value), violated: value < 0.0 }])
+            });
+            search.tell(told.collect());
+        }
+        margins.iter().position(|&margin| margin < 0.0).map(|at| at + 1)
+    }
+
+    #[test]
+    fn what_chance_finds_in_four_of_ten_searches_is_found_in_all() {
+        let found: Vec<_> = (1..=10).map(first_violation).collect();
+        let mean = found.iter().map(|found| found.unwrap_or(100)).sum::<usize>() / 10;
+        assert!(mean <= 20, "{found:?}");
+    }
+}
