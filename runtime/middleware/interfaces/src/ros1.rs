@@ -228,3 +228,33 @@ fn message(package: &str, written: &str) -> Option<String> {
 fn of_ros1(written: &str) -> Option<Primitive> {
     if written == "byte" { Some(Primitive::Int8) } else { Primitive::named(written) }
 }
+
+#[cfg(test)]
+mod tests {
+    use sesame_plan::InterfaceField;
+
+    use super::*;
+
+    fn texts(name: &str, fields: &[(&str, &str)]) -> String {
+        let field = |&(ty, name): &(&str, &str)| InterfaceField {
+            name: name.to_owned(),
+            ty: match ty {
+                "string" => WireType::String,
+                "uint32" => WireType::Primitive { primitive: Primitive::Uint32 },
+                _ => WireType::Interface { name: ty.to_owned() },
+            },
+        };
+        text(&Interface { name: name.to_owned(), fields: fields.iter().map(field).collect() })
+    }
+
+    #[test]
+    fn a_header_has_a_number_and_nothing_else_gets_one() {
+        let [stamp, frame] = [("builtin_interfaces/msg/Time", "stamp"), ("string", "frame_id")];
+        let of_ros1 = "uint32 seq\ntime stamp\nstring frame_id\n";
+        assert_eq!(texts(HEADER, &[stamp, frame]), of_ros1, "ROS 2 has none");
+        assert_eq!(texts(HEADER, &[("uint32", "seq"), stamp, frame]), of_ros1);
+        assert_eq!(texts("made_up/msg/Header", &[stamp, frame]), "time stamp\nstring frame_id\n");
+        assert_eq!(texts("made_up/msg/Stamped", &[(HEADER, "header")]), "std_msgs/Header header\n");
+        assert_eq!(texts("std_msgs/msg/Empty", &[("uint32", NOTHING)]), "");
+    }
+}
