@@ -36,7 +36,7 @@ def set_up(folder: pathlib.Path) -> None:
     shutil.rmtree(venv, ignore_errors=True)
     # The bootstrap of the ROS wheels marks the environment of the programs it starts; pip must start without that mark.
     environment = {name: value for name, value in os.environ.items() if name != "_ROS_WHEELS_BOOTSTRAP_COMPLETE"}
-    # A pip that this Python has installs into the environment, which then takes half the time.
+    # If this Python has pip, that installs into the environment, which takes half the time of one with its own pip.
     pip = [sys.executable, "-m", "pip", "--python"]
     if subprocess.run([*pip, sys.executable, "--version"], env=environment, capture_output=True).returncode == 0:
         run([sys.executable, "-m", "venv", "--without-pip", str(venv)], environment)
@@ -44,7 +44,7 @@ def set_up(folder: pathlib.Path) -> None:
     else:
         run([sys.executable, "-m", "venv", str(venv)], environment)
         pip = [str(venv / "bin" / "python"), "-m", "pip"]
-    # Of thousands of modules a few are ever imported, and Python compiles these then.
+    # Only a few of the thousands of modules are ever imported, and Python compiles those then.
     options = ["--quiet", "--disable-pip-version-check", "--no-compile", "--only-binary", ":all:", "--no-deps"]
     run([*pip, "install", *options, "--require-hashes", "-r", str(requirements)], environment)
     stamp.write_text(digest)

@@ -109,7 +109,7 @@ pub fn command(program: impl AsRef<Path>) -> Command {
 
 /// The profile with which the suite compiles runners. The suite compiles the runtime several times, so it optimises
 /// only the crates in which campaigns spend their time. The zeros overrule what a runner's manifest says of these
-/// crates. Crates of others are compiled as for the tests themselves, so that runners can use what is there.
+/// crates. Third-party crates are compiled as for the tests themselves, so that runners can use what is there.
 const SETTINGS: &str = "\
 [profile.dev]
 opt-level = 0
@@ -269,7 +269,7 @@ impl Project {
     /// `sesamec run` of a campaign that has to be compiled.
     pub fn run(&self, campaign: &str, arguments: &[&str]) -> Done {
         // Cargo puts the program where another project's of the same name may be, and it is started from there.
-        let _turn = turn("build");
+        let _turn = turn();
         let runner = self.runners.join(campaign);
         if runner.join("src").exists() {
             renew(&runner);
@@ -279,7 +279,7 @@ impl Project {
 
     /// Generates and builds the runner of a campaign, without running it.
     pub fn build(&self, campaign: &str) -> Runner {
-        self.built(&turn("build"), campaign)
+        self.built(&turn(), campaign)
     }
 
     fn built(&self, turn: &Turn, campaign: &str) -> Runner {
@@ -291,7 +291,7 @@ impl Project {
 
     /// Generates a monitor as a program, builds it, and insists that rustc has no warnings.
     pub fn monitor(&self, monitor: &str) -> PathBuf {
-        let turn = turn("build");
+        let turn = turn();
         self.sesamec("generate", &["--eddi", monitor]).expect(0);
         let package = format!("{monitor}_monitor");
         let built = self.cargo(&turn, &package, "build").expect(0);
@@ -347,7 +347,7 @@ pub fn shared(name: &str, key: &str, campaign: &str, project: impl FnOnce(&str) 
     let (stamp, program) = (home.join("run"), home.join("program"));
     let folder = fresh_folder(name);
     let runner = Runner { program: folder.join("program"), folder };
-    let turn = turn("build");
+    let turn = turn();
     if fs::read_to_string(&stamp).ok().as_deref() != Some(this_run()) {
         fs::create_dir_all(&home).expect("a folder can be made");
         let built = project(key).built(&turn, campaign);
@@ -371,27 +371,25 @@ fn this_run() -> &'static str {
     })
 }
 
-/// A turn at something that one test at a time may do, in whatever process; it is over when this is dropped.
+/// The turn to compile, which one test at a time has, in whatever process; it is over when this is dropped.
 #[derive(Debug)]
 #[must_use]
 pub struct Turn {
     _locked: File,
 }
 
-/// Waits for a turn at this.
-pub fn turn(what: &str) -> Turn {
+/// Waits for the turn to compile.
+pub fn turn() -> Turn {
     fs::create_dir_all(scratch()).expect("a folder can be made");
-    let file = File::create(scratch().join(what).with_extension("lock")).expect("a lock can be made");
+    let file = File::create(scratch().join("build.lock")).expect("a lock can be made");
     file.lock().expect("the file system has locks");
     let turn = Turn { _locked: file };
-    if what == "build" {
-        take_over(&turn);
-    }
+    take_over(&turn);
     turn
 }
 
 /// Begins an empty target folder with the libraries that cargo has compiled for these tests. Where a runner needs one
-/// of them with the same features and settings, which holds for most crates of others, it is not compiled again.
+/// of them with the same features and settings, as it does most third-party crates, it is not compiled again.
 fn take_over(_: &Turn) {
     let (from, to) = (scratch().with_file_name("debug"), target().join("debug"));
     if from.exists() && !to.exists() {

@@ -42,7 +42,7 @@ fn generated(folder: &Path, plans: &[RunnerPlan]) {
 
 /// Builds a runner; what rustc says.
 fn build(folder: &Path, runner: &str) -> (bool, String) {
-    let Done { code, err, .. } = cargo(&turn("build"), &folder.join("runners").join(runner), &["build", "--quiet"]);
+    let Done { code, err, .. } = cargo(&turn(), &folder.join("runners").join(runner), &["build", "--quiet"]);
     (code == Some(0), err)
 }
 
@@ -122,6 +122,6 @@ fn the_simulator_of_a_new_project_passes_its_own_tests() {
     fs::copy(workspace().join("Cargo.lock"), project.join("simulator/Cargo.lock")).unwrap();
     // Without features of the runtime the relay is compiled for this test alone, which needs little of it.
     let arguments = ["test", "--quiet", "--config", "profile.dev.package.sesame-relay.opt-level=0"];
-    let tested = cargo(&turn("build"), &project.join("simulator"), &arguments).expect(0);
+    let tested = cargo(&turn(), &project.join("simulator"), &arguments).expect(0);
     assert!(tested.out.contains("1 passed"), "{}", tested.out);
 }

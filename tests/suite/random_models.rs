@@ -179,7 +179,7 @@ fn compile_and_run(name: &str, seeds: impl IntoIterator<Item = u64>) {
          other => panic!(\"{{other:?}}\"),\n    }}\n}}\n"
     );
     fs::write(folder.join("src/main.rs"), main).unwrap();
-    let built = cargo(&turn("build"), &folder, &["build"]).expect(0);
+    let built = cargo(&turn(), &folder, &["build"]).expect(0);
     let warned = built.err.lines().filter(|line| line.starts_with("warning")).collect::<Vec<_>>();
     assert!(warned.is_empty(), "{}", built.err);
     let program = target().join("debug/random-runners");

@@ -37,7 +37,7 @@ fn the_readme_has_the_figures_of_its_command() {
 fn one_command(folder: &Path, options: &[&str]) -> String {
     let example = workspace().join("examples/transport");
     let mut run = command(example.join("run"));
-    let turn = turn("build");
+    let turn = turn();
     let said = done(run.env("SESAMEC", sesamec()).arg(folder).args(options).current_dir(folder)).expect(0);
     drop(turn);
     let line = said.out.lines().find_map(|line| line.strip_prefix("Tests with a missed hazard: ")).expect("a summary");

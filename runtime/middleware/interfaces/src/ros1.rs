@@ -235,7 +235,7 @@ mod tests {
 
     use super::*;
 
-    fn texts(name: &str, fields: &[(&str, &str)]) -> String {
+    fn text_of(name: &str, fields: &[(&str, &str)]) -> String {
         let field = |&(ty, name): &(&str, &str)| InterfaceField {
             name: name.to_owned(),
             ty: match ty {
@@ -251,10 +251,10 @@ mod tests {
     fn a_header_has_a_number_and_nothing_else_gets_one() {
         let [stamp, frame] = [("builtin_interfaces/msg/Time", "stamp"), ("string", "frame_id")];
         let of_ros1 = "uint32 seq\ntime stamp\nstring frame_id\n";
-        assert_eq!(texts(HEADER, &[stamp, frame]), of_ros1, "ROS 2 has none");
-        assert_eq!(texts(HEADER, &[("uint32", "seq"), stamp, frame]), of_ros1);
-        assert_eq!(texts("made_up/msg/Header", &[stamp, frame]), "time stamp\nstring frame_id\n");
-        assert_eq!(texts("made_up/msg/Stamped", &[(HEADER, "header")]), "std_msgs/Header header\n");
-        assert_eq!(texts("std_msgs/msg/Empty", &[("uint32", NOTHING)]), "");
+        assert_eq!(text_of(HEADER, &[stamp, frame]), of_ros1, "ROS 2 has none");
+        assert_eq!(text_of(HEADER, &[("uint32", "seq"), stamp, frame]), of_ros1);
+        assert_eq!(text_of("made_up/msg/Header", &[stamp, frame]), "time stamp\nstring frame_id\n");
+        assert_eq!(text_of("made_up/msg/Stamped", &[(HEADER, "header")]), "std_msgs/Header header\n");
+        assert_eq!(text_of("std_msgs/msg/Empty", &[("uint32", NOTHING)]), "");
     }
 }

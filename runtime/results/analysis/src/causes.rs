@@ -128,7 +128,7 @@ pub fn causes(repository: &Repository, selection: &Selection) -> Result<Vec<Caus
     Ok(causes_in(plan, &judge, &selected(&rows, selection)).found)
 }
 
-/// The tests of a selection with the reference runs, which belong to each.
+/// The tests of a selection, and the reference runs, which belong to every selection.
 fn selected<'a>(rows: &'a [TestRow], selection: &Selection) -> Vec<&'a TestRow> {
     rows.iter().filter(|row| row.origin == Origin::Reference || selection.holds(row.number)).collect()
 }

@@ -101,7 +101,7 @@ pub enum RegionsError {
 
 /// The numbers of tests, and what they fail in.
 struct Gathered {
-    /// The names of the operations of the cause of which these are the tests.
+    /// The names of the operations of a cause, if these are its tests.
     cause: Option<Vec<String>>,
     features: Vec<Feature>,
     /// Per feature the number of each test.

@@ -1,4 +1,4 @@
-//! Down to single messages: of the messages that a test alters, none can be left out.
+//! Down to single messages: none of those that a shrunk test alters can be left out.
 
 use super::*;
 
@@ -8,8 +8,7 @@ const EACH: u64 = 5;
 /// A message by the seed of the operation that alters it, and its number.
 type Altered = (u64, u64);
 
-/// What the operations of a test alter: of the first [`EACH`] messages of the first wire all, or those that are
-/// listed.
+/// What the operations of a test alter: all of the first [`EACH`] messages of the first wire, or only the listed ones.
 fn altered_by(test: &Test) -> BTreeSet<Altered> {
     let of = |used: &TestOperation| {
         let listed = |number: &u64| used.messages.as_ref().is_none_or(|messages| messages.hold(0, *number));
@@ -54,11 +53,11 @@ fn without_one(messages: &BTreeSet<Altered>) -> Vec<BTreeSet<Altered>> {
 }
 
 proptest! {
-    // Each case shrinks a test all the way, beside up to a thousand subsets.
+    // Each case shrinks a test all the way, and tries up to a thousand subsets.
     #![proptest_config(ProptestConfig::with_cases(32))]
 
-    /// Beside every subset of the messages: where more messages never make a failing test pass, what is left is one
-    /// of the smallest sets that fail; where anything may fail, it fails and no single message can be left out.
+    /// Compared with every subset of the messages. Where more messages never make a failing test pass, what is left is
+    /// a smallest set that fails. Elsewhere, what is left fails, and does not if any one of its messages is left out.
     #[test]
     fn what_is_left_is_smallest(
         operations in 1u32..3,
