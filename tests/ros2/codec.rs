@@ -23,7 +23,6 @@ fn printed(python: &Path, program: &str, arguments: &[&str], input: &str) -> Str
     let Output { status, stdout, stderr } = Command::new(python)
         .arg(workspace().join("tests/ros2").join(program))
         .args(arguments)
-        .env("PYTHONDONTWRITEBYTECODE", "1")
         .stdin(given)
         .output()
         .unwrap_or_else(|error| panic!("{} does not start: {error}", python.display()));

@@ -86,7 +86,6 @@ impl Peer {
             // When a peer is killed, Fast DDS leaves half a megabyte of shared memory and the locks of its ports
             // behind. A runner speaks UDP anyway.
             .env("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
-            .env("PYTHONDONTWRITEBYTECODE", "1")
             .env("PYTHONFAULTHANDLER", "1")
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())

@@ -27,7 +27,6 @@ impl Server {
             .args(["--port", &port.to_string()])
             .env("ROS_DOMAIN_ID", domain.number.to_string())
             .env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-            .env("PYTHONDONTWRITEBYTECODE", "1")
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())

@@ -136,7 +136,7 @@ fn a_master_of_ros_1_and_its_nodes_say_what_they_are() {
     }
     let peer = |script: &str, arguments: &[&str]| {
         let script = workspace().join("tests/ros1/peers").join(script);
-        start(Command::new(&python).arg("-B").arg(script).args(arguments))
+        start(Command::new(&python).arg(script).args(arguments))
     };
     let _peers = [
         peer("talker.py", &["__name:=talker"]),
@@ -180,7 +180,7 @@ fn a_simulator_that_speaks_simlog_is_stepped_only_if_that_is_asked_for() {
     let folder = fresh_folder("scan_simlog");
     for (script, version) in [("simulator2.py", "2"), ("simulator3.py", "3")] {
         let mut simulator = Command::new(&python);
-        simulator.args(["-B", script]).current_dir(workspace().join("runtime/middleware/simlog/tests"));
+        simulator.arg(script).current_dir(workspace().join("runtime/middleware/simlog/tests"));
         let mut simulator = Program(simulator.stdout(Stdio::piped()).spawn().expect("the peer starts"));
         let mut line = String::new();
         let output = simulator.0.stdout.take().expect("its output is a pipe");

@@ -149,7 +149,7 @@ fn cells(name: &str, disturbed: &Disturbed, size: Size) -> Option<[Example; 2]> 
         symlink(&path, grpc.folder().join(name)).expect("it can be linked");
     }
     let mut build = command(grpc.folder().join("venv/bin/python"));
-    done(build.args(["-B", "simlog_cell.py", "--build"]).current_dir(grpc.folder())).expect(0);
+    done(build.args(["simlog_cell.py", "--build"]).current_dir(grpc.folder())).expect(0);
     Some([ros2, grpc])
 }
 

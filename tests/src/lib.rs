@@ -108,12 +108,13 @@ pub fn command(program: impl AsRef<Path>) -> Command {
 }
 
 /// The profile with which the suite compiles runners. The suite compiles the runtime several times, so it optimises
-/// only the crates in which campaigns spend their time. The zeros overrule what a runner's manifest says of these
+/// only crates in which that saves more time than it takes. The zeros overrule what a runner's manifest says of these
 /// crates. Third-party crates are compiled as for the tests themselves, so that runners can use what is there.
 const SETTINGS: &str = "\
 [profile.dev]
 opt-level = 0
 debug-assertions = false
+lto = \"off\"
 overflow-checks = true
 
 [profile.dev.package]
@@ -128,7 +129,7 @@ sesame-notation = { opt-level = 0 }
 sesame-plan = { opt-level = 0 }
 sesame-present = { opt-level = 0 }
 sesame-record = { opt-level = 0 }
-sesame-relay = { opt-level = 1 }
+sesame-relay = { opt-level = 0 }
 sesame-report = { opt-level = 0 }
 sesame-rng = { opt-level = 1 }
 sesame-runtime = { opt-level = 0 }

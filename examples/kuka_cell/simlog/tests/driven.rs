@@ -41,8 +41,7 @@ fn driven(arguments: &[&str]) -> Option<Heard> {
     let port = line.rsplit(':').next().expect("there is a port").to_owned();
     let steps = STEPS.to_string();
     let driver = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/drive.py");
-    let driven =
-        Command::new(python).args(["-B", driver, &port, &steps]).args(arguments).output().expect("Python starts");
+    let driven = Command::new(python).args([driver, &port, &steps]).args(arguments).output().expect("Python starts");
     drop(served);
     let said = String::from_utf8_lossy(&driven.stderr);
     assert!(driven.status.success(), "the driver failed: {said}");

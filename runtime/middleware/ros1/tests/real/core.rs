@@ -120,7 +120,6 @@ impl Core {
             .env_remove("ROS_HOSTNAME")
             .env("ROS_HOME", own("home"))
             .env("ROS_LOG_DIR", own("log"))
-            .env("PYTHONDONTWRITEBYTECODE", "1")
             .env("PYTHONUNBUFFERED", "1");
         let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
         let lines = sesame_peers::lines(child.stdout.take().unwrap());

@@ -21,7 +21,7 @@ fn python() -> Option<PathBuf> {
 /// A plan that launches the peer with these arguments.
 fn launching(arguments: &[&str]) -> Option<CampaignPlan> {
     let program = python()?.display().to_string();
-    let own = ["-B", "simulator2.py", "--port", "{port}"];
+    let own = ["simulator2.py", "--port", "{port}"];
     let arguments = own.iter().chain(arguments).map(|&argument| argument.to_owned()).collect();
     let mut plan = minimal();
     plan.topics = vec![topic("point", &["point"], Type::Point { unit: None })];

@@ -22,7 +22,7 @@ impl Peer {
     pub(crate) fn start(script: &str, arguments: &[&str]) -> Option<Peer> {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests");
         let mut child = Command::new(python()?)
-            .args(["-B", script])
+            .arg(script)
             .args(arguments)
             .current_dir(folder)
             .stdout(Stdio::piped())

@@ -25,7 +25,8 @@ fn window_of(kind: &OperationSpace) -> Range {
     }
 }
 
-/// The cell that random tests find, most of them far from the middle: windows short or long, values at their ends.
+/// The cells that random tests find, most of them far from the middle: windows short or long, values at their ends.
+/// Points on the edge of a cell do not count: copies of one operation that are moved apart may lie exactly there.
 fn found(plan: &CampaignPlan, grid: &Grid, tests: u64) -> BTreeSet<usize> {
     let test_space = TestSpace::from_plan(plan).unwrap();
     let mut cells = BTreeSet::new();
@@ -60,9 +61,19 @@ fn found(plan: &CampaignPlan, grid: &Grid, tests: u64) -> BTreeSet<usize> {
             }
         }
         test_space.settle(&mut test, &mut stream);
-        cells.extend(grid.cell_of(&point(plan, &test)));
+        let point = point(plan, &test);
+        cells.extend(grid.cell_of(&point).filter(|&cell| !is_on_an_edge(&point, grid, cell)));
     }
     cells
+}
+
+/// Whether a point lies on a side of its cell. Numbers of operations are whole, and a side is as good as the inside.
+fn is_on_an_edge(point: &Point, grid: &Grid, cell: usize) -> bool {
+    let counts = [Dimension::O0, Dimension::O1, Dimension::O2, Dimension::O3];
+    grid.axes().iter().zip(grid.place(cell)).filter(|(axis, _)| !counts.contains(&axis.dimension)).any(|(axis, at)| {
+        let (low, high) = Grid::bounds(axis, at);
+        point.get(axis.dimension).is_some_and(|value| (value - low).abs().min((value - high).abs()) < MARGIN)
+    })
 }
 
 /// Whether a climber finds a test in a cell: it moves what a test chooses until the point's distance to the cell is
