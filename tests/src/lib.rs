@@ -129,7 +129,7 @@ sesame-notation = { opt-level = 0 }
 sesame-plan = { opt-level = 0 }
 sesame-present = { opt-level = 0 }
 sesame-record = { opt-level = 0 }
-sesame-relay = { opt-level = 0 }
+sesame-relay = { opt-level = 1 }
 sesame-report = { opt-level = 0 }
 sesame-rng = { opt-level = 1 }
 sesame-runtime = { opt-level = 0 }
