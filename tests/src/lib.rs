@@ -103,7 +103,7 @@ pub fn command(program: impl AsRef<Path>) -> Command {
         .env("NO_COLOR", "1")
         .env("RUST_BACKTRACE", "0")
         .stdin(Stdio::null());
-    settings();
+    prepare();
     command
 }
 
@@ -139,12 +139,17 @@ sha2 = { opt-level = 1 }
 zmij = { opt-level = 1 }
 ";
 
-/// Writes these settings where cargo looks for them. The long suite measures runners as users build them.
-fn settings() {
-    static WRITTEN: OnceLock<()> = OnceLock::new();
-    WRITTEN.get_or_init(write_settings);
+/// What cargo finds when a test first starts it, or starts a program that does: these settings, and what was compiled
+/// for the tests.
+fn prepare() {
+    static PREPARED: OnceLock<()> = OnceLock::new();
+    PREPARED.get_or_init(|| {
+        write_settings();
+        take_over();
+    });
 }
 
+/// Writes the settings where cargo looks for them. The long suite measures runners as users build them.
 fn write_settings() {
     let long = std::env::var("NEXTEST_PROFILE").as_deref() == Ok("long");
     let (wanted, folder) = (if long { "" } else { SETTINGS }, scratch().join(".cargo"));
@@ -384,16 +389,20 @@ pub fn turn() -> Turn {
     fs::create_dir_all(scratch()).expect("a folder can be made");
     let file = File::create(scratch().join("build.lock")).expect("a lock can be made");
     file.lock().expect("the file system has locks");
-    let turn = Turn { _locked: file };
-    take_over(&turn);
-    turn
+    Turn { _locked: file }
 }
 
 /// Begins an empty target folder with the libraries that cargo has compiled for these tests. Where a runner needs one
 /// of them with the same features and settings, as it does most third-party crates, it is not compiled again.
-fn take_over(_: &Turn) {
+fn take_over() {
     let (from, to) = (scratch().with_file_name("debug"), target().join("debug"));
-    if from.exists() && !to.exists() {
+    if !from.exists() || to.exists() {
+        return;
+    }
+    // One test does it, and others wait until it is done.
+    let file = File::create(scratch().join("take_over.lock")).expect("a lock can be made");
+    file.lock().expect("the file system has locks");
+    if !to.exists() {
         let new = target().with_extension("new");
         let _ = fs::remove_dir_all(&new);
         for folder in ["deps", "build", ".fingerprint"] {
