@@ -386,10 +386,15 @@ pub struct Turn {
 
 /// Waits for the turn to compile.
 pub fn turn() -> Turn {
+    Turn { _locked: locked("build") }
+}
+
+/// Waits for a lock of this name, which one test at a time has until the file is dropped.
+fn locked(name: &str) -> File {
     fs::create_dir_all(scratch()).expect("a folder can be made");
-    let file = File::create(scratch().join("build.lock")).expect("a lock can be made");
+    let file = File::create(scratch().join(name).with_extension("lock")).expect("a lock can be made");
     file.lock().expect("the file system has locks");
-    Turn { _locked: file }
+    file
 }
 
 /// Begins an empty target folder with the libraries that cargo has compiled for these tests. Where a runner needs one
@@ -400,8 +405,7 @@ fn take_over() {
         return;
     }
     // One test does it, and others wait until it is done.
-    let file = File::create(scratch().join("take_over.lock")).expect("a lock can be made");
-    file.lock().expect("the file system has locks");
+    let _locked = locked("take_over");
     if !to.exists() {
         let new = target().with_extension("new");
         let _ = fs::remove_dir_all(&new);

@@ -46,7 +46,7 @@ fn a_new_metric_and_operation_leave_earlier_hooks_as_they_are() {
     assert!(fs::read_to_string(project.runners.join("hooks/loudest.rs")).unwrap().contains("ctx.unimplemented()"));
     project.sesamec("generate", &["--check"]).expect(0);
 
-    let ran = project.sesamec("run", &["--campaign", "harmless"]).expect(0);
+    let ran = project.run("harmless", &[]).expect(0);
     assert!(ran.err.contains("the hook of metric `loudest` is not filled in yet"), "{}", ran.err);
 }
 
@@ -56,7 +56,7 @@ fn without_its_impl_a_hook_is_named_by_rustc_with_its_line_in_the_space() {
     project.sesamec("generate", &["--campaign", "harmless"]).expect(0);
     fs::write(project.runners.join("hooks/fragile.rs"), "#[derive(Default)]\npub struct Fragile;\n").unwrap();
     let line = fs::read_to_string(&project.space).unwrap().lines().position(|line| line.contains("metric fragile"));
-    let said = project.sesamec("run", &["--campaign", "harmless"]).expect(1).err;
+    let said = project.run("harmless", &[]).expect(1).err;
     let place = format!("metric `fragile` (bare.sesame:{}) has no hook", line.unwrap() + 1);
     assert!(said.contains(&place), "{place}: {said}");
     assert!(said.contains("cannot build the runner"), "{said}");
@@ -64,13 +64,12 @@ fn without_its_impl_a_hook_is_named_by_rustc_with_its_line_in_the_space() {
 
 #[test]
 fn an_objective_with_an_unfilled_stub_is_named_before_anything_is_simulated() {
-    let project = project("unfilled");
-    let run = |more: &[&str]| project.sesamec("run", &[&["--campaign", "harmless"], more].concat());
-    let refused = run(&[]).expect(1);
+    let project = project("unfilled_objective");
+    let refused = project.run("harmless", &[]).expect(1);
     assert!(refused.err.contains("the hook of `fragile` is not filled in yet"), "{}", refused.err);
     assert!(refused.err.contains("--allow-unimplemented"), "{}", refused.err);
     assert_eq!(refused.out, "");
     assert!(!project.runners.join("harmless/results").exists(), "nothing was simulated");
-    let allowed = run(&["--", "--allow-unimplemented"]).expect(0);
+    let allowed = project.run("harmless", &["--", "--allow-unimplemented"]).expect(0);
     assert!(allowed.out.contains("Front of"), "{}", allowed.out);
 }

@@ -128,7 +128,7 @@ pub fn causes(repository: &Repository, selection: &Selection) -> Result<Vec<Caus
     Ok(causes_in(plan, &judge, &selected(&rows, selection)).found)
 }
 
-/// The tests of a selection, and the reference runs, which belong to every selection.
+/// The selected tests and the reference runs; every selection includes those.
 fn selected<'a>(rows: &'a [TestRow], selection: &Selection) -> Vec<&'a TestRow> {
     rows.iter().filter(|row| row.origin == Origin::Reference || selection.holds(row.number)).collect()
 }

@@ -101,7 +101,7 @@ pub enum RegionsError {
 
 /// The numbers of tests, and what they fail in.
 struct Gathered {
-    /// The names of the operations of a cause, if these are its tests.
+    /// The names of the cause's operations, if all these tests belong to one cause.
     cause: Option<Vec<String>>,
     features: Vec<Feature>,
     /// Per feature the number of each test.

@@ -37,7 +37,9 @@ const MARGIN: f64 = 1e-9;
 /// Copies of one operation whose windows may not overlap are together at most as long as one window; other constraints
 /// between them are ignored.
 ///
-/// A cell that is only touched, in a point or along an edge, is not feasible: the probability of a test there is zero.
+/// A cell that is only touched, in a point or along an edge, is not feasible: a test drawn at random is never there.
+/// Copies that are moved apart can be; once a cell is hit, [`Coverage`](crate::coverage::Coverage) counts it as
+/// feasible.
 ///
 /// Since those other constraints are ignored, a cell that only tests with copies reach counts as feasible although it
 /// may not be; then the computation says that it is not exact.

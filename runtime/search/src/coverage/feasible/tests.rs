@@ -67,7 +67,8 @@ fn found(plan: &CampaignPlan, grid: &Grid, tests: u64) -> BTreeSet<usize> {
     cells
 }
 
-/// Whether a point lies on a side of its cell. Numbers of operations are whole, and a side is as good as the inside.
+/// Whether a point lies on a side of its cell. Numbers of operations do not count here: they are whole, so tests lie on
+/// such sides as a rule.
 fn is_on_an_edge(point: &Point, grid: &Grid, cell: usize) -> bool {
     let counts = [Dimension::O0, Dimension::O1, Dimension::O2, Dimension::O3];
     grid.axes().iter().zip(grid.place(cell)).filter(|(axis, _)| !counts.contains(&axis.dimension)).any(|(axis, at)| {

@@ -8,7 +8,8 @@ const EACH: u64 = 5;
 /// A message by the seed of the operation that alters it, and its number.
 type Altered = (u64, u64);
 
-/// What the operations of a test alter: all of the first [`EACH`] messages of the first wire, or only the listed ones.
+/// The messages that a test's operations alter: each operation alters those that it lists, or else messages 0 to
+/// [`EACH`] - 1 on the first wire.
 fn altered_by(test: &Test) -> BTreeSet<Altered> {
     let of = |used: &TestOperation| {
         let listed = |number: &u64| used.messages.as_ref().is_none_or(|messages| messages.hold(0, *number));
