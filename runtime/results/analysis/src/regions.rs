@@ -101,7 +101,7 @@ pub enum RegionsError {
 
 /// The numbers of tests, and what they fail in.
 struct Gathered {
-    /// The names of the cause's operations, if all these tests belong to one cause.
+    /// If all these tests belong to one cause: the names of the operations that it consists of.
     cause: Option<Vec<String>>,
     features: Vec<Feature>,
     /// Per feature the number of each test.
