@@ -146,9 +146,12 @@ fn a_wrong_token_none_and_plain_text_to_a_port_of_tls_are_refused_and_noted_with
     fs::write(folder.join("token"), SECRET).expect("a file can be written");
     let url = format!("wss://127.0.0.1:{}", hall.station);
     let settings = "{ token from file \"token\"  certificate \"hall.pem\"  key \"hall.key\" }";
-    let proxies = format!("proxy station \"{url}\" {settings}  domain");
-    let text = space(&hall.domain, JOINTS, "node station { publishes peer }", "", 60);
-    let bridge = format!("rosbridge \"ws://127.0.0.1:{}\" {{ {proxies}", hall.bridge);
+    let station = format!("proxy station \"{url}\" {settings}");
+    // Nobody is `absent`, so the run does not begin, whoever is let in.
+    let nodes = "node station { publishes peer }  node absent { subscribes peer }";
+    let text = space(&hall.domain, JOINTS, nodes, "operation lost on peer to absent = blackhole", 60);
+    let proxies = format!("{station}  proxy absent \"ws://127.0.0.1:{}\"", hall.viewer);
+    let bridge = format!("rosbridge \"ws://127.0.0.1:{}\" {{ {proxies}  domain", hall.bridge);
     let mut system = System::in_folder(plan(&text.replacen("ros2 { domain", &bridge, 1)), folder);
     let said = std::thread::scope(|scope| {
         let attempts = scope.spawn(|| {
@@ -177,9 +180,8 @@ fn a_wrong_token_none_and_plain_text_to_a_port_of_tls_are_refused_and_noted_with
                 attempt(&url, SECRET, ""),
             ]
         });
-        // The one that is let in leaves at once: the run does not begin.
         let error = system.reset();
-        assert!(error.contains("no client of node `station` is connected to its proxy at `wss://"), "{error}");
+        assert!(error.contains("no client of node `absent` is connected to its proxy at `ws://"), "{error}");
         attempts.join().expect("all were tried")
     });
     let [wrong, wrong_in_address, none, plain, in_address, right] = said;

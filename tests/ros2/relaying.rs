@@ -84,7 +84,7 @@ pub(crate) struct Exchange<'a> {
     /// The subscribers.
     pub(crate) to: &'a [&'a Peer],
     /// After how many messages each subscriber says how many it has heard, if the publisher waits for that: it is told
-    /// to go on when all but so many have arrived. Else it publishes all at once.
+    /// to go on when all have arrived. Else it publishes all at once.
     pub(crate) batch: Option<u64>,
     /// Whether subscribers are to be told when the first message comes that is no probe.
     pub(crate) begins: bool,
@@ -254,7 +254,7 @@ impl System {
                 }
                 // So few are on their way that no queue between here and there is too short for them.
                 let heard = to.iter().map(|peer| peer.told("count")).min().unwrap_or_default();
-                while batch.map_or(batches == 0, |batch| heard + batch >= batches * batch) {
+                if batch.map_or(batches == 0, |batch| heard >= batches * batch) {
                     from.go();
                     batches += 1;
                 }

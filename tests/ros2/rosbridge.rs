@@ -108,9 +108,9 @@ fn a_thousand_messages_reach_nodes_through_a_bridge_and_the_relay_however_they_a
         let publisher = speaking(&pythons, &domain, "1000", &["--batch", &BATCH.to_string()]);
         let to = [&subscriber];
         let exchange = Exchange { batch: Some(BATCH), ..Exchange::new(&publisher, &to) };
-        system.exchange(&Test::default(), &exchange);
+        let passed = system.exchange(&Test::default(), &exchange).messages();
         let [(_, said), (_, heard)] = [publisher.end(), subscriber.end()];
-        assert_eq!(heard["count"], 1000, "{settings}: {:?}", system.all_notes());
+        assert_eq!((passed, &heard["count"]), (1000, &1000.into()), "{settings}: {:?}", system.all_notes());
         assert_eq!(said["content"], heard["content"], "{settings}");
         assert_eq!(system.all_notes(), [""; 0]);
     }
