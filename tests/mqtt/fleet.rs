@@ -8,8 +8,8 @@ use sesame_tests::{Done, command, done, fresh_folder, sesamec, workspace};
 
 use crate::peers::{Broker, packages};
 
-/// Prepares a campaign of the fleet, whose relay may add so much to the way of a message. How long the slowest order took
-/// that was late, and that of which nothing was heard; 60 s stand for one that was never finished.
+/// Prepares a campaign of the fleet; the relay may add so much to the way of a message. How long the slowest order took
+/// when orders were late, and when nothing was heard of vehicles; 60 s stand for one that was never finished.
 fn prepared(name: &str, budget: &str) -> Option<[f64; 2]> {
     let packages = packages()?;
     let folder = fresh_folder(name);
