@@ -17,7 +17,7 @@ use crate::transport::{Capabilities, Incidents, Transport, TransportError, wall_
 use crate::wire::{Line, Wire, WireTable, lines, service_lines};
 use sesame_lifecycle::launch::{LaunchContext, LaunchError, Launched, Probe};
 
-/// How long a system may take until it is complete, where nothing else is declared.
+/// How long a system may take until it is complete, from when its programs are ready: these have limits of their own.
 const COMPLETE_WITHIN: Duration = Duration::from_secs(30);
 
 /// How long the clock may stand still.
@@ -145,7 +145,7 @@ impl System {
             let launched = &self.launched;
             self.bus.listen(&|address| launched.fill(address))?;
             self.launched.start(seed)?;
-            self.assemble()?;
+            self.assemble(COMPLETE_WITHIN)?;
         }
         self.bus.reset(SILENCE)?;
         self.calls.clear();
@@ -198,27 +198,25 @@ impl System {
 
     /// Waits until the launched programs are ready, the bus is connected, and everything is there. Messages from before
     /// go on unchanged.
-    fn assemble(&mut self) -> Result<(), TransportError> {
-        let limit = Instant::now() + COMPLETE_WITHIN;
+    fn assemble(&mut self, within: Duration) -> Result<(), TransportError> {
+        let mut ready_since: Option<Instant> = None;
         let mut heard = Heard::default();
         loop {
-            let ready = self.launched.poll_ready(&mut |probe| heard.shows(probe))?;
+            if self.launched.poll_ready(&mut |probe| heard.shows(probe))? {
+                ready_since.get_or_insert_with(Instant::now);
+            }
             if !self.connected {
                 let launched = &self.launched;
                 self.connected = self.bus.connect(&self.lines, &|address| launched.fill(address))?;
             }
             let missing = if self.connected { self.bus.missing() } else { vec![self.unreachable()] };
-            if ready && missing.is_empty() {
+            if ready_since.is_some() && missing.is_empty() {
                 return Ok(());
             }
-            if Instant::now() >= limit && !missing.is_empty() {
+            if ready_since.is_some_and(|since| since.elapsed() >= within) {
                 return Err(TransportError::from(LaunchError::Failed {
                     what: "the system".to_owned(),
-                    problem: format!(
-                        "is not complete after {} s: {}",
-                        COMPLETE_WITHIN.as_secs(),
-                        gathered(&missing).join("; ")
-                    ),
+                    problem: format!("is not complete after {} s: {}", within.as_secs(), gathered(&missing).join("; ")),
                     last_lines: String::new(),
                 }));
             }
@@ -504,4 +502,78 @@ impl Transport for System {
 /// That the clock stands still.
 fn no_tick() -> TransportError {
     TransportError::Silent { awaited: "a tick of the clock of the simulator".to_owned(), limit: SILENCE.as_secs_f64() }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::{Path, PathBuf};
+
+    use sesame_plan::testing::minimal;
+    use sesame_plan::{Command, Launch, Ready, ReadyWhen};
+
+    use super::*;
+    use crate::value::Value;
+
+    /// A bus on which somebody is missing until it was asked so often; then it makes a file.
+    struct Incomplete {
+        left: u32,
+        file: PathBuf,
+    }
+
+    impl Bus for Incomplete {
+        fn connect(&mut self, _: &[Line], _: &dyn Fn(&str) -> String) -> Result<bool, TransportError> {
+            Ok(true)
+        }
+
+        fn missing(&mut self) -> Vec<String> {
+            self.left = self.left.saturating_sub(1);
+            if self.left > 0 {
+                return vec!["nobody publishes on `/peer`".to_owned()];
+            }
+            std::fs::write(&self.file, "").unwrap();
+            Vec::new()
+        }
+
+        fn receive(&mut self, _: Duration) -> Result<Option<Event>, TransportError> {
+            Ok(None)
+        }
+
+        fn publish(&mut self, _: usize, _: usize, _: &Value, _: Option<u64>) -> Result<(), TransportError> {
+            Ok(())
+        }
+
+        fn reset(&mut self, _: Duration) -> Result<(), TransportError> {
+            Ok(())
+        }
+
+        fn disconnect(&mut self) {}
+    }
+
+    /// Assembles a system whose program is ready once a file is there, and on which somebody is missing until it was asked
+    /// so often. From when the program is ready, there is no time.
+    fn assembled(folder: &Path, ready_at: &str, missing: u32) -> Result<(), TransportError> {
+        let script = format!("while [ ! -e {ready_at} ]; do sleep 0.02; done; echo ready; exec sleep 1000");
+        let mut plan = minimal();
+        plan.simulator.lifecycle.launch = Some(Launch {
+            command: Command { program: "sh".to_owned(), arguments: vec!["-c".to_owned(), script] },
+            ready: Some(Ready { when: ReadyWhen::Line { text: "ready".to_owned() }, within: 120.0 }),
+        });
+        let bus = Incomplete { left: missing, file: folder.join("complete") };
+        let settings = Settings { has_clock: false, resets: false, addresses: Vec::new() };
+        let context = LaunchContext { in_runner: false, ..LaunchContext::of_worker(folder.to_owned()) };
+        let mut system = System::new(&plan, Box::new(bus), settings, context);
+        system.launched.start(1)?;
+        system.assemble(Duration::ZERO)
+    }
+
+    #[test]
+    fn the_limit_of_a_system_begins_when_its_programs_are_ready() {
+        let folder = tempfile::tempdir().unwrap();
+        assert_eq!(assembled(folder.path(), "complete", 5), Ok(()));
+
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("there"), "").unwrap();
+        let error = assembled(folder.path(), "there", u32::MAX).unwrap_err().to_string();
+        assert!(error.contains("is not complete after 0 s: nobody publishes on `/peer`"), "{error}");
+    }
 }
