@@ -18,7 +18,7 @@ use crate::facts::readable::short_numbers;
 use crate::facts::repetition::ViolationRate;
 use crate::facts::show::{OperationReport, TestReport, VerdictReport};
 use crate::facts::shrinking::{ShrinkTrigger, Shrinking, ShrunkMessages};
-use crate::facts::summary::Summary;
+use crate::facts::summary::{RequirementSummary, Summary};
 use crate::facts::wording::outcome_words;
 use sesame_base::visible::visible;
 
@@ -83,6 +83,17 @@ fn missed_words(monitors: &MonitorsSummary) -> Option<String> {
     let mut tests: Vec<TestNumber> = monitors.missed.iter().map(|missed| missed.test).collect();
     tests.dedup();
     (!tests.is_empty()).then(|| format!("hazards missed in {}", plural(tests.len(), "test", "tests")))
+}
+
+/// What a requirement with causes asks for, and how far tests are from that, in sentences: `R1: No load falls over people
+/// (drops ≤ 0). 11 tests violate it, in 2 ways; the worst value is 1, in T2.`
+pub(crate) fn violated_sentence(requirement: &RequirementSummary, causes: usize) -> String {
+    let RequirementSummary { requirement, text, metric, bound, violated, worst, .. } = requirement;
+    let tests = plural(*violated, "test violates it", "tests violate it");
+    let ways = plural(causes, "way", "ways");
+    let worst =
+        worst.as_ref().map_or(String::new(), |worst| format!("; the worst value is {}, in {}", worst.text, worst.test));
+    format!("{requirement}: {text} ({metric} {bound}). {tests}, in {ways}{worst}.")
 }
 
 /// In how many ways requirements are violated, and what is known of others, in sentences.

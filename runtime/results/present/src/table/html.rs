@@ -8,20 +8,34 @@ use crate::markup::{Markup, coordinate};
 impl Table {
     /// As HTML. Tests that are in `linked` are links to the elements that have their names as ids.
     pub fn html(&self, markup: &mut Markup, linked: &[u32]) {
+        self.rows_of(markup, linked, false);
+    }
+
+    /// The same; on a narrow screen each row becomes a block with a line for each of its cells, after the title of its
+    /// column.
+    pub fn html_stacking(&self, markup: &mut Markup, linked: &[u32]) {
+        self.rows_of(markup, linked, true);
+    }
+
+    fn rows_of(&self, markup: &mut Markup, linked: &[u32], stacking: bool) {
         let words: Vec<Vec<String>> = (0..self.columns.len()).map(|column| self.words(column)).collect();
         markup.open("div", &[("class", "scroll")]);
-        markup.open("table", &[]);
+        let stacks: &[(&str, &str)] = if stacking { &[("class", "stacks")] } else { &[] };
+        markup.open("table", stacks);
         self.titles(markup);
         markup.open("tbody", &[]);
         for (at, row) in self.rows.iter().enumerate() {
             markup.open("tr", &[]);
             for (column, cell) in row.iter().enumerate() {
-                let class = self.class(column, cell.tone);
-                match self.columns[column].style {
-                    Style::Heading => markup.open("th", &[("scope", "row")]),
-                    _ if class.is_empty() => markup.open("td", &[]),
-                    _ => markup.open("td", &[("class", &class)]),
+                let (class, title) = (self.class(column, cell.tone), self.shown_title(column));
+                let mut attributes: Vec<(&str, &str)> = Vec::new();
+                attributes.extend(stacking.then_some(("data-title", title.as_str())));
+                let is_heading = self.columns[column].style == Style::Heading;
+                match is_heading {
+                    true => attributes.push(("scope", "row")),
+                    false => attributes.extend((!class.is_empty()).then_some(("class", class.as_str()))),
                 }
+                markup.open(if is_heading { "th" } else { "td" }, &attributes);
                 match &cell.datum {
                     Datum::Test(test) => link(markup, *test, linked),
                     Datum::OfTest(test, text) => {
@@ -44,17 +58,22 @@ impl Table {
     fn titles(&self, markup: &mut Markup) {
         markup.open("thead", &[]);
         markup.open("tr", &[]);
-        for (at, Column { title, style, .. }) in self.columns.iter().enumerate() {
-            let mut title = title.clone();
-            // Names of metrics and of data stay as they are.
-            if let Some(first) = title.get_mut(..1).filter(|_| !matches!(style, Style::Metric | Style::Data)) {
-                first.make_ascii_uppercase();
-            }
+        for at in 0..self.columns.len() {
             let class = if self.is_right(at) { "number" } else { "words" };
-            markup.element("th", &[("scope", "col"), ("class", class)], &title);
+            markup.element("th", &[("scope", "col"), ("class", class)], &self.shown_title(at));
         }
         markup.close();
         markup.close();
+    }
+
+    /// The title of a column. Names of metrics and of data stay as they are.
+    fn shown_title(&self, column: usize) -> String {
+        let Column { title, style, .. } = &self.columns[column];
+        let mut title = title.clone();
+        if let Some(first) = title.get_mut(..1).filter(|_| !matches!(style, Style::Metric | Style::Data)) {
+            first.make_ascii_uppercase();
+        }
+        title
     }
 
     fn class(&self, column: usize, tone: Tone) -> String {
@@ -101,6 +120,20 @@ fn bar(markup: &mut Markup, shares: &[(usize, &'static str)]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_cells_of_a_stacking_table_know_the_titles_of_their_columns() {
+        let mut table = Table::with([Column::heading("cause"), Column::words("smallest test")]);
+        table.row([Datum::text("lag"), Datum::test(3)]);
+        let mut markup = Markup::default();
+        table.html_stacking(&mut markup, &[]);
+        let html = markup.finish();
+        let document = roxmltree::Document::parse(&html).unwrap();
+        let titles: Vec<_> = document.descendants().filter_map(|node| node.attribute("data-title")).collect();
+        assert_eq!(titles, ["Cause", "Smallest test"]);
+        let class = |name| document.descendants().find(|node| node.has_tag_name("table")).unwrap().attribute(name);
+        assert_eq!(class("class"), Some("stacks"));
+    }
 
     #[test]
     fn a_test_is_a_link_where_the_page_shows_it_and_findings_stand_out() {

@@ -10,6 +10,7 @@ use sesame_present::number;
 use sesame_record::{Judge, RecordError, Repository, TestRow, verdict};
 
 use crate::facts::show::{OperationReport, operations};
+use crate::facts::summary::distance_outside;
 use crate::facts::wording;
 
 /// What the tests of a campaign say about causes.
@@ -39,6 +40,9 @@ pub struct CauseSummary {
     pub metric: String,
     /// Its value in that test, in words.
     pub value: String,
+    /// How far that value lies outside the bound, in the metric's unit.
+    #[serde(skip)]
+    pub(crate) outside: f64,
     /// The bound in words.
     pub bound: String,
     /// The first test that violates the requirement and holds these operations.
@@ -58,6 +62,16 @@ impl CauseSummary {
     /// The operations as a name: `lag_link1 + drop_link0`.
     pub(crate) fn name(&self) -> String {
         self.operations.join(" + ")
+    }
+}
+
+impl CausesSummary {
+    /// The cause whose smallest test lies farthest outside the bound, of those of the first requirement that has any:
+    /// metrics of others have other units. Among equals, the first one.
+    pub(crate) fn worst(&self) -> Option<&CauseSummary> {
+        let first = self.causes.first()?;
+        let of_first = self.causes.iter().filter(|cause| cause.requirement == first.requirement);
+        of_first.reduce(|worst, cause| if cause.outside > worst.outside { cause } else { worst })
     }
 }
 
@@ -111,6 +125,7 @@ fn summarise(
         acting: operations(plan, &record).into_iter().filter(acts).collect(),
         metric: metric.name.clone(),
         value,
+        outside: shown.value.map_or(0.0, |value| distance_outside(requirement.bound, value)),
         bound: number::bound(requirement.bound, metric.unit.as_deref()),
         first: TestNumber(cause.violating.first().copied().unwrap_or(cause.smallest)),
         violating: cause.violating.len(),

@@ -548,7 +548,7 @@ impl RequirementSummary {
 }
 
 /// How far a value lies outside a bound, in the metric's unit; zero inside and on its edge.
-fn distance_outside(bound: Bound, value: f64) -> f64 {
+pub(crate) fn distance_outside(bound: Bound, value: f64) -> f64 {
     let (low, _, high, _) = sesame_base::verdict::ends(bound);
     let below = low.map_or(0.0, |low| low - value);
     let above = high.map_or(0.0, |high| value - high);

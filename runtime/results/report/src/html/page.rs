@@ -7,6 +7,7 @@ use sesame_present::markup::{Heading, Markup, fill};
 use sesame_present::table::Table;
 use sesame_record::{Origin, RecordError, Repository, TestRow};
 
+use crate::facts::causes::CausesSummary;
 use crate::facts::shrinking::Shrinking;
 use crate::facts::summary::{Summary, summarise};
 use crate::file::write_aside;
@@ -17,7 +18,7 @@ use crate::html::header::{about, header};
 use crate::html::policy::policy;
 use crate::html::test::test;
 use crate::html::{before_after, cells, monitors, pairs, regions, shrinking, tree};
-use crate::sentences::{QUARANTINED, causes_sentence, once_sentence};
+use crate::sentences::{QUARANTINED, causes_sentence, once_sentence, violated_sentence};
 use crate::tables;
 
 /// Causes whose smallest tests are drawn at most.
@@ -65,9 +66,9 @@ fn page_in(
     let members = repository.latest_result_set()?.map_or_else(Vec::new, |set| set.members);
     let summary = summarise(repository, &rows, &members)?;
     let groups = chosen(&summary, &rows);
-    let first = first_of_causes(&summary);
+    let worst = worst_of_causes(&summary);
     let drawn: Vec<u32> =
-        first.into_iter().chain(groups.iter().flat_map(|group| group.tests.iter().copied())).collect();
+        worst.into_iter().chain(groups.iter().flat_map(|group| group.tests.iter().copied())).collect();
 
     let mut body = Markup::default();
     body.open("main", &[("id", "main")]);
@@ -75,7 +76,7 @@ fn page_in(
         shrinking::shrinking(&mut body, shrinking, &drawn);
     }
     causes(&mut body, &summary, &drawn);
-    if let Some(number) = first {
+    if let Some(number) = worst {
         test(&mut body, repository, &summary, number, folder)?;
     }
     monitors::monitors(&mut body, &summary, &drawn);
@@ -194,25 +195,47 @@ fn chosen(summary: &Summary, rows: &[TestRow]) -> Vec<Group> {
             tests: more,
         },
     ];
-    let first = first_of_causes(summary);
+    let worst = worst_of_causes(summary);
     for group in &mut groups {
-        group.tests.retain(|number| Some(*number) != first);
+        group.tests.retain(|number| Some(*number) != worst);
     }
     groups
 }
 
-/// The causes of violations.
+/// The causes of violations: what each requirement asks for, its causes, and what is known of others.
 fn causes(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
     let Some(found) = summary.causes.as_ref().filter(|found| !found.causes.is_empty()) else { return };
-    let sentence = causes_sentence(found);
-    let caption = "A requirement with a smallest set of operations that violates it, as far as tests were run.";
-    let caption = [Some(caption.to_owned()), sentence].into_iter().flatten().collect::<Vec<_>>().join(" ");
-    section(body, "Causes", Some(&caption), tables::causes(found), drawn);
+    body.open("section", &[]);
+    body.heading("Causes");
+    for requirement in &summary.requirements {
+        let causes = found.causes.iter().filter(|cause| cause.requirement == requirement.requirement).count();
+        if causes > 0 {
+            body.element("p", &[], &violated_sentence(requirement, causes));
+        }
+    }
+    let mut table = tables::causes(found);
+    let more = table.truncate(FAILURES);
+    table.html_stacking(body, drawn);
+    left_out(body, more);
+    let caption =
+        "A cause is a requirement with a smallest set of operations that violates it, as far as tests were run.";
+    let caption =
+        [Some(caption.to_owned()), causes_sentence(found)].into_iter().flatten().collect::<Vec<_>>().join(" ");
+    body.element("p", &[("class", "quiet")], &caption);
+    if let Some(worst) = found.worst().filter(|_| found.causes.len() > 1) {
+        let of = if found.causes.iter().any(|cause| cause.requirement != worst.requirement) {
+            format!(" that violate {}", worst.requirement)
+        } else {
+            String::new()
+        };
+        body.element("p", &[], &format!("The worst of the smallest tests{of}:"));
+    }
+    body.close();
 }
 
-/// The smallest test of the first cause, which is drawn next to the causes.
-fn first_of_causes(summary: &Summary) -> Option<u32> {
-    summary.causes.iter().flat_map(|found| &found.causes).map(|cause| cause.test.0).next()
+/// The worst of the smallest tests of causes, which is drawn next to them.
+fn worst_of_causes(summary: &Summary) -> Option<u32> {
+    summary.causes.as_ref().and_then(CausesSummary::worst).map(|cause| cause.test.0)
 }
 
 /// What is on the page, to jump to.
@@ -267,8 +290,13 @@ fn section(body: &mut Markup, title: &str, caption: Option<&str>, mut table: Tab
     }
     let more = table.truncate(FAILURES);
     table.html(body, drawn);
+    left_out(body, more);
+    body.close();
+}
+
+/// How many rows a table lacks, if any.
+fn left_out(body: &mut Markup, more: usize) {
     if more > 0 {
         body.element("p", &[("class", "quiet")], &format!("And {more} more; the report in JSON has all."));
     }
-    body.close();
 }

@@ -30,12 +30,19 @@ fn the_page_is_well_formed_and_needs_nothing_but_itself() {
     }
     let mut tests = document.descendants().filter(|node| node.attribute("class") == Some("test"));
     let mut next = || tests.next().unwrap().attribute("id").unwrap().to_owned();
-    let smallest = causes(&repository).unwrap().causes[0].test.to_string();
+    let found = causes(&repository).unwrap();
+    let worst = found.worst().unwrap();
     assert_eq!(
         [next(), next()],
-        [smallest.as_str(), "T0"],
-        "the smallest test of the first cause, then the reference run"
+        [worst.test.to_string().as_str(), "T0"],
+        "the worst smallest test of a cause, then the reference run"
     );
+    assert!(found.causes.iter().all(|cause| cause.requirement != worst.requirement || cause.outside <= worst.outside));
+    let section = document.descendants().find(|node| node.text() == Some("Causes") && node.has_tag_name("h2")).unwrap();
+    let first = section.parent().unwrap().children().filter(|node| node.has_tag_name("p")).find_map(|node| node.text());
+    let said = first.unwrap();
+    assert!(said.starts_with(&format!("{}: {} (", worst.requirement, worst.text)), "{said}");
+    assert!(said.contains("; the worst value is "), "{said}");
     let contents = document.descendants().find(|node| node.attribute("class") == Some("contents")).unwrap();
     let sections: Vec<&str> = contents.children().filter_map(|link| link.text()).collect();
     assert_eq!(sections.first(), Some(&"Causes"));
