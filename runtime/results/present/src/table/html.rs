@@ -31,9 +31,10 @@ impl Table {
                 let mut attributes: Vec<(&str, &str)> = Vec::new();
                 attributes.extend(stacking.then_some(("data-title", title.as_str())));
                 let is_heading = self.columns[column].style == Style::Heading;
-                match is_heading {
-                    true => attributes.push(("scope", "row")),
-                    false => attributes.extend((!class.is_empty()).then_some(("class", class.as_str()))),
+                if is_heading {
+                    attributes.push(("scope", "row"));
+                } else if !class.is_empty() {
+                    attributes.push(("class", &class));
                 }
                 markup.open(if is_heading { "th" } else { "td" }, &attributes);
                 match &cell.datum {
