@@ -28,8 +28,8 @@ fn example(name: &str) -> Option<(Project, [Port; 3])> {
     Some((Project { space, runners: folder.join("runners"), folder }, held))
 }
 
-/// Runs the campaign, whose tests delay what is heard of one drone. How close the drones came in the reference run and in
-/// both tests, in metres.
+/// Runs the campaign, whose tests delay what is heard of one drone. How close the drones came in the reference run and
+/// in both tests, in metres.
 fn separations(run: impl Fn(&str, &[&str]) -> Done) -> [f64; 3] {
     run("run", &[]).ended_freely();
     let read = |subcommand: &str, arguments: &[&str]| -> Value {

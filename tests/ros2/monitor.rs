@@ -144,8 +144,8 @@ impl Watched {
     }
 }
 
-/// Nobody steps the nodes, and monitor and runner each hear the angle themselves. If the publisher rests for two seconds
-/// on a busy machine, or one of them hears late of it, only one may take that for silence.
+/// Nobody steps the nodes, and monitor and runner each hear the angle themselves. If the publisher rests for two
+/// seconds on a busy machine, or one of them hears late of it, only one may take that for silence.
 #[test]
 fn a_monitor_beside_real_nodes_is_heard_and_told_of_the_silence_of_the_test() {
     let Some(watched) = watched("ros2_monitor") else { return };

@@ -85,8 +85,8 @@ fn missed_words(monitors: &MonitorsSummary) -> Option<String> {
     (!tests.is_empty()).then(|| format!("hazards missed in {}", plural(tests.len(), "test", "tests")))
 }
 
-/// What a requirement with causes asks for, and how far tests are from that, in sentences: `R1: No load falls over people
-/// (drops ≤ 0). 11 tests violate it, in 2 ways; the worst value is 1, in T2.`
+/// What a requirement with causes asks for, and how far tests are from that, in sentences: `R1: No load falls over
+/// people (drops ≤ 0). 11 tests violate it, in 2 ways; the worst value is 1, in T2.`
 pub(crate) fn violated_sentence(requirement: &RequirementSummary, causes: usize) -> String {
     let RequirementSummary { requirement, text, metric, bound, violated, worst, .. } = requirement;
     let tests = plural(*violated, "test violates it", "tests violate it");

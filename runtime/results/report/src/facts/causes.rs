@@ -5,12 +5,11 @@ use serde::Serialize;
 use sesame_analysis::causes::{Cause, Causes, Fewer, Unseen, causes_in};
 use sesame_analysis::confirmed::FindingAgain;
 use sesame_base::test_number::TestNumber;
-use sesame_plan::{CampaignPlan, Task};
+use sesame_plan::{Bound, CampaignPlan, Task};
 use sesame_present::number;
 use sesame_record::{Judge, RecordError, Repository, TestRow, verdict};
 
 use crate::facts::show::{OperationReport, operations};
-use crate::facts::summary::distance_outside;
 use crate::facts::wording;
 
 /// What the tests of a campaign say about causes.
@@ -133,4 +132,12 @@ fn summarise(
         fewer: cause.fewer,
         again: again.filter(|_| was_run_again),
     })
+}
+
+/// How far a value lies outside a bound, in the metric's unit; zero inside and on its edge.
+pub(crate) fn distance_outside(bound: Bound, value: f64) -> f64 {
+    let (low, _, high, _) = sesame_base::verdict::ends(bound);
+    let below = low.map_or(0.0, |low| low - value);
+    let above = high.map_or(0.0, |high| value - high);
+    below.max(above).max(0.0)
 }

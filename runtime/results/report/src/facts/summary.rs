@@ -10,14 +10,14 @@ use sesame_analysis::confirmed::{
 use sesame_analysis::statistics::Sample;
 use sesame_base::observation::Outcome;
 use sesame_base::test_number::TestNumber;
-use sesame_plan::{Bound, CampaignPlan, Confirmation, Copies, Direction, MetricId, Requirement, Task};
+use sesame_plan::{CampaignPlan, Confirmation, Copies, Direction, MetricId, Requirement, Task};
 use sesame_present::number;
 use sesame_record::{
     Event, EventKind, Judge, MetricValue, NOT_IMPORTED, Origin, RecordError, Repository, Standing, TestRow, Verdict,
     is_quarantined, verdict,
 };
 
-use crate::facts::causes::{CausesSummary, causes_of_search};
+use crate::facts::causes::{CausesSummary, causes_of_search, distance_outside};
 use crate::facts::certificate::before_after::Mend;
 use crate::facts::certificate::campaign::{MonitorsSummary, monitors_summary};
 use crate::facts::coverage::{CoverageSummary, coverage};
@@ -545,14 +545,6 @@ impl RequirementSummary {
         }
         if parts.is_empty() { "–".to_owned() } else { parts.join("; ") }
     }
-}
-
-/// How far a value lies outside a bound, in the metric's unit; zero inside and on its edge.
-pub(crate) fn distance_outside(bound: Bound, value: f64) -> f64 {
-    let (low, _, high, _) = sesame_base::verdict::ends(bound);
-    let below = low.map_or(0.0, |low| low - value);
-    let above = high.map_or(0.0, |high| value - high);
-    below.max(above).max(0.0)
 }
 
 fn expectations(plan: &CampaignPlan, rows: &[TestRow]) -> Vec<ExpectationSummary> {
