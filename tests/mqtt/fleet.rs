@@ -86,7 +86,7 @@ fn orders_that_are_late_take_longer_and_those_of_which_nothing_is_heard_are_neve
 /// Undisturbed, an order takes between one and two seconds; late by four seconds, it takes between five and six, of
 /// eight and a half that are left.
 #[test]
-#[ignore = "long: how long an order takes depends on what else the machine does"]
+#[ignore = "long: how long an order takes depends on the load of the machine"]
 fn orders_that_are_late_are_finished_late() {
     let Some([late, never]) = prepared("mqtt_fleet_alone", "500ms") else { return };
     assert!((5.0..10.0).contains(&late), "{late}");

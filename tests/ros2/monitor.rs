@@ -68,7 +68,7 @@ fn built(name: &str, domain: &Domain) -> PathBuf {
     project.monitor("upright")
 }
 
-/// A moment of a run, in seconds, and the state that a monitor was in from there on.
+/// The simulation time in seconds at which a monitor changed its state, and the new state.
 type Moment = (f64, String);
 
 /// What a monitor came to in a test: what the runner's own decides on the recording of it, and what the runner heard of
@@ -147,19 +147,19 @@ impl Watched {
 /// Nobody steps the nodes, and monitor and runner each hear the angle themselves. If the publisher rests for two
 /// seconds on a busy machine, or one of them hears late of it, only one may take that for silence.
 #[test]
-fn a_monitor_beside_real_nodes_is_heard_and_told_of_the_silence_of_the_test() {
+fn a_monitor_beside_real_nodes_is_heard_and_notices_the_silence() {
     let Some(watched) = watched("ros2_monitor") else { return };
     for test in &watched {
         for (who, moments) in [("decided", &test.decided), ("heard", &test.heard)] {
             let moves = moments.iter().any(|(_, state)| state == "moves");
             assert!(moves, "T{}: the angle swings, {who}: {moments:?}", test.number);
         }
-        assert!(test.number != 1 || test.lost() >= 1, "the silence of the test: {:?}", test.heard);
+        assert!(test.number != 1 || test.lost() >= 1, "the monitor does not notice the silence: {:?}", test.heard);
     }
 }
 
 #[test]
-#[ignore = "long: what a monitor hears, and when, depends on what else the machine does"]
+#[ignore = "long: what a monitor hears, and when, depends on the load of the machine"]
 fn what_a_monitor_beside_real_nodes_publishes_is_what_the_runner_decides_and_heard_within_half_a_second() {
     for test in watched("ros2_monitor_alone").into_iter().flatten() {
         let Watched { number, heard, .. } = &test;
@@ -167,10 +167,6 @@ fn what_a_monitor_beside_real_nodes_publishes_is_what_the_runner_decides_and_hea
             assert!((0.0..ON_ITS_WAY).contains(&way), "T{number}: {way} s");
         }
         assert!(heard.len() >= 5, "T{number}: it swings three times: {heard:?}");
-        assert_eq!(
-            test.lost(),
-            usize::from(*number == 1),
-            "T{number}: it is told of the silence of the test: {heard:?}"
-        );
+        assert_eq!(test.lost(), usize::from(*number == 1), "T{number}: only the test silences the angle: {heard:?}");
     }
 }

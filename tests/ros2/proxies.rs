@@ -147,10 +147,10 @@ fn a_wrong_token_none_and_plain_text_to_a_port_of_tls_are_refused_and_noted_with
     let url = format!("wss://127.0.0.1:{}", hall.station);
     let settings = "{ token from file \"token\"  certificate \"hall.pem\"  key \"hall.key\" }";
     let station = format!("proxy station \"{url}\" {settings}");
-    // Nobody is `absent`, so the run does not begin, whoever is let in.
+    // No client ever connects as `absent`, so the run does not begin even while a client is let in as `station`.
     let nodes = "node station { publishes peer }  node absent { subscribes peer }";
     let text = space(&hall.domain, JOINTS, nodes, "operation lost on peer to absent = blackhole", 60);
-    let proxies = format!("{station}  proxy absent \"ws://127.0.0.1:{}\"", hall.viewer);
+    let proxies = format!("{station}  proxy absent \"wss://127.0.0.1:{}\" {settings}", hall.viewer);
     let bridge = format!("rosbridge \"ws://127.0.0.1:{}\" {{ {proxies}  domain", hall.bridge);
     let mut system = System::in_folder(plan(&text.replacen("ros2 { domain", &bridge, 1)), folder);
     let said = std::thread::scope(|scope| {
@@ -181,7 +181,7 @@ fn a_wrong_token_none_and_plain_text_to_a_port_of_tls_are_refused_and_noted_with
             ]
         });
         let error = system.reset();
-        assert!(error.contains("no client of node `absent` is connected to its proxy at `ws://"), "{error}");
+        assert!(error.contains("no client of node `absent` is connected to its proxy at `wss://"), "{error}");
         attempts.join().expect("all were tried")
     });
     let [wrong, wrong_in_address, none, plain, in_address, right] = said;

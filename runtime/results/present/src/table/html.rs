@@ -20,16 +20,17 @@ impl Table {
     fn rows_of(&self, markup: &mut Markup, linked: &[u32], stacking: bool) {
         let words: Vec<Vec<String>> = (0..self.columns.len()).map(|column| self.words(column)).collect();
         markup.open("div", &[("class", "scroll")]);
+        let titles: Vec<String> = (0..self.columns.len()).map(|column| self.shown_title(column)).collect();
         let stacks: &[(&str, &str)] = if stacking { &[("class", "stacks")] } else { &[] };
         markup.open("table", stacks);
-        self.titles(markup);
+        self.titles(markup, &titles);
         markup.open("tbody", &[]);
         for (at, row) in self.rows.iter().enumerate() {
             markup.open("tr", &[]);
             for (column, cell) in row.iter().enumerate() {
-                let (class, title) = (self.class(column, cell.tone), self.shown_title(column));
+                let class = self.class(column, cell.tone);
                 let mut attributes: Vec<(&str, &str)> = Vec::new();
-                attributes.extend(stacking.then_some(("data-title", title.as_str())));
+                attributes.extend(stacking.then_some(("data-title", titles[column].as_str())));
                 let is_heading = self.columns[column].style == Style::Heading;
                 if is_heading {
                     attributes.push(("scope", "row"));
@@ -56,12 +57,12 @@ impl Table {
     }
 
     /// A title for each column; those of columns of numbers stand to the right, as the numbers do.
-    fn titles(&self, markup: &mut Markup) {
+    fn titles(&self, markup: &mut Markup, titles: &[String]) {
         markup.open("thead", &[]);
         markup.open("tr", &[]);
-        for at in 0..self.columns.len() {
+        for (at, title) in titles.iter().enumerate() {
             let class = if self.is_right(at) { "number" } else { "words" };
-            markup.element("th", &[("scope", "col"), ("class", class)], &self.shown_title(at));
+            markup.element("th", &[("scope", "col"), ("class", class)], title);
         }
         markup.close();
         markup.close();

@@ -224,16 +224,16 @@ fn causes(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
     body.element("p", &[("class", "quiet")], &caption);
     if let Some(worst) = found.worst().filter(|_| found.causes.len() > 1) {
         let of = if found.causes.iter().any(|cause| cause.requirement != worst.requirement) {
-            format!(" that violate {}", worst.requirement)
+            format!(" that violates {}", worst.requirement)
         } else {
             String::new()
         };
-        body.element("p", &[], &format!("The worst of the smallest tests{of}:"));
+        body.element("p", &[], &format!("No other smallest test{of} is farther outside the bound:"));
     }
     body.close();
 }
 
-/// The worst of the smallest tests of causes, which is drawn next to them.
+/// The test that shows the worst cause; it is drawn next to the table.
 fn worst_of_causes(summary: &Summary) -> Option<u32> {
     summary.causes.as_ref().and_then(CausesSummary::worst).map(|cause| cause.test.0)
 }

@@ -35,7 +35,7 @@ fn the_page_is_well_formed_and_needs_nothing_but_itself() {
     assert_eq!(
         [next(), next()],
         [worst.test.to_string().as_str(), "T0"],
-        "the worst smallest test of a cause, then the reference run"
+        "the test that shows the worst cause, then the reference run"
     );
     assert!(found.causes.iter().all(|cause| cause.requirement != worst.requirement || cause.outside <= worst.outside));
     let section = document.descendants().find(|node| node.text() == Some("Causes") && node.has_tag_name("h2")).unwrap();

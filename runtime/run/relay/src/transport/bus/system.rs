@@ -514,7 +514,7 @@ mod tests {
     use super::*;
     use crate::value::Value;
 
-    /// A bus on which somebody is missing until it was asked so often; then it makes a file.
+    /// A bus that reports a missing node until it was asked so often; then it makes a file.
     struct Incomplete {
         left: u32,
         file: PathBuf,
@@ -549,8 +549,8 @@ mod tests {
         fn disconnect(&mut self) {}
     }
 
-    /// Assembles a system whose program is ready once a file is there, and on which somebody is missing until it was
-    /// asked so often. From when the program is ready, there is no time.
+    /// Assembles a system whose program is ready once a file is there. A node is missing until the bus was asked so
+    /// often. The limit is zero: what is missing once the program is ready is an error at once.
     fn assembled(folder: &Path, ready_at: &str, missing: u32) -> Result<(), TransportError> {
         let script = format!("while [ ! -e {ready_at} ]; do sleep 0.02; done; echo ready; exec sleep 1000");
         let mut plan = minimal();
