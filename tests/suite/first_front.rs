@@ -37,7 +37,7 @@ fn following_what_new_prints_leads_to_a_front() {
     fs::write(&hook, format!("{before}fn {function}({signature}{{\n        {body}\n    }}\n{after}")).unwrap();
 
     let ran = call(run);
-    assert!(ran.out.contains("Front of"), "{}", ran.out);
+    assert!(ran.out.contains("front of"), "{}", ran.out);
     assert!(ran.out.contains("R1"), "the cart comes too close to the wall in some test: {}", ran.out);
     assert!(!ran.err.contains("warning"), "a filled-in stub compiles without a warning: {}", ran.err);
 }

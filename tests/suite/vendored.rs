@@ -78,7 +78,7 @@ fn a_vendored_runner_builds_and_runs_with_no_checkout_and_no_project_near() {
     let mut run = command(env!("CARGO"));
     run.args(["run", "--quiet", "--", "run", "--workers", "2"]).env("CARGO_PROFILE_DEV_OPT_LEVEL", "0");
     let ran = done(run.current_dir(&runner)).expect(0);
-    assert!(ran.out.contains("Front of"), "{}", ran.out);
+    assert!(ran.out.contains("front of"), "{}", ran.out);
     assert!(!ran.err.contains("warning"), "{}", ran.err);
     assert!(runner.join("results/3/results.sqlite").is_file());
 }

@@ -3,7 +3,8 @@
 `digest` is over what was serialised, with padding whose bytes may be anything; `content` over the values alone, which
 is the same for all vendors and in every run. It says `up` and `matched`. With `--hold` it does what lines on its
 standard input say: a `probe` (`common.py`), or `go` for all samples or a batch of them, and it stays until its input
-ends, so that nothing of what it has sent is lost with it. Exit codes: 0 all was sent; 2 nobody subscribed in time.
+ends, so that nothing of what it has sent is lost with it. `reliable` is whether every subscription that it knows at the
+end asks for what was lost. Exit codes: 0 all was sent; 2 nobody subscribed in time.
 """
 
 import argparse
@@ -14,6 +15,7 @@ import time
 import common
 import rclpy
 from rclpy.duration import Duration
+from rclpy.qos import ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from samples import TYPES, canonical, probe, sample
 
@@ -65,7 +67,9 @@ def main() -> None:
                 due += 1 / options.rate
                 time.sleep(max(0.0, due - time.monotonic()))
     publisher.wait_for_all_acked(Duration(seconds=options.timeout))
-    common.say(count=sent, digest=digest.hexdigest(), content=content.hexdigest(), code=0)
+    known = node.get_subscriptions_info_by_topic(options.topic)
+    reliable = all(one.qos_profile.reliability == ReliabilityPolicy.RELIABLE for one in known)
+    common.say(count=sent, digest=digest.hexdigest(), content=content.hexdigest(), reliable=reliable, code=0)
     if options.hold:
         sys.stdin.read()
     node.destroy_node()

@@ -8,6 +8,7 @@ use sesame_base::test_number::TestNumber;
 
 use crate::number;
 
+pub use html::link_to_test;
 pub use text::{TextOptions, wrap};
 
 /// Rows of cells under named columns.

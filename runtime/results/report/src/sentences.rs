@@ -22,7 +22,8 @@ use crate::facts::summary::{RequirementSummary, Summary};
 use crate::facts::wording::outcome_words;
 use sesame_base::visible::visible;
 
-/// The whole in one sentence: `Front of 6 tests, 2 requirements violated (R1 by 31 tests, R4 by 3)`.
+/// The whole in one sentence, dangers first: `2 requirements violated (R1 by 31 tests, R4 by 3), 5 causes, front of 6
+/// tests`.
 pub fn headline(summary: &Summary) -> String {
     let mut violated: Vec<String> = Vec::new();
     for requirement in summary.requirements.iter().filter(|requirement| requirement.violated > 0) {
@@ -36,8 +37,6 @@ pub fn headline(summary: &Summary) -> String {
     let untested = summary.counts.evaluations == 0 && !summary.undisturbed;
     if untested {
         parts.push("nothing was tested".to_owned());
-    } else if !summary.objectives.is_empty() {
-        parts.push(format!("front of {}", plural(summary.front.len(), "test", "tests")));
     }
     let judged = summary.requirements.iter().any(|requirement| requirement.satisfied > 0);
     let open = summary.requirements.iter().any(|requirement| requirement.inconclusive > 0);
@@ -53,12 +52,6 @@ pub fn headline(summary: &Summary) -> String {
     if let Some(monitors) = &summary.monitors {
         parts.extend(missed_words(monitors));
     }
-    let satisfied = summary.expectations.iter().filter(|expectation| expectation.verdict == Verdict::Satisfied).count();
-    match summary.expectations.len() {
-        0 => {}
-        all if satisfied == all => parts.push(plural(all, "expectation satisfied", "expectations satisfied")),
-        all => parts.push(format!("{satisfied} of {} satisfied", plural(all, "expectation", "expectations"))),
-    }
     for (word, one, several) in [
         ("crash", "crash", "crashes"),
         ("timeout", "timeout", "timeouts"),
@@ -70,6 +63,15 @@ pub fn headline(summary: &Summary) -> String {
         if count > 0 {
             parts.push(plural(count, one, several));
         }
+    }
+    let satisfied = summary.expectations.iter().filter(|expectation| expectation.verdict == Verdict::Satisfied).count();
+    match summary.expectations.len() {
+        0 => {}
+        all if satisfied == all => parts.push(plural(all, "expectation satisfied", "expectations satisfied")),
+        all => parts.push(format!("{satisfied} of {} satisfied", plural(all, "expectation", "expectations"))),
+    }
+    if !untested && !summary.objectives.is_empty() {
+        parts.push(format!("front of {}", plural(summary.front.len(), "test", "tests")));
     }
     let mut sentence = parts.join(", ");
     if let Some(first) = sentence.get_mut(..1) {
@@ -85,15 +87,32 @@ fn missed_words(monitors: &MonitorsSummary) -> Option<String> {
     (!tests.is_empty()).then(|| format!("hazards missed in {}", plural(tests.len(), "test", "tests")))
 }
 
-/// What a requirement with causes asks for, and how far tests are from that, in sentences: `R1: No load falls over
-/// people (drops ≤ 0). 11 tests violate it, in 2 ways; the worst value is 1, in T2.`
-pub(crate) fn violated_sentence(requirement: &RequirementSummary, causes: usize) -> String {
-    let RequirementSummary { requirement, text, metric, bound, violated, worst, .. } = requirement;
-    let tests = plural(*violated, "test violates it", "tests violate it");
+/// What a requirement with causes asks for, and how far tests are from that.
+pub(crate) struct Violated {
+    /// `R1: No load falls over people (drops ≤ 0). 11 of 84 conclusive tests violate it, in 2 ways.`
+    pub sentences: String,
+    /// The worst test, with its value and what is done in it: `T2, where it is 1: lag (latency 310 ms, 4.00–9.00 s).`
+    pub worst: Option<(TestNumber, String)>,
+}
+
+/// What precedes the worst test of [`Violated`].
+pub(crate) const WORST: &str = "The worst test is";
+
+/// What is to be said of a requirement with this many causes.
+pub(crate) fn violated(requirement: &RequirementSummary, causes: usize) -> Violated {
+    let RequirementSummary { requirement, text, metric, bound, violated, satisfied, worst, .. } = requirement;
+    let of = plural(violated + satisfied, "conclusive test", "conclusive tests");
+    let violate = if *violated == 1 { "violates" } else { "violate" };
     let ways = plural(causes, "way", "ways");
-    let worst =
-        worst.as_ref().map_or(String::new(), |worst| format!("; the worst value is {}, in {}", worst.text, worst.test));
-    format!("{requirement}: {text} ({metric} {bound}). {tests}, in {ways}{worst}.")
+    let sentences = format!("{requirement}: {text} ({metric} {bound}). {violated} of {of} {violate} it, in {ways}.");
+    let worst = worst.as_ref().map(|worst| {
+        let what = match worst.acting.as_slice() {
+            [] => String::new(),
+            acting => format!(": {}", disturbances_text(acting)),
+        };
+        (worst.test, format!(", where {metric} is {}{what}.", worst.text))
+    });
+    Violated { sentences, worst }
 }
 
 /// In how many ways requirements are violated, and what is known of others, in sentences.

@@ -72,7 +72,7 @@ pub(super) fn causes(found: &CausesSummary) -> Table {
     let mut columns = vec![Column::heading("requirement"), Column::line("cause"), Column::words("smallest test")];
     columns.extend(again.then(|| Column::line("fresh runs")));
     columns.extend([Column::line("violating"), Column::line("first")]);
-    columns.extend(several.then(|| Column::line("fewer")));
+    columns.extend(several.then(|| Column::line("with fewer")));
     columns.push(Column::sentence("what it does"));
     let mut table = Table::with(columns);
     for cause in &found.causes {
@@ -82,9 +82,9 @@ pub(super) fn causes(found: &CausesSummary) -> Table {
             Datum::Test(cause.test).into(),
         ];
         cells.extend(again.then(|| Datum::maybe(cause.again.as_ref().map(FindingAgain::words)).into()));
-        cells.push(Datum::text(format!("{} of {}", cause.violating, cause.held)).into());
+        cells.push(Datum::text(format!("{} of {} with it", cause.violating, cause.held)).into());
         cells.push(Datum::Test(cause.first).into());
-        cells.extend(several.then(|| Datum::text(cause.fewer.word()).into()));
+        cells.extend(several.then(|| Datum::maybe(cause.fewer.word().map(str::to_owned)).into()));
         let what = disturbances_text(&cause.acting);
         cells.push(Datum::text(format!("{what}: {} is {}", cause.metric, cause.value)).into());
         table.row(cells);

@@ -39,9 +39,9 @@ impl Table {
                 }
                 markup.open(if is_heading { "th" } else { "td" }, &attributes);
                 match &cell.datum {
-                    Datum::Test(test) => link(markup, *test, linked),
+                    Datum::Test(test) => link_to_test(markup, *test, linked),
                     Datum::OfTest(test, text) => {
-                        link(markup, *test, linked);
+                        link_to_test(markup, *test, linked);
                         markup.text(&format!(" {text}"));
                     }
                     Datum::Shares(shares) => bar(markup, shares),
@@ -95,7 +95,7 @@ impl Table {
 }
 
 /// The name of a test, as a link if there is an element to lead to.
-fn link(markup: &mut Markup, test: TestNumber, linked: &[u32]) {
+pub fn link_to_test(markup: &mut Markup, test: TestNumber, linked: &[u32]) {
     let name = test.to_string();
     if linked.contains(&test.0) {
         markup.element("a", &[("href", &format!("#{name}"))], &name);

@@ -9,7 +9,7 @@ use sesame_plan::{Bound, CampaignPlan, Task};
 use sesame_present::number;
 use sesame_record::{Judge, RecordError, Repository, TestRow, verdict};
 
-use crate::facts::show::{OperationReport, operations};
+use crate::facts::show::{OperationReport, acting};
 use crate::facts::wording;
 
 /// What the tests of a campaign say about causes.
@@ -112,7 +112,6 @@ fn summarise(
     let record = repository.test(cause.smallest)?;
     let shown = record.observation.value(requirement.metric);
     let value = wording::value_text(shown, metric.unit.as_deref(), &[requirement.bound]);
-    let acts = |used: &OperationReport| used.counters.is_none_or(|counters| counters.any_effect());
     let first = verdict(requirement.bound, &record.observation.outcome, shown);
     let was_run_again = !judge.runs(cause.smallest).is_empty();
     let again = FindingAgain::of(&requirement.name, judge.tally(cause.smallest, requirement), first);
@@ -121,7 +120,7 @@ fn summarise(
         text: requirement.text.clone(),
         operations: cause.operations.iter().map(|&id| plan.operation(id).name.clone()).collect(),
         test: TestNumber(cause.smallest),
-        acting: operations(plan, &record).into_iter().filter(acts).collect(),
+        acting: acting(plan, &record),
         metric: metric.name.clone(),
         value,
         outside: shown.value.map_or(0.0, |value| distance_outside(requirement.bound, value)),

@@ -351,6 +351,12 @@ pub(crate) fn report_on(
     }
 }
 
+/// The operations of a test without those that had no effect, and what they did.
+pub(crate) fn acting(plan: &CampaignPlan, record: &TestRecord) -> Vec<OperationReport> {
+    let acts = |used: &OperationReport| used.counters.is_none_or(|counters| counters.any_effect());
+    operations(plan, record).into_iter().filter(acts).collect()
+}
+
 /// The operations of a test, and what they did.
 pub(crate) fn operations(plan: &CampaignPlan, record: &TestRecord) -> Vec<OperationReport> {
     let reports = record.test.operations.iter().enumerate().map(|(position, used)| {

@@ -24,6 +24,7 @@ use crate::facts::coverage::{CoverageSummary, coverage};
 use crate::facts::pairs::{PairsSummary, pairs_of_search};
 use crate::facts::readable;
 use crate::facts::repetition::{Repetition, repetition};
+use crate::facts::show::{OperationReport, acting};
 use crate::facts::shrinking::{Shrinking, shrinkings};
 use crate::facts::stacked::{Stacked, stacked_in};
 use crate::facts::wording::{operations, tests_not_imported, value_text, violated};
@@ -112,6 +113,16 @@ pub struct Summary {
 }
 
 impl Summary {
+    /// The requirements that have causes, and how many each has.
+    pub(crate) fn violated_by_causes<'a>(
+        &'a self,
+        found: &'a CausesSummary,
+    ) -> impl Iterator<Item = (&'a RequirementSummary, usize)> {
+        let causes = |name: &str| found.causes.iter().filter(|cause| cause.requirement == name).count();
+        let counted = self.requirements.iter().map(move |requirement| (requirement, causes(&requirement.requirement)));
+        counted.filter(|(_, causes)| *causes > 0)
+    }
+
     /// How tests were shrunk, one or several.
     pub(crate) fn shrunk(&self) -> impl Iterator<Item = &Shrinking> {
         self.shrinking.iter().chain(&self.shrinkings)
@@ -213,6 +224,8 @@ pub struct Worst {
     pub value: f64,
     /// The value and its unit; `(never set)` follows where it is the default.
     pub text: String,
+    /// Its operations, without those that had no effect.
+    pub acting: Vec<OperationReport>,
 }
 
 /// Whether a metric of a regression test is as expected.
@@ -357,8 +370,8 @@ pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: &[u3
         requirements: plan
             .requirements
             .iter()
-            .map(|requirement| summarise_requirement(plan, &judge, requirement, rows))
-            .collect(),
+            .map(|requirement| summarise_requirement(repository, &judge, requirement, rows))
+            .collect::<Result<_, _>>()?,
         causes: causes_of_search(repository, &judge, rows)?,
         monitors: monitors_summary(repository, rows)?,
         mend: None,
@@ -477,11 +490,12 @@ fn stacked_of(repository: &Repository, row: &TestRow) -> Result<Vec<Stacked>, Re
 }
 
 fn summarise_requirement(
-    plan: &CampaignPlan,
+    repository: &Repository,
     judge: &Judge<'_>,
     requirement: &Requirement,
     rows: &[TestRow],
-) -> RequirementSummary {
+) -> Result<RequirementSummary, RecordError> {
+    let plan = repository.plan();
     let metric = plan.metric(requirement.metric);
     let unit = metric.unit.as_deref();
     let mut found = RequirementSummary {
@@ -526,11 +540,14 @@ fn summarise_requirement(
             }
         }
     }
-    found.worst = worst.and_then(|(_, row, shown)| {
-        let value = shown.value?;
-        Some(Worst { test: TestNumber(row.number), value, text: value_text(shown, unit, &[requirement.bound]) })
-    });
-    found
+    if let Some((_, row, shown)) = worst
+        && let Some(value) = shown.value
+    {
+        let acting = acting(plan, &repository.test(row.number)?);
+        let text = value_text(shown, unit, &[requirement.bound]);
+        found.worst = Some(Worst { test: TestNumber(row.number), value, text, acting });
+    }
+    Ok(found)
 }
 
 impl RequirementSummary {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use sesame_present::chart::evenly;
 use sesame_present::markup::{Heading, Markup, fill};
-use sesame_present::table::Table;
+use sesame_present::table::{Table, link_to_test};
 use sesame_record::{Origin, RecordError, Repository, TestRow};
 
 use crate::facts::causes::CausesSummary;
@@ -18,7 +18,7 @@ use crate::html::header::{about, header};
 use crate::html::policy::policy;
 use crate::html::test::test;
 use crate::html::{before_after, cells, monitors, pairs, regions, shrinking, tree};
-use crate::sentences::{QUARANTINED, causes_sentence, once_sentence, violated_sentence};
+use crate::sentences::{QUARANTINED, Violated, WORST, causes_sentence, once_sentence, violated};
 use crate::tables;
 
 /// Causes whose smallest tests are drawn at most.
@@ -207,18 +207,25 @@ fn causes(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
     let Some(found) = summary.causes.as_ref().filter(|found| !found.causes.is_empty()) else { return };
     body.open("section", &[]);
     body.heading("Causes");
-    for requirement in &summary.requirements {
-        let causes = found.causes.iter().filter(|cause| cause.requirement == requirement.requirement).count();
-        if causes > 0 {
-            body.element("p", &[], &violated_sentence(requirement, causes));
+    for (requirement, causes) in summary.violated_by_causes(found) {
+        let Violated { sentences, worst } = violated(requirement, causes);
+        body.open("p", &[]);
+        body.text(&sentences);
+        if let Some((test, words)) = worst {
+            body.text(&format!(" {WORST} "));
+            link_to_test(body, test, drawn);
+            body.text(&words);
         }
+        body.close();
     }
     let mut table = tables::causes(found);
     let more = table.truncate(FAILURES);
     table.html_stacking(body, drawn);
     left_out(body, more);
     let caption =
-        "A cause is a requirement with a smallest set of operations that violates it, as far as tests were run.";
+        "A cause is a requirement with a smallest set of operations that violates it, as far as tests were run. \
+         Violating: how many of the conclusive tests with these operations violate the requirement; first: the first one \
+         that does.";
     let caption =
         [Some(caption.to_owned()), causes_sentence(found)].into_iter().flatten().collect::<Vec<_>>().join(" ");
     body.element("p", &[("class", "quiet")], &caption);

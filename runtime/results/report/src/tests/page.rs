@@ -39,10 +39,12 @@ fn the_page_is_well_formed_and_needs_nothing_but_itself() {
     );
     assert!(found.causes.iter().all(|cause| cause.requirement != worst.requirement || cause.outside <= worst.outside));
     let section = document.descendants().find(|node| node.text() == Some("Causes") && node.has_tag_name("h2")).unwrap();
-    let first = section.parent().unwrap().children().filter(|node| node.has_tag_name("p")).find_map(|node| node.text());
-    let said = first.unwrap();
+    let paragraph = section.parent().unwrap().children().find(|node| node.has_tag_name("p")).unwrap();
+    let said = paragraph.text().unwrap();
     assert!(said.starts_with(&format!("{}: {} (", worst.requirement, worst.text)), "{said}");
-    assert!(said.contains("; the worst value is "), "{said}");
+    assert!(said.ends_with(" The worst test is "), "{said}");
+    let link = paragraph.children().find(|node| node.has_tag_name("a")).expect("a link to the worst test");
+    assert!(link.next_sibling().unwrap().text().unwrap().starts_with(", where "), "its value, and what it does");
     let contents = document.descendants().find(|node| node.attribute("class") == Some("contents")).unwrap();
     let sections: Vec<&str> = contents.children().filter_map(|link| link.text()).collect();
     assert_eq!(sections.first(), Some(&"Causes"));
