@@ -18,9 +18,10 @@ use crate::facts::show::{TestList, TestReport};
 use crate::facts::shrinking::Shrinking;
 use crate::facts::summary::Summary;
 use crate::sentences::{
-    QUARANTINED, Violated, WORST, beyond_sentence, causes_sentence, confirmation_sentence, counts_sentence, coverage_sentence,
-    disturbances_text, headline, mend_sentence, monitors_run_again, monitors_sentence, needs_sentences, once_sentence,
-    outcome_sentence, shrinking_sentence, values_sentence, violated, without_effect_sentence,
+    QUARANTINED, Violated, WORST, beyond_sentence, causes_sentence, confirmation_sentence, counts_sentence,
+    coverage_sentence, disturbances_text, headline, mend_sentence, monitors_run_again, monitors_sentence,
+    needs_sentences, once_sentence, outcome_sentence, shrinking_sentence, values_sentence, violated,
+    without_effect_sentence,
 };
 use crate::tables;
 

@@ -222,8 +222,7 @@ fn causes(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
     let more = table.truncate(FAILURES);
     table.html_stacking(body, drawn);
     left_out(body, more);
-    let caption =
-        "A cause is a requirement with a smallest set of operations that violates it, as far as tests were run. \
+    let caption = "A cause is a requirement with a smallest set of operations that violates it, as far as tests were run. \
          Violating: how many of the conclusive tests with these operations violate the requirement; first: the first one \
          that does.";
     let caption =
