@@ -87,16 +87,16 @@ fn missed_words(monitors: &MonitorsSummary) -> Option<String> {
     (!tests.is_empty()).then(|| format!("hazards missed in {}", plural(tests.len(), "test", "tests")))
 }
 
-/// What a requirement with causes asks for, and how far tests are from that.
+/// What a requirement with causes asks for, and how far tests are from that: sentences, in which a test is named.
 pub(crate) struct Violated {
-    /// `R1: No load falls over people (drops ≤ 0). 11 of 84 conclusive tests violate it, in 2 ways.`
-    pub sentences: String,
-    /// The worst test, with its value and what is done in it: `T2, where it is 1: lag (latency 310 ms, 4.00–9.00 s).`
-    pub worst: Option<(TestNumber, String)>,
+    /// `R1: No load falls over people (drops ≤ 0). 11 of 84 conclusive tests violate it, in 2 ways. The worst value is
+    /// 1, in `
+    pub before: String,
+    /// The test with that value.
+    pub worst: Option<TestNumber>,
+    /// What is done in it: `: lag (latency 310 ms, at 4.00–9.00 s).`
+    pub after: String,
 }
-
-/// What precedes the worst test of [`Violated`].
-pub(crate) const WORST: &str = "The worst test is";
 
 /// What is to be said of a requirement with this many causes.
 pub(crate) fn violated(requirement: &RequirementSummary, causes: usize) -> Violated {
@@ -104,15 +104,13 @@ pub(crate) fn violated(requirement: &RequirementSummary, causes: usize) -> Viola
     let of = plural(violated + satisfied, "conclusive test", "conclusive tests");
     let violate = if *violated == 1 { "violates" } else { "violate" };
     let ways = plural(causes, "way", "ways");
-    let sentences = format!("{requirement}: {text} ({metric} {bound}). {violated} of {of} {violate} it, in {ways}.");
-    let worst = worst.as_ref().map(|worst| {
-        let what = match worst.acting.as_slice() {
-            [] => String::new(),
-            acting => format!(": {}", disturbances_text(acting)),
-        };
-        (worst.test, format!(", where {metric} is {}{what}.", worst.text))
-    });
-    Violated { sentences, worst }
+    let before = format!("{requirement}: {text} ({metric} {bound}). {violated} of {of} {violate} it, in {ways}.");
+    let Some(worst) = worst else { return Violated { before, worst: None, after: String::new() } };
+    let after = match worst.acting.as_slice() {
+        [] => ".".to_owned(),
+        acting => format!(": {}.", disturbances_text(acting)),
+    };
+    Violated { before: format!("{before} The worst value is {}, in ", worst.text), worst: Some(worst.test), after }
 }
 
 /// In how many ways requirements are violated, and what is known of others, in sentences.
@@ -365,10 +363,11 @@ pub(crate) fn verdict_value_text(requirement: &VerdictReport) -> String {
     }
 }
 
-/// What operations do in a test, and when: `lag_link1 (latency 310 ms, 4.00–9.00 s)`.
+/// What operations do in a test, and when: `lag_link1 (latency 310 ms, at 4.00–9.00 s)`.
 pub(crate) fn disturbances_text(operations: &[OperationReport]) -> String {
     let words = |used: &OperationReport| {
-        let words = [choices_text(used), planned_text(used)];
+        let at = if used.planned.is_some() { "at " } else { "" };
+        let words = [choices_text(used), format!("{at}{}", planned_text(used))];
         let words: Vec<&str> = words.iter().map(String::as_str).filter(|words| *words != "–").collect();
         if words.is_empty() { used.operation.clone() } else { format!("{} ({})", used.operation, words.join(", ")) }
     };

@@ -18,10 +18,9 @@ use crate::facts::show::{TestList, TestReport};
 use crate::facts::shrinking::Shrinking;
 use crate::facts::summary::Summary;
 use crate::sentences::{
-    QUARANTINED, Violated, WORST, beyond_sentence, causes_sentence, confirmation_sentence, counts_sentence,
-    coverage_sentence, disturbances_text, headline, mend_sentence, monitors_run_again, monitors_sentence,
-    needs_sentences, once_sentence, outcome_sentence, shrinking_sentence, values_sentence, violated,
-    without_effect_sentence,
+    QUARANTINED, Violated, beyond_sentence, causes_sentence, confirmation_sentence, counts_sentence, coverage_sentence,
+    disturbances_text, headline, mend_sentence, monitors_run_again, monitors_sentence, needs_sentences, once_sentence,
+    outcome_sentence, shrinking_sentence, values_sentence, violated, without_effect_sentence,
 };
 use crate::tables;
 
@@ -34,10 +33,10 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
     paragraph(&mut text, &headline(summary), options);
     if let Some(found) = &summary.causes {
         for (requirement, causes) in summary.violated_by_causes(found) {
-            let Violated { sentences, worst } = violated(requirement, causes);
-            let worst = worst.map_or(String::new(), |(test, words)| format!(" {WORST} {test}{words}"));
+            let Violated { before, worst, after } = violated(requirement, causes);
+            let worst = worst.map_or(String::new(), |test| test.to_string());
             text.push('\n');
-            paragraph(&mut text, &format!("{sentences}{worst}"), options);
+            paragraph(&mut text, &format!("{before}{worst}{after}"), options);
         }
         causes(&mut text, found, options);
     }

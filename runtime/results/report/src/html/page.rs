@@ -2,12 +2,13 @@
 
 use std::path::Path;
 
+use sesame_analysis::causes::Fewer;
 use sesame_present::chart::evenly;
 use sesame_present::markup::{Heading, Markup, fill};
 use sesame_present::table::{Table, link_to_test};
 use sesame_record::{Origin, RecordError, Repository, TestRow};
 
-use crate::facts::causes::CausesSummary;
+use crate::facts::causes::{CauseSummary, CausesSummary};
 use crate::facts::shrinking::Shrinking;
 use crate::facts::summary::{Summary, summarise};
 use crate::file::write_aside;
@@ -18,7 +19,7 @@ use crate::html::header::{about, header};
 use crate::html::policy::policy;
 use crate::html::test::test;
 use crate::html::{before_after, cells, monitors, pairs, regions, shrinking, tree};
-use crate::sentences::{QUARANTINED, Violated, WORST, causes_sentence, once_sentence, violated};
+use crate::sentences::{QUARANTINED, Violated, causes_sentence, once_sentence, violated};
 use crate::tables;
 
 /// Causes whose smallest tests are drawn at most.
@@ -208,36 +209,42 @@ fn causes(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
     body.open("section", &[]);
     body.heading("Causes");
     for (requirement, causes) in summary.violated_by_causes(found) {
-        let Violated { sentences, worst } = violated(requirement, causes);
+        let Violated { before, worst, after } = violated(requirement, causes);
         body.open("p", &[]);
-        body.text(&sentences);
-        if let Some((test, words)) = worst {
-            body.text(&format!(" {WORST} "));
+        body.text(&before);
+        if let Some(test) = worst {
             link_to_test(body, test, drawn);
-            body.text(&words);
         }
+        body.text(&after);
         body.close();
     }
     let mut table = tables::causes(found);
     let more = table.truncate(FAILURES);
     table.html_stacking(body, drawn);
     left_out(body, more);
-    let caption = "A cause is a requirement with a smallest set of operations that violates it, as far as tests were run. \
-         Violating: how many of the conclusive tests with these operations violate the requirement; first: the first one \
-         that does.";
-    let caption =
-        [Some(caption.to_owned()), causes_sentence(found)].into_iter().flatten().collect::<Vec<_>>().join(" ");
-    body.element("p", &[("class", "quiet")], &caption);
+    let mut caption = vec![COLUMNS_OF_CAUSES.to_owned()];
+    caption.extend(found.causes.iter().any(|cause| cause.fewer != Fewer::Single).then(|| WITH_FEWER.to_owned()));
+    caption.extend(causes_sentence(found));
+    body.element("p", &[("class", "quiet")], &caption.join(" "));
     if let Some(worst) = found.worst().filter(|_| found.causes.len() > 1) {
-        let of = if found.causes.iter().any(|cause| cause.requirement != worst.requirement) {
-            format!(" that violates {}", worst.requirement)
-        } else {
-            String::new()
-        };
-        body.element("p", &[], &format!("No other smallest test{of} is farther outside the bound:"));
+        let CauseSummary { test, requirement, .. } = worst;
+        let name = worst.name();
+        body.open("p", &[]);
+        body.prose(&format!(
+            "{test}, the smallest test of `{name}`: no other smallest test violates {requirement} by more."
+        ));
+        body.close();
     }
     body.close();
 }
+
+/// What a cause is, and what the columns of the table of causes mean.
+const COLUMNS_OF_CAUSES: &str = "A cause is a smallest set of operations with which a requirement is violated, as far as tests were run; a test may \
+     show several. Its smallest test has no other operations. Violating: of all conclusive tests with its operations, \
+     those that violate the requirement; first: the first of them.";
+
+/// What the column means that only causes of several operations have.
+const WITH_FEWER: &str = "With fewer: what came of the same test without each of its operations.";
 
 /// The test that shows the worst cause; it is drawn next to the table.
 fn worst_of_causes(summary: &Summary) -> Option<u32> {

@@ -42,9 +42,9 @@ fn the_page_is_well_formed_and_needs_nothing_but_itself() {
     let paragraph = section.parent().unwrap().children().find(|node| node.has_tag_name("p")).unwrap();
     let said = paragraph.text().unwrap();
     assert!(said.starts_with(&format!("{}: {} (", worst.requirement, worst.text)), "{said}");
-    assert!(said.ends_with(" The worst test is "), "{said}");
+    assert!(said.ends_with(", in "), "{said}");
     let link = paragraph.children().find(|node| node.has_tag_name("a")).expect("a link to the worst test");
-    assert!(link.next_sibling().unwrap().text().unwrap().starts_with(", where "), "its value, and what it does");
+    assert!(link.next_sibling().unwrap().text().unwrap().starts_with(": "), "what it does");
     let contents = document.descendants().find(|node| node.attribute("class") == Some("contents")).unwrap();
     let sections: Vec<&str> = contents.children().filter_map(|link| link.text()).collect();
     assert_eq!(sections.first(), Some(&"Causes"));
