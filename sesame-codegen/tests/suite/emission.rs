@@ -126,6 +126,16 @@ fn names_that_are_none_are_refused_all_at_once() {
 }
 
 #[test]
+fn a_dependency_that_cargo_would_not_know_by_its_name_is_refused() {
+    let mut environment = environment();
+    let runtime = environment.dependencies["sesame-runtime"].clone();
+    environment.dependencies.insert("a]\nb".to_owned(), runtime);
+    let refused = emit(&[small("c")], &environment).expect_err("the name ends its table");
+    let refused: Vec<String> = refused.iter().map(Problem::to_string).collect();
+    assert_eq!(refused, ["`a]\\nb` is not the name of a package, as [dependencies] has them"]);
+}
+
+#[test]
 fn metrics_that_would_share_a_file_are_refused() {
     let mut runner = small("c");
     runner.hooks[1].metric = "CollisionOccurrence".into();

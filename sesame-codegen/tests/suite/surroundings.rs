@@ -83,16 +83,20 @@ fn a_checkout_build_uses_the_runtime_of_its_checkout_and_its_locked_versions() {
 }
 
 #[test]
-fn a_sibling_runners_lock_file_comes_first() {
+fn the_lock_file_of_the_first_sibling_runner_by_name_comes_first() {
     let folder = tempfile::tempdir().unwrap();
     project(folder.path(), "");
     let out = folder.path().join("runners");
-    fs::create_dir_all(out.join("b")).unwrap();
-    fs::write(out.join("b/Cargo.lock"), "of b").unwrap();
+    // The right one is neither the oldest nor the newest, and one of many: no folder lists it first by chance.
+    for name in (150..200).chain(100..150).map(|number| format!("runner_{number}")) {
+        fs::create_dir_all(out.join(&name)).unwrap();
+        fs::write(out.join(format!("{name}/Cargo.lock")), format!("of {name}")).unwrap();
+    }
+    fs::create_dir_all(out.join("a")).unwrap();
     let found =
         environment(&folder.path().join("kuka_cell.sesame"), &out, &[small("c")], &EnvironmentOptions::default())
             .unwrap();
-    assert_eq!(found.lock.as_deref(), Some("of b"));
+    assert_eq!(found.lock.as_deref(), Some("of runner_100"));
 }
 
 #[test]

@@ -72,9 +72,7 @@ pub(super) fn describe(
             if question.asked.is_some_and(|asked| at - asked < AGAIN) {
                 continue;
             }
-            // A node that does not answer may be of another middleware, so the next one is asked then.
-            let node = question.nodes[question.times / 2 % question.nodes.len()];
-            question.times += 1;
+            let node = question.next_node();
             question.asked = Some(at);
             let (Some(client), Some(request)) = (clients.get_mut(node), descriptions.ask(question.name, question.hash))
             else {
@@ -122,6 +120,16 @@ fn question<'a>(facts: &'a Facts, name: &'a str) -> Option<Question<'a>> {
     Some(Question { name, hash, nodes, asked: None, times: 0, answer: None })
 }
 
+impl<'a> Question<'a> {
+    /// Whom to ask now. Each node is asked twice: one that does not answer may be of another middleware, so the next
+    /// one is asked then.
+    fn next_node(&mut self) -> &'a str {
+        let node = self.nodes[self.times / 2 % self.nodes.len()];
+        self.times += 1;
+        node
+    }
+}
+
 impl Client {
     fn new(node: &str, dds: &mut Participant) -> Result<Self, DdsError> {
         let [request, reply] = ["Request", "Response"].map(|part| names::type_name(&format!("{SERVICE}_{part}")));
@@ -139,5 +147,18 @@ impl Client {
             self.asked.insert(sent.sequence_number, question);
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_node_is_asked_twice_and_then_the_next_one() {
+        let nodes = vec!["/silent", "/other"];
+        let mut question = Question { name: "a", hash: "b", nodes, asked: None, times: 0, answer: None };
+        let asked: Vec<&str> = (0..6).map(|_| question.next_node()).collect();
+        assert_eq!(asked, ["/silent", "/silent", "/other", "/other", "/silent", "/silent"]);
     }
 }

@@ -227,6 +227,26 @@ fn cells_over_counts_spreads_and_integers_are_reached() {
 }
 
 #[test]
+fn a_test_made_of_given_numbers_keeps_the_operations_that_it_has() {
+    let mut plan = SYNTHETIC_ROBOTS[2].plan(Search::new(Strategy::Random, 1));
+    plan.campaign.count = Count { min: 2, max: 3 };
+    let (grid, test_space) = (table_3(), TestSpace::from_plan(&plan).unwrap());
+    let feasible = Feasible::from_plan(&plan, &grid);
+    let placer = CellPlacer::new(test_space.clone(), grid, feasible, plan.campaign.copies);
+    let kind: Vec<OperationId> = test_space.operations().iter().map(|kind| kind.operation).collect();
+    assert!(kind.len() >= 3, "there is a fresh operation to add");
+    let mut stream = Stream::derive(1, "test", &[]);
+    for _ in 0..50 {
+        let mut test = fresh_test(&test_space, &mut stream);
+        test.operations.truncate(2);
+        test.operations.dedup_by_key(|operation| operation.operation);
+        let made = placer.made_of(&test, &[(&kind, 3)], &mut stream).unwrap();
+        assert_eq!(made.operations.len(), 3, "{made:?}");
+        assert!(test.operations.iter().all(|kept| made.operations.contains(kept)), "{test:?} became {made:?}");
+    }
+}
+
+#[test]
 fn a_test_in_the_cell_changes_little_and_other_tests_keep_middles_and_numbers() {
     let mut plan = SYNTHETIC_ROBOTS[0].plan(Search::new(Strategy::Random, 1));
     // Disjoint copies leave less room, so some may have to be removed.

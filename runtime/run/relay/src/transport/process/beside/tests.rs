@@ -10,6 +10,7 @@ use sesame_plan::{
     MonitorId, Stale, StaleIs, Test, TopicId, Type,
 };
 
+use super::request::Delivered;
 use super::*;
 use crate::relay::{Listener, Relay};
 use crate::transport::process::session::Session;
@@ -153,6 +154,23 @@ fn a_monitor_beside_the_cell_decides_what_one_in_the_runner_decides_to_the_nanos
     assert!(disturbed.1.iter().any(|step| !step[1].as_array().unwrap().is_empty()), "mitigation is sent");
     assert_eq!(decided(true, &Test { operations: Vec::new() }), undisturbed);
     assert_eq!(decided(true, &late), disturbed, "decisions, and what the cell hears in each step");
+}
+
+#[test]
+fn what_time_alone_decides_is_told_when_it_passes() {
+    let [with, _] = plans();
+    let alone = with.of_monitor_alone(MonitorId(0)).unwrap();
+    let wires = WireTable::new(&alone);
+    let table = MetricTable::new(&alone, &wires, &[]).unwrap();
+    let mut told = Vec::new();
+    let mut tell = |decided: &Decided| told.push(decided.at);
+    let mut hearing = Hearing::new(&alone, &wires, &table.start(), &mut tell);
+    let value = serde_json::value::to_raw_value(&2.0).unwrap();
+    let level = Delivered { topic: "level".into(), time: 0.1, value: &value };
+    hearing.delivered(&[level], &mut Vec::new()).unwrap();
+    hearing.pass_to(SimTime::from_seconds(1.0));
+    // The level has been high for long enough after 170 ms, and is older than 230 ms a nanosecond later than that.
+    assert_eq!(told, [0, 270_000_000, 330_000_001].map(SimTime::from_nanos));
 }
 
 #[test]
