@@ -105,8 +105,8 @@ fn a_thousand_messages_reach_nodes_through_a_bridge_and_the_relay_however_they_a
         let plan = plan(&bridged(&domain, &port, settings, "", 60));
         let subscriber = hearing(&pythons, &domain, "1000", &["--content"]);
         let publisher = speaking(&pythons, &domain, "1000", &["--batch", &BATCH.to_string()]);
-        // A bridge that knows no publisher subscribes to a topic as best effort, and messages may be lost. So the first
-        // connection is for being known, and the second one is that of the test.
+        // Until the bridge has discovered the publisher, it subscribes as best effort, and messages may be lost. So the
+        // first connection waits until they have found each other, and the test uses the second.
         System::new(plan.clone()).relay_until(&Test::default(), || publisher.await_match(), |_| true);
         let mut system = System::new(plan);
         let to = [&subscriber];

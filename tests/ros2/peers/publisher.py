@@ -3,8 +3,8 @@
 `digest` is over what was serialised, with padding whose bytes may be anything; `content` over the values alone, which
 is the same for all vendors and in every run. It says `up` and `matched`. With `--hold` it does what lines on its
 standard input say: a `probe` (`common.py`), or `go` for all samples or a batch of them, and it stays until its input
-ends, so that nothing of what it has sent is lost with it. `reliable` is whether every subscription that it knows at the
-end asks for what was lost. Exit codes: 0 all was sent; 2 nobody subscribed in time.
+ends, so that nothing of what it has sent is lost with it. `reliable` says whether all subscriptions that
+it knows at the end are reliable. Exit codes: 0 all was sent; 2 nobody subscribed in time.
 """
 
 import argparse

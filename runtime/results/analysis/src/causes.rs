@@ -50,12 +50,12 @@ pub enum Fewer {
 }
 
 impl Fewer {
-    /// The word that tables use; `None` for a single operation, of which there are no fewer.
-    pub fn word(self) -> Option<&'static str> {
+    /// The word that tables use.
+    pub fn word(self) -> &'static str {
         match self {
-            Fewer::Single => None,
-            Fewer::NoViolation => Some("no violation"),
-            Fewer::NotTried => Some("not tried"),
+            Fewer::Single => "none",
+            Fewer::NoViolation => "no violation",
+            Fewer::NotTried => "not tried",
         }
     }
 }
@@ -213,7 +213,7 @@ pub fn table(plan: &CampaignPlan, causes: &[Cause]) -> Table {
             Datum::Whole(i64::from(cause.held)),
             cause.violating.first().map_or(Datum::Missing, |&test| Datum::test(test)),
             Datum::test(cause.smallest),
-            Datum::maybe(cause.fewer.word().map(str::to_owned)),
+            Datum::text(cause.fewer.word()),
         ]);
     }
     table

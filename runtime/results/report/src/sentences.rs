@@ -99,7 +99,7 @@ pub(crate) struct Violated {
 }
 
 /// What is to be said of a requirement with this many causes.
-pub(crate) fn violated(requirement: &RequirementSummary, causes: usize) -> Violated {
+pub(crate) fn violated_requirement(requirement: &RequirementSummary, causes: usize) -> Violated {
     let RequirementSummary { requirement, text, metric, bound, violated, satisfied, worst, .. } = requirement;
     let of = plural(violated + satisfied, "conclusive test", "conclusive tests");
     let violate = if *violated == 1 { "violates" } else { "violate" };

@@ -84,7 +84,8 @@ pub(super) fn causes(found: &CausesSummary) -> Table {
         cells.extend(again.then(|| Datum::maybe(cause.again.as_ref().map(FindingAgain::words)).into()));
         cells.push(Datum::text(format!("{} of {} with it", cause.violating, cause.held)).into());
         cells.push(Datum::Test(cause.first).into());
-        cells.extend(several.then(|| Datum::maybe(cause.fewer.word().map(str::to_owned)).into()));
+        let with_fewer = (cause.fewer != Fewer::Single).then(|| cause.fewer.word().to_owned());
+        cells.extend(several.then(|| Datum::maybe(with_fewer).into()));
         let what = disturbances_text(&cause.acting);
         cells.push(Datum::text(format!("{what}: {} is {}", cause.metric, cause.value)).into());
         table.row(cells);

@@ -20,7 +20,7 @@ use crate::facts::summary::Summary;
 use crate::sentences::{
     QUARANTINED, Violated, beyond_sentence, causes_sentence, confirmation_sentence, counts_sentence, coverage_sentence,
     disturbances_text, headline, mend_sentence, monitors_run_again, monitors_sentence, needs_sentences, once_sentence,
-    outcome_sentence, shrinking_sentence, values_sentence, violated, without_effect_sentence,
+    outcome_sentence, shrinking_sentence, values_sentence, violated_requirement, without_effect_sentence,
 };
 use crate::tables;
 
@@ -33,7 +33,7 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
     paragraph(&mut text, &headline(summary), options);
     if let Some(found) = &summary.causes {
         for (requirement, causes) in summary.violated_by_causes(found) {
-            let Violated { before, worst, after } = violated(requirement, causes);
+            let Violated { before, worst, after } = violated_requirement(requirement, causes);
             let worst = worst.map_or(String::new(), |test| test.to_string());
             text.push('\n');
             paragraph(&mut text, &format!("{before}{worst}{after}"), options);

@@ -351,7 +351,7 @@ pub(crate) fn report_on(
     }
 }
 
-/// The operations of a test without those that had no effect, and what they did.
+/// The operations that had an effect in a test, or whose effect is unknown, and what they did.
 pub(crate) fn acting(plan: &CampaignPlan, record: &TestRecord) -> Vec<OperationReport> {
     let acts = |used: &OperationReport| used.counters.is_none_or(|counters| counters.any_effect());
     operations(plan, record).into_iter().filter(acts).collect()

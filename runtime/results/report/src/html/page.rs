@@ -19,7 +19,7 @@ use crate::html::header::{about, header};
 use crate::html::policy::policy;
 use crate::html::test::test;
 use crate::html::{before_after, cells, monitors, pairs, regions, shrinking, tree};
-use crate::sentences::{QUARANTINED, Violated, causes_sentence, once_sentence, violated};
+use crate::sentences::{QUARANTINED, Violated, causes_sentence, once_sentence, violated_requirement};
 use crate::tables;
 
 /// Causes whose smallest tests are drawn at most.
@@ -209,7 +209,7 @@ fn causes(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
     body.open("section", &[]);
     body.heading("Causes");
     for (requirement, causes) in summary.violated_by_causes(found) {
-        let Violated { before, worst, after } = violated(requirement, causes);
+        let Violated { before, worst, after } = violated_requirement(requirement, causes);
         body.open("p", &[]);
         body.text(&before);
         if let Some(test) = worst {
@@ -240,11 +240,12 @@ fn causes(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
 
 /// What a cause is, and what the columns of the table of causes mean.
 const COLUMNS_OF_CAUSES: &str = "A cause is a smallest set of operations with which a requirement is violated, as far as tests were run; a test may \
-     show several. Its smallest test has no other operations. Violating: of all conclusive tests with its operations, \
-     those that violate the requirement; first: the first of them.";
+     show several. In its smallest test no other operation had an effect. Violating: of all conclusive tests with its \
+     operations, those that violate the requirement; first: the first of them.";
 
 /// What the column means that only causes of several operations have.
-const WITH_FEWER: &str = "With fewer: what came of the same test without each of its operations.";
+const WITH_FEWER: &str =
+    "With fewer: what came of a violating test of just these operations when each of them was left out.";
 
 /// The test that shows the worst cause; it is drawn next to the table.
 fn worst_of_causes(summary: &Summary) -> Option<u32> {

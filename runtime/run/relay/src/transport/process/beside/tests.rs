@@ -169,7 +169,7 @@ fn what_time_alone_decides_is_told_when_it_passes() {
     let level = Delivered { topic: "level".into(), time: 0.1, value: &value };
     hearing.delivered(&[level], &mut Vec::new()).unwrap();
     hearing.pass_to(SimTime::from_seconds(1.0));
-    // The level has been high for long enough after 170 ms, and is older than 230 ms a nanosecond later than that.
+    // The level counts as high after 170 ms, and as stale a nanosecond after 230 ms.
     assert_eq!(told, [0, 270_000_000, 330_000_001].map(SimTime::from_nanos));
 }
 
