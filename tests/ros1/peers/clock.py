@@ -3,6 +3,7 @@
     clock.py TOPIC
 """
 
+import threading
 import time
 
 import rospy
@@ -15,22 +16,26 @@ from common import say, start
 
 def main():
     (topic,) = start("clock")
-    clock = rospy.Publisher("/clock", Clock, queue_size=100)
-    publisher = rospy.Publisher(topic, String, queue_size=100)
+    # Without a limit: on a busy machine it catches up with hundreds of ticks at once, and none of them may be dropped.
+    clock = rospy.Publisher("/clock", Clock, queue_size=0)
+    publisher = rospy.Publisher(topic, String, queue_size=0)
     begun, at, steps = time.monotonic(), 0, 0
+    ticking = threading.Lock()
 
     def reset(_):
         nonlocal at
-        at = 0
+        with ticking:
+            at = 0
         return EmptyResponse()
 
     rospy.Service("/reset", Empty, reset)
     say({"ready": True})
     while True:
-        at, steps = at + 1, steps + 1
-        clock.publish(Clock(rospy.Time(1000 + at // 50, at % 50 * 20_000_000)))
-        if at % 50 == 0:
-            publisher.publish(String(str(at // 50)))
+        with ticking:
+            at, steps = at + 1, steps + 1
+            clock.publish(Clock(rospy.Time(1000 + at // 50, at % 50 * 20_000_000)))
+            if at % 50 == 0:
+                publisher.publish(String(str(at // 50)))
         time.sleep(max(0.0, begun + steps / 500 - time.monotonic()))
 
 

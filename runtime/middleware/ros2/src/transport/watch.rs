@@ -55,6 +55,10 @@ pub(super) struct Watch {
     there: BTreeMap<GUID, Present>,
     /// Who has appeared, and when; until it has a name, or long enough.
     fresh: BTreeMap<GUID, Instant>,
+    /// Who was there at the beginning of the first run.
+    familiar: BTreeSet<Known>,
+    /// Who has come since, without those who came back, in the order in which they came.
+    newcomers: Vec<GUID>,
     /// Who has gone and not come back.
     gone: BTreeSet<Known>,
     /// Who is beyond those declared, in a sentence.
@@ -69,6 +73,7 @@ impl Watch {
         self.said.clear();
         if self.looked.is_none() {
             self.there = present().into_iter().map(|present| (present.guid, present)).collect();
+            self.familiar = self.there.values().map(known).collect();
         }
     }
 
@@ -106,6 +111,7 @@ impl Watch {
             }
         }
         self.fresh.retain(|guid, _| present.contains_key(guid));
+        self.newcomers.retain(|guid| present.contains_key(guid));
         self.beyond.retain(|guid, _| present.contains_key(guid));
         for (&guid, newcomer) in &present {
             if self.there.contains_key(&guid) {
@@ -116,18 +122,37 @@ impl Watch {
                 continue;
             }
             self.fresh.remove(&guid);
-            let there = present.values().filter(|other| other.declared == newcomer.declared).count();
             if self.gone.remove(&known(newcomer)) {
                 notes.push(came_back(&known(newcomer)));
-            } else if let Some(most) = newcomer.declared.most.filter(|&most| there > most) {
-                self.beyond.insert(guid, too_many(newcomer, there, most));
+            } else {
+                self.newcomers.push(guid);
             }
             self.there.insert(guid, newcomer.clone());
         }
+        self.find_those_beyond(&present);
         notes.extend(self.gone.iter().map(has_gone));
         notes.extend(self.beyond.values().cloned());
         notes.retain(|note| self.said.insert(note.clone()));
         notes
+    }
+
+    /// Where more are there than are declared, those beyond are newcomers: first those whose names are new, and of them
+    /// the latest. A newcomer may have been there before it was one too many, for example while a declared node was
+    /// away.
+    fn find_those_beyond(&mut self, present: &BTreeMap<GUID, Present>) {
+        let mut newcomers: Vec<&Present> = self.newcomers.iter().rev().map(|guid| &present[guid]).collect();
+        newcomers.sort_by_key(|newcomer| self.familiar.contains(&known(newcomer)));
+        let mut found: BTreeMap<&DeclaredEndpoint, usize> = BTreeMap::new();
+        for newcomer in newcomers {
+            let declared = &newcomer.declared;
+            let Some(most) = declared.most else { continue };
+            let there = present.values().filter(|other| other.declared == *declared).count();
+            let found = found.entry(declared).or_default();
+            if *found < there.saturating_sub(most) {
+                *found += 1;
+                self.beyond.entry(newcomer.guid).or_insert_with(|| too_many(newcomer, there, most));
+            }
+        }
     }
 }
 
@@ -244,6 +269,44 @@ mod tests {
         let seen = said(&[arm], &looks);
         assert_eq!(seen.iter().map(Vec::len).collect::<Vec<_>>(), [0, 0, 0, 0, 0, 0, 1], "{seen:?}");
         assert!(seen[6][0].starts_with("`participant 0202"), "{seen:?}");
+    }
+
+    #[test]
+    fn who_came_while_a_declared_node_was_away_is_one_too_many_when_that_returns() {
+        let (arm, again) = (present(1, Role::Publishes, Some("/arm")), present(3, Role::Publishes, Some("/arm")));
+        let stray = present(2, Role::Publishes, Some("/stray"));
+        let (alone, both) = ([stray.clone()], [stray, again]);
+        let seen = said(&[arm], &[(&alone, &[]), (&both, &[]), (&both, &[])]);
+        let sentence =
+            "`/stray` publishes on `/arm/undisturbed` since the run began: 2 publish there, and 1 is declared";
+        let returned = "`/arm` publishes on `/arm` again";
+        assert_eq!(
+            seen,
+            [
+                vec!["`/arm` no longer publishes on `/arm`".to_owned()],
+                vec![returned.to_owned(), sentence.to_owned()],
+                vec![]
+            ]
+        );
+    }
+
+    #[test]
+    fn a_restarted_node_is_not_the_one_too_many_and_a_second_one_of_its_name_is() {
+        let [arm, restarted, second] = [1, 2, 4].map(|participant| present(participant, Role::Publishes, Some("/arm")));
+        let stray = present(3, Role::Publishes, Some("/stray"));
+        let mut watch = Watch::default();
+        watch.begin(|| vec![arm.clone()]);
+        watch.forget(|guid| guid == arm.guid);
+        let mut look = |present: &[&Present]| {
+            let present = present.iter().map(|&each| each.clone()).collect();
+            watch.look(super::super::wall_clock::now(), present, &BTreeSet::new())
+        };
+        assert_eq!(look(&[&stray]), [""; 0]);
+        let [note] = &look(&[&stray, &restarted])[..] else { panic!("a note is missing") };
+        assert!(note.starts_with("`/stray` publishes"), "{note}");
+        let notes = look(&[&restarted, &second]);
+        assert_eq!(notes[0], "`/stray` no longer publishes on `/arm`");
+        assert!(notes[1].starts_with("`/arm` publishes on `/arm/undisturbed` since"), "{notes:?}");
     }
 
     #[test]
