@@ -124,11 +124,14 @@ pub(crate) fn causes_sentence(found: &CausesSummary) -> Option<String> {
         (_, 1) => "one of them explains only one violating test on its own".to_owned(),
         (_, once) => format!("{once} of them each explain only one violating test on their own"),
     };
-    let bias =
-        if unseen.independent { "" } else { "; a biased bound, as this search does not draw its tests independently" };
+    let guide = if unseen.independent {
+        ""
+    } else {
+        " The figure is a rough guide, because this search does not draw its tests independently."
+    };
     Some(format!(
-        "{known}; {once}. Another test like these shows a new cause with a probability of at most {} % (a bound at 99 % \
-         confidence after Good and Turing, from {}{bias}).",
+        "{known}; {once}. A further test like these shows a new cause with a probability of at most {} % (Good–Turing \
+         estimate at 99 % confidence, from {}).{guide}",
         fixed(100.0 * unseen.at_most, 1),
         plural(unseen.tests as usize, "test", "tests"),
     ))
