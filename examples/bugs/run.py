@@ -12,6 +12,8 @@ strategies:
 The table has all results of the folder for these cases, seeds and numbers of tests, those of earlier calls included.
 What is finished is not run again.
 
+The folder `published` holds results of other strategies with the seeds 501 to 520. `--published` puts them in the table.
+
 exit codes:
   0    done
   1    failed: the last line says why
@@ -22,6 +24,7 @@ exit codes:
 """
 
 import argparse
+import gzip
 import json
 import os
 import shutil
@@ -39,6 +42,8 @@ from bugs.strategies import Unavailable, strategy_class
 from bugs.table import as_csv, as_json, as_text, as_text_of_problems, rows
 
 HERE = Path(__file__).resolve().parent
+PUBLISHED = HERE / "published"
+PUBLISHED_SEEDS = range(501, 521)
 
 
 def main(arguments: list[str]) -> int:
@@ -52,6 +57,10 @@ def main(arguments: list[str]) -> int:
         for strategy in options.strategies:
             check(strategy, options.sesamec)
         store = Store(options.out, cases)
+        if options.publish:
+            return publish(store, options.tests)
+        if options.published:
+            store.read(PUBLISHED)
         jobs = [
             Job(strategy, case.name, seed, options.tests)
             for strategy in options.strategies
@@ -75,8 +84,10 @@ def parsed(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--cases", type=lambda text: text.split(","), metavar="A,B", help="these cases (default: all)")
     parser.add_argument("--problems", action="store_true", help="the problems of falsification in place of the cases")
     parser.add_argument(
-        "--seeds", type=seeds, default="1-20", metavar="1-20", help="seeds, such as 1-5,9 (default: 1-20)"
-    )
+        "--seeds", type=seeds, metavar="1-20",
+        help="seeds, such as 1-5,9 (default: 1-20, and 501-520 with --published)",
+    )  # fmt: skip
+    parser.add_argument("--published", action="store_true", help="with the published results in the table")
     parser.add_argument("--tests", type=positive, default=120, help="tests per search (default: 120)")
     parser.add_argument("--early", type=positive, default=40, help="the early budget in the table (default: 40)")
     parser.add_argument(
@@ -95,11 +106,18 @@ def parsed(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument(
         "--update-plans", action="store_true", help="write plan.json of the cases by sesamec, and run nothing"
     )
+    parser.add_argument(
+        "--publish", action="store_true",
+        help="write the results of the seeds 501 to 520 into the folder `published`, and run nothing",
+    )  # fmt: skip
     options = parser.parse_args(arguments)
     options.folder = PROBLEMS if options.problems else CASES
+    options.seeds = options.seeds or list(PUBLISHED_SEEDS if options.published else range(1, 21))
     options.out = options.out or HERE / ("results/problems" if options.problems else "results")
     if options.update_plans and options.sesamec is None:
         parser.error("--update-plans needs --sesamec")
+    if options.problems and (options.published or options.publish):
+        parser.error("there are no published results of the problems")
     if options.early > options.tests:
         parser.error("--early exceeds --tests")
     return options
@@ -156,21 +174,45 @@ def update_plans(folders: list[Path], sesamec: Path) -> int:
     return 0
 
 
+def publish(store: "Store", tests: int) -> int:
+    """Writes the records of the published seeds, a file for each strategy of the list that has all of them for all
+    cases."""
+    jobs = [(case, seed) for case in store.current for seed in PUBLISHED_SEEDS]
+    PUBLISHED.mkdir(exist_ok=True)
+    for strategy in sorted({record.strategy for record in store.records.values() if ".py:" not in record.strategy}):
+        records = [store.records.get(Job(strategy, case, seed, tests)) for case, seed in jobs]
+        missing = records.count(None)
+        if missing:
+            print(f"{strategy}: not published, {missing} of {len(jobs)} searches are missing")
+            continue
+        lines = "".join(json.dumps(record.as_json()) + "\n" for record in records)
+        # Without a time in the header, equal records have equal files.
+        (PUBLISHED / f"{file_name(strategy)}.jsonl.gz").write_bytes(gzip.compress(lines.encode(), mtime=0))
+        print(f"{strategy}: published")
+    return 0
+
+
 class Store:
     """The records of a folder: a file of JSON lines per strategy, to which finished jobs are added."""
 
     def __init__(self, folder: Path, cases: list[Case]) -> None:
         self.folder = folder
         self.records: dict[Job, Record] = {}
-        current = {case.name: fingerprint(case) for case in cases}
-        for file in sorted(folder.glob("*.jsonl")):
-            for line in file.read_text(encoding="utf-8").splitlines():
+        self.current = {case.name: fingerprint(case) for case in cases}
+        self.read(folder)
+
+    def read(self, folder: Path) -> None:
+        """Adds the records of a folder for which there is no other one."""
+        found: dict[Job, Record] = {}
+        for file in sorted(folder.glob("*.jsonl*")):
+            for line in text_of(file).splitlines():
                 try:
                     record = record_from(json.loads(line))
                 except (ValueError, TypeError, KeyError):
                     continue  # a line that a kill cut off, or one of an older version: its job is run again
-                if current.get(record.case) == record.fingerprint:
-                    self.records[record.job] = record
+                if self.current.get(record.case) == record.fingerprint:
+                    found[record.job] = record
+        self.records = found | self.records
 
     def has(self, job: Job, origin: str) -> bool:
         """Whether there is a record of a job, made by the same version of its strategy."""
@@ -179,14 +221,23 @@ class Store:
     def add(self, record: Record) -> None:
         self.records[record.job] = record
         self.folder.mkdir(parents=True, exist_ok=True)
-        name = "".join(letter if letter.isalnum() else "_" for letter in record.strategy)
-        with (self.folder / f"{name}.jsonl").open("a", encoding="utf-8") as file:
+        with (self.folder / f"{file_name(record.strategy)}.jsonl").open("a", encoding="utf-8") as file:
             file.write(json.dumps(record.as_json()) + "\n")
 
     def of(self, seeds: list[int], tests: int) -> list[Record]:
         """All records of these seeds with so many tests, by strategy."""
         records = [record for record in self.records.values() if record.seed in seeds and record.tests == tests]
         return sorted(records, key=lambda record: record.strategy)
+
+
+def file_name(strategy: str) -> str:
+    return "".join(letter if letter.isalnum() else "_" for letter in strategy)
+
+
+def text_of(file: Path) -> str:
+    """What a file of records holds, packed or not."""
+    packed = file.suffix == ".gz"
+    return gzip.decompress(file.read_bytes()).decode() if packed else file.read_text(encoding="utf-8")
 
 
 def run_all(jobs: list[Job], store: Store, cases: list[Case], options: argparse.Namespace) -> None:
@@ -254,6 +305,7 @@ def show(records: list[Record], cases: list[Case], options: argparse.Namespace) 
     text = as_text_of_problems(table, cases) if options.problems else as_text(table, cases)
     texts = {"text": text + "\n", "csv": as_csv(table), "json": as_json(table)}
     if table:
+        options.out.mkdir(parents=True, exist_ok=True)
         for name, text in texts.items():
             ending = {"text": "txt"}.get(name, name)
             (options.out / f"table.{ending}").write_text(text, encoding="utf-8")

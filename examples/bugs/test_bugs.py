@@ -19,6 +19,7 @@ from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 from random import Random
+from unittest import mock
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
@@ -462,6 +463,29 @@ class Table(unittest.TestCase):
                 outputs.append(output.getvalue())
             self.assertEqual(*outputs)
             self.assertEqual(len((Path(folder) / "random.jsonl").read_text().splitlines()), 2)
+
+    def test_published_results_stand_in_the_table_and_are_not_run_again(self):
+        case, silent = CASES[0].name, contextlib.redirect_stdout(io.StringIO())
+        with tempfile.TemporaryDirectory() as folder, silent, contextlib.redirect_stderr(io.StringIO()):
+            published = mock.patch.multiple(command, PUBLISHED=Path(folder) / "published", PUBLISHED_SEEDS=range(1, 2))
+            with published, mock.patch.object(command, "load_cases", return_value=[CASES[0]]):
+                few = ["--tests", "5", "--early", "5"]
+                first = ["--out", str(Path(folder) / "first"), "--workers", "1", "--seeds", "1", *few]
+                self.assertEqual(command.main(["random", OWN, *first]), 0)
+                self.assertEqual(command.main(["--publish", *first]), 0)
+                self.assertEqual([file.name for file in (Path(folder) / "published").iterdir()], ["random.jsonl.gz"])
+                with mock.patch.object(command, "run", side_effect=AssertionError("nothing is to be run")):
+                    command.main(["random", "--published", "--out", str(Path(folder) / "second"), *few])
+                records = json.loads((Path(folder) / "second" / "table.json").read_text())
+                self.assertEqual([(row["strategy"], row["case"], row["seeds"]) for row in records], [("random", case, 1)])
+
+    def test_published_results_are_of_these_cases(self):
+        for file in command.PUBLISHED.iterdir():
+            with self.subTest(file=file.name):
+                store = command.Store(command.PUBLISHED, CASES)
+                name = file.name.removesuffix(".jsonl.gz")
+                found = {job for job in store.records if command.file_name(job.strategy) == name}
+                self.assertEqual(len(found), len(CASES) * len(command.PUBLISHED_SEEDS), "run it again, and publish it")
 
     def test_seeds_are_numbers_and_ranges(self):
         self.assertEqual(command.seeds("1-3,9,2"), [1, 2, 3, 9])

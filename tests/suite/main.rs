@@ -2,6 +2,7 @@
 #![cfg(test)]
 
 mod a50_cell;
+mod bugs;
 mod building;
 mod choice;
 mod commands;
