@@ -136,9 +136,9 @@ impl Watch {
         notes
     }
 
-    /// Where more are there than are declared, those beyond are newcomers: first those whose names are new, and of them
-    /// the latest. A newcomer may have been there before it was one too many, for example while a declared node was
-    /// away.
+    /// Finds who is one too many where more are there than are declared. Newcomers are: nodes with new names before
+    /// those with familiar ones, and later ones before earlier ones. A newcomer may have been there before it became one
+    /// too many, for example while a declared node was away.
     fn find_those_beyond(&mut self, present: &BTreeMap<GUID, Present>) {
         let mut newcomers: Vec<&Present> = self.newcomers.iter().rev().map(|guid| &present[guid]).collect();
         newcomers.sort_by_key(|newcomer| self.familiar.contains(&known(newcomer)));
