@@ -137,8 +137,8 @@ impl Watch {
     }
 
     /// Finds who is one too many where more are there than are declared. Newcomers are: nodes with new names before
-    /// those with familiar ones, and later ones before earlier ones. A newcomer may have been there before it became one
-    /// too many, for example while a declared node was away.
+    /// those with familiar ones, and later ones before earlier ones. A newcomer may have been there before it became
+    /// one too many, for example while a declared node was away.
     fn find_those_beyond(&mut self, present: &BTreeMap<GUID, Present>) {
         let mut newcomers: Vec<&Present> = self.newcomers.iter().rev().map(|guid| &present[guid]).collect();
         newcomers.sort_by_key(|newcomer| self.familiar.contains(&known(newcomer)));
