@@ -118,6 +118,8 @@ def parsed(arguments: list[str]) -> argparse.Namespace:
         parser.error("--update-plans needs --sesamec")
     if options.problems and (options.published or options.publish):
         parser.error("there are no published results of the problems")
+    if options.publish and options.cases:
+        parser.error("--publish writes the results of all cases, so it does not go with --cases")
     if options.early > options.tests:
         parser.error("--early exceeds --tests")
     return options

@@ -4,7 +4,7 @@ use std::process::Command;
 
 use sesame_tests::{sesamec, workspace};
 
-/// Python as the benchmark needs it; without it the test is to be skipped, which is printed here.
+/// Python as the benchmark needs it; without it the test is skipped, and this says so.
 fn python() -> Option<Command> {
     let new_enough = "import sys; sys.exit(sys.version_info < (3, 11))";
     let found = ["python3", "python3.11"]
@@ -12,7 +12,7 @@ fn python() -> Option<Command> {
         .find(|python| Command::new(python).args(["-c", new_enough]).output().is_ok_and(|said| said.status.success()));
     assert!(found.is_some() || std::env::var_os("CI").is_none(), "Python 3.11 or later is needed");
     if found.is_none() {
-        eprintln!("skipped: there is no Python 3.11 or later here");
+        eprintln!("skipped: Python 3.11 or later was not found");
     }
     found.map(Command::new)
 }
@@ -31,7 +31,8 @@ fn passes(names: &[&str]) {
         .expect("Python starts");
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{said}");
-    assert!(!said.contains("skipped"), "{said}");
+    // Strategies whose packages are not installed are skipped; the comparisons with Sesame are not.
+    assert!(!said.contains("the variable SESAMEC"), "{said}");
     let ran = said.lines().filter(|line| line.ends_with("... ok")).count();
     assert!(ran >= names.len().max(1), "{said}");
 }
