@@ -97,10 +97,10 @@ fn measured(test: &Value) -> String {
 
 const WORKERS: [&str; 3] = ["--", "--workers", "2"];
 
-/// Four tests instead of eighteen, of five seconds: both arms are on their way, and disturbed.
+/// Two tests instead of eighteen, one for each worker, of five seconds: both arms are on their way, and disturbed.
 const SHORT: [(&str, &str); 1] = [(
     "nsga2 { population 6  evaluations 18  seed 42 }",
-    "nsga2 { population 4  evaluations 4  seed 42 }\n  end after 5s",
+    "nsga2 { population 2  evaluations 2  seed 42 }\n  end after 5s",
 )];
 
 #[test]

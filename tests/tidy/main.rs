@@ -6,6 +6,7 @@
 
 mod architecture;
 mod json_page;
+mod protocol;
 mod rules;
 
 use std::fs;

@@ -1,6 +1,8 @@
-//! The messages and calls of the protocol, as the build makes them of its files.
+//! The messages and calls of the protocol. `generate` makes this Rust of the protocol's files, so that a build needs
+//! neither `protoc` nor a compiler of such files in Rust.
 
 /// Version 2.
+#[rustfmt::skip]
 #[expect(missing_docs, reason = "generated; the protocol's file describes it")]
 #[expect(clippy::pedantic, reason = "generated")]
 #[cfg_attr(
@@ -8,22 +10,21 @@
     expect(clippy::allow_attributes_without_reason, reason = "generated")
 )]
 #[cfg_attr(feature = "server", expect(clippy::allow_attributes, reason = "generated"))]
-pub mod v2 {
-    tonic::include_proto!("simulation.server");
-}
+pub mod v2;
 
 /// Version 3: topics.
+#[rustfmt::skip]
 #[expect(missing_docs, reason = "generated; the protocol's file describes it")]
 #[expect(clippy::pedantic, reason = "generated")]
 #[cfg_attr(feature = "client", expect(clippy::allow_attributes_without_reason, reason = "generated"))]
-pub mod v3 {
-    tonic::include_proto!("simlog.server");
-}
+pub mod v3;
 
 /// Version 3: steps.
+#[rustfmt::skip]
 #[cfg(feature = "client")]
 #[expect(missing_docs, reason = "generated; the protocol's file describes it")]
 #[expect(clippy::pedantic, clippy::allow_attributes_without_reason, reason = "generated")]
-pub mod simulator3 {
-    tonic::include_proto!("com.ttsnetwork.simulator3");
-}
+pub mod simulator3;
+
+#[cfg(test)]
+mod tests;
