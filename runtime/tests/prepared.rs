@@ -76,9 +76,7 @@ mod runner {
             }
             return ExitCode::SUCCESS;
         }
-        if Command::new("python3").arg("--version").output().is_err() {
-            assert!(env::var_os("CI").is_none(), "python3 is needed");
-            eprintln!("skipped: there is no python3 here");
+        if !sesame_peers::has_python3() {
             return ExitCode::SUCCESS;
         }
         let named = |name: &str| words.iter().all(|word| word.starts_with('-') || name.contains(word.as_str()));

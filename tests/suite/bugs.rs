@@ -4,24 +4,14 @@ use std::process::Command;
 
 use sesame_tests::{sesamec, workspace};
 
-/// Python as the benchmark needs it; without it the test is skipped, and this says so.
-fn python() -> Option<Command> {
-    let new_enough = "import sys; sys.exit(sys.version_info < (3, 11))";
-    let found = ["python3", "python3.11"]
-        .into_iter()
-        .find(|python| Command::new(python).args(["-c", new_enough]).output().is_ok_and(|said| said.status.success()));
-    assert!(found.is_some() || std::env::var_os("CI").is_none(), "Python 3.11 or later is needed");
-    if found.is_none() {
-        eprintln!("skipped: Python 3.11 or later was not found");
-    }
-    found.map(Command::new)
-}
+/// What succeeds in Python 3.11 and later, which the benchmark needs.
+const NEW_ENOUGH: &str = "import sys; sys.exit(sys.version_info < (3, 11))";
 
 /// Runs the benchmark's tests whose names contain one of these; all of them if there is none.
 fn passes(names: &[&str]) {
-    let Some(mut python) = python() else { return };
+    let Some(python) = sesame_peers::installed(&["python3", "python3.11"], &["-c", NEW_ENOUGH]) else { return };
     let selected = names.iter().flat_map(|name| ["-k", name]);
-    let output = python
+    let output = Command::new(python)
         .args(["test_bugs.py", "-v"])
         .args(selected)
         .current_dir(workspace().join("examples/bugs"))

@@ -1,20 +1,11 @@
 //! A runner for a simulator that is a program: generated, built and run, with Python on the other side.
 
 use std::fs;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
 use sesame_patience as patience;
+use sesame_peers::has_python3;
 use sesame_tests::{Project, Runner, fresh_folder, workspace};
-
-/// Whether there is a Python here. In the pipeline there must be.
-fn python() -> bool {
-    let found = Command::new("python3").arg("--version").output().is_ok_and(|output| output.status.success());
-    assert!(found || std::env::var_os("CI").is_none(), "python3 is needed");
-    if !found {
-        eprintln!("skipped: there is no python3 here");
-    }
-    found
-}
 
 /// The example `two_robots` with its simulator, in a folder of its own, and the runner of its campaign `crossing`.
 fn built(name: &str) -> Runner {
@@ -53,7 +44,7 @@ while order:
 
 #[test]
 fn a_campaign_on_a_python_program_gives_the_same_results_on_any_number_of_workers() {
-    if !python() {
+    if !has_python3() {
         return;
     }
     let runner = built("python_program");

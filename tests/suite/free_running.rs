@@ -3,12 +3,13 @@
 use std::fs;
 
 use sesame_base::observation::Outcome;
+use sesame_peers::has_python3;
 use sesame_record::{EventKind, Origin, Repository, Verdict};
 use sesame_tests::{Project, workspace};
 
 #[test]
 fn equal_tests_of_a_free_running_simulator_are_simulated_again_and_a_replay_may_differ() {
-    if !python() {
+    if !has_python3() {
         return;
     }
     let space = fs::read_to_string(workspace().join("tests/simulators/free_running/space.sesame")).unwrap();
@@ -46,7 +47,7 @@ fn equal_tests_of_a_free_running_simulator_are_simulated_again_and_a_replay_may_
 fn a_system_that_has_gone_silent_is_never_taken_for_a_safe_one() {
     use Verdict::{Inconclusive, Satisfied};
 
-    if !python() {
+    if !has_python3() {
         return;
     }
     let space = fs::read_to_string(workspace().join("tests/simulators/falls_silent/space.sesame")).unwrap();
@@ -71,14 +72,4 @@ fn a_system_that_has_gone_silent_is_never_taken_for_a_safe_one() {
                    disconnect";
     assert!(ran.err.contains(&format!("not as required: {differs}")), "{}", ran.err);
     assert_eq!(repository.test(0).unwrap().observation.traffic.len(), 2, "what was heard is recorded");
-}
-
-fn python() -> bool {
-    let found =
-        std::process::Command::new("python3").arg("--version").output().is_ok_and(|output| output.status.success());
-    assert!(found || std::env::var_os("CI").is_none(), "python3 is needed");
-    if !found {
-        eprintln!("skipped: there is no python3 here");
-    }
-    found
 }

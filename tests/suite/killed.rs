@@ -17,6 +17,7 @@ use proptest::test_runner::{RngSeed, TestRunner};
 
 use sesame_base::observation::Outcome;
 use sesame_patience as patience;
+use sesame_peers::has_python3;
 use sesame_record::{Repository, TestRow, Verdict};
 use sesame_tests::{Done, Project, Runner, workspace};
 
@@ -24,11 +25,7 @@ use crate::interruption::Clock;
 
 /// The runner of a campaign on the simulator that starts others; `None`, with the reason, without a Python.
 fn breeding(name: &str, campaign: &str) -> Option<Runner> {
-    let found =
-        std::process::Command::new("python3").arg("--version").output().is_ok_and(|output| output.status.success());
-    assert!(found || std::env::var_os("CI").is_none(), "python3 is needed");
-    if !found {
-        eprintln!("skipped: there is no python3 here");
+    if !has_python3() {
         return None;
     }
     let space = fs::read_to_string(workspace().join("tests/simulators/breeding/space.sesame")).unwrap();

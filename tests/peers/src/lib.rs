@@ -6,7 +6,7 @@ pub mod oracle;
 
 use std::io::{BufRead as _, BufReader, Read};
 use std::path::PathBuf;
-use std::process::Child;
+use std::process::{Child, Command};
 use std::sync::mpsc::{Receiver, channel};
 
 /// The program or folder that an environment variable names. Without the variable the test is to be skipped, which is
@@ -22,6 +22,28 @@ pub fn named(variable: &str) -> Option<PathBuf> {
     };
     assert!(path.exists(), "{variable} names {}, which does not exist", path.display());
     Some(path)
+}
+
+/// The first of these programs that the system has, which succeeds with these arguments. Without any the test is to be
+/// skipped, which is printed here; with `CI=true` that is an error.
+#[track_caller]
+pub fn installed(programs: &[&'static str], arguments: &[&str]) -> Option<&'static str> {
+    let succeeds =
+        |program: &str| Command::new(program).args(arguments).output().is_ok_and(|said| said.status.success());
+    let found = programs.iter().copied().find(|program| succeeds(program));
+    if found.is_none() {
+        let wanted = programs.join(" or ");
+        let insists = std::env::var_os("CI").is_some_and(|ci| ci == "true");
+        assert!(!insists, "{wanted} is not installed, or fails with {arguments:?}");
+        eprintln!("skipped: {wanted} is not installed, or fails with {arguments:?}");
+    }
+    found
+}
+
+/// Whether the system has `python3`; see [`installed`].
+#[track_caller]
+pub fn has_python3() -> bool {
+    installed(&["python3"], &["--version"]).is_some()
 }
 
 /// A program that is ended when this is dropped.
