@@ -90,7 +90,10 @@ pub fn bound(bound: Bound, unit: Option<&str>) -> String {
         Bound::AtLeast { value } => format!("≥ {}", quantity(value, unit)),
         Bound::Above { value } => format!("> {}", quantity(value, unit)),
         Bound::Equal { value } => format!("= {}", quantity(value, unit)),
-        Bound::Within { low, high } => with_unit(range(low, high), unit),
+        Bound::Within { low, high } => {
+            let decimals = decimals([low, high]);
+            with_unit(format!("{}…{}", fixed(low, decimals), fixed(high, decimals)), unit)
+        }
     }
 }
 
@@ -113,11 +116,6 @@ pub fn exact(x: f64) -> String {
     if x == 0.0 || (1e-6..1e15).contains(&magnitude) { format!("{}", x + 0.0) } else { format!("{x:e}") }
 }
 
-fn range(low: f64, high: f64) -> String {
-    let decimals = decimals([low, high]);
-    format!("{}…{}", fixed(low, decimals), fixed(high, decimals))
-}
-
 /// The unit in which a parameter's values up to this one are written, and by what they are multiplied for that.
 pub fn scale<'p>(kind: &OperationKind, parameter: &'p Parameter, highest: f64) -> (f64, Option<&'p str>) {
     match kind {
@@ -129,7 +127,8 @@ pub fn scale<'p>(kind: &OperationKind, parameter: &'p Parameter, highest: f64) -
     }
 }
 
-/// What a test chose, as in `offset 0.27…0.29 rad`, `loss 40 %`, `delay 20…100 ms`.
+/// What a test chose, as in `offset 0.27…0.29 rad`, `loss 40 %`, `delay 20…100 ms`. A range whose ends are written alike
+/// is written as one number.
 pub fn choice(kind: &OperationKind, parameter: &Parameter, choice: &Choice) -> String {
     let (low, high) = match choice {
         Choice::Value { value } => (*value, *value),
@@ -142,10 +141,10 @@ pub fn choice(kind: &OperationKind, parameter: &Parameter, choice: &Choice) -> S
         Choice::Text { text } => return format!("{} {text}", parameter.name),
     };
     let (factor, unit) = scale(kind, parameter, high);
-    let text = match choice {
-        Choice::Value { .. } => number(low * factor),
-        _ => range(low * factor, high * factor),
-    };
+    let ends = [low * factor, high * factor];
+    let decimals = decimals(ends);
+    let [low, high] = ends.map(|end| fixed(end, decimals));
+    let text = if low == high { low } else { format!("{low}…{high}") };
     format!("{} {}", parameter.name, with_unit(text, unit))
 }
 
@@ -170,6 +169,8 @@ pub fn is_zero(count: &usize) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use sesame_plan::{ChoiceKind, Domain, ValueMode};
+
     use super::*;
 
     #[test]
@@ -217,6 +218,21 @@ mod tests {
         );
         assert_eq!(exact_bound(Bound::Equal { value: 49.238_12f64.next_up() }, Some("s")), "= 49.23812000000001 s");
         assert_eq!(exact_bound(Bound::Within { low: 1.0, high: 40.0 }, None), "1…40");
+    }
+
+    #[test]
+    fn a_range_that_is_written_with_one_number_is_one_number() {
+        let offset = Parameter {
+            name: "offset".to_owned(),
+            unit: Some("rad".to_owned()),
+            domain: Domain::Number { low: -1.0, high: 1.0, shape: ChoiceKind::Range, integer: false },
+        };
+        let kind = OperationKind::RandomValue { mode: ValueMode::Offset, integer: false };
+        let written = |low, high| choice(&kind, &offset, &Choice::Range { low, high });
+        assert_eq!(written(-0.25, 0.3), "offset -0.25…0.30 rad");
+        assert_eq!(written(0.3, 0.3), "offset 0.3 rad");
+        assert_eq!(written(0.249_99, 0.250_01), "offset 0.250 rad");
+        assert_eq!(written(-0.0, 0.0), "offset 0 rad");
     }
 
     #[test]
