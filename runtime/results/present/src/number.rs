@@ -127,8 +127,8 @@ pub fn scale<'p>(kind: &OperationKind, parameter: &'p Parameter, highest: f64) -
     }
 }
 
-/// What a test chose, as in `offset 0.27…0.29 rad`, `loss 40 %`, `delay 20…100 ms`. A range whose ends are written alike
-/// is written as one number.
+/// What a test chose, as in `offset 0.27…0.29 rad`, `loss 40 %`, `delay 20…100 ms`. A range whose ends are written
+/// alike is written as one number.
 pub fn choice(kind: &OperationKind, parameter: &Parameter, choice: &Choice) -> String {
     let (low, high) = match choice {
         Choice::Value { value } => (*value, *value),
