@@ -1,4 +1,4 @@
-//! The Rust of SimlogAPI is what the protocol's files say.
+//! The modules of SimlogAPI are those that its files give.
 
 use std::fs;
 use std::process::Command;
@@ -6,10 +6,10 @@ use std::process::Command;
 use sesame_tests::{fresh_folder, workspace};
 
 #[test]
-#[ignore = "long: compiles what makes the modules"]
-fn the_modules_of_simlog_are_what_is_made_of_the_protocols_files() {
+#[ignore = "long: compiles the generator of the modules"]
+fn the_modules_of_simlog_are_those_that_its_files_give() {
     let package = workspace().join("runtime/middleware/simlog");
-    let made = fresh_folder("simlog_made_anew");
+    let made = fresh_folder("simlog_generated_anew");
     let ran = Command::new(env!("CARGO"))
         .args(["run", "--quiet", "--locked", "--manifest-path"])
         .arg(package.join("generate/Cargo.toml"))

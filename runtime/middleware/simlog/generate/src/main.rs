@@ -1,6 +1,6 @@
-//! Makes Rust of the protocol's files, in Rust alone: no `protoc` is needed.
+//! Generates Rust code from the protocol's files, in Rust alone: no `protoc` is needed.
 //!
-//! `cargo run` writes the modules of the crate anew. `cargo run -- FOLDER` writes them into a folder, to be compared.
+//! `cargo run` writes the modules of the crate anew. `cargo run -- FOLDER` writes them into a folder for comparison.
 
 use std::env::args_os;
 use std::error::Error;
@@ -9,12 +9,12 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
-/// A file of the protocol, and the module that is made of it.
+/// A file of the protocol, and the module that is generated from it.
 struct Protocol {
     file: &'static str,
     package: &'static str,
     module: &'static str,
-    /// Whether a simulator of ours can serve it.
+    /// Whether one of our simulators can serve it.
     served: bool,
 }
 
@@ -41,9 +41,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         let digest = Sha256::digest(fs::read(package.join("proto").join(protocol.file))?);
         let digest: String = digest.iter().map(|byte| format!("{byte:02x}")).collect();
         let begin = format!(
-            "//! Messages and calls of `proto/{}`, of which `cargo run` in `generate` made this.\n//!\n\
-             //! SHA-256 of that file: {digest}\n\n",
-            protocol.file
+            "//! Messages and calls of `proto/{file}`. `cargo run` in `generate` generated this file from it.\n//!\n\
+             //! SHA-256 of `proto/{file}`: {digest}\n\n",
+            file = protocol.file
         );
         fs::write(folder.join(protocol.module).with_extension("rs"), begin + &text)?;
     }

@@ -1,7 +1,7 @@
 use sha2::{Digest, Sha256};
 
 #[test]
-fn each_module_is_made_of_the_file_that_is_there() {
+fn each_module_was_generated_from_the_file_that_is_there() {
     let of = [
         ("simlog2", &include_bytes!("../../proto/simlog2.proto")[..], include_str!("v2.rs")),
         ("simlog3", &include_bytes!("../../proto/simlog3.proto")[..], include_str!("v3.rs")),
