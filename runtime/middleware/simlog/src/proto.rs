@@ -1,5 +1,5 @@
-//! The messages and calls of the protocol. A program in `generate` generates these modules from the protocol's files, so
-//! that a build needs neither `protoc` nor a compiler for such files in Rust.
+//! The messages and calls of the protocol. A program in `generate` generates these modules from the protocol's files,
+//! so that a build needs neither `protoc` nor a compiler for such files in Rust.
 
 /// Version 2.
 #[rustfmt::skip]
