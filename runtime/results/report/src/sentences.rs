@@ -108,7 +108,7 @@ pub(crate) fn violated_requirement(requirement: &RequirementSummary, causes: usi
     let Some(worst) = worst else { return Violated { before, worst: None, after: String::new() } };
     let after = match worst.acting.as_slice() {
         [] => ".".to_owned(),
-        acting => format!(": {}.", disturbances_text(acting)),
+        acting => format!(": {}.", worst_text(acting)),
     };
     Violated { before: format!("{before} The worst value is {}, in ", worst.text), worst: Some(worst.test), after }
 }
@@ -366,6 +366,29 @@ pub(crate) fn verdict_value_text(requirement: &VerdictReport) -> String {
     }
 }
 
+/// How many operations a sentence describes.
+const DESCRIBED: usize = 2;
+
+/// What the operations of a worst test do. If there are many, they are only named, since a page begins with such a
+/// sentence for each requirement: `jitter_link0 ×4 + jitter_link1`.
+fn worst_text(acting: &[OperationReport]) -> String {
+    if acting.len() <= DESCRIBED {
+        return disturbances_text(acting);
+    }
+    let mut counts: Vec<(&str, usize)> = Vec::new();
+    for used in acting {
+        match counts.iter_mut().find(|(name, _)| *name == used.operation) {
+            Some((_, count)) => *count += 1,
+            None => counts.push((&used.operation, 1)),
+        }
+    }
+    let words = |&(name, count): &(&str, usize)| match count {
+        1 => name.to_owned(),
+        count => format!("{name} ×{count}"),
+    };
+    counts.iter().map(words).collect::<Vec<_>>().join(" + ")
+}
+
 /// What operations do in a test, and when: `lag_link1 (latency 310 ms, at 4.00–9.00 s)`.
 pub(crate) fn disturbances_text(operations: &[OperationReport]) -> String {
     let words = |used: &OperationReport| {
@@ -471,4 +494,34 @@ fn shrunk_messages_sentence(shrinking: &Shrinking) -> Option<String> {
         (true, _) if shrinking.minimal => format!("What it needs are {text}: without any single one it does not fail"),
         (true, _) => format!("What it needs are at most {text}"),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lost(operation: &str, start: f64) -> OperationReport {
+        OperationReport {
+            operation: operation.to_owned(),
+            kind: "blackhole".to_owned(),
+            topic: Some("order".to_owned()),
+            resource: None,
+            planned: Some(Span { start, end: start + 1.0 }),
+            conditions: None,
+            messages: None,
+            observed: None,
+            choices: Vec::new(),
+            operation_seed: 1,
+            counters: None,
+            first_touch: None,
+            last_touch: None,
+        }
+    }
+
+    #[test]
+    fn a_worst_test_of_many_operations_is_described_by_their_names() {
+        let acting = [("a", 1.0), ("b", 2.0), ("a", 4.0), ("a", 5.0)].map(|(name, start)| lost(name, start));
+        assert_eq!(worst_text(&acting), "a ×3 + b");
+        assert_eq!(worst_text(&acting[..2]), "a (at 1.00–2.00 s) + b (at 2.00–3.00 s)");
+    }
 }
