@@ -15,9 +15,7 @@ use std::sync::mpsc::{Receiver, channel};
 pub fn named(variable: &str) -> Option<PathBuf> {
     let named = std::env::var_os(variable).map(PathBuf::from);
     let Some(path) = named else {
-        let insists = std::env::var_os("CI").is_some_and(|ci| ci == "true");
-        assert!(!insists, "{variable} is not set: `./test` finds or makes what it names");
-        eprintln!("skipped: {variable} is not set; `./test` finds or makes what it names");
+        skip(&format!("{variable} is not set; `./test` finds or makes what it names"));
         return None;
     };
     assert!(path.exists(), "{variable} names {}, which does not exist", path.display());
@@ -32,10 +30,7 @@ pub fn installed(programs: &[&'static str], arguments: &[&str]) -> Option<&'stat
         |program: &str| Command::new(program).args(arguments).output().is_ok_and(|said| said.status.success());
     let found = programs.iter().copied().find(|program| succeeds(program));
     if found.is_none() {
-        let wanted = programs.join(" or ");
-        let insists = std::env::var_os("CI").is_some_and(|ci| ci == "true");
-        assert!(!insists, "{wanted} is not installed, or fails with {arguments:?}");
-        eprintln!("skipped: {wanted} is not installed, or fails with {arguments:?}");
+        skip(&format!("{} is not installed, or fails with {arguments:?}", programs.join(" or ")));
     }
     found
 }
@@ -44,6 +39,14 @@ pub fn installed(programs: &[&'static str], arguments: &[&str]) -> Option<&'stat
 #[track_caller]
 pub fn has_python3() -> bool {
     installed(&["python3"], &["--version"]).is_some()
+}
+
+/// Says why a test is skipped; fails with `CI=true`.
+#[track_caller]
+fn skip(reason: &str) {
+    let insists = std::env::var_os("CI").is_some_and(|ci| ci == "true");
+    assert!(!insists, "{reason}");
+    eprintln!("skipped: {reason}");
 }
 
 /// A program that is ended when this is dropped.

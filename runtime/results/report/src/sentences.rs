@@ -19,7 +19,7 @@ use crate::facts::repetition::ViolationRate;
 use crate::facts::show::{OperationReport, TestReport, VerdictReport};
 use crate::facts::shrinking::{ShrinkTrigger, Shrinking, ShrunkMessages};
 use crate::facts::summary::{RequirementSummary, Summary};
-use crate::facts::wording::outcome_words;
+use crate::facts::wording::{counted, outcome_words};
 use sesame_base::visible::visible;
 
 /// The whole in one sentence, dangers first: `2 requirements violated (R1 by 31 tests, R4 by 3), 5 causes, front of 6
@@ -375,18 +375,7 @@ fn worst_text(acting: &[OperationReport]) -> String {
     if acting.len() <= DESCRIBED {
         return disturbances_text(acting);
     }
-    let mut counts: Vec<(&str, usize)> = Vec::new();
-    for used in acting {
-        match counts.iter_mut().find(|(name, _)| *name == used.operation) {
-            Some((_, count)) => *count += 1,
-            None => counts.push((&used.operation, 1)),
-        }
-    }
-    let words = |&(name, count): &(&str, usize)| match count {
-        1 => name.to_owned(),
-        count => format!("{name} ×{count}"),
-    };
-    counts.iter().map(words).collect::<Vec<_>>().join(" + ")
+    counted(acting.iter().map(|used| used.operation.as_str())).join(" + ")
 }
 
 /// What operations do in a test, and when: `lag_link1 (latency 310 ms, at 4.00–9.00 s)`.

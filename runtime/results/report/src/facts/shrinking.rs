@@ -20,7 +20,7 @@ use sesame_search::{Strategy as _, sspr};
 
 use crate::export::shrunk_block;
 use crate::facts::show::{OperationReport, operations as operation_reports};
-use crate::facts::wording::{bounds_on, operations, value_text};
+use crate::facts::wording::{bounds_on, counted, operations, value_text};
 
 pub use triggers::ShrinkTrigger;
 use triggers::triggers;
@@ -445,16 +445,13 @@ fn size(
 fn change(plan: &CampaignPlan, base: &Test, test: &Test) -> String {
     let name = |used: &TestOperation| plan.operation(used.operation).name.as_str();
     let mut kept = test.operations.iter().peekable();
-    let mut out: Vec<(&str, usize)> = Vec::new();
+    let mut out = Vec::new();
     let mut changes = Vec::new();
     for was in &base.operations {
         let is_it = |used: &TestOperation| TestOperation { messages: was.messages.clone(), ..used.clone() } == *was;
         let same_number = test.operations.len() == base.operations.len();
         let Some(used) = kept.next_if(|used| same_number || is_it(used)) else {
-            match out.iter_mut().find(|(known, _)| *known == name(was)) {
-                Some((_, times)) => *times += 1,
-                None => out.push((name(was), 1)),
-            }
+            out.push(name(was));
             continue;
         };
         let kind = plan.operation(used.operation);
@@ -471,13 +468,8 @@ fn change(plan: &CampaignPlan, base: &Test, test: &Test) -> String {
             changes.push(format!("{} alters only {}{before} messages", name(used), messages.count()));
         }
     }
-    let words = |(name, times): &(&str, usize)| match times {
-        1 => (*name).to_owned(),
-        times => format!("{name} ×{times}"),
-    };
     if !out.is_empty() {
-        let out = number::join_words(&out.iter().map(words).collect::<Vec<_>>());
-        changes.insert(0, format!("without {out}"));
+        changes.insert(0, format!("without {}", number::join_words(&counted(out))));
     }
     changes.join("; ")
 }

@@ -20,16 +20,29 @@ pub(crate) fn operations(plan: &CampaignPlan, row: &TestRow) -> String {
         plan.operations.iter().enumerate().filter_map(move |(id, operation)| {
             let used = row.test.operations.iter().enumerate().filter(|(_, used)| used.operation.index() == id);
             let used = used.filter(|(at, _)| row.idle.get(*at).copied().unwrap_or(false) == idle);
-            let times = match used.count() {
-                0 => return None,
-                1 => String::new(),
-                n => format!(" ×{n}"),
-            };
-            Some(format!("{}{times}{}", operation.name, if idle { " (no effect)" } else { "" }))
+            let times = used.count();
+            (times > 0)
+                .then(|| format!("{}{}", repeated(&operation.name, times), if idle { " (no effect)" } else { "" }))
         })
     };
     let named: Vec<String> = of(false).chain(of(true)).chain(not_imported(row.left_out)).collect();
     if named.is_empty() { "without disturbance".to_owned() } else { named.join(", ") }
+}
+
+/// Names in the order in which they first occur, with their counts, as in `jitter_link0 ×4`.
+pub(crate) fn counted<'n>(names: impl IntoIterator<Item = &'n str>) -> Vec<String> {
+    let mut counts: Vec<(&str, usize)> = Vec::new();
+    for name in names {
+        match counts.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, times)) => *times += 1,
+            None => counts.push((name, 1)),
+        }
+    }
+    counts.into_iter().map(|(name, times)| repeated(name, times)).collect()
+}
+
+fn repeated(name: &str, times: usize) -> String {
+    if times == 1 { name.to_owned() } else { format!("{name} ×{times}") }
 }
 
 /// A sentence about tests with operations that could not be imported.
