@@ -35,7 +35,7 @@ fn ran(python: &Path, domain: &Domain, plan: CampaignPlan) -> (System, u64) {
 /// How many messages a run observes in which so many topics are relayed, and to how many of them something was added.
 fn relayed(python: &Path, first: u32) -> (u64, Vec<(String, u64)>) {
     let domain = Domain::free();
-    let plan = plan(&space(&domain, KIND, "node hearing { subscribes peer }", "", 1000)).relaying(first);
+    let plan = plan(&space(&domain, KIND, "node hearing { subscribes peer }", "", "1000s")).relaying(first);
     let (mut system, observed) = ran(python, &domain, plan);
     (observed, system.added().into_iter().map(|wire| (wire.path, wire.latencies.messages())).collect())
 }
@@ -55,7 +55,7 @@ fn a_topic_that_is_not_relayed_is_observed_without_remapping_and_nothing_is_adde
 /// What is noted of a run with this budget.
 fn noted(python: &Path, latency: f64, jitter: f64) -> Vec<String> {
     let domain = Domain::free();
-    let mut plan = plan(&space(&domain, KIND, "node hearing { subscribes peer }", "", 1000));
+    let mut plan = plan(&space(&domain, KIND, "node hearing { subscribes peer }", "", "1000s"));
     plan.simulator.lifecycle.relay_budget = Some(RelayBudget { latency: Some(latency), jitter: Some(jitter) });
     ran(python, &domain, plan).0.notes()
 }

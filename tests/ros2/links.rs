@@ -30,7 +30,7 @@ fn of_two_subscribers_one_can_be_cut_off_while_the_other_hears_everything() {
     let publisher = Peer::start(&python, &domain, "publisher.py", &arguments);
     let nodes = "node deaf { subscribes peer }  node hearing { subscribes peer }  node speaker { publishes peer }";
     let lost = format!("operation lost on peer to deaf = blackhole\n{HOLE}");
-    let mut system = System::new(plan(&space(&domain, KIND, nodes, &lost, 1000)));
+    let mut system = System::new(plan(&space(&domain, KIND, nodes, &lost, "1000s")));
     let test = cut_off(&system);
     let exchanged = system.exchange(&test, &Exchange::new(&publisher, &[&hearing]));
     deaf.await_match();
@@ -55,7 +55,7 @@ fn of_two_publishers_one_can_be_cut_off_while_the_other_is_heard() {
     let (mute, loud) = (publisher("/peer/from/mute", "1"), publisher("/peer/undisturbed", "2"));
     let nodes = "node hearing { subscribes peer }  node mute { publishes peer }  node loud { publishes peer }";
     let lost = format!("operation lost on peer from mute = blackhole\n{HOLE}");
-    let mut system = System::new(plan(&space(&domain, KIND, nodes, &lost, 1000)));
+    let mut system = System::new(plan(&space(&domain, KIND, nodes, &lost, "1000s")));
     let test = cut_off(&system);
     // The mute one has said all when the last of it is acknowledged.
     let (to, beside) = ([&hearing], [&mute]);

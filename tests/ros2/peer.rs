@@ -7,6 +7,7 @@ use std::io::{BufRead as _, BufReader, Write as _};
 use std::os::unix::process::ExitStatusExt as _;
 use std::path::Path;
 use std::process::{Child, ChildStdout, Command, Stdio};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -35,6 +36,8 @@ pub(crate) struct Peer {
     child: Mutex<Child>,
     said: Arc<Said>,
     listening: Option<JoinHandle<()>>,
+    /// How many probes it was told to send.
+    probes: AtomicU64,
 }
 
 /// What a peer has said until now.
@@ -95,7 +98,13 @@ impl Peer {
         let said = Arc::<Said>::default();
         let hears = Arc::clone(&said);
         let listening = std::thread::spawn(move || listen(output, &hears));
-        Peer { name: program.to_owned(), child: Mutex::new(child), said, listening: Some(listening) }
+        Peer {
+            name: program.to_owned(),
+            child: Mutex::new(child),
+            said,
+            listening: Some(listening),
+            probes: AtomicU64::new(0),
+        }
     }
 
     /// Tells one that waits for it to begin, or to go on.
@@ -103,9 +112,16 @@ impl Peer {
         self.tell("go");
     }
 
-    /// Tells a publisher to send a probe.
-    pub(crate) fn probe(&self) {
+    /// Tells a publisher to send a probe: its number.
+    pub(crate) fn probe(&self) -> u64 {
         self.tell("probe");
+        self.probes.fetch_add(1, Ordering::Relaxed) + 1
+    }
+
+    /// Waits until nobody subscribes to what it publishes.
+    pub(crate) fn await_alone(&self) {
+        self.tell("alone");
+        self.await_said("alone");
     }
 
     fn tell(&self, line: &str) {

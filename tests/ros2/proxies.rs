@@ -41,7 +41,7 @@ impl Hall {
     /// A space in which an operation tells the subscriber apart, so that both have names of their own at the bridge.
     fn text(&self) -> String {
         let nodes = "node station { publishes peer }  node viewer { subscribes peer }";
-        let text = space(&self.domain, JOINTS, nodes, "operation lost on peer to viewer = blackhole", 60);
+        let text = space(&self.domain, JOINTS, nodes, "operation lost on peer to viewer = blackhole", "60s");
         let Hall { bridge, station, viewer, .. } = self;
         let proxies = format!("proxy station \"ws://127.0.0.1:{station}\"  proxy viewer \"ws://127.0.0.1:{viewer}\"");
         text.replacen("ros2 { domain", &format!("rosbridge \"ws://127.0.0.1:{bridge}\" {{ {proxies}  domain"), 1)
@@ -149,7 +149,7 @@ fn a_wrong_token_none_and_plain_text_to_a_port_of_tls_are_refused_and_noted_with
     let station = format!("proxy station \"{url}\" {settings}");
     // No client ever connects as `absent`, so the run does not begin even while a client is let in as `station`.
     let nodes = "node station { publishes peer }  node absent { subscribes peer }";
-    let text = space(&hall.domain, JOINTS, nodes, "operation lost on peer to absent = blackhole", 60);
+    let text = space(&hall.domain, JOINTS, nodes, "operation lost on peer to absent = blackhole", "60s");
     let proxies = format!("{station}  proxy absent \"wss://127.0.0.1:{}\" {settings}", hall.viewer);
     let bridge = format!("rosbridge \"ws://127.0.0.1:{}\" {{ {proxies}  domain", hall.bridge);
     let mut system = System::in_folder(plan(&text.replacen("ros2 { domain", &bridge, 1)), folder);

@@ -32,8 +32,8 @@ pub(crate) fn plans(file: &str, text: &str) -> Vec<CampaignPlan> {
 }
 
 /// A space in which one topic, `/peer`, is cut, with declarations of nodes and operations, of which one may be named
-/// `lost`. A run ends after `seconds`. A node named `clock` makes it one with a clock.
-pub(crate) fn space(domain: &Domain, kind: &str, nodes: &str, operations: &str, seconds: u32) -> String {
+/// `lost`. A run ends after `end`. A node named `clock` makes it one with a clock.
+pub(crate) fn space(domain: &Domain, kind: &str, nodes: &str, operations: &str, end: &str) -> String {
     format!(
         "space peers\n\
          system {{\n\
@@ -49,7 +49,7 @@ pub(crate) fn space(domain: &Domain, kind: &str, nodes: &str, operations: &str, 
            objectives disturbed\n\
            operations hole{more}   1 per test\n\
            search     random {{ evaluations 1 }}\n\
-           end        after {seconds}s\n\
+           end        after {end}\n\
          }}\n",
         domain = domain.number,
         clock = if nodes.contains("clock") { "clock \"/clock\"" } else { "" },
@@ -129,7 +129,9 @@ const FIRST_WAIT: Duration = Duration::from_secs(1);
 /// Sends probes until the latest one has been heard by all.
 #[derive(Default)]
 struct Probing {
-    sent: u64,
+    /// The number of the latest one, which counts those of earlier runs.
+    latest: u64,
+    sent: u32,
     begun: Option<Instant>,
     next: Option<Instant>,
 }
@@ -137,13 +139,13 @@ struct Probing {
 impl Probing {
     fn is_over(&mut self, from: &Peer, to: &[&Peer]) -> bool {
         let heard: Vec<u64> = to.iter().map(|peer| peer.told("heard")).collect();
-        if self.sent > 0 && heard.iter().all(|&latest| latest == self.sent) {
+        if self.sent > 0 && heard.iter().all(|&latest| latest == self.latest) {
             return true;
         }
         let begun = self.begun.get_or_insert_with(Instant::now);
-        assert!(begun.elapsed() < LIMIT, "of {} probes, the latest that each peer heard: {heard:?}", self.sent);
+        assert!(begun.elapsed() < LIMIT, "of {} probes, the latest that each peer heard: {heard:?}", self.latest);
         if self.next.is_none_or(|next| Instant::now() >= next) {
-            from.probe();
+            self.latest = from.probe();
             self.next = Some(Instant::now() + FIRST_WAIT * (1 << self.sent));
             self.sent += 1;
         }
@@ -213,6 +215,14 @@ impl System {
         });
         self.noted.append(&mut noted);
         finished
+    }
+
+    /// A run that lasts until all peers have heard a probe of the publisher, so that whatever is between them knows
+    /// both sides.
+    pub(crate) fn introduce(&mut self, from: &Peer, to: &[&Peer]) {
+        let mut probing = Probing::default();
+        let ready = || [from].iter().chain(to).for_each(|peer| peer.await_match());
+        self.relay_until(&Test::default(), ready, |_| probing.is_over(from, to));
     }
 
     /// A run in which a peer publishes what others are to hear. Before anything counts, probes go all the way: who is

@@ -33,7 +33,7 @@ fn soaked(count: u64) -> Option<Vec<u64>> {
     let subscriber = Peer::start(&python, &domain, "subscriber.py", &[&arguments[..], &["--tell", &batch]].concat());
     let speaking = ["--topic", "/peer/undisturbed", "--hold", "--batch", &batch];
     let publisher = Peer::start(&python, &domain, "publisher.py", &[&arguments[..], &speaking].concat());
-    let mut system = System::new(plan(&space(&domain, KIND, "node hearing { subscribes peer }", "", 1000)));
+    let mut system = System::new(plan(&space(&domain, KIND, "node hearing { subscribes peer }", "", "1000s")));
     let (mut memories, begin) = (Vec::new(), Instant::now());
     let to = [&subscriber];
     let exchange = Exchange { batch: Some(BATCH), ..Exchange::new(&publisher, &to) };
@@ -83,7 +83,7 @@ fn rushed(count: u64, limit: Duration) -> Vec<u64> {
     let (publisher, subscriber) = (participant(domain.number), participant(domain.number));
     let writer = Writer::new(&publisher, "rt/peer/undisturbed", JOINTS);
     let mut reader = Reader::new(&subscriber, "rt/peer", JOINTS);
-    let mut system = System::new(plan(&space(&domain, KIND, "node hearing { subscribes peer }", "", 100_000)));
+    let mut system = System::new(plan(&space(&domain, KIND, "node hearing { subscribes peer }", "", "100000s")));
     let (go, heard) = (AtomicBool::new(false), AtomicU64::new(0));
     let begin = Instant::now();
     let mut memories = Vec::new();

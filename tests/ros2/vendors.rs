@@ -38,7 +38,7 @@ fn relayed(publisher: Vendor, subscribers: &[Vendor], kind: &str, count: u32, ra
     let Some(speaking) = start(publisher, "publish", &domain, &speaking) else { return };
     let named = |at: usize| format!("node s{at} {{ subscribes peer }}");
     let nodes: Vec<String> = (0..hearing.len()).map(named).collect();
-    let mut system = System::new(plan(&space(&domain, kind, &nodes.join("\n"), "", 1000)));
+    let mut system = System::new(plan(&space(&domain, kind, &nodes.join("\n"), "", "1000s")));
     let to: Vec<&Peer> = hearing.iter().map(|(_, peer)| peer).collect();
     let relayed = system.exchange(&Test::default(), &Exchange::new(&speaking, &to));
     let sent = speaking.expect();

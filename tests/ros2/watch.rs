@@ -32,7 +32,7 @@ fn who_comes_and_goes_during_a_run_is_noted_by_node_and_topic() {
     // The publisher leaves when it is dropped, and the subscriber when it has heard enough.
     let (first, subscriber) = (publisher(), start("subscriber.py", "--count 100"));
     let nodes = "node speaker \"/peer_publisher\" { publishes peer }  node listener { subscribes peer }";
-    let mut system = System::new(plan(&space(&domain, KIND, nodes, "", 1000)));
+    let mut system = System::new(plan(&space(&domain, KIND, nodes, "", "1000s")));
     let (first, again, stray) = (RefCell::new(Some(first)), RefCell::new(None), RefCell::new(None));
     let begin = Instant::now();
     // Each happens when what happened before it was noted.

@@ -2,9 +2,10 @@
 
 `digest` is over what was serialised, with padding whose bytes may be anything; `content` over the values alone, which
 is the same for all vendors and in every run. It says `up` and `matched`. With `--hold` it does what lines on its
-standard input say: a `probe` (`common.py`), or `go` for all samples or a batch of them, and it stays until its input
-ends, so that nothing of what it has sent is lost with it. `reliable` says whether all subscriptions that
-it knows at the end are reliable. Exit codes: 0 all was sent; 2 nobody subscribed in time.
+standard input say: a `probe` (`common.py`), `go` for all samples or a batch of them, or `alone` to wait until nobody
+subscribes any more, which it then says. It stays until its input ends, so that nothing of what it has sent is lost with
+it. `reliable` says whether all subscriptions that it knows at the end are reliable. Exit codes: 0 all was sent; 2
+nobody subscribed in time, or somebody still did.
 """
 
 import argparse
@@ -54,6 +55,11 @@ def main() -> None:
         if line.strip() == "probe":
             probed += 1
             publisher.publish(serialised(probe(options.type, probed)))
+            continue
+        if line.strip() == "alone":
+            heard_by = node.get_subscriptions_info_by_topic
+            common.wait_until("somebody subscribes", options.timeout, lambda: not heard_by(options.topic))
+            common.say(alone=True)
             continue
         # Without a rate, time does not matter; with one, the first sample of a batch is due at once.
         due = time.monotonic()
