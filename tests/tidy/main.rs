@@ -75,6 +75,7 @@ fn the_tree_is_tidy() {
         rules::pictures_not_shown(&files),
         rules::digests(&files),
         rules::exit_codes(&files),
+        rules::unknown_tests(&files, &crates),
     ]
     .concat();
     assert!(complaints.is_empty(), "{} things are untidy:\n{}\n", complaints.len(), complaints.join("\n"));

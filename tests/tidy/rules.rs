@@ -203,6 +203,36 @@ pub(crate) fn exit_codes(files: &[File]) -> Vec<String> {
     complaints
 }
 
+/// Tests that a page names in a command, and that their crate does not have.
+pub(crate) fn unknown_tests(files: &[File], crates: &[Crate]) -> Vec<String> {
+    let mut complaints = Vec::new();
+    for page in files.iter().filter(|file| file.ending() == Some("md")) {
+        for command in page.text.lines().filter_map(test_command) {
+            let words = || command.split_whitespace();
+            let Some(package) = words().skip_while(|&word| word != "-p").nth(1) else { continue };
+            let Some(named) = crates.iter().find(|of| of.name == package) else {
+                complaints.push(format!("{}: `{command}`: there is no crate `{package}`", page.path));
+                continue;
+            };
+            let folder = named.manifest.trim_end_matches("Cargo.toml");
+            let of_it = || files.iter().filter(|file| file.path.starts_with(folder) && file.ending() != Some("md"));
+            for test in words().filter(|&word| word.contains('_') && !word.contains('=')) {
+                let last = test.rsplit("::").next().unwrap_or(test);
+                if !of_it().any(|file| file.path.contains(last) || file.text.contains(last)) {
+                    complaints.push(format!("{}: `{command}`: {package} has no test `{test}`", page.path));
+                }
+            }
+        }
+    }
+    complaints
+}
+
+/// The command of a line that runs tests, without what stands around it.
+fn test_command(line: &str) -> Option<&str> {
+    let begin = ["cargo test ", "cargo nextest run "].iter().find_map(|command| line.find(command))?;
+    line[begin..].split('`').next()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -358,5 +388,19 @@ mod tests {
         assert_eq!(exit_codes(&[page(PAGE, &guide), page("docs/b.md", "")]), [""; 0]);
         assert_eq!(exit_codes(&[page(PAGE, &twice), page("docs/b.md", table)]).len(), 2);
         assert_eq!(exit_codes(&[page(PAGE, "")]).len(), 1);
+    }
+
+    #[test]
+    fn a_command_of_a_page_names_tests_that_exist() {
+        let page = |command: &str| file("docs/a.md", &format!("Run `A=b_c {command}`.\n"));
+        let test = file("a/tests/suite.rs", "fn it_works() {}\n");
+        let complaints = |command: &str| unknown_tests(&[page(command), test.clone()], &[crate_named("a")]);
+        assert_eq!(complaints("cargo test -p a --test suite -- --ignored some::it_works"), [""; 0]);
+        assert_eq!(complaints("cargo test --workspace"), [""; 0]);
+        assert_eq!(
+            complaints("cargo nextest run -p a it_worked"),
+            ["docs/a.md: `cargo nextest run -p a it_worked`: a has no test `it_worked`"]
+        );
+        assert_eq!(complaints("cargo test -p b"), ["docs/a.md: `cargo test -p b`: there is no crate `b`"]);
     }
 }
