@@ -89,8 +89,8 @@ fn missed_words(monitors: &MonitorsSummary) -> Option<String> {
 
 /// What a requirement with causes asks for, and how far tests are from that: sentences, in which a test is named.
 pub(crate) struct Violated {
-    /// `R1: No load falls over people (drops ≤ 0). 11 of 84 conclusive tests violate it, in 2 ways. The worst value is
-    /// 1, in `
+    /// `R1: No load falls over people (drops ≤ 0). 11 of 84 tests violate it; the run without disturbance does not. 2
+    /// causes: lag, loss. The worst value is 1, in `
     pub before: String,
     /// The test with that value.
     pub worst: Option<TestNumber>,
@@ -98,14 +98,28 @@ pub(crate) struct Violated {
     pub after: String,
 }
 
-/// What is to be said of a requirement with this many causes.
-pub(crate) fn violated_requirement(requirement: &RequirementSummary, causes: usize) -> Violated {
-    let RequirementSummary { requirement, text, metric, bound, violated, satisfied, worst, .. } = requirement;
-    let of = plural(violated + satisfied, "conclusive test", "conclusive tests");
+/// How many causes of a requirement its sentence names.
+const NAMED: usize = 4;
+
+/// What is to be said of a requirement with causes of these names.
+pub(crate) fn violated_requirement(of: &RequirementSummary, causes: &[String]) -> Violated {
+    let RequirementSummary { requirement, text, metric, bound, violated, satisfied, inconclusive, .. } = of;
+    let [one, several] = if *inconclusive == 0 { ["test", "tests"] } else { ["conclusive test", "conclusive tests"] };
+    let tests = plural(violated + satisfied, one, several);
     let violate = if *violated == 1 { "violates" } else { "violate" };
-    let ways = plural(causes, "way", "ways");
-    let before = format!("{requirement}: {text} ({metric} {bound}). {violated} of {of} {violate} it, in {ways}.");
-    let Some(worst) = worst else { return Violated { before, worst: None, after: String::new() } };
+    let undisturbed = match of.reference {
+        Some(Verdict::Satisfied) => "; the run without disturbance does not",
+        _ => "",
+    };
+    let mut names = causes[..causes.len().min(NAMED)].join(", ");
+    if causes.len() > NAMED {
+        let _ = write!(names, " and {} more", causes.len() - NAMED);
+    }
+    let causes = plural(causes.len(), "cause", "causes");
+    let before = format!(
+        "{requirement}: {text} ({metric} {bound}). {violated} of {tests} {violate} it{undisturbed}. {causes}: {names}."
+    );
+    let Some(worst) = &of.worst else { return Violated { before, worst: None, after: String::new() } };
     let after = match worst.acting.as_slice() {
         [] => ".".to_owned(),
         acting => format!(": {}.", worst_text(acting)),
@@ -113,7 +127,7 @@ pub(crate) fn violated_requirement(requirement: &RequirementSummary, causes: usi
     Violated { before: format!("{before} The worst value is {}, in ", worst.text), worst: Some(worst.test), after }
 }
 
-/// In how many ways requirements are violated, and what is known of others, in sentences.
+/// How many causes are known, and what is known of others, in sentences.
 pub(crate) fn causes_sentence(found: &CausesSummary) -> Option<String> {
     let unseen = found.unseen?;
     let known = plural(found.causes.len(), "cause is known", "causes are known");

@@ -69,23 +69,24 @@ pub(super) fn requirements(summary: &Summary) -> Table {
 pub(super) fn causes(found: &CausesSummary) -> Table {
     let again = found.causes.iter().any(|cause| cause.again.is_some());
     let several = found.causes.iter().any(|cause| cause.fewer != Fewer::Single);
-    let mut columns = vec![Column::heading("requirement"), Column::line("cause"), Column::words("smallest test")];
-    columns.extend(again.then(|| Column::line("fresh runs")));
+    let mut columns = vec![Column::heading("requirement"), Column::line("cause")];
     columns.extend([Column::line("violating"), Column::line("first")]);
     columns.extend(several.then(|| Column::line("with fewer")));
+    columns.push(Column::words("smallest test"));
+    columns.extend(again.then(|| Column::line("fresh runs")));
     columns.push(Column::sentence("what it does"));
     let mut table = Table::with(columns);
     for cause in &found.causes {
         let mut cells: Vec<Cell> = vec![
             Datum::text(&cause.requirement).bad_if(true),
             Datum::text(cause.name()).into(),
-            Datum::Test(cause.test).into(),
+            Datum::text(format!("{} of {} with it", cause.violating, cause.held)).into(),
+            Datum::Test(cause.first).into(),
         ];
-        cells.extend(again.then(|| Datum::maybe(cause.again.as_ref().map(FindingAgain::words)).into()));
-        cells.push(Datum::text(format!("{} of {} with it", cause.violating, cause.held)).into());
-        cells.push(Datum::Test(cause.first).into());
         let with_fewer = (cause.fewer != Fewer::Single).then(|| cause.fewer.word().to_owned());
         cells.extend(several.then(|| Datum::maybe(with_fewer).into()));
+        cells.push(Datum::Test(cause.test).into());
+        cells.extend(again.then(|| Datum::maybe(cause.again.as_ref().map(FindingAgain::words)).into()));
         let what = disturbances_text(&cause.acting);
         cells.push(Datum::text(format!("{what}: {} is {}", cause.metric, cause.value)).into());
         table.row(cells);

@@ -33,7 +33,7 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
     paragraph(&mut text, &headline(summary), options);
     if let Some(found) = &summary.causes {
         for (requirement, causes) in summary.violated_by_causes(found) {
-            let Violated { before, worst, after } = violated_requirement(requirement, causes);
+            let Violated { before, worst, after } = violated_requirement(requirement, &causes);
             let worst = worst.map_or(String::new(), |test| test.to_string());
             text.push('\n');
             paragraph(&mut text, &format!("{before}{worst}{after}"), options);

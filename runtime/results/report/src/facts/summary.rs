@@ -17,7 +17,7 @@ use sesame_record::{
     is_quarantined, verdict,
 };
 
-use crate::facts::causes::{CausesSummary, causes_of_search, distance_outside};
+use crate::facts::causes::{CauseSummary, CausesSummary, causes_of_search, distance_outside};
 use crate::facts::certificate::before_after::Mend;
 use crate::facts::certificate::campaign::{MonitorsSummary, monitors_summary};
 use crate::facts::coverage::{CoverageSummary, coverage};
@@ -113,14 +113,16 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// The requirements that have causes, and how many each has.
+    /// The requirements that have causes, and the names of these.
     pub(crate) fn violated_by_causes<'a>(
         &'a self,
         found: &'a CausesSummary,
-    ) -> impl Iterator<Item = (&'a RequirementSummary, usize)> {
-        let causes = |name: &str| found.causes.iter().filter(|cause| cause.requirement == name).count();
-        let counted = self.requirements.iter().map(move |requirement| (requirement, causes(&requirement.requirement)));
-        counted.filter(|(_, causes)| *causes > 0)
+    ) -> impl Iterator<Item = (&'a RequirementSummary, Vec<String>)> {
+        let with_causes = self.requirements.iter().map(move |requirement| {
+            let of_it = found.causes.iter().filter(|cause| cause.requirement == requirement.requirement);
+            (requirement, of_it.map(CauseSummary::name).collect::<Vec<_>>())
+        });
+        with_causes.filter(|(_, causes)| !causes.is_empty())
     }
 
     /// How tests were shrunk, one or several.

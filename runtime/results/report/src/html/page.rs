@@ -209,7 +209,7 @@ fn causes(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
     body.open("section", &[]);
     body.heading("Causes");
     for (requirement, causes) in summary.violated_by_causes(found) {
-        let Violated { before, worst, after } = violated_requirement(requirement, causes);
+        let Violated { before, worst, after } = violated_requirement(requirement, &causes);
         body.open("p", &[]);
         body.text(&before);
         if let Some(test) = worst {
