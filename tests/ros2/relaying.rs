@@ -32,7 +32,7 @@ pub(crate) fn plans(file: &str, text: &str) -> Vec<CampaignPlan> {
 }
 
 /// A space in which one topic, `/peer`, is cut, with declarations of nodes and operations, of which one may be named
-/// `lost`. A run ends after `end`. A node named `clock` makes it one with a clock.
+/// `lost`. A node named `clock` makes it one with a clock. `end` says when a run ends: `2s`, or `9s or when heard > 0`.
 pub(crate) fn space(domain: &Domain, kind: &str, nodes: &str, operations: &str, end: &str) -> String {
     format!(
         "space peers\n\
@@ -129,7 +129,7 @@ const FIRST_WAIT: Duration = Duration::from_secs(1);
 /// Sends probes until the latest one has been heard by all.
 #[derive(Default)]
 struct Probing {
-    /// The number of the latest one, which counts those of earlier runs.
+    /// How many the publisher has been told to send, in earlier runs too.
     latest: u64,
     sent: u32,
     begun: Option<Instant>,
@@ -217,7 +217,7 @@ impl System {
         finished
     }
 
-    /// A run that lasts until all peers have heard a probe of the publisher, so that whatever is between them knows
+    /// A run that lasts until all peers have heard a probe from the publisher, so that whatever is between them knows
     /// both sides.
     pub(crate) fn introduce(&mut self, from: &Peer, to: &[&Peer]) {
         let mut probing = Probing::default();

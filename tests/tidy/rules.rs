@@ -227,7 +227,7 @@ pub(crate) fn unknown_tests(files: &[File], crates: &[Crate]) -> Vec<String> {
     complaints
 }
 
-/// The command of a line that runs tests, without what stands around it.
+/// The command in a line that runs tests, up to a backtick.
 fn test_command(line: &str) -> Option<&str> {
     let begin = ["cargo test ", "cargo nextest run "].iter().find_map(|command| line.find(command))?;
     line[begin..].split('`').next()

@@ -107,10 +107,8 @@ pub(crate) fn violated_requirement(of: &RequirementSummary, causes: &[String]) -
     let [one, several] = if *inconclusive == 0 { ["test", "tests"] } else { ["conclusive test", "conclusive tests"] };
     let tests = plural(violated + satisfied, one, several);
     let violate = if *violated == 1 { "violates" } else { "violate" };
-    let undisturbed = match of.reference {
-        Some(Verdict::Satisfied) => "; the run without disturbance does not",
-        _ => "",
-    };
+    let holds_undisturbed = of.reference == Some(Verdict::Satisfied);
+    let undisturbed = if holds_undisturbed { "; the run without disturbance does not" } else { "" };
     let mut names = causes[..causes.len().min(NAMED)].join(", ");
     if causes.len() > NAMED {
         let _ = write!(names, " and {} more", causes.len() - NAMED);

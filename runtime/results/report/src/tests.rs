@@ -33,6 +33,27 @@ fn the_summary_shows_the_front_the_requirements_and_what_failed() {
 }
 
 #[test]
+fn the_sentence_of_a_requirement_says_no_more_than_its_tests() {
+    let (_folder, repository) = repository();
+    let mut requirement = summary(&repository).unwrap().requirements.remove(0);
+    let causes = ["a", "b", "c", "d", "e", "f"].map(str::to_owned);
+    let begins = |requirement: &facts::summary::RequirementSummary, causes: &[String]| {
+        let sentence = sentences::violated_requirement(requirement, causes).before;
+        sentence.split_once("). ").unwrap().1.split_once(" The worst").unwrap().0.to_owned()
+    };
+    let undisturbed = "; the run without disturbance does not";
+    assert_eq!(
+        begins(&requirement, &causes[..1]),
+        format!("30 of 58 conclusive tests violate it{undisturbed}. 1 cause: a.")
+    );
+    requirement.inconclusive = 0;
+    requirement.reference = Some(Verdict::Inconclusive);
+    assert_eq!(begins(&requirement, &causes), "30 of 58 tests violate it. 6 causes: a, b, c, d and 2 more.");
+    requirement.reference = None;
+    assert_eq!(begins(&requirement, &causes[..4]), "30 of 58 tests violate it. 4 causes: a, b, c, d.");
+}
+
+#[test]
 fn the_summary_fits_a_terminal() {
     let (_folder, repository) = repository();
     let text = summary_text(&summary(&repository).unwrap(), TextOptions { width: Some(100), colour: false });
