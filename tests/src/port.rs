@@ -5,7 +5,7 @@ use std::net::{Ipv4Addr, TcpListener, UdpSocket};
 use std::ops::RangeInclusive;
 use std::os::fd::OwnedFd;
 
-/// The ports of servers of TCP, and those of servers of UDP. They lie below the ports that the system assigns by itself,
+/// The ports of servers of TCP, and those of servers of UDP. They lie below the ports that the system assigns itself,
 /// so nobody takes a port before its server does, or while the server is restarted. No example names one of them, so
 /// the ports of an example can be replaced one after the other.
 const OF_TCP: RangeInclusive<u16> = 10_000..=12_499;
