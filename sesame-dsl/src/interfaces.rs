@@ -51,8 +51,9 @@ impl Interfaces for NoInterfaces {
 }
 
 /// The full name of an interface of a kind, `msg` or `srv`: `sensor_msgs/JointState` is short for
-/// `sensor_msgs/msg/JointState`. `None` if it is none.
-pub fn full_name(written: &str, kind: &str) -> Option<String> {
+/// `sensor_msgs/msg/JointState`. `None` if it cannot be the name of one. ROS 1 allows underscores and small letters
+/// where ROS 2 does not: `ublox_msgs/CfgGNSS_Block`, `tf/tfMessage`.
+pub fn full_name(written: &str, kind: &str, dialect: Dialect) -> Option<String> {
     let parts: Vec<&str> = written.split('/').collect();
     let (package, name) = match parts[..] {
         [package, name] => (package, name),
@@ -61,8 +62,9 @@ pub fn full_name(written: &str, kind: &str) -> Option<String> {
     };
     let package_fits = package.starts_with(|first: char| first.is_ascii_lowercase())
         && package.bytes().all(|byte| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'_');
-    let name_fits = name.starts_with(|first: char| first.is_ascii_uppercase())
-        && name.bytes().all(|byte| byte.is_ascii_alphanumeric());
+    let of_ros1 = dialect == Dialect::Ros1;
+    let name_fits = name.starts_with(|first: char| first.is_ascii_uppercase() || of_ros1 && first.is_ascii_lowercase())
+        && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || of_ros1 && byte == b'_');
     (package_fits && name_fits).then(|| format!("{package}/{kind}/{name}"))
 }
 
@@ -94,7 +96,7 @@ pub fn known(name: &str) -> Option<Vec<Interface>> {
     let mut found = Vec::new();
     let mut of = Vec::new();
     for (ty, field) in *fields {
-        let ty = wire_type(ty).expect("the table has types");
+        let ty = wire_type(ty, Dialect::Ros2).expect("the table has types");
         if let WireType::Interface { name } = &ty {
             found.extend(known(name).expect("the table has what its interfaces contain"));
         }
@@ -117,7 +119,7 @@ pub(crate) fn interface(name: String, mut fields: Vec<InterfaceField>) -> Interf
 }
 
 /// A type as it is written in a `.msg` file, such as `uint8`, `float64[36]`, `string<=10` or `geometry_msgs/Point[]`.
-pub fn wire_type(written: &str) -> Option<WireType> {
+pub fn wire_type(written: &str, dialect: Dialect) -> Option<WireType> {
     let (base, array) = match written.split_once('[') {
         Some((base, rest)) => (base, Some(rest.strip_suffix(']')?)),
         None => (written, None),
@@ -128,7 +130,7 @@ pub fn wire_type(written: &str) -> Option<WireType> {
         Some(("string", bound)) if number(bound).is_some() => WireType::String,
         Some(("wstring", bound)) if number(bound).is_some() => WireType::WString,
         Some(_) => return None,
-        None => scalar(base)?,
+        None => scalar(base, dialect)?,
     };
     let Some(array) = array else { return Some(of) };
     let of = Box::new(of);
@@ -141,13 +143,13 @@ pub fn wire_type(written: &str) -> Option<WireType> {
     }
 }
 
-fn scalar(name: &str) -> Option<WireType> {
+fn scalar(name: &str, dialect: Dialect) -> Option<WireType> {
     match name {
         "string" => Some(WireType::String),
         "wstring" => Some(WireType::WString),
         _ => match Primitive::named(name) {
             Some(primitive) => Some(WireType::Primitive { primitive }),
-            None => full_name(name, "msg").map(|name| WireType::Interface { name }),
+            None => full_name(name, "msg", dialect).map(|name| WireType::Interface { name }),
         },
     }
 }
@@ -200,22 +202,30 @@ mod tests {
 
     #[test]
     fn names_of_types_are_completed_and_checked() {
-        assert_eq!(full_name("sensor_msgs/JointState", "msg").as_deref(), Some("sensor_msgs/msg/JointState"));
-        assert_eq!(full_name("std_srvs/srv/SetBool", "srv").as_deref(), Some("std_srvs/srv/SetBool"));
+        let of_ros2 = |written: &str, kind: &str| full_name(written, kind, Dialect::Ros2);
+        assert_eq!(of_ros2("sensor_msgs/JointState", "msg").as_deref(), Some("sensor_msgs/msg/JointState"));
+        assert_eq!(of_ros2("std_srvs/srv/SetBool", "srv").as_deref(), Some("std_srvs/srv/SetBool"));
         for wrong in ["JointState", "a/srv/B", "A/B", "a/b", "a//B", "a/msg/b/C", "a/msg/B_C", "", "1a/B", "a/B "] {
-            assert_eq!(full_name(wrong, "msg"), None, "{wrong}");
+            assert_eq!(of_ros2(wrong, "msg"), None, "{wrong}");
+        }
+        for (written, full) in [("tf/tfMessage", "tf/msg/tfMessage"), ("a/B_C", "a/msg/B_C")] {
+            assert_eq!(full_name(written, "msg", Dialect::Ros1).as_deref(), Some(full));
+            assert_eq!(of_ros2(written, "msg"), None, "{written}");
+        }
+        for wrong in ["a/_B", "a/B-C", "a/1B"] {
+            assert_eq!(full_name(wrong, "msg", Dialect::Ros1), None, "{wrong}");
         }
     }
 
     #[test]
     fn types_on_the_wire_are_those_of_msg_files() {
         for text in ["uint8", "float64[36]", "string[]", "int8[<=5]", "wstring", "geometry_msgs/msg/Point[2]"] {
-            assert_eq!(in_words(&wire_type(text).unwrap()), text);
+            assert_eq!(in_words(&wire_type(text, Dialect::Ros2).unwrap()), text);
         }
-        assert_eq!(wire_type("byte"), wire_type("uint8"));
-        assert_eq!(wire_type("string<=10"), Some(WireType::String));
+        assert_eq!(wire_type("byte", Dialect::Ros2), wire_type("uint8", Dialect::Ros2));
+        assert_eq!(wire_type("string<=10", Dialect::Ros2), Some(WireType::String));
         for wrong in ["uint", "float64[", "float64[-1]", "float64[<]", "int8<=5", "float64[+3]", "float64[3][3]", ""] {
-            assert_eq!(wire_type(wrong), None, "{wrong}");
+            assert_eq!(wire_type(wrong, Dialect::Ros2), None, "{wrong}");
         }
     }
 

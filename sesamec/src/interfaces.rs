@@ -2,7 +2,10 @@
 //! asked for, in the order in which one contains another. For `MAVLink`, these are the files of a dialect, read once.
 //!
 //! A folder holds packages, as `share` of a distribution and the folder of a workspace's sources do:
-//! `PACKAGE/msg/NAME.msg`, `PACKAGE/srv/NAME.srv`, or `.idl` in their place. Nothing else in it is looked at.
+//! `PACKAGE/msg/NAME.msg`, `PACKAGE/srv/NAME.srv`, or `.idl` in their place. A package that is not there is searched in
+//! the repositories below ([`workspace`]).
+
+mod workspace;
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -60,6 +63,8 @@ pub(crate) struct Files {
     read: RefCell<BTreeMap<String, Read>>,
     /// By the files, and the file to which they are relative.
     dialects: RefCell<BTreeMap<(Vec<String>, String), Dialects>>,
+    /// The packages in repositories below a folder, by the folder.
+    packages: RefCell<BTreeMap<PathBuf, BTreeMap<String, PathBuf>>>,
 }
 
 impl Default for Files {
@@ -91,7 +96,7 @@ fn parse(name: &str, definition: &Definition) -> Result<Vec<Interface>, String> 
 impl Files {
     /// No file is read yet.
     pub(crate) fn new(parse: Parse) -> Self {
-        Files { parse, read: RefCell::default(), dialects: RefCell::default() }
+        Files { parse, read: RefCell::default(), dialects: RefCell::default(), packages: RefCell::default() }
     }
 
     /// The layout of an interface itself.
@@ -112,13 +117,38 @@ impl Files {
     }
 
     fn definition(&self, folders: Folders<'_>, name: &str) -> Read {
-        let Some((file, format)) = find(folders, name) else { return Ok(None) };
+        let Some((file, format)) = self.file(folders, name) else { return Ok(None) };
         let text = input::text(&file).map_err(|unreadable| match unreadable {
             Unreadable::System(error) => format!("{} cannot be read: {error}", file.display()),
             other => format!("{}: {other}", file.display()),
         })?;
         let definition = Definition { file, format, dialect: folders.dialect, text };
         (self.parse)(name, &definition).map(Some).map_err(|why| format!("{}: {why}", definition.file.display()))
+    }
+
+    /// The first file of the folders that may define an interface: each folder's own packages, then those below it.
+    fn file(&self, folders: Folders<'_>, name: &str) -> Option<(PathBuf, Format)> {
+        let mut parts = name.split('/');
+        let (Some(package), Some(kind), Some(last)) = (parts.next(), parts.next(), parts.next()) else {
+            return None;
+        };
+        let plain =
+            |part: &str| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
+        if !plain(package) || !plain(last) || !["msg", "srv"].contains(&kind) || parts.next().is_some() {
+            return None;
+        }
+        let beside = Path::new(folders.file).parent().unwrap_or(Path::new(""));
+        for folder in folders.written.iter().map(|folder| beside.join(folder)) {
+            if let Some(found) = in_package(&folder.join(package), kind, last) {
+                return Some(found);
+            }
+            let mut packages = self.packages.borrow_mut();
+            let below = packages.entry(folder.clone()).or_insert_with(|| workspace::packages(&folder));
+            if let Some(found) = below.get(package).and_then(|package| in_package(package, kind, last)) {
+                return Some(found);
+            }
+        }
+        None
     }
 
     /// Adds an interface to those that are found, after those that it contains. `open` are those that contain it.
@@ -153,7 +183,13 @@ impl Files {
         for field in &layout.fields {
             let Some(inner) = contained(&field.ty) else { continue };
             if !self.add(folders, inner, open, found)? {
-                return Err(format!("it contains `{inner}`, of which no folder has a definition"));
+                let header = inner.ends_with("/msg/Header") && folders.dialect == Dialect::Ros2;
+                let hint = if header {
+                    "; a bare `Header` is of its own package, and the common one is `std_msgs/Header`"
+                } else {
+                    ""
+                };
+                return Err(format!("it contains `{inner}`, of which no folder has a definition{hint}"));
             }
         }
         open.pop();
@@ -193,26 +229,12 @@ fn defined_as(name: &str) -> &str {
     of_service.flatten().unwrap_or(name)
 }
 
-/// The first file of the folders that may define an interface.
-fn find(folders: Folders<'_>, name: &str) -> Option<(PathBuf, Format)> {
-    let mut parts = name.split('/');
-    let (package, kind, last) = (parts.next()?, parts.next()?, parts.next()?);
-    let plain = |part: &str| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
-    if !plain(package) || !plain(last) || parts.next().is_some() {
-        return None;
-    }
-    let formats = match kind {
-        "msg" => [("msg", Format::Msg), ("idl", Format::Idl)],
-        "srv" => [("srv", Format::Srv), ("idl", Format::Idl)],
-        _ => return None,
-    };
-    let beside = Path::new(folders.file).parent().unwrap_or(Path::new(""));
-    folders.written.iter().find_map(|folder| {
-        let folder = beside.join(folder).join(package).join(kind);
-        formats.iter().find_map(|&(extension, format)| {
-            let file = folder.join(format!("{last}.{extension}"));
-            file.exists().then_some((file, format))
-        })
+/// The file in a package that may define an interface of a kind, `msg` or `srv`.
+fn in_package(package: &Path, kind: &str, name: &str) -> Option<(PathBuf, Format)> {
+    let format = if kind == "msg" { Format::Msg } else { Format::Srv };
+    [(kind, format), ("idl", Format::Idl)].into_iter().find_map(|(extension, format)| {
+        let file = package.join(kind).join(format!("{name}.{extension}"));
+        file.exists().then_some((file, format))
     })
 }
 
@@ -288,6 +310,20 @@ mod tests {
     }
 
     #[test]
+    fn packages_of_a_workspace_lie_in_repositories() {
+        let manifest = |name: &str| format!("<package><name>{name}</name></package>");
+        let files = [
+            ("first/repository/a/package.xml", &*manifest("a")),
+            ("first/repository/a/msg/Outer.msg", "b/msg/Leaf"),
+            ("first/other/renamed/package.xml", &*manifest("b")),
+            ("first/other/renamed/msg/Leaf.msg", ""),
+            ("second/b/msg/Leaf.msg", "c/msg/None"),
+        ];
+        assert_eq!(found(&files, "a/msg/Outer").unwrap().unwrap(), ["b/msg/Leaf", "a/msg/Outer"]);
+        assert_eq!(found(&files, "renamed/msg/Leaf").unwrap(), None);
+    }
+
+    #[test]
     fn a_dialect_is_relative_to_the_space_and_read_with_the_files_that_it_includes() {
         let folder = tempfile::tempdir().unwrap();
         let message = r#"<message id="1" name="LEVEL"><field type="float[3]" name="level"/></message>"#;
@@ -320,6 +356,9 @@ mod tests {
         for (path, text) in [
             ("a/msg/Joint.msg", "std_msgs/Level[] levels # of each\nuint8 COUNT=3\nfloat32[3] axes\n"),
             ("a/srv/Move.srv", "Joint to\nstd_msgs/Header header\n---\n"),
+            ("a/msg/Own.msg", "Header header\n"),
+            ("a/msg/Header.msg", "uint32 number\n"),
+            ("b/msg/Stamped.msg", "Header header\n"),
             ("std_msgs/msg/Level.idl", header),
         ] {
             let path = folder.path().join(path);
@@ -338,6 +377,11 @@ mod tests {
         let expected = ["std_msgs/msg/Level", "a/msg/Joint", header[0], header[1], "a/srv/Move_Request"];
         assert_eq!(names("a/srv/Move_Request"), expected, "headers are known without a file");
         assert_eq!(names("a/srv/Move_Response"), ["a/srv/Move_Response"]);
+        // A bare name is of the same package in ROS 2, `Header` too.
+        assert_eq!(names("a/msg/Own"), ["a/msg/Header", "a/msg/Own"]);
+        let why = files.find(folders, "b/msg/Stamped").unwrap_err();
+        let hint = "a bare `Header` is of its own package, and the common one is `std_msgs/Header`";
+        assert!(why.contains("`b/msg/Header`") && why.ends_with(hint), "{why}");
     }
 
     #[test]

@@ -92,7 +92,7 @@ impl<'a> Resolver<'a> {
         if written.text.trim().is_empty() {
             return None;
         }
-        let name = interfaces::full_name(&written.text, kind);
+        let name = interfaces::full_name(&written.text, kind, self.dialect());
         if name.is_none() {
             let (what, example) = if kind == "msg" {
                 ("message", "sensor_msgs/msg/JointState")
@@ -157,9 +157,11 @@ impl<'a> Resolver<'a> {
             }
             (Layout::Block(_), _) => {
                 let wires = message.fields.iter().filter_map(|field| field.wire.as_ref());
-                let inner = wires.filter_map(|wire| match interfaces::innermost(&interfaces::wire_type(&wire.text)?) {
-                    WireType::Interface { name } => Some((declared(name)?, wire.span)),
-                    _ => None,
+                let inner = wires.filter_map(|wire| {
+                    match interfaces::innermost(&interfaces::wire_type(&wire.text, self.dialect())?) {
+                        WireType::Interface { name } => Some((declared(name)?, wire.span)),
+                        _ => None,
+                    }
                 });
                 inner.collect()
             }
@@ -197,8 +199,10 @@ impl<'a> Resolver<'a> {
                 continue;
             };
             let has = &fields[position].ty;
-            let another =
-                field.wire.as_ref().filter(|wire| interfaces::wire_type(&wire.text).as_ref() != Some(&of_wire.ty));
+            let another = field
+                .wire
+                .as_ref()
+                .filter(|wire| interfaces::wire_type(&wire.text, self.dialect()).as_ref() != Some(&of_wire.ty));
             if !fits(&ty, has) || another.is_some() {
                 let wire = interfaces::in_words(&of_wire.ty);
                 let title = format!("field `{}` of `{}` is `{wire}`", name.text, last.name);
@@ -291,7 +295,7 @@ impl<'a> Resolver<'a> {
         if written.text.trim().is_empty() {
             return None;
         }
-        let Some(wire) = interfaces::wire_type(&written.text) else {
+        let Some(wire) = interfaces::wire_type(&written.text, self.dialect()) else {
             let title = format!("`{}` is not a type of ROS", written.text);
             let mut diagnostic = Diagnostic::new(Code::NO_LAYOUT, written.span, title)
                 .label("expected a type as in a `.msg` file, for example `uint8` or `float64[36]`");

@@ -53,7 +53,10 @@ fn facts(topics: Vec<FoundTopic>, services: Vec<FoundService>, nodes: &[&str]) -
 }
 
 fn layout(name: &str, fields: &[(&str, &str)]) -> Interface {
-    let field = |(name, ty): &(&str, &str)| InterfaceField { name: (*name).to_owned(), ty: wire_type(ty).unwrap() };
+    let field = |(name, ty): &(&str, &str)| InterfaceField {
+        name: (*name).to_owned(),
+        ty: wire_type(ty, Dialect::Ros2).unwrap(),
+    };
     Interface { name: name.to_owned(), fields: fields.iter().map(field).collect() }
 }
 

@@ -62,7 +62,10 @@ impl Types {
         let mut types = Types::default();
         for FoundType { name, source, fields, .. } in found {
             let field = |field: &FoundField| {
-                Some(InterfaceField { name: field.name.clone(), ty: interfaces::wire_type(&field.ty)? })
+                Some(InterfaceField {
+                    name: field.name.clone(),
+                    ty: interfaces::wire_type(&field.ty, Dialect::default())?,
+                })
             };
             let details = fields.iter().map(|field| (field.name.clone(), field.clone())).collect();
             let ty = Type { details, ..Type::of(*source, fields.iter().filter_map(field).collect()) };
@@ -90,7 +93,7 @@ impl Types {
             Some(last) => Type::of(source, last.fields),
             None => unknown(None),
         };
-        let found = if interfaces::full_name(name, "msg").as_deref() != Some(name) {
+        let found = if interfaces::full_name(name, "msg", folders.dialect).as_deref() != Some(name) {
             unknown(Some("this is not a type of messages in ROS".to_owned()))
         } else if let Some(known) = interfaces::known(name) {
             of(TypeSource::Known, known)
@@ -122,7 +125,7 @@ impl Types {
             self.look_up(&interface.name, files, folders);
             let Some(ty) = self.by_name.get_mut(&interface.name) else { continue };
             if ty.source == TypeSource::Unknown && ty.problem.is_none() {
-                *ty = match wrong_field(&interface.fields) {
+                *ty = match wrong_field(&interface.fields, folders.dialect) {
                     Some(problem) => Type::unknown(Some(problem)),
                     None => Type::of(TypeSource::Node, interface.fields.clone()),
                 };
@@ -294,13 +297,13 @@ impl Types {
 }
 
 /// What is wrong with the fields that a node described.
-fn wrong_field(fields: &[InterfaceField]) -> Option<String> {
+fn wrong_field(fields: &[InterfaceField], dialect: Dialect) -> Option<String> {
     let is_name = |field: &InterfaceField| field.name.len() <= 100 && sesame_notation::is_name(&field.name);
     if fields.iter().any(|field| !is_name(field)) {
         return Some("one of its fields has no name of ROS".to_owned());
     }
     let known = |field: &InterfaceField| {
-        contained(&field.ty).is_none_or(|name| interfaces::full_name(name, "msg").as_deref() == Some(name))
+        contained(&field.ty).is_none_or(|name| interfaces::full_name(name, "msg", dialect).as_deref() == Some(name))
     };
     (!fields.iter().all(known)).then(|| "one of its fields has no type of ROS".to_owned())
 }

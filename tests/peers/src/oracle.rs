@@ -9,8 +9,8 @@ use serde::de::DeserializeOwned;
 use serde_json::Value as Json;
 use sesame_relay::value::Value;
 
-/// Calls a function with each line of an oracle, a script below `tests/`, and returns how many there were. The script
-/// gets what it is asked for, how many of it, and the seed of its draws.
+/// Calls a function with each line of an oracle, a script below `tests/` with these arguments, and returns how many
+/// there were.
 ///
 /// # Panics
 ///
@@ -18,12 +18,12 @@ use sesame_relay::value::Value;
 pub fn each_line<T: DeserializeOwned>(
     python: &Path,
     script: &str,
-    (asked, count, seed): (&str, usize, u64),
+    arguments: &[&str],
     mut check: impl FnMut(&T),
 ) -> usize {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("this is a folder of `tests`").join(script);
     let mut oracle = Command::new(python);
-    oracle.arg(script).args([asked, &count.to_string(), &seed.to_string()]).stdout(Stdio::piped());
+    oracle.arg(script).args(arguments).stdout(Stdio::piped());
     let mut oracle = oracle.spawn().expect("a Python that is named starts");
     let mut found = 0;
     for line in BufReader::new(oracle.stdout.take().expect("it is piped")).lines() {

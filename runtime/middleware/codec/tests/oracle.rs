@@ -150,7 +150,7 @@ fn check(interfaces: &[Interface], sample: &Sample, cdr: &[u8]) {
 
 fn check_rosbags(count: usize, seed: u64) {
     let Some(python) = named("SESAME_ROS2_CYCLONE") else { return };
-    let found = each_line(&python, ORACLE, ("rosbags", count, seed), |sample: &Sample| {
+    let found = each_line(&python, ORACLE, &["rosbags", &count.to_string(), &seed.to_string()], |sample: &Sample| {
         let mut catalogue = Catalogue::default();
         for (name, text) in &sample.files {
             catalogue.add(msg("oracle", name, text).unwrap_or_else(|error| panic!("{error}: {text}")));
@@ -204,7 +204,7 @@ fn all_installed_messages_are_read_and_written_as_rclpy_does() {
     for variable in ["SESAME_ROS2_KILTED", "SESAME_ROS2_JAZZY"] {
         let Some(python) = named(variable) else { continue };
         let catalogue = installed(&python);
-        let found = each_line(&python, ORACLE, ("rclpy", 5, 7), |sample: &Sample| {
+        let found = each_line(&python, ORACLE, &["rclpy", "5", "7"], |sample: &Sample| {
             let interfaces = catalogue.layout(&sample.interface).unwrap();
             // `serialize_message` hands out a buffer of the size it estimated before. What nodes publish ends with the
             // last field.

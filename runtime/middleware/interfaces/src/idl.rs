@@ -1,4 +1,5 @@
-//! `.idl` files as the tools of ROS generate and accept them: modules with structs, constants and typedefs of arrays.
+//! `.idl` files as the tools of ROS generate and accept them, and enumerations, which other tools of DDS write: modules
+//! with structs, enumerations, constants and typedefs.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +10,14 @@ use crate::{Constant, Definition, DefinitionError, Field, LONGEST_ARRAY, definit
 /// The interfaces that an `.idl` file declares. Their names are those of its modules, so of the file
 /// `std_msgs/msg/Header.idl` it is `std_msgs/msg/Header`.
 pub fn idl(text: &str) -> Result<Vec<Definition>, DefinitionError> {
-    let mut parser = Parser { tokens: tokens(text)?, at: 0, modules: Vec::new(), typedefs: BTreeMap::new() };
+    let mut parser = Parser {
+        tokens: tokens(text)?,
+        at: 0,
+        modules: Vec::new(),
+        typedefs: BTreeMap::new(),
+        lengths: BTreeMap::new(),
+        bits: None,
+    };
     let (mut found, mut constants) = (Vec::new(), BTreeMap::new());
     parser.members(&mut found, &mut constants)?;
     for definition in &mut found {
@@ -35,9 +43,16 @@ struct Parser {
     modules: Vec<String>,
     /// What other names of types stand for.
     typedefs: BTreeMap<String, WireType>,
+    /// The constants that can be lengths.
+    lengths: BTreeMap<String, u32>,
+    /// What `@bit_bound` says about the next declaration.
+    bits: Option<u32>,
 }
 
 type Constants = BTreeMap<String, Vec<Constant>>;
+
+/// How many values an array can hold.
+const LENGTHS: std::ops::RangeInclusive<u32> = 1..=LONGEST_ARRAY;
 
 /// The deepest nesting of modules and sequences.
 const DEEPEST: usize = 20;
@@ -65,6 +80,18 @@ impl Parser {
     /// A name in the module at hand.
     fn full_name(&self, name: &str) -> String {
         self.modules.iter().map(String::as_str).chain([name]).collect::<Vec<_>>().join("/")
+    }
+
+    /// What a name stands for: the nearest declaration, from the module at hand outwards.
+    fn nearest<T: Clone>(&self, declared: &BTreeMap<String, T>, name: &str) -> Option<T> {
+        let name = name.replace("::", "/");
+        if let Some(absolute) = name.strip_prefix('/') {
+            return declared.get(absolute).cloned();
+        }
+        (0..=self.modules.len()).rev().find_map(|depth| {
+            let full = self.modules[..depth].iter().map(String::as_str).chain([name.as_str()]);
+            declared.get(&full.collect::<Vec<_>>().join("/")).cloned()
+        })
     }
 
     fn sign(&mut self, sign: char) -> Result<(), DefinitionError> {
@@ -106,8 +133,12 @@ impl Parser {
                 Token::Word(word) => match word.as_str() {
                     "module" => self.module(found, constants)?,
                     "struct" => found.push(self.structure()?),
+                    "enum" => self.enumeration()?,
                     "const" => {
                         let constant = self.constant()?;
+                        if let Some(length) = constant.value.parse().ok().filter(|length| LENGTHS.contains(length)) {
+                            self.lengths.insert(self.full_name(&constant.name), length);
+                        }
                         constants.entry(self.modules.join("/")).or_default().push(constant);
                     }
                     "typedef" => self.typedef()?,
@@ -116,7 +147,7 @@ impl Parser {
                         return self.wrong(format!("`{other}` is not supported here"));
                     }
                 },
-                _ => return self.wrong("expected `module`, `struct`, `const` or `typedef`"),
+                _ => return self.wrong("expected `module`, `struct`, `enum`, `const` or `typedef`"),
             }
         }
         if self.modules.is_empty() { Ok(()) } else { self.wrong("the file ends inside of a module") }
@@ -147,14 +178,12 @@ impl Parser {
                 self.annotation()?;
                 continue;
             }
-            let ty = self.ty(0)?;
-            let name = self.name()?;
-            let ty = self.dimensions(ty)?;
-            self.sign(';')?;
-            if fields.iter().any(|other| other.name == name) {
-                return self.wrong(format!("field `{name}` is there twice"));
+            for (name, ty) in self.declared()? {
+                if fields.iter().any(|other| other.name == name) {
+                    return self.wrong(format!("field `{name}` is there twice"));
+                }
+                fields.push(Field { name, ty });
             }
-            fields.push(Field { name, ty });
         }
         self.takes(';');
         // What the tools of ROS write for an interface without fields.
@@ -180,24 +209,63 @@ impl Parser {
 
     fn typedef(&mut self) -> Result<(), DefinitionError> {
         self.at += 1;
-        let ty = self.ty(0)?;
-        let name = self.name()?;
-        let ty = self.dimensions(ty)?;
-        self.sign(';')?;
-        self.typedefs.insert(self.full_name(&name), ty);
+        for (name, ty) in self.declared()? {
+            self.typedefs.insert(self.full_name(&name), ty);
+        }
         Ok(())
     }
 
-    /// `@name` with its arguments in parentheses, which mean nothing on the wire.
+    /// One type, and the names that have it or are arrays of it.
+    fn declared(&mut self) -> Result<Vec<(String, WireType)>, DefinitionError> {
+        let ty = self.ty(0)?;
+        let mut declared = Vec::new();
+        loop {
+            let name = self.name()?;
+            declared.push((name, self.dimensions(ty.clone())?));
+            if !self.takes(',') {
+                self.sign(';')?;
+                return Ok(declared);
+            }
+        }
+    }
+
+    /// An enumeration. On the wire it is a number of as many bits as it needs, 32 unless `@bit_bound` says less.
+    fn enumeration(&mut self) -> Result<(), DefinitionError> {
+        self.at += 1;
+        let primitive = match self.bits.take() {
+            None | Some(17..=32) => Primitive::Int32,
+            Some(9..=16) => Primitive::Int16,
+            Some(1..=8) => Primitive::Int8,
+            Some(bits) => return self.wrong(format!("an enumeration has 1 to 32 bits, not {bits}")),
+        };
+        let name = self.name()?;
+        self.sign('{')?;
+        loop {
+            while self.peek() == Some(&Token::Sign('@')) {
+                self.annotation()?;
+            }
+            self.name()?;
+            if !self.takes(',') {
+                break;
+            }
+        }
+        self.sign('}')?;
+        self.takes(';');
+        self.typedefs.insert(self.full_name(&name), WireType::Primitive { primitive });
+        Ok(())
+    }
+
+    /// `@name` with its arguments in parentheses. Only `@bit_bound` means anything on the wire.
     fn annotation(&mut self) -> Result<(), DefinitionError> {
         self.at += 1;
-        self.word()?;
+        let bounds_bits = self.word()? == "bit_bound";
         if self.takes('(') {
             let mut open = 1;
             while open > 0 {
                 match self.next() {
                     Some(Token::Sign('(')) => open += 1,
                     Some(Token::Sign(')')) => open -= 1,
+                    Some(Token::Literal(text)) if bounds_bits => self.bits = text.parse().ok(),
                     Some(_) => {}
                     None => return self.wrong("the file ends inside of an annotation"),
                 }
@@ -222,11 +290,12 @@ impl Parser {
     fn length(&mut self) -> Result<u32, DefinitionError> {
         let length = match self.next() {
             Some(Token::Literal(text)) => text.parse().ok(),
+            Some(Token::Word(name)) => self.nearest(&self.lengths, &name),
             _ => None,
         };
-        match length.filter(|length| (1..=LONGEST_ARRAY).contains(length)) {
+        match length.filter(|length| LENGTHS.contains(length)) {
             Some(length) => Ok(length),
-            None => self.wrong(format!("expected a length from 1 to {LONGEST_ARRAY}")),
+            None => self.wrong(format!("expected a length from 1 to {LONGEST_ARRAY}, or a constant with one")),
         }
     }
 
@@ -241,7 +310,8 @@ impl Parser {
             "octet" | "char" | "uint8" => primitive(Primitive::Uint8),
             "int8" => primitive(Primitive::Int8),
             "int16" | "short" => primitive(Primitive::Int16),
-            "uint16" => primitive(Primitive::Uint16),
+            // ROS sends half of a wide character.
+            "uint16" | "wchar" => primitive(Primitive::Uint16),
             "int32" => primitive(Primitive::Int32),
             "uint32" => primitive(Primitive::Uint32),
             "int64" => primitive(Primitive::Int64),
@@ -287,8 +357,8 @@ impl Parser {
                 } else {
                     self.full_name(name)
                 };
-                if let Some(ty) = self.typedefs.get(&full) {
-                    return Ok(ty.clone());
+                if let Some(ty) = self.nearest(&self.typedefs, name) {
+                    return Ok(ty);
                 }
                 if !full.split('/').all(is_name) {
                     return self.wrong(format!("`{name}` is not a type"));

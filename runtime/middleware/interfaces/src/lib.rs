@@ -1,10 +1,11 @@
 //! Definitions of messages: the text of `.msg`, `.srv` and `.idl` files of ROS as layouts, and that of the files of
 //! [`mavlink`].
 //!
-//! Pure: it reads no files. A caller gives the text of each file to [`msg`], [`srv`] or [`idl`], collects what comes
-//! out in a [`Catalogue`], and asks it for the layout of an interface with everything that it contains. Files of ROS 1
-//! are read by [`ros1`].
+//! Pure: it reads no files. A caller gives the text of each file to [`msg`], [`srv`], [`action()`] or [`idl`], collects
+//! what comes out in a [`Catalogue`], and asks it for the layout of an interface with everything that it contains.
+//! Files of ROS 1 are read by [`ros1`].
 
+pub mod action;
 mod catalogue;
 mod idl;
 pub mod mavlink;
@@ -13,7 +14,7 @@ pub mod ros1;
 
 pub use catalogue::{Catalogue, ResolveError};
 pub use idl::idl;
-pub use msg::{msg, srv};
+pub use msg::{action, msg, srv};
 
 use sesame_plan::WireType;
 

@@ -1,4 +1,4 @@
-//! `.msg` and `.srv` files: a line per field or constant.
+//! `.msg` and `.srv` files of ROS 2: a line per field or constant, as `rosidl_adapter` reads them.
 
 use sesame_plan::{Primitive, WireType};
 
@@ -11,15 +11,39 @@ pub fn msg(package: &str, name: &str, text: &str) -> Result<Definition, Definiti
 
 /// The interfaces of requests and replies that a `.srv` file declares: `NAME_Request` and `NAME_Response`.
 pub fn srv(package: &str, name: &str, text: &str) -> Result<[Definition; 2], DefinitionError> {
+    parts(package, "srv", text, [&format!("{name}_Request"), &format!("{name}_Response")])
+}
+
+/// The interfaces of an action that a `.action` file declares: `NAME_Goal`, `NAME_Result` and `NAME_Feedback`. What is
+/// on the wire contains them; see [`crate::action::messages`].
+pub fn action(package: &str, name: &str, text: &str) -> Result<[Definition; 3], DefinitionError> {
+    let names = ["Goal", "Result", "Feedback"].map(|part| format!("{name}_{part}"));
+    parts(package, "action", text, [&names[0], &names[1], &names[2]])
+}
+
+/// The parts of a file, with lines `---` between them.
+fn parts<const N: usize>(
+    package: &str,
+    kind: &str,
+    text: &str,
+    names: [&str; N],
+) -> Result<[Definition; N], DefinitionError> {
     let lines: Vec<&str> = text.lines().collect();
-    let middle = lines.iter().position(|line| line.trim() == "---").ok_or_else(|| DefinitionError {
-        line: lines.len().max(1),
-        problem: "a line `---` between request and reply is missing".to_owned(),
-    })?;
-    let request = part(package, format!("{package}/srv/{name}_Request"), lines[..middle].iter().copied(), 1)?;
-    let reply =
-        part(package, format!("{package}/srv/{name}_Response"), lines[middle + 1..].iter().copied(), middle + 2)?;
-    Ok([request, reply])
+    let ends: Vec<usize> = (0..lines.len()).filter(|&at| lines[at].trim() == "---").collect();
+    if ends.len() < N - 1 {
+        let between = if N == 2 { "request and reply" } else { "goal, result and feedback" };
+        let problem = format!("a line `---` between {between} is missing");
+        return Err(DefinitionError { line: lines.len().max(1), problem });
+    }
+    let begin = |part: usize| if part == 0 { 0 } else { ends[part - 1] + 1 };
+    // A line too many is in the last part, which refuses it.
+    let end = |part: usize| if part == N - 1 { lines.len() } else { ends[part] };
+    let mut made = Vec::with_capacity(N);
+    for (at, name) in names.iter().enumerate() {
+        let lines = lines[begin(at)..end(at)].iter().copied();
+        made.push(part(package, format!("{package}/{kind}/{name}"), lines, begin(at) + 1)?);
+    }
+    Ok(made.try_into().expect("there is one for each name"))
 }
 
 fn part<'a>(
@@ -31,12 +55,13 @@ fn part<'a>(
     let (mut fields, mut constants) = (Vec::<Field>::new(), Vec::new());
     for (at, line) in lines.enumerate() {
         let wrong = |problem: String| DefinitionError { line: first + at, problem };
-        let line = line.trim();
-        if line.is_empty() || line.starts_with('#') {
+        // A comment begins at the sign wherever it stands, so even in quotes.
+        let line = line.split('#').next().unwrap_or_default().trim();
+        if line.is_empty() {
             continue;
         }
         if line == "---" {
-            return Err(wrong("`---` separates parts of services only".to_owned()));
+            return Err(wrong("`---` separates parts of services and actions only".to_owned()));
         }
         let (ty, rest) = line.split_once(char::is_whitespace).ok_or_else(|| wrong(format!("`{line}` has no name")))?;
         let ty = wire_type(package, ty).map_err(wrong)?;
@@ -47,10 +72,10 @@ fn part<'a>(
             return Err(wrong(format!("`{}` is not a field name", rest.split_whitespace().next().unwrap_or(field))));
         }
         if let Some(value) = rest.trim_start().strip_prefix('=') {
-            constants.push(Constant { name: field.to_owned(), value: constant(&ty, value) });
+            constants.push(Constant { name: field.to_owned(), value: value.trim().to_owned() });
             continue;
         }
-        if !rest.is_empty() && !rest.starts_with(|c: char| c.is_whitespace() || c == '#') {
+        if !rest.is_empty() && !rest.starts_with(char::is_whitespace) {
             return Err(wrong(format!("`{field}{rest}` is not a field name")));
         }
         if fields.iter().any(|other| other.name == field) {
@@ -59,24 +84,6 @@ fn part<'a>(
         fields.push(Field { name: field.to_owned(), ty });
     }
     Ok(definition(name, fields, constants))
-}
-
-/// A constant's value without the comment behind it. Text in quotes may contain the sign of comments.
-fn constant(ty: &WireType, value: &str) -> String {
-    let value = value.trim();
-    let quote = value.chars().next().filter(|first| matches!(first, '"' | '\''));
-    if let (WireType::String | WireType::WString, Some(quote)) = (ty, quote) {
-        let mut escaped = false;
-        let end = value[1..].find(|c: char| {
-            let is_end = c == quote && !escaped;
-            escaped = c == '\\' && !escaped;
-            is_end
-        });
-        if let Some(end) = end {
-            return value[..end + 2].to_owned();
-        }
-    }
-    value.split('#').next().unwrap_or_default().trim_end().to_owned()
 }
 
 /// A type as `.msg` files write it, for example `float64[9]` or `geometry_msgs/Point[]`.
@@ -117,7 +124,7 @@ fn element(package: &str, written: &str) -> Result<WireType, String> {
         "time" | "duration" => {
             return Err(format!("`{name}` is of ROS 1; in ROS 2 it is `builtin_interfaces/{}`", capital(name)));
         }
-        "Header" => "std_msgs/msg/Header".to_owned(),
+        // A bare name is of the same package. That holds for `Header` as well, which ROS 1 takes from `std_msgs`.
         name => match *name.split('/').collect::<Vec<_>>() {
             [name] => format!("{package}/msg/{name}"),
             [package, name] | [package, "msg", name] => format!("{package}/msg/{name}"),

@@ -6,14 +6,15 @@
 use std::path::{Path, PathBuf};
 
 use proptest::prelude::*;
-use sesame_interfaces::{Catalogue, Definition, idl, msg, srv};
+use sesame_interfaces::{Catalogue, Definition, Field, action, idl, msg, srv};
 use sesame_plan::WireType;
 
 const POSE: &str = "\
 # A pose, with all that a file may hold.
 uint8 KIND_ARM=1          # one kind
 string GREETING=hello  # a comment
-string ROOM=\"room #1\" # a comment
+string ROOM=\"room 1\" # a comment
+string CUT=\"room #1\"
 float64 PI = 3.14159
 Header header
 geometry_msgs/Point[] way
@@ -52,6 +53,16 @@ fn a_message_is_its_fields_and_constants() {
 fn a_service_is_two_messages_and_nothing_is_a_byte() {
     let [request, reply] = srv("std_srvs", "Trigger", "---\nbool success # whether\nstring message\n").unwrap();
     insta::assert_snapshot!(shown(&request) + &shown(&reply));
+}
+
+#[test]
+fn an_action_is_three_messages_and_five_that_follow() {
+    let parts = action("cell", "Move", "Pose to\n---\nbool done\n---\nfloat64 left\n").unwrap();
+    let following = action::messages("cell", "Move");
+    insta::assert_snapshot!(parts.iter().chain(&following).map(shown).collect::<String>());
+    let wrong = |text: &str| action("p", "A", text).unwrap_err().to_string();
+    assert_eq!(wrong("int8 a\n---"), "line 2: a line `---` between goal, result and feedback is missing");
+    assert_eq!(wrong("---\n---\n---"), "line 3: `---` separates parts of services and actions only");
 }
 
 #[test]
@@ -112,6 +123,10 @@ fn what_is_wrong_is_said_with_its_line() {
         "/* never",
         "const string X = \"never",
         "struct S { int32 x; int32 x; };",
+        "struct S { int32 x, x; };",
+        "struct S { int32 x[NONE]; };",
+        "@bit_bound(64) enum E { A };",
+        "enum E { A, };",
     ] {
         shown.push(format!("{text:?}: {}", idl(text).unwrap_err()));
     }
@@ -152,6 +167,31 @@ proptest! {
         let nested = format!("module a {{ struct S {{ {} int32 {} x; }}; }};", "sequence<".repeat(300), ">".repeat(300));
         prop_assert!(idl(&nested).is_err());
     }
+}
+
+#[test]
+fn an_idl_file_may_say_what_no_tool_of_ros_generates() {
+    let text = "
+const long WIDTH = 2;
+module cell {
+  const unsigned short DEPTH = 3;
+  @bit_bound(8) enum Grip { OPEN, @value(5) CLOSED };
+  module msg {
+    enum Mode { IDLE, MOVING };
+    typedef double pair[WIDTH], single;
+    struct Arm {
+      short one, two[cell::DEPTH], three;
+      sequence<pair, DEPTH> pairs;
+      string<WIDTH> text;
+      single value;
+      wchar letter;
+      @key Mode mode;
+      ::cell::Grip grip[2];
+    };
+  };
+};
+";
+    insta::assert_snapshot!(idl(text).unwrap().iter().map(shown).collect::<String>());
 }
 
 /// The folder of interfaces of an installed distribution, which an environment variable names by its Python.
@@ -212,6 +252,9 @@ fn constants(definition: &Definition) -> Vec<(String, String)> {
 
 /// What an installed distribution has.
 mod real {
+    use serde_json::Value;
+    use sesame_peers::oracle::each_line;
+
     use super::*;
 
     #[test]
@@ -231,5 +274,91 @@ mod real {
             }
             assert!(from_idl.contains("sensor_msgs/msg/JointState"), "{variable}");
         }
+    }
+
+    /// Compares what ROS reads in the definitions below a folder with what we read; how many it reads.
+    fn compared(python: &Path, folder: &Path) -> usize {
+        let text = |value: &Value| value.as_str().unwrap().to_owned();
+        let mut compared = 0;
+        each_line(python, "ros2/rosidl_oracle.py", &[folder.to_str().unwrap()], |said: &Value| {
+            let Some(parts) = said["parts"].as_array() else { return };
+            let [file, package, name, kind] = ["file", "package", "name", "kind"].map(|key| text(&said[key]));
+            let written = std::fs::read_to_string(&file).unwrap();
+            let read = match kind.as_str() {
+                "msg" => msg(&package, &name, &written).map(|one| vec![one]),
+                "srv" => srv(&package, &name, &written).map(Vec::from),
+                _ => action(&package, &name, &written).map(Vec::from),
+            };
+            let read = read.unwrap_or_else(|error| panic!("{file}: ROS reads it, and we do not: {error}"));
+            assert_eq!(read.len(), parts.len(), "{file}");
+            for (ours, theirs) in read.iter().zip(parts) {
+                let fields = theirs["fields"].as_array().unwrap();
+                let fields: Vec<_> = fields.iter().map(|field| (text(&field[0]), text(&field[1]))).collect();
+                let nothing = |field: &&Field| field.name != "structure_needs_at_least_one_member";
+                let own = ours.fields.iter().filter(nothing).map(|field| (field.name.clone(), words(&field.ty)));
+                assert_eq!(own.collect::<Vec<_>>(), fields, "{file}");
+                let constants = theirs["constants"].as_array().unwrap();
+                assert_eq!(ours.constants.len(), constants.len(), "{file}");
+                for (own, constant) in ours.constants.iter().zip(constants) {
+                    assert_eq!(own.name, text(&constant[0]), "{file}");
+                    assert!(
+                        is_value(&own.value, &constant[1]),
+                        "{file}: {} is {}, and {}",
+                        own.name,
+                        own.value,
+                        constant[1]
+                    );
+                }
+            }
+            compared += 1;
+        });
+        compared
+    }
+
+    /// Whether a constant's value, as it is written, is what ROS reads.
+    fn is_value(written: &str, value: &Value) -> bool {
+        match value {
+            Value::Bool(value) => ["1", "true"].contains(&written.to_lowercase().as_str()) == *value,
+            Value::Number(value) => {
+                let (written, base) = match written.to_lowercase().trim_start_matches('+') {
+                    hexadecimal if hexadecimal.starts_with("0x") => (hexadecimal[2..].to_owned(), 16),
+                    binary if binary.starts_with("0b") => (binary[2..].to_owned(), 2),
+                    other => (other.replace('_', ""), 10),
+                };
+                let whole = i128::from_str_radix(&written, base).map(|whole| whole.to_string());
+                whole.is_ok_and(|whole| whole == value.to_string())
+                    || written.parse().is_ok_and(|written: f64| Some(written) == value.as_f64())
+            }
+            Value::String(value) => {
+                let quoted = ['"', '\''].iter().find_map(|&quote| {
+                    let inner = written.strip_prefix(quote)?.strip_suffix(quote)?;
+                    Some(inner.replace(&format!("\\{quote}"), &quote.to_string()))
+                });
+                quoted.unwrap_or_else(|| written.to_owned()) == *value
+            }
+            _ => false,
+        }
+    }
+
+    #[test]
+    fn ros_itself_reads_the_same_in_each_definition() {
+        for (variable, least) in [("SESAME_ROS2_KILTED", 130), ("SESAME_ROS2_JAZZY", 130)] {
+            let (Some(python), Some(share)) = (sesame_peers::named(variable), share(variable)) else { continue };
+            let compared = compared(&python, &share);
+            assert!(compared >= least, "{variable}: {compared}");
+        }
+    }
+
+    /// As the test above, with definitions of one's own, of which there can be thousands.
+    #[test]
+    fn ros_itself_reads_the_same_in_each_definition_of_a_folder() {
+        let Some(folder) = std::env::var_os("SESAME_DEFINITIONS") else {
+            eprintln!("skipped: SESAME_DEFINITIONS names no folder with definitions");
+            return;
+        };
+        let Some(python) = sesame_peers::named("SESAME_ROS2_KILTED") else { return };
+        let compared = compared(&python, Path::new(&folder));
+        eprintln!("{compared} definitions compared");
+        assert!(compared > 0, "ROS reads no definition in {}", folder.display());
     }
 }

@@ -118,19 +118,19 @@ fn check(described: &Described) {
 #[test]
 fn all_installed_types_and_their_messages_are_as_genmsg_and_genpy_have_them() {
     let Some(python) = named("SESAME_ROS1") else { return };
-    let found = each_line(&python, ORACLE, ("installed", 5, 7), check);
+    let found = each_line(&python, ORACLE, &["installed", "5", "7"], check);
     assert!(found > 100, "{found}");
 }
 
 #[test]
 fn random_types_and_their_messages_are_as_genmsg_and_genpy_have_them() {
     let Some(python) = named("SESAME_ROS1") else { return };
-    assert_eq!(each_line(&python, ORACLE, ("random", 300, 7), check), 300);
+    assert_eq!(each_line(&python, ORACLE, &["random", "300", "7"], check), 300);
 }
 
 #[test]
 #[ignore = "takes minutes"]
 fn many_random_types_and_their_messages_are_as_genmsg_and_genpy_have_them() {
     let Some(python) = named("SESAME_ROS1") else { return };
-    assert_eq!(each_line(&python, ORACLE, ("random", 5_000, 8), check), 5_000);
+    assert_eq!(each_line(&python, ORACLE, &["random", "5000", "8"], check), 5_000);
 }

@@ -50,7 +50,7 @@ impl Definitions {
         let has_layout =
             |part: &str| interfaces::known(part).is_some() || matches!(self.files.find(folders, part), Ok(Some(_)));
         let has_layouts = |ty: &str| {
-            interfaces::full_name(ty, "srv").as_deref() == Some(ty)
+            interfaces::full_name(ty, "srv", folders.dialect).as_deref() == Some(ty)
                 && ["Request", "Response"].into_iter().all(|part| has_layout(&format!("{ty}_{part}")))
         };
         types.into_iter().filter(|ty| has_layouts(ty)).cloned().collect()

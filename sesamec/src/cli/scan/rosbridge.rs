@@ -71,7 +71,8 @@ fn wanted(written: &str) -> anyhow::Result<Wanted> {
         None => (written, None),
     };
     let shown = written.escape_debug();
-    let ty = match ty.map(|ty| full_name(ty, "msg")) {
+    // Which ROS it is turns out later; ROS 1 allows all names that ROS 2 does.
+    let ty = match ty.map(|ty| full_name(ty, "msg", Dialect::Ros1)) {
         Some(None) => {
             bail!("`{shown}` names no type of ROS; write `--topic NAME:TYPE` with one like `std_msgs/msg/Float64`")
         }
