@@ -30,6 +30,7 @@ mod custom;
 mod depth;
 mod disturbance;
 mod eddi;
+mod elements;
 mod evidence;
 mod examples;
 mod exploration;

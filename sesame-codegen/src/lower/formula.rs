@@ -24,6 +24,7 @@ pub(super) fn inputs(inputs: &[model::Input]) -> Vec<plan::Input> {
     let inputs = inputs.iter().map(|input| plan::Input {
         field: field(&input.field),
         members: input.members,
+        list: input.list.clone(),
         text: input.text.clone(),
     });
     inputs.collect()

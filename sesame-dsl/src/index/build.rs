@@ -286,14 +286,49 @@ impl<'a> Indexer<'a> {
             return;
         }
         let mut target = self.mention(&path.topic, within);
-        for field in &path.fields {
-            let ty = target.and_then(|target| self.types.get(&target));
-            if ty.is_some_and(|ty| matches!(ty.kind, TypeKind::Point)) {
+        let mut outer = None;
+        let fields = path.fields.iter().map(|name| Some((name, None)));
+        let steps = path.elements.iter().map(|step| match step {
+            Step::Field(name) => Some((name, None)),
+            Step::Filter(filter) => filter.key.first().map(|name| (name, Some(&filter.key[1..]))),
+            Step::Element(..) | Step::Elements(..) | Step::Each(_) => None,
+        });
+        for (name, key) in fields.chain(steps).flatten() {
+            if self.is_point(target) {
                 // Its coordinates are words of the language.
                 return;
             }
-            target = self.field(target, field, within);
+            let Some(inner) = key else {
+                outer = target;
+                target = self.field(target, name, within);
+                continue;
+            };
+            // The key of a filter is a field of the elements, or a list beside theirs.
+            let of = if self.has_field(target, name) { target } else { outer };
+            let mut of = self.field(of, name, within);
+            for name in inner {
+                if self.is_point(of) {
+                    break;
+                }
+                of = self.field(of, name, within);
+            }
         }
+    }
+
+    fn is_point(&self, of: Option<DefinitionId>) -> bool {
+        let ty = of.and_then(|of| self.types.get(&of));
+        ty.is_some_and(|ty| matches!(ty.kind, TypeKind::Point))
+    }
+
+    /// Whether what a topic or field carries has a field of this name.
+    fn has_field(&self, of: Option<DefinitionId>, name: &Name) -> bool {
+        let mut ty = of.and_then(|of| self.types.get(&of)).copied();
+        while let Some(TypeKind::List(inner)) = ty.map(|ty| &ty.kind) {
+            ty = Some(inner);
+        }
+        let Some(TypeKind::Message(message)) = ty.map(|ty| &ty.kind) else { return false };
+        let message = self.names.get(message.text.as_str());
+        message.is_some_and(|&message| self.members.contains_key(&(message, name.text.as_str())))
     }
 
     fn type_of(&mut self, ty: &'a Type, within: DefinitionId) {
@@ -436,12 +471,7 @@ impl<'a> Indexer<'a> {
             contains,
         } = &operation.body;
         for place in target.iter().flat_map(|target| &target.places) {
-            let mut target = self.mention(&place.topic, id);
-            for step in &place.steps {
-                if let Step::Field(name) = step {
-                    target = self.field(target, name, id);
-                }
-            }
+            self.path(place, id);
         }
         if let Some(Resource { parameter: _, node, span: _ }) = resource {
             self.mention(node, id);

@@ -3,7 +3,7 @@
 //! Numbers are in the units of the wire or of a conversion that is part of the expression; so evaluating one
 //! needs no units.
 
-use sesame_plan::{Aggregate, Condition, Members, TextTest};
+use sesame_plan::{Aggregate, Condition, InList, Members, TextTest};
 
 use super::system::FieldPath;
 
@@ -31,6 +31,8 @@ pub struct Input {
     pub field: FieldPath,
     /// What is made of a group's members.
     pub members: Members,
+    /// For a value in a list: the way from the field, which is the list, to it.
+    pub list: Option<InList>,
     /// For a text: the input is whether this holds of it.
     pub text: Option<TextTest>,
 }

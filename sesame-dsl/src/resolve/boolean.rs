@@ -3,6 +3,7 @@
 use std::cmp::Ordering;
 
 use super::Resolver;
+use super::formula::position;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{Comparison, Condition, Expression, Input, TextTest, Type};
 use crate::span::Span;
@@ -114,12 +115,12 @@ impl<'a> Resolver<'a> {
             ExpressionKind::Members(members, word, path) => (path, Some((*members, *word))),
             _ => return None,
         };
-        let (field, _) = self.field(path)?;
         if matches!(members, Some((ast::Members::Sum, _))) {
             self.not_summed(expression.span, path, "a `bool`");
             return None;
         }
-        self.input(inputs, path, field, members, None)
+        let read = self.reading(path, members)?;
+        Some(position(inputs, read.input(None)))
     }
 
     fn not_summed(&mut self, span: Span, path: &Path, is: &str) {
@@ -132,9 +133,8 @@ impl<'a> Resolver<'a> {
     pub(super) fn is_text(&self, expression: &ast::Expression) -> bool {
         match &expression.kind {
             ExpressionKind::Text(_) => true,
-            ExpressionKind::Field(path) | ExpressionKind::Members(_, _, path) => {
-                self.type_at(&path.topic, &path.fields).is_some_and(|ty| *ty == Type::Text)
-            }
+            ExpressionKind::Field(path) => self.type_read(path, None) == Some(Type::Text),
+            ExpressionKind::Members(word, _, path) => self.type_read(path, Some(*word)) == Some(Type::Text),
             _ => false,
         }
     }
@@ -194,12 +194,12 @@ impl<'a> Resolver<'a> {
                 return None;
             }
         };
-        let (field, _) = self.field(path)?;
         if matches!(members, Some((ast::Members::Sum, _))) {
             self.not_summed(of.span, path, "a `text`");
             return None;
         }
-        self.input(inputs, path, field, members, Some(test))
+        let read = self.reading(path, members)?;
+        Some(position(inputs, read.input(Some(test))))
     }
 
     fn texts_have_no_order(&mut self, span: Span) {
@@ -223,9 +223,8 @@ impl<'a> Resolver<'a> {
             | ExpressionKind::Prefixed(..)
             | ExpressionKind::Until(..)
             | ExpressionKind::Implies(..) => true,
-            ExpressionKind::Field(path) | ExpressionKind::Members(_, _, path) => {
-                self.type_at(&path.topic, &path.fields).is_some_and(|ty| *ty == Type::Bool)
-            }
+            ExpressionKind::Field(path) => self.type_read(path, None) == Some(Type::Bool),
+            ExpressionKind::Members(word, _, path) => self.type_read(path, Some(*word)) == Some(Type::Bool),
             _ => false,
         }
     }

@@ -3,6 +3,7 @@
 use sesame_grammar::Rule;
 
 use super::Resolver;
+use super::elements::Place;
 use super::quantity::is_of_times;
 use super::resource::acts_on_nodes;
 use super::words::type_in_words;
@@ -375,7 +376,7 @@ impl<'a> Resolver<'a> {
             self.report(diagnostic);
             return None;
         };
-        if place.steps.is_empty() {
+        if place.fields.is_empty() && place.elements.is_empty() {
             return Some(Target { topic: found.topic, places: Vec::new() });
         }
         let parts = Span { lo: place.topic.span.hi, ..place.span };
@@ -402,7 +403,7 @@ impl<'a> Resolver<'a> {
         let mut first_words = "";
         let mut complete = true;
         for place in &target.places {
-            let Some((topic, steps, ty)) = self.place(place) else {
+            let Some((topic, steps, ty)) = self.disturbed(place) else {
                 complete = false;
                 continue;
             };
@@ -441,14 +442,24 @@ impl<'a> Resolver<'a> {
         Some((Target { topic, places: found.into_iter().map(|(_, steps, _)| steps).collect() }, ty))
     }
 
-    fn report_unfit(
-        &mut self,
-        place: &ast::ValuePath,
-        user: &str,
-        wants: &str,
-        ty: &Type,
-        is_for: impl Fn(&Type) -> bool,
-    ) {
+    /// Where a place is that an operation changes, and its type.
+    fn disturbed(&mut self, path: &'a ast::Path) -> Option<(TopicId, Vec<Step>, Type)> {
+        let Place { topic, fields, steps, point, ty, .. } = self.place(path, false)?;
+        if let Some(holder) = point {
+            let in_list = path.elements.iter().rev().find_map(|step| match step {
+                ast::Step::Field(name) => Some(name),
+                _ => None,
+            });
+            let span = in_list.or(path.fields.last()).map_or(path.span, |last| last.span);
+            let title = format!("{holder} has no fields");
+            let label = "it is a point, which an operation changes as a whole";
+            self.report(Diagnostic::new(Code::WRONG_TYPE, span, title).label(label));
+            return None;
+        }
+        Some((topic, fields.into_iter().map(Step::Field).chain(steps).collect(), ty))
+    }
+
+    fn report_unfit(&mut self, place: &ast::Path, user: &str, wants: &str, ty: &Type, is_for: impl Fn(&Type) -> bool) {
         let written = self.text(place.span);
         let title = format!("{user} needs {wants}, but `{written}` is {}", type_in_words(ty));
         let mut diagnostic = Diagnostic::new(Code::WRONG_TYPE, place.span, title).label(format!("expected {wants}"));
@@ -468,44 +479,6 @@ impl<'a> Resolver<'a> {
             _ => {}
         }
         self.report(diagnostic);
-    }
-
-    /// Where a place is, and its type.
-    fn place(&mut self, place: &'a ast::ValuePath) -> Option<(TopicId, Vec<Step>, Type)> {
-        let index = self.find(&place.topic, super::Kind::Topic)?;
-        let mut ty = self.system.topics[index].as_ref()?.ty.clone();
-        let mut holder = format!("topic `{}`", place.topic.text);
-        let mut steps = Vec::new();
-        for step in &place.steps {
-            let (span, step) = match step {
-                ast::Step::Field(name) => {
-                    ty = self.field_in(&ty, &holder, name)?;
-                    holder = format!("field `{}`", name.text);
-                    steps.push(Step::Field(name.text.clone()));
-                    continue;
-                }
-                ast::Step::Each(span) => (*span, Step::Each),
-                ast::Step::Element(at, span) => {
-                    let Ok(index) = u32::try_from(at.value?) else {
-                        let title = format!("`{}` is not a valid index", self.text(at.span));
-                        let label = "expected a whole number below 2^32";
-                        self.report(Diagnostic::new(Code::BAD_NUMBER, at.span, title).label(label));
-                        return None;
-                    };
-                    (*span, Step::Element(index))
-                }
-            };
-            let Type::List(of) = ty else {
-                let title = format!("{holder} has no elements");
-                let label = format!("it is {}", type_in_words(&ty));
-                self.report(Diagnostic::new(Code::WRONG_TYPE, span, title).label(label));
-                return None;
-            };
-            ty = *of;
-            "an element".clone_into(&mut holder);
-            steps.push(step);
-        }
-        Some((TopicId::from_index(index), steps, ty))
     }
 }
 

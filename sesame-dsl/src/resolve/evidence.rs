@@ -53,6 +53,7 @@ impl<'a> Resolver<'a> {
             return None;
         }
         self.at_most_one(&evidence.inbound, "inbound");
+        self.elements_fit(&inputs, Some("evidence"), evidence.condition.span)?;
         self.one_condition(&evidence.condition, &condition)?;
         Some(Evidence {
             declaration: self.declaration(&evidence.head),
@@ -143,7 +144,7 @@ impl<'a> Resolver<'a> {
             };
             Some(Evidence {
                 declaration: self.declaration(&guarantee.head),
-                inputs: vec![Input { field: field.clone(), members: model::Members::Min, text }],
+                inputs: vec![Input { field: field.clone(), members: model::Members::Min, list: None, text }],
                 condition,
                 held: 0.0,
                 stale: None,

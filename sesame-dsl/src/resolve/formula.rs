@@ -7,7 +7,7 @@ use super::parts::first_part;
 use super::score::scores;
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::model::{Aggregate, Condition, Expression, FieldPath, Formula, Id as _, Input, Members};
-use crate::model::{MetricSource, TextTest, Type};
+use crate::model::{MetricSource, Type};
 use crate::span::Span;
 use crate::syntax::ast::{self, ExpressionKind, FormulaKind, Name, Path, PrefixWord};
 use crate::units::{Unit, convert, dimension, product};
@@ -90,6 +90,11 @@ impl<'a> Resolver<'a> {
         }
         let (every, per) = (every?, per?);
         self.members_fit(&inputs, whole)?;
+        let lasting = match &aggregate {
+            Aggregate::Duration { .. } => Some("`duration`"),
+            _ => every.map(|_| "`every`"),
+        };
+        self.elements_fit(&inputs, lasting, whole)?;
         if let Some((word, path)) =
             formula.per.first().filter(|_| inputs.iter().any(|input| input.members == Members::First))
         {
@@ -108,6 +113,7 @@ impl<'a> Resolver<'a> {
         if let (Aggregate::Last { of: Expression::Input(0) }, None, None, None, false) =
             (&aggregate, &when, every, &per, outbound)
             && self.members_of(&inputs[0].field) == 1
+            && inputs[0].list.is_none()
         {
             return Some((MetricSource::Last(inputs[0].field.clone()), unit));
         }
@@ -324,29 +330,15 @@ impl<'a> Resolver<'a> {
         members: Option<(ast::Members, Span)>,
     ) -> Option<Number> {
         let before = self.diagnostics.len();
-        let field = self.number_field(path);
+        let read = self.number_read(path, members);
         if path.topic.text == "time"
             && let Some(diagnostic) = self.diagnostics.get_mut(before)
         {
             let note = "`time` is the simulation time unless something in the space is named `time`";
             diagnostic.notes.push(note.to_owned());
         }
-        let (field, unit) = field?;
-        let at = self.input(inputs, path, field, members, None)?;
-        Some((Expression::Input(at), unit))
-    }
-
-    /// The position of an input, which is added if it is new.
-    pub(super) fn input(
-        &mut self,
-        inputs: &mut Vec<Input>,
-        path: &'a Path,
-        field: FieldPath,
-        members: Option<(ast::Members, Span)>,
-        text: Option<TextTest>,
-    ) -> Option<u32> {
-        let members = self.members(path, &field, members)?;
-        Some(position(inputs, Input { field, members, text }))
+        let (read, unit) = read?;
+        Some((Expression::Input(position(inputs, read.input(None))), unit))
     }
 
     fn product(&mut self, inputs: &mut Vec<Input>, factors: &'a [(bool, ast::Expression)]) -> Option<Number> {

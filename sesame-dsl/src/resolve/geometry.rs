@@ -1,6 +1,7 @@
 //! Points in formulas: their distances from each other and from regions.
 
 use super::Resolver;
+use super::elements::Reading;
 use super::formula::{Number, position};
 use super::region::scaled;
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
@@ -89,8 +90,14 @@ impl<'a> Resolver<'a> {
 
     /// The distances among a group's members.
     fn pairs(&mut self, inputs: &mut Vec<Input>, path: &'a Path, word: Span) -> Option<Number> {
-        let (field, unit) = self.point_field(path)?;
-        let [first, second] = self.pair_of(path, &field, word)?;
+        let (read, unit) = self.point_read(path, None)?;
+        if read.list.is_some() {
+            let title = "`each pair of` is of the members of a group, not of the elements of a list";
+            let label = "expected a group of topics";
+            self.report(Diagnostic::new(Code::UNPAIRED, word.to(path.span), title).label(label));
+            return None;
+        }
+        let [first, second] = self.pair_of(path, &read.field, word)?;
         let [from, to] = [first, second].map(|input| Point::Input(position(inputs, input)));
         Some((between(from, to, 1.0), unit))
     }
@@ -110,7 +117,9 @@ impl<'a> Resolver<'a> {
     /// The path of an argument, and its field if it is a point without mistakes. Reports nothing.
     fn group_of(&mut self, argument: &'a ast::Expression) -> Option<(&'a Path, FieldPath)> {
         let (ExpressionKind::Field(path) | ExpressionKind::Members(_, _, path)) = &argument.kind else { return None };
-        matches!(self.type_at(&path.topic, &path.fields), Some(Type::Point(_))).then_some(())?;
+        let in_list = !path.elements.is_empty();
+        let is_point = !in_list && matches!(self.type_at(&path.topic, &path.fields), Some(Type::Point(_)));
+        is_point.then_some(())?;
         Some((path, self.field(path)?.0))
     }
 
@@ -161,8 +170,8 @@ impl<'a> Resolver<'a> {
                 return None;
             }
         };
-        let (field, unit) = self.point_field(path)?;
-        if self.members_of(&field) > 1 && !matches!(members, Some((Members::Each | Members::EachPair, _))) {
+        let (read, unit) = self.point_read(path, members)?;
+        if self.members_of(&read.field) > 1 && !matches!(members, Some((Members::Each | Members::EachPair, _))) {
             let title = format!("`{}` is a group of topics, but a single point is needed", path.topic.text);
             let diagnostic = Diagnostic::new(Code::WRONG_TYPE, expression.span, title)
                 .label("expected one point")
@@ -170,16 +179,17 @@ impl<'a> Resolver<'a> {
             self.report(diagnostic);
             return None;
         }
-        let at = self.input(inputs, path, field, members, None)?;
-        Some(Operand::Read { at, unit })
+        Some(Operand::Read { at: position(inputs, read.input(None)), unit })
     }
 
-    /// A topic or field that is a point, with its unit.
-    fn point_field(&mut self, path: &'a Path) -> Option<(FieldPath, Option<Unit>)> {
-        let (field, ty) = self.value_field(path)?;
-        if let Type::Point(unit) = ty {
-            return Some((field, unit));
+    /// What a formula reads at a path that leads to a point, with its unit.
+    fn point_read(&mut self, path: &'a Path, word: Option<(Members, Span)>) -> Option<(Reading, Option<Unit>)> {
+        let read = self.reading(path, word)?;
+        if let Type::Point(unit) = &read.ty {
+            let unit = unit.clone();
+            return Some((read, unit));
         }
+        let ty = read.ty;
         let title = format!("`{}` is not a point", self.text(path.span));
         let label = format!("it is {}", super::words::type_in_words(&ty));
         self.report(Diagnostic::new(Code::WRONG_TYPE, path.span, title).label(label));

@@ -21,6 +21,8 @@ impl<'a> Resolver<'a> {
         let Some((members, word)) = members else { return Some(Members::Min) };
         self.is_group(path, field, members, word)?;
         Some(match members {
+            // What is of lists only was refused before.
+            ast::Members::Min | ast::Members::Mean | ast::Members::Count | ast::Members::Length => Members::Min,
             ast::Members::Max => Members::Max,
             ast::Members::Sum => Members::Sum,
             ast::Members::Each => Members::Each,
@@ -68,7 +70,7 @@ impl<'a> Resolver<'a> {
             self.report(Diagnostic::new(Code::TOO_LARGE, word.to(path.span), title).label("too many pairs"));
             return None;
         }
-        let of = |members| Input { field: field.clone(), members, text: None };
+        let of = |members| Input { field: field.clone(), members, list: None, text: None };
         Some([of(Members::First), of(Members::Second)])
     }
 

@@ -72,6 +72,7 @@ impl<'a> Resolver<'a> {
             return None;
         }
         self.members_fit(&inputs, of.span)?;
+        self.elements_fit(&inputs, Some("`robustness`"), of.span)?;
         let outbound = !formula.outbound.is_empty();
         let whole_windows = !formula.whole.is_empty();
         let robustness = Robustness { inputs, signals, formula: resolved, outbound, whole_windows };

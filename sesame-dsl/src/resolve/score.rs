@@ -184,7 +184,9 @@ impl<'a> Resolver<'a> {
 
     fn part_named(&mut self, of: &'a ast::Expression, expected: &str) -> Option<(usize, MonitorPart, Span)> {
         match &of.kind {
-            ExpressionKind::Field(Path { topic, fields, span: _ }) if fields.len() == 1 => {
+            ExpressionKind::Field(Path { topic, fields, elements, span: _ })
+                if fields.len() == 1 && elements.is_empty() =>
+            {
                 let part = &fields[0];
                 let (eddi, found) = self.part((&topic.text, topic.span), (&part.text, part.span))?;
                 Some((eddi, found, part.span))

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, HashSet};
 use std::hash::Hash;
 
+use super::elements::Reading;
 use super::words::type_in_words;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
@@ -164,6 +165,14 @@ impl<'a> Resolver<'a> {
     /// What a path refers to: its topic, and the type at its end. `None` was reported, here or before.
     pub(super) fn field(&mut self, path: &'a ast::Path) -> Option<(model::FieldPath, Type)> {
         let index = self.find(&path.topic, Kind::Topic)?;
+        if let Some(ast::Step::Element(_, span) | ast::Step::Elements(_, _, span) | ast::Step::Each(span)) =
+            path.elements.first()
+        {
+            let title = format!("`{}` is in a list, but a field is needed", self.text(path.span));
+            let label = "elements of a list cannot be used here";
+            self.report(Diagnostic::new(Code::WRONG_TYPE, *span, title).label(label));
+            return None;
+        }
         let topic = self.system.topics[index].as_ref()?;
         let mut ty = topic.ty.clone();
         let mut holder = format!("topic `{}`", path.topic.text);
@@ -180,7 +189,7 @@ impl<'a> Resolver<'a> {
     }
 
     /// Adds to the last report, of a field that does not exist, what to write if the member of a group was meant.
-    fn note_on_members(&mut self, topic: usize, name: &Name) {
+    pub(super) fn note_on_members(&mut self, topic: usize, name: &Name) {
         let Some(topic) = self.system.topics[topic].as_ref() else { return };
         let is_member = |path: &String| path.split('/').any(|part| part == name.text);
         let (Some(last), Some(member)) = (self.diagnostics.last_mut(), topic.paths.iter().find(|path| is_member(path)))
@@ -198,25 +207,6 @@ impl<'a> Resolver<'a> {
                 "to name one of them, declare `{member}` as a topic of its own, instead of a member of the group"
             ));
         }
-    }
-
-    /// A path to a value that a formula reads: a field, or a coordinate of a point.
-    pub(super) fn value_field(&mut self, path: &'a ast::Path) -> Option<(model::FieldPath, Type)> {
-        let Some((last, before)) = path.fields.split_last() else { return self.field(path) };
-        let Some(Type::Point(unit)) = self.type_at(&path.topic, before) else { return self.field(path) };
-        if !matches!(last.text.as_str(), "x" | "y" | "z") {
-            let title = format!("a point has no coordinate `{}`", last.text);
-            let diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, last.span, title).label("expected `x`, `y` or `z`");
-            self.report(match last.text.to_lowercase().as_str() {
-                lower @ ("x" | "y" | "z") => diagnostic.did_you_mean(last.span, lower),
-                _ => diagnostic,
-            });
-            return None;
-        }
-        let unit = unit.clone();
-        let topic = TopicId::from_index(self.find(&path.topic, Kind::Topic)?);
-        let fields = path.fields.iter().map(|name| name.text.clone()).collect();
-        Some((model::FieldPath { topic, fields }, Type::Real(unit)))
     }
 
     /// The type of a topic or field; `None` also for one that does not exist. Reports nothing.
@@ -260,12 +250,19 @@ impl<'a> Resolver<'a> {
         Some(field.ty.clone())
     }
 
-    /// A path to a single number, with its unit.
-    pub(super) fn number_field(&mut self, path: &'a ast::Path) -> Option<(model::FieldPath, Option<Unit>)> {
-        let (found, ty) = self.value_field(path)?;
-        let other = match ty {
-            Type::Int(unit) | Type::Real(unit) => return Some((found, unit)),
-            other => other,
+    /// What a formula reads at a path that leads to a single number, with its unit.
+    pub(super) fn number_read(
+        &mut self,
+        path: &'a ast::Path,
+        word: Option<(ast::Members, Span)>,
+    ) -> Option<(Reading, Option<Unit>)> {
+        let read = self.reading(path, word)?;
+        let other = match &read.ty {
+            Type::Int(unit) | Type::Real(unit) => {
+                let unit = unit.clone();
+                return Some((read, unit));
+            }
+            other => other.clone(),
         };
         let written = self.text(path.span);
         let title = format!("a formula needs a number, but `{written}` is {}", type_in_words(&other));
@@ -285,6 +282,12 @@ impl<'a> Resolver<'a> {
             }
             Type::Text => {
                 diagnostic = diagnostic.note(format!("a text can be compared, for example `{written} == \"ready\"`"));
+                Vec::new()
+            }
+            Type::List(_) => {
+                diagnostic = diagnostic.note(format!("`{written}[0]` is its first element")).note(
+                    "`min of`, `max of`, `mean of`, `sum of`, `count of` and `length of` make one value of a list",
+                );
                 Vec::new()
             }
             _ => Vec::new(),

@@ -183,7 +183,11 @@ pub(super) fn phrases_of(rule: Rule) -> Vec<String> {
         | Rule::k_eventually
         | Rule::k_pair
         | Rule::element
+        | Rule::element_filter
+        | Rule::element_key
+        | Rule::element_range
         | Rule::of_these
+        | Rule::reduction
         | Rule::formula_within => &[],
         _ => {
             let members: Vec<String> = blocks::members(rule).map(blocks::Member::phrase).collect();

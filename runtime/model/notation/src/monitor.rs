@@ -5,8 +5,8 @@
 use std::fmt::Write as _;
 
 use sesame_plan::{
-    CampaignPlan, Comparison, Condition, Evidence, Expression, FieldRef, Input, Members, Mitigation, MitigationValue,
-    Point, Region, Side, StaleIs, TextTest, Type,
+    CampaignPlan, Condition, Evidence, Expression, FieldRef, InList, Input, Members, Mitigation, MitigationValue,
+    Point, Reduction, Region, Side, StaleIs, Step, TextTest, Type, value_path_in_words,
 };
 
 use crate::text::quoted;
@@ -54,12 +54,25 @@ fn name_of_field(plan: &CampaignPlan, field: &FieldRef) -> String {
 
 /// The unit of a field that is a number or a point, or a coordinate of one.
 fn unit_of_field<'a>(plan: &'a CampaignPlan, field: &FieldRef) -> Option<Unit<'a>> {
+    unit_in(plan, field, &[])
+}
+
+/// The unit of the value behind the steps from a field.
+fn unit_in<'a>(plan: &'a CampaignPlan, field: &FieldRef, steps: &[Step]) -> Option<Unit<'a>> {
     let mut ty = &plan.topic(field.topic).ty;
-    for name in &field.path {
-        ty = match ty {
-            Type::Message { id } => &plan.message(*id).fields.iter().find(|field| field.name == *name)?.ty,
+    let fields = field.path.iter().map(Some);
+    let steps = steps.iter().map(|step| match step {
+        Step::Field(name) => Some(name),
+        _ => None,
+    });
+    for name in fields.chain(steps) {
+        ty = match (ty, name) {
+            (Type::Message { id }, Some(name)) => {
+                &plan.message(*id).fields.iter().find(|field| field.name == *name)?.ty
+            }
+            (Type::List { of }, None) => of,
             // A coordinate of a point.
-            other => other,
+            (other, _) => other,
         };
     }
     match ty {
@@ -84,7 +97,7 @@ impl<'a> Names<'a> {
             Condition::Input(at) => self.input(*at),
             Condition::Compare { left, by, right } => {
                 let unit = self.unit(left).or_else(|| self.unit(right)).unwrap_or(Unit::None);
-                format!("{} {} {}", self.expression(left, unit), sign(*by), self.expression(right, unit))
+                format!("{} {} {}", self.expression(left, unit), by.sign(), self.expression(right, unit))
             }
             Condition::Same { left, right } => format!("{} == {}", self.part(left), self.part(right)),
             Condition::All(parts) => joined(parts, " and "),
@@ -156,7 +169,12 @@ impl<'a> Names<'a> {
     }
 
     fn unit_of_input(&self, at: u32) -> Option<Unit<'a>> {
-        unit_of_field(self.plan, &self.inputs.get(at as usize)?.field)
+        let input = self.inputs.get(at as usize)?;
+        match &input.list {
+            None => unit_of_field(self.plan, &input.field),
+            Some(InList { reduction: Reduction::Count | Reduction::Length, .. }) => Some(Unit::None),
+            Some(list) => unit_in(self.plan, &input.field, &list.steps),
+        }
     }
 
     fn unit_of_point(&self, point: Point) -> Option<Unit<'a>> {
@@ -185,8 +203,21 @@ impl<'a> Names<'a> {
     }
 
     fn input(&self, at: u32) -> String {
-        let Some(Input { field, members, text }) = self.inputs.get(at as usize) else { return "?".to_owned() };
+        let Some(Input { field, members, list, text }) = self.inputs.get(at as usize) else { return "?".to_owned() };
         let mut name = name_of_field(self.plan, field);
+        if let Some(InList { steps, reduction }) = list {
+            name.push_str(&value_path_in_words(steps));
+            name = match reduction {
+                Reduction::First => name,
+                Reduction::Min => format!("min of {name}"),
+                Reduction::Max => format!("max of {name}"),
+                Reduction::Sum => format!("sum of {name}"),
+                Reduction::Mean => format!("mean of {name}"),
+                Reduction::Count => format!("count of {name}"),
+                Reduction::Length => format!("length of {name}"),
+                Reduction::Each => format!("each of {name}"),
+            };
+        }
         if self.plan.topic(field.topic).paths.len() > 1 {
             match members {
                 Members::Min => name = format!("min({name})"),
@@ -203,21 +234,10 @@ impl<'a> Names<'a> {
     }
 }
 
-fn sign(by: Comparison) -> &'static str {
-    match by {
-        Comparison::AtMost => "<=",
-        Comparison::Below => "<",
-        Comparison::AtLeast => ">=",
-        Comparison::Above => ">",
-        Comparison::Equal => "==",
-        Comparison::NotEqual => "!=",
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use sesame_plan::testing::{evidence_above, minimal, topic};
-    use sesame_plan::{Stale, TopicId};
+    use sesame_plan::{Comparison, Stale, TopicId};
 
     use super::*;
 
@@ -257,6 +277,7 @@ mod tests {
         let input = |topic, text| Input {
             field: FieldRef { topic: TopicId(topic), path: Vec::new() },
             members: Members::Min,
+            list: None,
             text,
         };
         let halves = Expression::Product(vec![

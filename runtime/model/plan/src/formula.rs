@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::FieldRef;
+use crate::{FieldRef, Step};
 
 /// A metric computed from messages without any code of the user.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -39,9 +39,46 @@ pub struct Input {
     pub field: FieldRef,
     /// What is made of a group's members; [`Members::Min`] for a single topic.
     pub members: Members,
+    /// For a value in a list: the way from the field, which is the list, to it. `None` for all others, and then not
+    /// written.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub list: Option<InList>,
     /// For a field that is a text: the input is whether this holds of it. `None` for all others, and then not written.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub text: Option<TextTest>,
+}
+
+/// Values in a list. For what reads them, a message without any is as if it had not come; only their number and their
+/// sum are 0 then.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct InList {
+    /// From the list to the values. For the length of the list it is empty. It may end with `x`, `y` or `z` of a point.
+    pub steps: Vec<Step>,
+    /// What is made of the values.
+    pub reduction: Reduction,
+}
+
+/// What is made of values in a list. Numbers that are not finite are left out, except as a single value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Reduction {
+    /// The first, where only one is meant.
+    First,
+    /// The least.
+    Min,
+    /// The greatest.
+    Max,
+    /// The sum; 0 without any.
+    Sum,
+    /// The mean.
+    Mean,
+    /// How many there are; of truth values, how many are true.
+    Count,
+    /// How many elements the list has.
+    Length,
+    /// Each of them: the formula is evaluated for each, together with the values at the same place that other inputs
+    /// read in the same list.
+    Each,
 }
 
 /// A comparison of a text.
@@ -349,7 +386,7 @@ impl Condition {
 }
 
 /// How two numbers are compared.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Comparison {
     /// `<=`
@@ -367,6 +404,18 @@ pub enum Comparison {
 }
 
 impl Comparison {
+    /// Its sign in the language.
+    pub const fn sign(self) -> &'static str {
+        match self {
+            Comparison::AtMost => "<=",
+            Comparison::Below => "<",
+            Comparison::AtLeast => ">=",
+            Comparison::Above => ">",
+            Comparison::Equal => "==",
+            Comparison::NotEqual => "!=",
+        }
+    }
+
     /// Whether it holds between two numbers; with a NaN none does.
     pub fn holds(self, left: f64, right: f64) -> bool {
         match self {

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::condition::Constraint;
-use crate::{NodeId, OperationKind, TopicId};
+use crate::{Comparison, NodeId, OperationKind, TopicId};
 
 /// A fuzzing operation with its permitted ranges. A test holds instances of it, see [`crate::TestOperation`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -120,8 +120,74 @@ pub enum Step {
     Field(String),
     /// The element of a list at this position, from 0; none in a list that is shorter.
     Element(u32),
+    /// The elements of a list from one position to another, from 0 and both included, as far as there are some.
+    Elements {
+        /// The first.
+        first: u32,
+        /// The last; not before the first.
+        last: u32,
+    },
     /// Each element of a list.
     Each,
+    /// The elements of a list of which something holds.
+    Filter(Filter),
+}
+
+/// Which elements of a list are chosen.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct Filter {
+    /// What of each element is compared.
+    pub key: FilterKey,
+    /// How it is compared.
+    pub by: Comparison,
+    /// With what. Texts and truth values are equal, or they are not.
+    pub with: Compared,
+}
+
+/// What of an element of a list a filter compares.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FilterKey {
+    /// The value at the end of this path of fields into the element; the element itself if it is empty.
+    Own(Vec<String>),
+    /// The element at the same position of another list in the same message: `name` of `position[name == "elbow"]`.
+    Parallel(String),
+}
+
+/// What a filter compares with.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Compared {
+    /// A text.
+    Text(String),
+    /// A number, as it is on the wire.
+    Number {
+        /// The number.
+        value: Finite,
+        /// Its unit; `None` for a plain number.
+        unit: Option<String>,
+    },
+    /// True or false.
+    Truth(bool),
+}
+
+/// A finite number, which therefore has an order and is equal to itself.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Finite(pub f64);
+
+impl Eq for Finite {}
+
+impl PartialOrd for Finite {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Finite {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.0.total_cmp(&other.0)
+    }
 }
 
 /// The path to a value behind a topic's name, as the `.sesame` file has it: `.level`, `[3]`, `.ranges[*]`.
@@ -129,7 +195,21 @@ pub fn value_path_in_words(path: &[Step]) -> String {
     let step = |step: &Step| match step {
         Step::Field(name) => format!(".{name}"),
         Step::Element(at) => format!("[{at}]"),
+        Step::Elements { first, last } => format!("[{first}..{last}]"),
         Step::Each => "[*]".to_owned(),
+        Step::Filter(Filter { key, by, with }) => {
+            let key = match key {
+                FilterKey::Own(path) if path.is_empty() => "*".to_owned(),
+                FilterKey::Own(path) => path.join("."),
+                FilterKey::Parallel(name) => name.clone(),
+            };
+            let with = match with {
+                Compared::Text(text) => format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\"")),
+                Compared::Number { value, unit } => format!("{}{}", value.0, unit.as_deref().unwrap_or_default()),
+                Compared::Truth(truth) => truth.to_string(),
+            };
+            format!("[{key} {} {with}]", by.sign())
+        }
     };
     path.iter().map(step).collect()
 }

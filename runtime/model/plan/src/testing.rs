@@ -208,6 +208,7 @@ pub fn evidence_above(name: &str, topic: u32, limit: f64) -> Evidence {
         inputs: vec![Input {
             field: FieldRef { topic: TopicId(topic), path: Vec::new() },
             members: Members::Min,
+            list: None,
             text: None,
         }],
         condition: formula::Condition::Compare {

@@ -16,6 +16,8 @@ mod expression;
 mod group_tests;
 mod growth;
 mod held;
+#[cfg(test)]
+mod list_tests;
 mod probe;
 mod region;
 mod robustness;
@@ -25,8 +27,8 @@ mod tests;
 
 pub use engine::{MetricError, MetricTable, Metrics};
 pub(crate) use engine::{Shown, next_mark};
-pub(crate) use expression::{Held, Moment, holds};
-pub(crate) use held::{HeldInputs, hear};
+pub(crate) use expression::{Moment, holds};
+pub(crate) use held::{HeardValues, HeldInputs, hear};
 pub(crate) use probe::sample;
 pub use probe::unimplemented_hooks;
 

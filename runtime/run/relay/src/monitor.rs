@@ -30,7 +30,7 @@ use crate::wire::{Wire, WireTable};
 pub use decided::{Cause, Decided};
 
 use decided::Told;
-use evidence::EvidenceState;
+use evidence::{Came, EvidenceState};
 use outlet::Outlets;
 use record::Record;
 use scores::Scores;
@@ -206,13 +206,14 @@ impl<'p> Monitors<'p> {
                 Err(lacking) => {
                     self.note(id, wire, &lacking);
                 }
-                Ok(None) => {
+                Ok(Came::Nothing) => {}
+                Ok(Came::Waits) => {
                     self.latest[id.index()] = Some((wire, index));
                     if !std::mem::replace(&mut self.is_waiting[id.index()], true) {
                         self.waiting.push(id);
                     }
                 }
-                Ok(Some(truth)) => {
+                Ok(Came::Truth(truth)) => {
                     self.last_heard[id.index()] = self.event;
                     self.heard.push((id, truth));
                 }

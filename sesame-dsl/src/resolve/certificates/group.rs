@@ -236,6 +236,7 @@ fn evidence(evidence: &Evidence) -> plan::Evidence {
             path: input.field.fields.clone(),
         },
         members: input.members,
+        list: input.list.clone(),
         text: input.text.clone(),
     });
     plan::Evidence {

@@ -91,11 +91,15 @@ pub(crate) struct Until {
     pub(crate) interval: Option<Range>,
 }
 
-/// What a group of topics is taken as, other than its minimum.
-#[derive(Debug, Clone, Copy)]
+/// What the values of a list, or those of a group's topics, are reduced to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Members {
+    Min,
     Max,
     Sum,
+    Mean,
+    Count,
+    Length,
     Each,
     EachPair,
 }

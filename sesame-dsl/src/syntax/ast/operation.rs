@@ -2,7 +2,7 @@
 
 use sesame_grammar::Rule;
 
-use super::words::{Count, Head, Name, Point, Quantity, Range, Text, UnitName};
+use super::words::{Head, Name, Path, Point, Quantity, Range, Text, UnitName};
 use crate::span::Span;
 
 #[derive(Debug)]
@@ -37,7 +37,7 @@ pub(crate) struct Target {
     /// The topic of the first place.
     pub(crate) topic: Name,
     /// At least one.
-    pub(crate) places: Vec<ValuePath>,
+    pub(crate) places: Vec<Path>,
     pub(crate) span: Span,
 }
 
@@ -47,23 +47,6 @@ pub(crate) struct Resource {
     pub(crate) parameter: Option<Text>,
     pub(crate) node: Name,
     pub(crate) span: Span,
-}
-
-/// A place in the messages of a topic.
-#[derive(Debug)]
-pub(crate) struct ValuePath {
-    pub(crate) topic: Name,
-    pub(crate) steps: Vec<Step>,
-    pub(crate) span: Span,
-}
-
-#[derive(Debug)]
-pub(crate) enum Step {
-    Field(Name),
-    /// `[3]`; the span includes the brackets.
-    Element(Count, Span),
-    /// `[*]`
-    Each(Span),
 }
 
 /// What the start condition of an operation has to contain.

@@ -1,5 +1,6 @@
 //! Names, texts, numbers with their units, and bounds: what all constructs are made of.
 
+use super::formula::Relation;
 use crate::span::Span;
 
 /// A name, where it stands.
@@ -55,6 +56,41 @@ pub(crate) struct Count {
     pub(crate) span: Span,
 }
 
+/// One step into a message.
+#[derive(Debug, Clone)]
+pub(crate) enum Step {
+    Field(Name),
+    /// `[3]`; the span includes the brackets.
+    Element(Count, Span),
+    /// `[3..5]`, both included.
+    Elements(Count, Count, Span),
+    /// `[*]`
+    Each(Span),
+    /// `[name == "elbow"]`, `[* < 0.5m]`
+    Filter(Box<Filter>),
+}
+
+/// Of which elements of a list something holds.
+#[derive(Debug, Clone)]
+pub(crate) struct Filter {
+    /// What is compared: the element itself, or the field at the end of this path.
+    pub(crate) key: Vec<Name>,
+    /// Where that is written.
+    pub(crate) key_span: Span,
+    pub(crate) by: Relation,
+    pub(crate) with: ComparedWith,
+    /// With the brackets.
+    pub(crate) span: Span,
+}
+
+/// What the elements of a list are compared with.
+#[derive(Debug, Clone)]
+pub(crate) enum ComparedWith {
+    Number(Quantity),
+    Text(Text),
+    Truth(bool, Span),
+}
+
 /// Three numbers of one unit.
 #[derive(Debug)]
 pub(crate) struct Point {
@@ -63,11 +99,14 @@ pub(crate) struct Point {
     pub(crate) span: Span,
 }
 
-/// A topic, and fields of its message.
+/// A place in the messages of a topic.
 #[derive(Debug, Clone)]
 pub(crate) struct Path {
     pub(crate) topic: Name,
+    /// Fields, up to the first list of which an element is chosen.
     pub(crate) fields: Vec<Name>,
+    /// From the first choice of elements on.
+    pub(crate) elements: Vec<Step>,
     pub(crate) span: Span,
 }
 

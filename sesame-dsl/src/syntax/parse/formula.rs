@@ -171,6 +171,12 @@ impl Reader<'_> {
                 let members = match word.as_rule() {
                     Rule::k_max => Members::Max,
                     Rule::k_sum => Members::Sum,
+                    Rule::reduction => match word.as_str() {
+                        "min" => Members::Min,
+                        "mean" => Members::Mean,
+                        "count" => Members::Count,
+                        _ => Members::Length,
+                    },
                     _ if pair.is_some() => Members::EachPair,
                     _ => Members::Each,
                 };

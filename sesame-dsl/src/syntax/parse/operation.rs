@@ -7,7 +7,7 @@ use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::span::Span;
 use crate::syntax::ast::{
     Amounts, Contained, Custom, CustomParameter, Distribution, Domain, Drain, Moment, NotFinite, Operation,
-    OperationBody, OperationKind, Point, Range, Resource, Step, Stuck, Target, Text, UnitName, ValuePath,
+    OperationBody, OperationKind, Path, Point, Range, Resource, Stuck, Target, Text, UnitName,
 };
 
 impl Reader<'_> {
@@ -67,22 +67,9 @@ impl Reader<'_> {
     }
 
     pub(super) fn target(&mut self, pair: &Pair<'_>) -> Target {
-        let places: Vec<ValuePath> = children(pair, Rule::target).map(|place| self.place(&place)).collect();
+        let places: Vec<Path> = children(pair, Rule::target).map(|place| self.path(&place)).collect();
         let topic = places.first().expect("an operation has a target").topic.clone();
         Target { topic, places, span: self.span(pair) }
-    }
-
-    fn place(&mut self, pair: &Pair<'_>) -> ValuePath {
-        let steps = pair.clone().into_inner().filter_map(|step| match step.as_rule() {
-            Rule::field_name => Some(Step::Field(self.field_name(&step))),
-            Rule::element => Some(match child(&step, Rule::number) {
-                Some(number) => Step::Element(self.count(&number), self.span(&step)),
-                None => Step::Each(self.span(&step)),
-            }),
-            _ => None,
-        });
-        let steps = steps.collect();
-        ValuePath { topic: self.name(&expect_child(pair, Rule::name)), steps, span: self.span(pair) }
     }
 
     fn operation_kind(&mut self, kind: &Pair<'_>) -> OperationKind {

@@ -2,10 +2,12 @@
 
 use sesame_grammar::Rule;
 
-use super::reader::{Pair, Reader, child, children, expect_child};
+use super::reader::{Pair, Reader, child, children, comparison, expect_child};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::span::Span;
-use crate::syntax::ast::{Count, Head, Name, Path, Point, Quantity, Range, Text, UnitName};
+use crate::syntax::ast::{
+    ComparedWith, Count, Filter, Head, Name, Path, Point, Quantity, Range, Relation, Step, Text, UnitName,
+};
 
 impl Reader<'_> {
     pub(super) fn head(&mut self, pair: &Pair<'_>) -> Head {
@@ -71,12 +73,56 @@ impl Reader<'_> {
     }
 
     pub(super) fn path(&mut self, pair: &Pair<'_>) -> Path {
-        Path {
+        let mut path = Path {
             topic: self.name(&expect_child(pair, Rule::name)),
-            fields: children(pair, Rule::field_name)
-                .map(|field| Name { text: field.as_str().to_owned(), span: self.span(&field) })
-                .collect(),
+            fields: Vec::new(),
+            elements: Vec::new(),
             span: self.span(pair),
+        };
+        for step in pair.clone().into_inner() {
+            match step.as_rule() {
+                Rule::field_name if path.elements.is_empty() => path.fields.push(self.field_name(&step)),
+                Rule::field_name => path.elements.push(Step::Field(self.field_name(&step))),
+                Rule::element => path.elements.push(self.element(&step)),
+                _ => {}
+            }
+        }
+        path
+    }
+
+    fn element(&mut self, pair: &Pair<'_>) -> Step {
+        let span = self.span(pair);
+        if let Some(range) = child(pair, Rule::element_range) {
+            let mut ends = children(&range, Rule::number).map(|end| self.count(&end)).collect::<Vec<_>>();
+            let last = ends.pop().expect("a range has two ends");
+            let first = ends.pop().expect("a range has two ends");
+            return Step::Elements(first, last, span);
+        }
+        if let Some(filter) = child(pair, Rule::element_filter) {
+            return Step::Filter(Box::new(self.filter(&filter, span)));
+        }
+        match child(pair, Rule::number) {
+            Some(number) => Step::Element(self.count(&number), span),
+            None => Step::Each(span),
+        }
+    }
+
+    fn filter(&mut self, pair: &Pair<'_>, span: Span) -> Filter {
+        let key = child(pair, Rule::element_key).or_else(|| child(pair, Rule::each_element));
+        let key = key.expect("a filter says what it compares");
+        let with = if let Some(text) = child(pair, Rule::text) {
+            ComparedWith::Text(self.any_text(&text))
+        } else if let Some(truth) = child(pair, Rule::truth) {
+            ComparedWith::Truth(child(&truth, Rule::k_true).is_some(), self.span(&truth))
+        } else {
+            ComparedWith::Number(self.signed(&expect_child(pair, Rule::signed)))
+        };
+        Filter {
+            key: children(&key, Rule::field_name).map(|name| self.field_name(&name)).collect(),
+            key_span: self.span(&key),
+            by: comparison(pair).map_or(Relation::NotEqual, Relation::Comparison),
+            with,
+            span,
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use sesame_plan::{Input, Members, Side};
+use sesame_plan::{Input, Members, Reduction, Side};
 
 use super::logic::{Literal, Logic};
 use super::theory::{Comparison, Term, TermIndex, TermKind};
@@ -98,7 +98,8 @@ impl Atoms {
     /// The number of an input of evidence, if it has one.
     pub(super) fn find(&self, evidence: EvidenceId, side: Side, input: &Input) -> Option<usize> {
         self.inputs.iter().position(|known| {
-            let same = (&known.input.field, known.input.members) == (&input.field, input.members);
+            let of = |input: &Input| (input.field.clone(), input.members, input.list.clone());
+            let same = of(&known.input) == of(input);
             same && (known.side, known.owner) == (side, owner(evidence, input))
         })
     }
@@ -224,10 +225,16 @@ impl Atoms {
         literal
     }
 
-    /// What always holds: a text is at most one of several.
+    /// What always holds: a text is at most one of several. Where an input holds if one of many texts is this one, the
+    /// others may be other texts.
     pub(super) fn laws(&mut self) -> Vec<Literal> {
-        let several = self.texts.values().filter(|texts| texts.len() > 1);
-        let several: Vec<Vec<Literal>> = several.map(|texts| texts.values().copied().collect()).collect();
+        let of_any = |input: &Input| {
+            let reduction = input.list.as_ref().map(|list| list.reduction);
+            input.members == Members::Max || !matches!(reduction, None | Some(Reduction::First | Reduction::Min))
+        };
+        let several =
+            self.texts.iter().filter(|(input, texts)| texts.len() > 1 && !of_any(&self.inputs[**input].input));
+        let several: Vec<Vec<Literal>> = several.map(|(_, texts)| texts.values().copied().collect()).collect();
         several.into_iter().map(|literals| !self.logic.at_least(2, literals)).collect()
     }
 }

@@ -24,6 +24,7 @@ fn inputs() -> Vec<Input> {
     let input = |topic, text: Option<TextTest>| Input {
         field: FieldRef { topic: TopicId(topic), path: Vec::new() },
         members: Members::Min,
+        list: None,
         text,
     };
     let is = |text: &str| Some(TextTest::Is(text.into()));

@@ -84,6 +84,7 @@ fn evidence(held: i64, stale: Option<(i64, bool, bool)>) -> Evidence {
         inputs: vec![Input {
             field: FieldRef { topic: TopicId(0), path: Vec::new() },
             members: Members::Min,
+            list: None,
             text: None,
         }],
         condition: Condition::Input(0),

@@ -2,6 +2,7 @@
 
 use sesame_plan::{Step, ValuePath};
 
+use crate::elements::{self, Found, chosen, positions};
 use crate::fuzz::action::Action;
 use crate::value::Value;
 
@@ -69,37 +70,33 @@ fn visit(value: &mut Value, path: &[Step], next: &mut u64, change: &mut impl FnM
         return change(value, draw);
     };
     match (step, value) {
-        (Step::Field(name), Value::Record(record)) => {
-            record.get_mut(name).is_some_and(|field| visit(field, rest, next, change))
+        (Step::Field(name), Value::Record(record)) => match (rest, record.get(name)) {
+            // Which elements a filter chooses may depend on another list of the record.
+            ([filter @ Step::Filter(_), inner @ ..], Some(Value::List(items))) => {
+                let chosen: Vec<usize> = chosen(filter, items, Some(record)).collect();
+                let Some(Value::List(items)) = record.get_mut(name) else { return false };
+                chosen.iter().fold(false, |changed, &at| visit(&mut items[at], inner, next, change) | changed)
+            }
+            _ => record.get_mut(name).is_some_and(|field| visit(field, rest, next, change)),
+        },
+        (filter @ Step::Filter(_), Value::List(items)) => {
+            let chosen: Vec<usize> = chosen(filter, items, None).collect();
+            chosen.iter().fold(false, |changed, &at| visit(&mut items[at], rest, next, change) | changed)
         }
-        (Step::Element(at), Value::List(items)) => {
-            items.get_mut(*at as usize).is_some_and(|item| visit(item, rest, next, change))
-        }
-        (Step::Each, Value::List(items)) => {
-            items.iter_mut().fold(false, |changed, item| visit(item, rest, next, change) | changed)
+        (step, Value::List(items)) => {
+            let positions = positions(step, items.len());
+            items[positions].iter_mut().fold(false, |changed, item| visit(item, rest, next, change) | changed)
         }
         _ => false,
     }
 }
 
 fn collect(value: &Value, path: &[Step], next: &mut u64, memory: &mut Memory) {
-    let Some((step, rest)) = path.split_first() else {
-        memory.0.push((*next, value.clone()));
-        *next += DRAWS_PER_VALUE;
-        return;
-    };
-    match (step, value) {
-        (Step::Field(name), Value::Record(record)) => {
-            if let Some(field) = record.get(name) {
-                collect(field, rest, next, memory);
-            }
+    elements::visit(value, None, path, &mut |found| {
+        // A path to what an operation changes does not end at a coordinate.
+        if let Found::Value(value) = found {
+            memory.0.push((*next, value.clone()));
+            *next += DRAWS_PER_VALUE;
         }
-        (Step::Element(at), Value::List(items)) => {
-            if let Some(item) = items.get(*at as usize) {
-                collect(item, rest, next, memory);
-            }
-        }
-        (Step::Each, Value::List(items)) => items.iter().for_each(|item| collect(item, rest, next, memory)),
-        _ => {}
-    }
+    });
 }

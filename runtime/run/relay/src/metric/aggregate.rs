@@ -25,7 +25,7 @@ use crate::metric::Context;
 use crate::metric::attendance::Attendance;
 use crate::metric::expression::{Held, greatest, least};
 use crate::metric::growth::{next_change, next_crossing};
-use crate::metric::held::{HeldInputs, hear};
+use crate::metric::held::{HeardValues, HeldInputs, hear};
 use crate::metric::tally::{Tally, step};
 use crate::value::{Text, Value};
 
@@ -48,7 +48,7 @@ pub(super) struct FormulaState<'p> {
     /// When it was evaluated last.
     evaluated: Option<SimTime>,
     /// The values of the current message, per input.
-    heard: Vec<(usize, Held)>,
+    heard: HeardValues,
 }
 
 /// What a formula is evaluated for.
@@ -110,7 +110,7 @@ impl<'p> FormulaState<'p> {
             keys: BTreeMap::new(),
             attendance: several.then(|| Attendance::new(&formula.inputs, plan)),
             evaluated: None,
-            heard: Vec::new(),
+            heard: HeardValues::default(),
         }
     }
 
@@ -127,6 +127,12 @@ impl<'p> FormulaState<'p> {
                 context.note(format!("a message on `{}` has no value `{lacking}`", context.topic));
                 return false;
             }
+        }
+        if let Some(several) = self.heard.note(&self.formula.inputs) {
+            context.note(format!("in a message on `{}`, {several}", context.topic));
+        }
+        if self.heard.is_nothing() {
+            return false;
         }
         let of_members = |input: &Input| matches!(input.members, Members::Each | Members::First | Members::Second);
         let mut read = self.formula.inputs.iter().filter(|input| input.field.topic == topic);
@@ -236,7 +242,7 @@ impl<'p> FormulaState<'p> {
     fn held(&self) -> impl Iterator<Item = Vec<Held>> {
         // The initial state of new keys aggregates nothing.
         let streams = self.streams().skip(usize::from(self.formula.per.is_some()));
-        streams.flat_map(|stream| (0..self.of.count()).filter_map(|at| stream.turned_to(self.formula, &self.of, at)))
+        streams.flat_map(|stream| (0..self.of.count()).flat_map(|at| stream.turned_to(self.formula, &self.of, at)))
     }
 
     /// The value that would have been reached if every number had been finite: messages after the first number that was
@@ -427,8 +433,16 @@ impl Stream {
         }
     }
 
-    /// Aggregates the values that are held now.
+    /// Aggregates the values that are held now, of each element if the formula is of the elements of a list.
     fn step(&mut self, formula: &Formula, at: usize, context: &mut Context) {
+        let Some(elements) = self.held.elements() else { return self.take(formula, at, context) };
+        for element in 0..elements {
+            self.held.turn_to_element(element);
+            self.take(formula, at, context);
+        }
+    }
+
+    fn take(&mut self, formula: &Formula, at: usize, context: &mut Context) {
         if let Some(value) = step(formula, &self.held, &mut self.tallies[at], context) {
             self.sum = (self.sum.0 + value, self.sum.1 + 1.0);
             self.last = Some(value);
@@ -440,14 +454,24 @@ impl Stream {
         (count > 0.0).then(|| sum / count)
     }
 
-    /// The values of all inputs for one of those that the formula is of, once all are known and finite.
-    fn turned_to(&self, formula: &Formula, of: &Of, at: usize) -> Option<Vec<Held>> {
+    /// The values of all inputs for one of those that the formula is of, once all are known and finite: of each element
+    /// if the formula is of the elements of a list.
+    fn turned_to(&self, formula: &Formula, of: &Of, at: usize) -> Vec<Vec<Held>> {
         let mut held = self.held.clone();
         let known = match of {
             Of::Inputs => true,
             Of::Members(_) => held.turn_to(&formula.inputs, at),
             Of::Pairs(pairs) => held.turn_to_pair(&formula.inputs, pairs[at]),
         };
-        known.then(|| held.values().map(<[Held]>::to_vec)).flatten()
+        let values = |held: &HeldInputs| held.values().map(<[Held]>::to_vec);
+        if !known {
+            return Vec::new();
+        }
+        let Some(elements) = held.elements() else { return values(&held).into_iter().collect() };
+        let of_element = |element| {
+            held.turn_to_element(element);
+            values(&held)
+        };
+        (0..elements).filter_map(of_element).collect()
     }
 }

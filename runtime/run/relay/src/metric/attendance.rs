@@ -69,7 +69,10 @@ mod tests {
         ) {
             // `arm/command`, and both members of `zones`.
             let input = |topic| Input {
-                field: FieldRef { topic: TopicId(topic), path: Vec::new() }, members: Members::Min, text: None,
+                field: FieldRef { topic: TopicId(topic), path: Vec::new() },
+                members: Members::Min,
+                list: None,
+                text: None,
             };
             let mut attendance = Attendance::new(&[input(1), input(0), input(1)], &plan(Vec::new()));
             let spoke: Vec<Vec<bool>> = spoke.into_iter().filter(|instant| instant.contains(&true)).collect();

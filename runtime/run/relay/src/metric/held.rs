@@ -1,40 +1,155 @@
 //! The values that formulas hold: the last value of each input, and of each member of a group.
 
-use sesame_plan::{CampaignPlan, Input, Members, TextTest, TopicId};
+use sesame_plan::{CampaignPlan, InList, Input, Members, Reduction, TextTest, TopicId, value_path_in_words};
 
+use crate::elements::{Found, visit};
 use crate::metric::expression::{Held, greatest, least};
 use crate::value::Value;
 
 /// The held value of an input whose last value was not finite.
 const NOT_FINITE: Held = [f64::NAN; 3];
 
-/// Reads the values of the inputs that a message on a topic has, with their positions, and returns whether all of them
-/// are finite. The error is a missing field.
-pub(crate) fn hear(
-    inputs: &[Input],
-    topic: TopicId,
-    value: &Value,
-    heard: &mut Vec<(usize, Held)>,
-) -> Result<bool, String> {
-    heard.clear();
+/// The values that a message has of a formula's inputs, by their positions.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct HeardValues {
+    /// Of inputs that are one value.
+    values: Vec<(usize, Held)>,
+    /// Of inputs that are each value of a list.
+    lists: Vec<(usize, Vec<Held>)>,
+    /// The first input for which several elements of a list were there, although it is one value.
+    several: Option<usize>,
+}
+
+impl HeardValues {
+    /// Whether there was none, as if the message had not come.
+    pub(crate) fn is_nothing(&self) -> bool {
+        self.values.is_empty() && self.lists.is_empty()
+    }
+
+    /// The values of inputs that are one value.
+    pub(crate) fn values(&self) -> &[(usize, Held)] {
+        &self.values
+    }
+
+    /// What to say of inputs that are one value although a list has several for them.
+    pub(crate) fn note(&self, inputs: &[Input]) -> Option<String> {
+        let input = &inputs[self.several?];
+        let steps = input.list.as_ref().map_or(&[][..], |list| &list.steps);
+        let path = format!("{}{}", input.field.path.join("."), value_path_in_words(steps));
+        Some(format!("several elements are `{path}`; the first one counts"))
+    }
+}
+
+/// Reads the values of the inputs that a message on a topic has, and returns whether all of them are finite. The error
+/// is a missing field.
+pub(crate) fn hear(inputs: &[Input], topic: TopicId, value: &Value, heard: &mut HeardValues) -> Result<bool, String> {
+    heard.values.clear();
+    heard.lists.clear();
+    heard.several = None;
     let mut all_finite = true;
     for (at, input) in inputs.iter().enumerate().filter(|(_, input)| input.field.topic == topic) {
         let path = &input.field.path;
-        let number = |number: f64| [number, 0.0, 0.0];
-        let held = match (value.at(path), &input.text) {
-            (Some(Value::Point(point)), None) => Some(*point),
-            (Some(value), None) => value.number().map(number),
+        let held = match (&input.list, value.at(path)) {
+            (Some(list), Some(found)) => match in_list(list, input, value, found, at, heard) {
+                Some(held) => Some(held),
+                None => continue,
+            },
+            (None, Some(found)) => held_of(Found::Value(found), input.text.as_ref()),
             (None, None) => value.coordinate_at(path).map(number),
-            (Some(Value::Text(text)), Some(TextTest::Is(wanted))) => Some(truth(text == wanted.as_str())),
-            (Some(Value::Text(text)), Some(TextTest::IsNot(other))) => Some(truth(text != other.as_str())),
-            (_, Some(_)) => None,
+            (Some(_), None) => None,
         };
         let Some(held) = held else { return Err(path.join(".")) };
-        let finite = held.iter().all(|x| x.is_finite());
+        let finite = is_finite(held);
         all_finite &= finite;
-        heard.push((at, if finite { held } else { NOT_FINITE }));
+        heard.values.push((at, if finite { held } else { NOT_FINITE }));
     }
     Ok(all_finite)
+}
+
+/// What a list in a message is for an input; `None` if the message is as if it had not come, or all is in `heard`.
+fn in_list(
+    list: &InList,
+    input: &Input,
+    message: &Value,
+    found: &Value,
+    at: usize,
+    heard: &mut HeardValues,
+) -> Option<Held> {
+    let beside = input.field.path.split_last().and_then(|(_, outer)| match message.at(outer) {
+        Some(Value::Record(record)) => Some(record),
+        _ => None,
+    });
+    let mut first = None;
+    let mut count = 0_u64;
+    let mut each = Vec::new();
+    let mut reduced: Option<f64> = None;
+    visit(found, beside, &list.steps, &mut |found| {
+        match (list.reduction, found) {
+            (Reduction::Count, found) => {
+                count += u64::from(!matches!(found, Found::Value(Value::Bool(false))));
+                return;
+            }
+            (Reduction::Length, Found::Value(Value::List(items))) => {
+                first = first.or(Some(number(items.len() as f64)));
+                return;
+            }
+            _ => {}
+        }
+        let Some(held) = held_of(found, input.text.as_ref()) else { return };
+        if list.reduction != Reduction::First && !is_finite(held) {
+            return;
+        }
+        count += 1;
+        match list.reduction {
+            Reduction::Each => each.push(held),
+            Reduction::First => first = first.or(Some(held)),
+            Reduction::Min => reduced = Some(reduced.map_or(held[0], |before| least(before, held[0]))),
+            Reduction::Max => reduced = Some(reduced.map_or(held[0], |before| greatest(before, held[0]))),
+            Reduction::Sum | Reduction::Mean => reduced = Some(reduced.unwrap_or(0.0) + held[0]),
+            Reduction::Count | Reduction::Length => {}
+        }
+    });
+    match list.reduction {
+        Reduction::First => {
+            if count > 1 {
+                heard.several = heard.several.or(Some(at));
+            }
+            first
+        }
+        Reduction::Length => first,
+        Reduction::Each => {
+            heard.lists.push((at, each));
+            None
+        }
+        Reduction::Min | Reduction::Max => reduced.map(number),
+        Reduction::Sum => Some(number(reduced.unwrap_or(0.0))),
+        Reduction::Mean => reduced.map(|sum| number(sum / count as f64)),
+        Reduction::Count => Some(number(count as f64)),
+    }
+}
+
+/// A value as an input holds it; `None` if it is not of a type that can be held.
+fn held_of(found: Found<'_>, text: Option<&TextTest>) -> Option<Held> {
+    match (found, text) {
+        (Found::Coordinate(coordinate), None) => Some(number(coordinate)),
+        (Found::Value(Value::Point(point)), None) => Some(*point),
+        (Found::Value(value), None) => value.number().map(number),
+        (Found::Value(Value::Text(text)), Some(TextTest::Is(wanted))) => Some(truth(text == wanted.as_str())),
+        (Found::Value(Value::Text(text)), Some(TextTest::IsNot(other))) => Some(truth(text != other.as_str())),
+        (_, Some(_)) => None,
+    }
+}
+
+fn number(number: f64) -> Held {
+    [number, 0.0, 0.0]
+}
+
+fn is_finite(held: Held) -> bool {
+    held.iter().all(|x| x.is_finite())
+}
+
+fn is_each(input: &Input) -> bool {
+    input.list.as_ref().is_some_and(|list| list.reduction == Reduction::Each)
 }
 
 fn truth(holds: bool) -> Held {
@@ -50,6 +165,8 @@ pub(crate) struct HeldInputs {
     inputs: Vec<Held>,
     /// Per input: whether there was a message at all.
     known: Vec<bool>,
+    /// Per input that is each value of a list: these values, in the last message.
+    lists: Vec<(usize, Vec<Held>)>,
 }
 
 impl HeldInputs {
@@ -59,6 +176,19 @@ impl HeldInputs {
             members: inputs.iter().map(|input| vec![None; plan.topic(input.field.topic).paths.len()]).collect(),
             inputs: vec![[0.0; 3]; inputs.len()],
             known: vec![false; inputs.len()],
+            lists: (0..inputs.len()).filter(|&at| is_each(&inputs[at])).map(|at| (at, Vec::new())).collect(),
+        }
+    }
+
+    /// How many values the lists have of which a formula is evaluated for each; `None` for a formula without.
+    pub(super) fn elements(&self) -> Option<usize> {
+        self.lists.iter().map(|(_, values)| values.len()).min()
+    }
+
+    /// Makes inputs that are each value of a list the value at this place.
+    pub(super) fn turn_to_element(&mut self, element: usize) {
+        for (at, values) in &self.lists {
+            self.inputs[*at] = values[element];
         }
     }
 
@@ -74,7 +204,18 @@ impl HeldInputs {
     }
 
     /// Takes the values that [`hear`] found in a message on the `member`th path of its topic.
-    pub(crate) fn hold(&mut self, inputs: &[Input], heard: &[(usize, Held)], member: usize) {
+    pub(crate) fn hold(&mut self, inputs: &[Input], heard: &HeardValues, member: usize) {
+        for (at, values) in &heard.lists {
+            self.known[*at] = true;
+            if let Some((_, held)) = self.lists.iter_mut().find(|(of, _)| of == at) {
+                held.clone_from(values);
+            }
+        }
+        self.hold_values(inputs, &heard.values, member);
+    }
+
+    /// As [`HeldInputs::hold`], for values that are not in lists.
+    pub(crate) fn hold_values(&mut self, inputs: &[Input], heard: &[(usize, Held)], member: usize) {
         for &(at, value) in heard {
             self.known[at] = true;
             let members = &mut self.members[at];

@@ -12,8 +12,8 @@ use sesame_plan::{Bound, CampaignPlan, Expression, Members, TopicId};
 use crate::metric::Context;
 use crate::metric::aggregate::pairs_of;
 use crate::metric::attendance::Attendance;
-use crate::metric::expression::{Held, Moment, least, number};
-use crate::metric::held::{HeldInputs, hear};
+use crate::metric::expression::{Moment, least, number};
+use crate::metric::held::{HeardValues, HeldInputs, hear};
 use crate::value::Value;
 use sesame_stl::{FormulaError, Monitor, Signal};
 
@@ -29,7 +29,7 @@ pub(super) struct RobustnessState<'p> {
     /// Once the run is over: its last instant.
     end: SimTime,
     attendance: Attendance,
-    heard: Vec<(usize, Held)>,
+    heard: HeardValues,
     /// A monitor without samples, to find out when a requirement was lost; `None` where nothing is required of it.
     fresh: Option<Monitor>,
 }
@@ -156,7 +156,7 @@ impl<'p> RobustnessState<'p> {
             previous: SimTime::ZERO,
             end: SimTime::ZERO,
             attendance,
-            heard: Vec::new(),
+            heard: HeardValues::default(),
             fresh: required.then_some(fresh),
         })
     }
@@ -173,6 +173,9 @@ impl<'p> RobustnessState<'p> {
                 return;
             }
         }
+        if let Some(several) = self.heard.note(inputs) {
+            context.note(format!("in a message on `{}`, {several}", context.topic));
+        }
         if context.now > self.last {
             self.previous = std::mem::replace(&mut self.last, context.now);
         }
@@ -182,7 +185,7 @@ impl<'p> RobustnessState<'p> {
             // to its own.
             let mut finite = true;
             let mut concerned = false;
-            for &(input, value) in &self.heard {
+            for &(input, value) in self.heard.values() {
                 let own = match inputs[input].members {
                     Members::Min | Members::Max | Members::Sum => true,
                     Members::Each | Members::First => member == of.0,
@@ -191,7 +194,7 @@ impl<'p> RobustnessState<'p> {
                 if own {
                     concerned = true;
                     finite &= value.iter().all(|x| x.is_finite());
-                    held.hold(inputs, &[(input, value)], member);
+                    held.hold_values(inputs, &[(input, value)], member);
                 }
             }
             // What another member says tells nothing about this one.
@@ -360,11 +363,11 @@ mod tests {
     }
 
     fn command() -> Input {
-        Input { field: FieldRef { topic: TopicId(0), path: Vec::new() }, members: Members::Min, text: None }
+        Input { field: FieldRef { topic: TopicId(0), path: Vec::new() }, members: Members::Min, list: None, text: None }
     }
 
     fn level(members: Members) -> Input {
-        Input { field: FieldRef { topic: TopicId(1), path: vec!["level".into()] }, members, text: None }
+        Input { field: FieldRef { topic: TopicId(1), path: vec!["level".into()] }, members, list: None, text: None }
     }
 
     fn above(signal: u32) -> Formula {

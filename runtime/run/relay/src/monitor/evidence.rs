@@ -4,7 +4,7 @@ use sesame_base::time::SimTime;
 use sesame_monitor::Truth;
 use sesame_plan::{CampaignPlan, Evidence, TopicId};
 
-use crate::metric::{Held, HeldInputs, Moment, hear, holds};
+use crate::metric::{HeardValues, HeldInputs, Moment, hear, holds};
 use crate::value::Value;
 use crate::wire::Wire;
 
@@ -13,7 +13,7 @@ pub(super) struct EvidenceState<'p> {
     evidence: &'p Evidence,
     held: HeldInputs,
     /// The values of the current message, per input.
-    heard: Vec<(usize, Held)>,
+    heard: HeardValues,
     sources: Sources,
 }
 
@@ -23,28 +23,29 @@ impl<'p> EvidenceState<'p> {
         EvidenceState {
             evidence,
             held: HeldInputs::new(&evidence.inputs, plan),
-            heard: Vec::new(),
+            heard: HeardValues::default(),
             sources: Sources::new(sources),
         }
     }
 
-    /// Takes a message on the `member`th path of a topic. Returns what the condition comes to now; evidence with
-    /// several sources comes to nothing before the end of the instant. The error is a missing field; such a message is
-    /// not heard.
+    /// Takes a message on the `member`th path of a topic. The error is a missing field; such a message is not heard.
     pub(super) fn hear(
         &mut self,
         wire: Wire,
         (topic, member): (TopicId, usize),
         now: SimTime,
         value: &Value,
-    ) -> Result<Option<Truth>, String> {
+    ) -> Result<Came, String> {
         hear(&self.evidence.inputs, topic, value, &mut self.heard)?;
+        if self.heard.is_nothing() {
+            return Ok(Came::Nothing);
+        }
         self.held.hold(&self.evidence.inputs, &self.heard, member);
         if self.sources.are_several() {
             self.sources.spoke(wire, now);
-            return Ok(None);
+            return Ok(Came::Waits);
         }
-        Ok(Some(self.truth(now)))
+        Ok(Came::Truth(self.truth(now)))
     }
 
     /// What the condition comes to now. It is unknown while a number that was read last is not finite, and where a
@@ -57,6 +58,17 @@ impl<'p> EvidenceState<'p> {
     pub(super) fn sources(&self) -> &Sources {
         &self.sources
     }
+}
+
+/// What comes of a message for evidence.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Came {
+    /// It has no element that the evidence reads, so it is as if it had not come.
+    Nothing,
+    /// Evidence with several sources waits for the end of the instant.
+    Waits,
+    /// What the condition comes to.
+    Truth(Truth),
 }
 
 /// When each source of evidence, a topic or a member of a group, had its last message. It is kept only if there are

@@ -11,7 +11,7 @@ use sesame_monitor::{Changes, EvidenceChange, EvidenceId, Network, Reading, Run,
 use sesame_plan::{CampaignPlan, MonitorId, Side};
 
 use super::evidence::{Sources, truth_of};
-use crate::metric::{Held, HeldInputs, hear};
+use crate::metric::{HeardValues, HeldInputs, hear};
 use crate::value::Value;
 use crate::wire::{Wire, WireTable};
 
@@ -43,7 +43,7 @@ struct Stream {
 }
 
 /// What a piece of evidence reads in a message: per input.
-type Content = (EvidenceId, Vec<(usize, Held)>);
+type Content = (EvidenceId, HeardValues);
 
 /// What monitors do on a recording.
 #[derive(Debug, Clone, PartialEq)]
@@ -101,8 +101,9 @@ impl<'p> RecordedMonitors<'p> {
         let mut content: Vec<Content> = Vec::new();
         let topic = self.wires.topic(wire);
         for id in self.streams[stream as usize].evidence.clone() {
-            let mut heard = Vec::new();
+            let mut heard = HeardValues::default();
             match hear(&evidence_of(self.plan, &self.network, id).inputs, topic, value, &mut heard) {
+                Ok(_) if heard.is_nothing() => {}
                 Ok(_) => content.push((id, heard)),
                 Err(lacking) => self.note(id, wire, &lacking),
             }

@@ -425,6 +425,7 @@ fn times_that_grow_are_compared_where_they_meet_and_not_at_every_nanosecond() {
         inputs: vec![Input {
             field: FieldRef { topic: TopicId(0), path: Vec::new() },
             members: Members::Min,
+            list: None,
             text: None,
         }],
         aggregate: Aggregate::Duration { of: Holds::Constant(true) },
@@ -494,6 +495,7 @@ fn an_outbound_metric_hears_its_topic() {
             inputs: vec![Input {
                 field: FieldRef { topic: TopicId(0), path: Vec::new() },
                 members: Members::Min,
+                list: None,
                 text: None,
             }],
             aggregate: Aggregate::Count { of: Holds::Constant(true) },

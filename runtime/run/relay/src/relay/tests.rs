@@ -290,6 +290,7 @@ fn an_outbound_metric_hears_what_operations_made_of_a_message_and_an_inbound_one
             inputs: vec![Input {
                 field: FieldRef { topic: TopicId(0), path: Vec::new() },
                 members: Members::Min,
+                list: None,
                 text: None,
             }],
             aggregate: Aggregate::Count { of: Condition::Constant(true) },
@@ -486,6 +487,7 @@ fn what_an_outbound_metric_shows_counts_once_its_message_is_through() {
             inputs: vec![Input {
                 field: FieldRef { topic: TopicId(0), path: Vec::new() },
                 members: Members::Min,
+                list: None,
                 text: None,
             }],
             aggregate: Aggregate::Count { of: Condition::Constant(true) },

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use sesame_plan::{CampaignPlan, FieldRef, Input, MetricSource, OperationKind, Step, TopicId, ValuePath};
+use sesame_plan::{CampaignPlan, FieldRef, Filter, FilterKey, MetricSource, OperationKind, Step, TopicId};
 
 /// Which fields of a message are read.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -46,45 +46,52 @@ pub fn wanted(plan: &CampaignPlan, topic: TopicId) -> Wanted {
         return Wanted::All;
     }
     let mut wanted = Wanted::nothing();
-    let mut read = |field: &FieldRef| {
+    let mut read = |field: &FieldRef, steps: &[Step]| {
         if field.topic == topic {
-            wanted.add(field.path.iter().map(String::as_str));
+            let path: Vec<&str> = field.path.iter().map(String::as_str).collect();
+            add(&mut wanted, &path, steps);
         }
     };
-    for metric in &plan.metrics {
-        let inputs: &[Input] = match &metric.source {
-            MetricSource::Last { input } => {
-                read(input);
-                &[]
-            }
-            MetricSource::Formula { formula } => {
-                formula.per.iter().for_each(&mut read);
-                &formula.inputs
-            }
-            MetricSource::Robustness { robustness } => &robustness.inputs,
-            MetricSource::Hook { .. } | MetricSource::FuzzingTime | MetricSource::Monitor { .. } => &[],
-        };
-        for input in inputs {
-            read(&input.field);
-        }
+    let evidence = plan.monitors.iter().flat_map(|monitor| &monitor.evidence);
+    let of_monitors = evidence.flat_map(|evidence| &evidence.inputs);
+    let of_metrics = plan.metrics.iter().flat_map(|metric| match &metric.source {
+        MetricSource::Formula { formula } => formula.inputs.as_slice(),
+        MetricSource::Robustness { robustness } => &robustness.inputs,
+        MetricSource::Last { .. }
+        | MetricSource::Hook { .. }
+        | MetricSource::FuzzingTime
+        | MetricSource::Monitor { .. } => &[],
+    });
+    for input in of_metrics.chain(of_monitors) {
+        read(&input.field, input.list.as_ref().map_or(&[], |list| &list.steps));
     }
-    for evidence in plan.monitors.iter().flat_map(|monitor| &monitor.evidence) {
-        for input in &evidence.inputs {
-            read(&input.field);
+    for metric in &plan.metrics {
+        match &metric.source {
+            MetricSource::Last { input } => read(input, &[]),
+            MetricSource::Formula { formula } => formula.per.iter().for_each(|per| read(per, &[])),
+            _ => {}
         }
     }
     for operation in plan.operations.iter().filter(|operation| operation.topic == Some(topic)) {
         for place in &operation.places {
-            wanted.add(fields(place));
+            add(&mut wanted, &[], place);
         }
     }
     wanted
 }
 
-/// The fields up to the first list of a path.
-fn fields(path: &ValuePath) -> impl Iterator<Item = &str> {
-    path.iter().map_while(|step| match step {
-        Step::Field(name) => Some(name.as_str()),
-        Step::Element(_) | Step::Each => None,
-    })
+/// Adds what a path leads to: the fields up to its first list with everything in it, and the list beside it that says
+/// which elements are meant.
+fn add<'a>(wanted: &mut Wanted, fields: &[&'a str], steps: &'a [Step]) {
+    let mut path = fields.to_vec();
+    let mut rest = steps;
+    while let [Step::Field(name), inner @ ..] = rest {
+        path.push(name);
+        rest = inner;
+    }
+    wanted.add(path.iter().copied());
+    if let [Step::Filter(Filter { key: FilterKey::Parallel(name), .. }), ..] = rest {
+        path.pop();
+        wanted.add(path.into_iter().chain([name.as_str()]));
+    }
 }

@@ -1,0 +1,479 @@
+//! Paths into messages: fields, elements of lists, and what a formula makes of several of them.
+
+use sesame_plan::{Compared, Filter, FilterKey, Finite, InList, Reduction, Step, WireType};
+
+use super::boolean::relation;
+use super::words::type_in_words;
+use super::{Kind, Resolver};
+use crate::diagnostic::{Code, Diagnostic};
+use crate::interfaces;
+use crate::model::{Comparison, FieldPath, Id as _, Input, Members, TextTest, TopicId, Type};
+use crate::similar::most_similar;
+use crate::span::Span;
+use crate::syntax::ast::{self, ComparedWith, Name, Path};
+
+/// Where a path leads.
+pub(super) struct Place {
+    pub(super) topic: TopicId,
+    /// Fields up to the first list whose elements are chosen.
+    pub(super) fields: Vec<String>,
+    /// From that list on.
+    pub(super) steps: Vec<Step>,
+    /// Whether it may lead to several values of a message.
+    pub(super) many: bool,
+    /// The field before the last one, if that is a coordinate of a point.
+    pub(super) point: Option<String>,
+    pub(super) ty: Type,
+}
+
+/// What a formula reads.
+pub(super) struct Reading {
+    pub(super) field: FieldPath,
+    pub(super) members: Members,
+    pub(super) list: Option<InList>,
+    pub(super) ty: Type,
+}
+
+impl Reading {
+    pub(super) fn input(self, text: Option<TextTest>) -> Input {
+        Input { field: self.field, members: self.members, list: self.list, text }
+    }
+}
+
+/// What a word before a path makes of the values of a list; `None` for pairs.
+fn reduction(word: ast::Members) -> Option<Reduction> {
+    Some(match word {
+        ast::Members::Min => Reduction::Min,
+        ast::Members::Max => Reduction::Max,
+        ast::Members::Sum => Reduction::Sum,
+        ast::Members::Mean => Reduction::Mean,
+        ast::Members::Count => Reduction::Count,
+        ast::Members::Length => Reduction::Length,
+        ast::Members::Each => Reduction::Each,
+        ast::Members::EachPair => return None,
+    })
+}
+
+/// Whether a word takes all elements of a list at which a path ends or which it passes.
+fn takes_all(word: Option<ast::Members>) -> bool {
+    word.and_then(reduction).is_some_and(|reduction| reduction != Reduction::Length)
+}
+
+impl<'a> Resolver<'a> {
+    /// What a formula reads at a path, with the word before it.
+    pub(super) fn reading(&mut self, path: &'a Path, word: Option<(ast::Members, Span)>) -> Option<Reading> {
+        let before = word.map(|(word, _)| word);
+        let Place { topic, fields, steps, many, ty, .. } = self.place(path, takes_all(before))?;
+        let field = FieldPath { topic, fields };
+        let of_list = many || (before == Some(ast::Members::Length) && matches!(ty, Type::List(_)));
+        let whole = word.map_or(path.span, |(_, word)| word.to(path.span));
+        let Some(reduction) = before.and_then(reduction).filter(|_| of_list) else {
+            if many {
+                self.several_values(path);
+                return None;
+            }
+            if let Some((ast::Members::Mean | ast::Members::Count | ast::Members::Length, of)) = word {
+                let title = format!("`{}` is not a list", self.text(path.span));
+                let label = format!("it is {}, and `{} of` is of a list", type_in_words(&ty), self.text(of));
+                self.report(Diagnostic::new(Code::WRONG_TYPE, whole, title).label(label));
+                return None;
+            }
+            let members = self.members(path, &field, word)?;
+            let list = (!steps.is_empty()).then_some(InList { steps, reduction: Reduction::First });
+            return Some(Reading { field, members, list, ty });
+        };
+        let members = match reduction {
+            Reduction::Max => Members::Max,
+            Reduction::Sum => Members::Sum,
+            _ => Members::Min,
+        };
+        let of_group = matches!(reduction, Reduction::Min | Reduction::Max | Reduction::Sum);
+        if self.members_of(&field) > 1 && !of_group {
+            let title = format!("`{}` is a group of topics, each with a list", path.topic.text);
+            let diagnostic = Diagnostic::new(Code::UNPAIRED, whole, title)
+                .label("whose elements are meant is not clear")
+                .note("`min of`, `max of` and `sum of` are over the elements of all members")
+                .note("to read the list of one member, declare it as a topic of its own");
+            self.report(diagnostic);
+            return None;
+        }
+        if reduction == Reduction::Sum && matches!(ty, Type::Bool | Type::Text) {
+            let title = format!("`{}` is {}, which cannot be summed", self.text(path.span), type_in_words(&ty));
+            self.report(Diagnostic::new(Code::WRONG_TYPE, path.span, title).label("expected numbers after `sum of`"));
+            return None;
+        }
+        let ty = match reduction {
+            Reduction::Count | Reduction::Length => Type::Int(None),
+            _ => ty,
+        };
+        if matches!(ty, Type::Point(_)) && reduction != Reduction::Each {
+            let title = format!("`{}` is a list of points", self.text(path.span));
+            let diagnostic = Diagnostic::new(Code::WRONG_TYPE, whole, title)
+                .label("points have no order and no sum")
+                .note("`each of` stands for each of them, for example `min(distance(p, each of path))`");
+            self.report(diagnostic);
+            return None;
+        }
+        Some(Reading { field, members, list: Some(InList { steps, reduction }), ty })
+    }
+
+    fn several_values(&mut self, path: &'a Path) {
+        let written = self.text(path.span);
+        let title = format!("`{written}` is several values, but one value is needed");
+        let diagnostic = Diagnostic::new(Code::WRONG_TYPE, path.span, title)
+            .label("expected one value")
+            .note("`min of`, `max of`, `mean of`, `sum of` and `count of` make one value of them")
+            .suggest("use the least of them", path.span, format!("min of {written}"));
+        self.report(diagnostic);
+    }
+
+    /// Where a path leads. If `all` elements are taken, so are those of a list that has none chosen.
+    pub(super) fn place(&mut self, path: &'a Path, all: bool) -> Option<Place> {
+        let index = self.find(&path.topic, Kind::Topic)?;
+        let topic = self.system.topics[index].as_ref()?;
+        let of_group = topic.paths.len() > 1;
+        let ty = topic.ty.clone();
+        let place = Place {
+            topic: TopicId::from_index(index),
+            fields: Vec::new(),
+            steps: Vec::new(),
+            many: false,
+            point: None,
+            ty,
+        };
+        let mut walk = Walk { place, outer: None, holder: format!("topic `{}`", path.topic.text) };
+        for name in &path.fields {
+            self.step_into_field(&mut walk, name, all, index)?;
+        }
+        for step in &path.elements {
+            match step {
+                ast::Step::Field(name) => self.step_into_field(&mut walk, name, all, index)?,
+                step => {
+                    let only_topic = of_group && path.fields.is_empty();
+                    self.step_into_element(&mut walk, step, all, only_topic.then_some(path))?;
+                }
+            }
+        }
+        if all && let Type::List(of) = &walk.place.ty {
+            walk.place.ty = (**of).clone();
+            walk.place.steps.push(Step::Each);
+            walk.place.many = true;
+        }
+        Some(walk.place)
+    }
+
+    fn step_into_field(&mut self, walk: &mut Walk, name: &'a Name, all: bool, topic: usize) -> Option<()> {
+        if all && let Type::List(of) = &walk.place.ty {
+            walk.place.ty = (**of).clone();
+            walk.place.steps.push(Step::Each);
+            walk.place.many = true;
+        }
+        if let Type::List(_) = &walk.place.ty {
+            let title = format!("{} is a list, which has no fields", walk.holder);
+            let diagnostic = Diagnostic::new(Code::WRONG_TYPE, name.span, title)
+                .label("expected an element before it, such as `[0]`")
+                .note(
+                    "brackets choose elements: `[0]` by position, `[name == \"elbow\"]` by a field, `[*]` all of them",
+                );
+            self.report(diagnostic);
+            return None;
+        }
+        let ty = if let Type::Point(unit) = &walk.place.ty {
+            let unit = unit.clone();
+            self.is_coordinate(name)?;
+            walk.place.point = Some(walk.holder.clone());
+            Type::Real(unit)
+        } else {
+            let Some(ty) = self.field_in(&walk.place.ty, &walk.holder, name) else {
+                self.note_on_members(topic, name);
+                return None;
+            };
+            ty
+        };
+        if walk.place.steps.is_empty() {
+            walk.place.fields.push(name.text.clone());
+        } else {
+            walk.place.steps.push(Step::Field(name.text.clone()));
+        }
+        walk.outer = Some(std::mem::replace(&mut walk.place.ty, ty));
+        walk.holder = format!("field `{}`", name.text);
+        Some(())
+    }
+
+    fn is_coordinate(&mut self, name: &Name) -> Option<()> {
+        if matches!(name.text.as_str(), "x" | "y" | "z") {
+            return Some(());
+        }
+        let title = format!("a point has no coordinate `{}`", name.text);
+        let diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title).label("expected `x`, `y` or `z`");
+        self.report(match name.text.to_lowercase().as_str() {
+            lower @ ("x" | "y" | "z") => diagnostic.did_you_mean(name.span, lower),
+            _ => diagnostic,
+        });
+        None
+    }
+
+    /// `group` is the path of a group of topics, if its members may be meant.
+    fn step_into_element(
+        &mut self,
+        walk: &mut Walk,
+        step: &'a ast::Step,
+        all: bool,
+        group: Option<&Path>,
+    ) -> Option<()> {
+        let span = match step {
+            ast::Step::Field(name) => name.span,
+            ast::Step::Element(_, span) | ast::Step::Elements(_, _, span) | ast::Step::Each(span) => *span,
+            ast::Step::Filter(filter) => filter.span,
+        };
+        let Type::List(of) = walk.place.ty.clone() else {
+            let title = format!("{} has no elements", walk.holder);
+            let label = format!("it is {}", type_in_words(&walk.place.ty));
+            let mut diagnostic = Diagnostic::new(Code::WRONG_TYPE, span, title).label(label);
+            if group.is_some() {
+                diagnostic = diagnostic.note(
+                    "members of a group have no index: `each of` stands for each of them, `max of` for the greatest \
+                     value, and the name alone for the least",
+                );
+            }
+            self.report(diagnostic);
+            return None;
+        };
+        let chosen = match step {
+            ast::Step::Field(_) => return None,
+            ast::Step::Element(at, _) => Step::Element(self.position(at, walk)?),
+            ast::Step::Elements(first, last, _) => {
+                let (first_at, last_at) = (self.position(first, walk)?, self.position(last, walk)?);
+                if first_at > last_at {
+                    let title = format!("`{}` chooses no element", self.text(span));
+                    let diagnostic = Diagnostic::new(Code::OUT_OF_RANGE, span, title)
+                        .label("the first position is after the last")
+                        .suggest("swap the two", span, format!("[{last_at}..{first_at}]"));
+                    self.report(diagnostic);
+                    return None;
+                }
+                walk.place.many = true;
+                Step::Elements { first: first_at, last: last_at }
+            }
+            ast::Step::Each(_) => {
+                walk.place.many = true;
+                Step::Each
+            }
+            ast::Step::Filter(filter) => {
+                // Without a word, the first element that passes counts.
+                walk.place.many |= all;
+                Step::Filter(self.filter(filter, &of, walk.outer.as_ref().filter(|_| walk.in_field()))?)
+            }
+        };
+        walk.place.steps.push(chosen);
+        walk.place.ty = *of;
+        walk.outer = None;
+        "an element".clone_into(&mut walk.holder);
+        Some(())
+    }
+
+    /// A position in the list at hand, which may have it.
+    fn position(&mut self, count: &ast::Count, walk: &Walk) -> Option<u32> {
+        let Ok(position) = u32::try_from(count.value?) else {
+            let title = format!("`{}` is not a valid index", self.text(count.span));
+            let label = "expected a whole number below 2^32";
+            self.report(Diagnostic::new(Code::BAD_NUMBER, count.span, title).label(label));
+            return None;
+        };
+        if let Some((longest, wire)) = self.longest(walk).filter(|(longest, _)| position >= *longest) {
+            let title = format!("{} has no element {position}: it is `{wire}`", walk.holder);
+            let diagnostic = Diagnostic::new(Code::OUT_OF_RANGE, count.span, title)
+                .label(format!("expected at most {}", longest - 1))
+                .note("positions count from 0");
+            self.report(diagnostic);
+            return None;
+        }
+        Some(position)
+    }
+
+    /// How many elements the list at hand can have, and its type on the wire, if that says so.
+    fn longest(&self, walk: &Walk) -> Option<(u32, String)> {
+        let Type::Message(id) = walk.outer.as_ref()? else { return None };
+        let message = self.system.messages.get(id.index())?.as_ref()?;
+        let interface = message.interface.as_ref()?;
+        let layout = self.system.ros.interfaces.iter().find(|layout| layout.name == *interface)?;
+        let name = match walk.place.steps.last() {
+            Some(Step::Field(name)) => name,
+            Some(_) => return None,
+            None => walk.place.fields.last()?,
+        };
+        let ty = &layout.fields.iter().find(|field| field.name == *name)?.ty;
+        match ty {
+            WireType::Array { length, .. } => Some((*length, interfaces::in_words(ty))),
+            WireType::Sequence { bound: Some(bound), .. } => Some((*bound, interfaces::in_words(ty))),
+            _ => None,
+        }
+    }
+
+    /// A filter of a list of elements of this type, which lies in a message of the type `outer`.
+    fn filter(&mut self, filter: &'a ast::Filter, of: &Type, outer: Option<&Type>) -> Option<Filter> {
+        let (key, ty) = match filter.key.as_slice() {
+            [] => (FilterKey::Own(Vec::new()), of.clone()),
+            [name] if self.own_field(of, &name.text).is_none() && self.beside(outer, &name.text).is_some() => {
+                (FilterKey::Parallel(name.text.clone()), self.beside(outer, &name.text)?)
+            }
+            [name] if !matches!(of, Type::Message(_) | Type::Point(_)) => {
+                self.nothing_beside(name, outer);
+                return None;
+            }
+            names => {
+                let mut ty = of.clone();
+                let mut holder = "an element".to_owned();
+                for name in names {
+                    ty = match ty {
+                        Type::Point(unit) => {
+                            self.is_coordinate(name)?;
+                            Type::Real(unit)
+                        }
+                        ty => self.field_in(&ty, &holder, name)?,
+                    };
+                    holder = format!("field `{}`", name.text);
+                }
+                (FilterKey::Own(names.iter().map(|name| name.text.clone()).collect()), ty)
+            }
+        };
+        let by = relation(filter.by);
+        let what = format!("`{}`", self.text(filter.key_span));
+        let equality = matches!(by, Comparison::Equal | Comparison::NotEqual);
+        let with = match (&filter.with, &ty) {
+            (ComparedWith::Text(text), Type::Text) if equality => Compared::Text(text.text.clone()),
+            (ComparedWith::Truth(truth, _), Type::Bool) if equality => Compared::Truth(*truth),
+            (ComparedWith::Number(number), Type::Int(unit) | Type::Real(unit)) => {
+                let value = self.value(number, unit.as_ref(), &what)?;
+                Compared::Number { value: Finite(value), unit: unit.as_ref().map(|unit| unit.text().to_owned()) }
+            }
+            (with, ty) => {
+                let span = match with {
+                    ComparedWith::Number(number) => number.span,
+                    ComparedWith::Text(text) => text.span,
+                    ComparedWith::Truth(_, span) => *span,
+                };
+                let fits =
+                    matches!((with, ty), (ComparedWith::Text(_), Type::Text) | (ComparedWith::Truth(..), Type::Bool));
+                let diagnostic = if fits {
+                    let title = format!("{what} is {}, which has no order", type_in_words(ty));
+                    Diagnostic::new(Code::WRONG_TYPE, filter.span, title).label("compare with `==` or `!=`")
+                } else {
+                    let title = format!("`{}` cannot be compared with {what}", self.text(span));
+                    Diagnostic::new(Code::WRONG_TYPE, span, title).label(format!("{what} is {}", type_in_words(ty)))
+                };
+                self.report(diagnostic);
+                return None;
+            }
+        };
+        Some(Filter { key, by, with })
+    }
+
+    /// Reports the key of a filter that is no list beside the one of the filter, whose elements have no fields.
+    fn nothing_beside(&mut self, name: &Name, outer: Option<&Type>) {
+        let message = match outer {
+            Some(Type::Message(id)) => self.system.messages.get(id.index()).and_then(Option::as_ref),
+            _ => None,
+        };
+        let fields = message.iter().flat_map(|message| &message.fields);
+        let lists = fields.filter(|field| matches!(field.ty, Type::List(_)));
+        let lists: Vec<&str> = lists.map(|field| field.declaration.name.as_str()).collect();
+        let title = format!("the message has no list named `{}`", name.text);
+        let diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title)
+            .label("expected `*` for the element itself, or a list of the same message");
+        let diagnostic = match most_similar(&name.text, lists.iter().copied()) {
+            Some(similar) => diagnostic.did_you_mean(name.span, similar),
+            None => diagnostic,
+        };
+        self.report(diagnostic);
+    }
+
+    /// The type of a field of an element; `None` also for one that does not exist. Reports nothing.
+    fn own_field(&self, of: &Type, name: &str) -> Option<Type> {
+        let Type::Message(id) = of else { return None };
+        let message = self.system.messages.get(id.index())?.as_ref()?;
+        message.fields.iter().find(|field| field.declaration.name == name).map(|field| field.ty.clone())
+    }
+
+    /// The type of the elements of a list of this name in a message.
+    fn beside(&self, outer: Option<&Type>, name: &str) -> Option<Type> {
+        match self.own_field(outer?, name)? {
+            Type::List(of) => Some(*of),
+            _ => None,
+        }
+    }
+
+    /// The type of what a formula reads at a path; `None` also for a path with a mistake. Reports nothing.
+    pub(super) fn type_read(&self, path: &Path, word: Option<ast::Members>) -> Option<Type> {
+        let definition = self.names.get(path.topic.text.as_str()).filter(|found| found.kind == Kind::Topic)?;
+        let mut ty = self.system.topics.get(definition.index)?.as_ref()?.ty.clone();
+        let all = takes_all(word);
+        let element = |ty: Type| match ty {
+            Type::List(of) if all => *of,
+            other => other,
+        };
+        let field = |ty: Type, name: &Name| match element(ty) {
+            Type::Point(unit) if matches!(name.text.as_str(), "x" | "y" | "z") => Some(Type::Real(unit)),
+            ty => self.own_field(&ty, &name.text),
+        };
+        for name in &path.fields {
+            ty = field(ty, name)?;
+        }
+        for step in &path.elements {
+            ty = match (step, ty) {
+                (ast::Step::Field(name), ty) => field(ty, name)?,
+                (_, Type::List(of)) => *of,
+                _ => return None,
+            };
+        }
+        match word {
+            Some(ast::Members::Count | ast::Members::Length) => Some(Type::Int(None)),
+            _ => Some(element(ty)),
+        }
+    }
+
+    /// Checks that a formula which is evaluated for each element of a list is one that can be: the elements are of one
+    /// list, and nothing lasts from one message to the next, in which the same element may be at another place.
+    pub(super) fn elements_fit(&mut self, inputs: &[Input], lasting: Option<&str>, whole: Span) -> Option<()> {
+        let each = inputs.iter().filter_map(|input| {
+            let list = input.list.as_ref().filter(|list| list.reduction == Reduction::Each)?;
+            let end = list.steps.iter().rposition(|step| !matches!(step, Step::Field(_)))?;
+            Some((&input.field, &list.steps[..=end]))
+        });
+        let mut each = each.peekable();
+        let first = each.peek().copied();
+        let Some(first) = first else { return Some(()) };
+        if let Some(lasting) = lasting {
+            let title = format!("{lasting} cannot be combined with `each of` a list");
+            let diagnostic = Diagnostic::new(Code::UNPAIRED, whole, title)
+                .label("an element has no identity from one message to the next")
+                .note("`min of`, `max of`, `mean of`, `sum of` and `count of` make one value of a list");
+            self.report(diagnostic);
+            return None;
+        }
+        if each.any(|other| other != first) {
+            let diagnostic = Diagnostic::new(Code::UNPAIRED, whole, "`each of` refers to two lists in one formula")
+                .label("expected the elements of one list")
+                .note("the formula is evaluated for each element, with the values that this element has");
+            self.report(diagnostic);
+            return None;
+        }
+        Some(())
+    }
+}
+
+/// The way along a path.
+struct Walk {
+    place: Place,
+    /// The type of the message that has the last field.
+    outer: Option<Type>,
+    /// The value at hand, in words.
+    holder: String,
+}
+
+impl Walk {
+    /// Whether the value at hand is a field of a message.
+    fn in_field(&self) -> bool {
+        self.outer.is_some()
+    }
+}
