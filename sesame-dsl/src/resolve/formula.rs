@@ -165,7 +165,10 @@ impl<'a> Resolver<'a> {
             "count" => (Aggregate::Count { of: self.condition(inputs, argument)? }, None),
             "duration" => (Aggregate::Duration { of: self.condition(inputs, argument)? }, Some(Unit::seconds())),
             word => {
-                let (value, unit) = self.number(inputs, argument)?;
+                let (value, unit) = match self.whole_list(name, argument) {
+                    Some((path, all)) => self.numeric_input(inputs, path, Some((all, name.span)))?,
+                    None => self.number(inputs, argument)?,
+                };
                 let aggregate = match word {
                     "min" => Aggregate::Min { of: value },
                     "max" => Aggregate::Max { of: value },
@@ -175,6 +178,20 @@ impl<'a> Resolver<'a> {
                 (aggregate, unit)
             }
         })
+    }
+
+    /// Elements of a list whose least or greatest over time is asked for: `min(scan.ranges)` is
+    /// `min(min of scan.ranges)`.
+    fn whole_list(&self, name: &Name, argument: &'a ast::Expression) -> Option<(&'a Path, ast::Members)> {
+        let all = match name.text.as_str() {
+            "min" => ast::Members::Min,
+            "max" => ast::Members::Max,
+            _ => return None,
+        };
+        let ExpressionKind::Field(path) = &argument.kind else { return None };
+        let several = |step: &ast::Step| matches!(step, ast::Step::Elements(..) | ast::Step::Each(_));
+        let of_all = matches!(self.type_read(path, None), Some(Type::List(_)));
+        (of_all || path.elements.iter().any(several)).then_some((path, all))
     }
 
     fn no_aggregate(&mut self, expression: &'a ast::Expression) {

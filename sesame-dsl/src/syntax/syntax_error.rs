@@ -290,7 +290,12 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
              the name alone for the least",
         );
     }
-    if counts(Rule::each_element) && found.kind == TokenKind::Word {
+    let open = open_bracket(text, from, found.lo);
+    if let Some(open) = open {
+        // What begins like a choice of elements may be the interval of a temporal operator: `G[0s, 2s]`.
+        diagnostic = rewritten(diagnostic, foreign::notation(text, from, open, Expected::Operator));
+    }
+    if counts(Rule::each_element) && found.kind == TokenKind::Word || open.is_some() && counts(Rule::equal_to) {
         diagnostic = diagnostic.note(
             "brackets choose elements of a list; to disturb one member of a group, remove it from the group and declare \
              it as a topic of its own",
@@ -320,6 +325,16 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
         }
     }
     diagnostic
+}
+
+/// Where the bracket behind a name begins that is not closed before a place.
+fn open_bracket(text: &str, from: usize, at: usize) -> Option<usize> {
+    let inside = tokens(text, from, at).fold(None, |open, token| match token.text {
+        "[" => Some(token.lo),
+        "]" => None,
+        _ => open,
+    });
+    inside.filter(|&open| text[..open].ends_with(|c: char| c.is_alphanumeric() || c == '_'))
 }
 
 fn placed(file: FileId, range: std::ops::Range<usize>) -> Span {

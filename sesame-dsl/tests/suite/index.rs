@@ -56,6 +56,18 @@ fn a_file_with_errors_has_its_definitions_and_their_uses() {
 }
 
 #[test]
+fn the_key_of_a_filter_is_a_field_of_the_elements_or_a_list_beside_theirs() {
+    let (sources, index, has_errors) = index(include_str!("../good/lists.sesame"));
+    assert!(!has_errors);
+    let of = |name: &str| uses(&sources, &index, name).into_iter().map(|(name, _)| name).collect::<Vec<_>>();
+    assert_eq!(of("Joints.name"), ["elbow", "bent"]);
+    assert_eq!(of("Joints.position"), ["elbow", "bent"]);
+    assert_eq!(of("Transform.child"), ["apart", "apart", "moved"]);
+    assert_eq!(of("Transform.at"), ["apart", "apart", "home", "height", "height", "moved"]);
+    assert_eq!(of("Part.level"), ["worst", "failing"]);
+}
+
+#[test]
 fn an_operation_on_a_node_or_its_parameter_mentions_the_node() {
     let text = "space cell
         system { simulator sim = ros2  node arm { launch \"./arm\" }  node plan { } }
