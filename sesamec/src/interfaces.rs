@@ -142,6 +142,10 @@ impl Files {
             if let Some(found) = in_package(&folder.join(package), kind, last) {
                 return Some(found);
             }
+            // What needs no file is not worth a search through a workspace.
+            if is_known(name) {
+                continue;
+            }
             let mut packages = self.packages.borrow_mut();
             let below = packages.entry(folder.clone()).or_insert_with(|| workspace::packages(&folder));
             if let Some(found) = below.get(package).and_then(|package| in_package(package, kind, last)) {
@@ -227,6 +231,11 @@ fn defined_as(name: &str) -> &str {
     let ends = ["_Request", "_Response"];
     let of_service = name.contains("/srv/").then(|| ends.iter().find_map(|end| name.strip_suffix(end)));
     of_service.flatten().unwrap_or(name)
+}
+
+/// Whether a message or service needs no file.
+fn is_known(name: &str) -> bool {
+    known(name).is_some() || known(&format!("{name}_Request")).is_some()
 }
 
 /// The file in a package that may define an interface of a kind, `msg` or `srv`.

@@ -246,7 +246,7 @@ impl<'a> Indexer<'a> {
     fn part(&mut self, path: &'a Path, within: DefinitionId) -> bool {
         let monitor = self.names.get(path.topic.text.as_str()).copied();
         let is_monitor = |id: &DefinitionId| self.index.definitions[id.0].kind == Kind::Monitor;
-        let (Some(monitor), [part]) = (monitor.filter(is_monitor), path.fields.as_slice()) else { return false };
+        let (Some(monitor), Some(part)) = (monitor.filter(is_monitor), path.part()) else { return false };
         self.mention(&path.topic, within);
         let part_id = self.members.get(&(monitor, part.text.as_str())).copied();
         self.refer(part.span, part_id, within);
@@ -348,7 +348,7 @@ impl<'a> Indexer<'a> {
             | ExpressionKind::Text(_)
             | ExpressionKind::Point(_)
             | ExpressionKind::Region(_) => {}
-            ExpressionKind::Field(path) if path.fields.is_empty() => {
+            ExpressionKind::Field(path) if path.is_name() => {
                 // Inside of a monitor its own names come first.
                 let own = self.members.get(&(within, path.topic.text.as_str())).copied();
                 // The simulation time is a word of the language, unless something is named like it.

@@ -86,7 +86,7 @@ impl<'a> Resolver<'a> {
     /// Whether a path means a metric that is true or false: a part of a monitor, or a metric of whether one holds.
     fn is_true_or_false(&self, path: &ast::Path) -> bool {
         let metric = match self.names.get(path.topic.text.as_str()) {
-            Some(definition) if path.fields.is_empty() && definition.kind == Kind::Metric => {
+            Some(definition) if path.is_name() && definition.kind == Kind::Metric => {
                 self.metrics[definition.index].as_ref()
             }
             _ => None,
@@ -96,10 +96,7 @@ impl<'a> Resolver<'a> {
 
     /// Whether a metric that is true or false is this. One that is neither yet is not.
     fn truth_of(&mut self, path: &'a ast::Path, truth: bool) -> Option<Condition> {
-        let index = match path.fields.as_slice() {
-            [] => self.find(&path.topic, Kind::Metric)?,
-            _ => self.metric_of_path(path)?,
-        };
+        let index = if path.is_name() { self.find(&path.topic, Kind::Metric)? } else { self.metric_of_path(path)? };
         let (left, right) = (Operand::Variable(MetricId::from_index(index)), number_of(truth));
         self.open_outcome(path.span, (left, right), Comparison::Equal)?;
         Some(Condition::Compare { left, by: Comparison::Equal, right })
@@ -197,7 +194,7 @@ impl<'a> Resolver<'a> {
             ExpressionKind::Field(path) if self.is_part(path) => {
                 self.metric_of_path(path).map(|index| Side::Metric(MetricId::from_index(index)))
             }
-            ExpressionKind::Field(path) if path.fields.is_empty() => {
+            ExpressionKind::Field(path) if path.is_name() => {
                 let before = self.diagnostics.len();
                 let found = self.find(&path.topic, Kind::Metric);
                 if path.topic.text == "time"

@@ -376,7 +376,7 @@ impl<'a> Resolver<'a> {
             self.report(diagnostic);
             return None;
         };
-        if place.fields.is_empty() && place.elements.is_empty() {
+        if place.is_name() {
             return Some(Target { topic: found.topic, places: Vec::new() });
         }
         let parts = Span { lo: place.topic.span.hi, ..place.span };

@@ -154,19 +154,15 @@ impl<'a> Resolver<'a> {
                 }
             }
         }
-        if all && let Type::List(of) = &walk.place.ty {
-            walk.place.ty = (**of).clone();
-            walk.place.steps.push(Step::Each);
-            walk.place.many = true;
+        if all {
+            walk.take_all();
         }
         Some(walk.place)
     }
 
     fn step_into_field(&mut self, walk: &mut Walk, name: &'a Name, all: bool, topic: usize) -> Option<()> {
-        if all && let Type::List(of) = &walk.place.ty {
-            walk.place.ty = (**of).clone();
-            walk.place.steps.push(Step::Each);
-            walk.place.many = true;
+        if all {
+            walk.take_all();
         }
         if let Type::List(_) = &walk.place.ty {
             let title = format!("{} is a list, which has no fields", walk.holder);
@@ -221,11 +217,7 @@ impl<'a> Resolver<'a> {
         all: bool,
         group: Option<&Path>,
     ) -> Option<()> {
-        let span = match step {
-            ast::Step::Field(name) => name.span,
-            ast::Step::Element(_, span) | ast::Step::Elements(_, _, span) | ast::Step::Each(span) => *span,
-            ast::Step::Filter(filter) => filter.span,
-        };
+        let span = step.span();
         let Type::List(of) = walk.place.ty.clone() else {
             let title = format!("{} has no elements", walk.holder);
             let label = format!("it is {}", type_in_words(&walk.place.ty));
@@ -262,7 +254,7 @@ impl<'a> Resolver<'a> {
             ast::Step::Filter(filter) => {
                 // Without a word, the first element that passes counts.
                 walk.place.many |= all;
-                Step::Filter(self.filter(filter, &of, walk.outer.as_ref().filter(|_| walk.in_field()))?)
+                Step::Filter(self.filter(filter, &of, walk.outer.as_ref())?)
             }
         };
         walk.place.steps.push(chosen);
@@ -310,7 +302,7 @@ impl<'a> Resolver<'a> {
         }
     }
 
-    /// A filter of a list of elements of this type, which lies in a message of the type `outer`.
+    /// A filter for a list whose elements have this type, in a message of the type `outer`.
     fn filter(&mut self, filter: &'a ast::Filter, of: &Type, outer: Option<&Type>) -> Option<Filter> {
         let (key, ty) = match filter.key.as_slice() {
             [] => (FilterKey::Own(Vec::new()), of.clone()),
@@ -369,7 +361,7 @@ impl<'a> Resolver<'a> {
         Some(Filter { key, by, with })
     }
 
-    /// Reports the key of a filter that is no list beside the one of the filter, whose elements have no fields.
+    /// Reports that a message has no list with the name of a filter's key, and the elements have no fields either.
     fn nothing_beside(&mut self, name: &Name, outer: Option<&Type>) {
         let message = match outer {
             Some(Type::Message(id)) => self.system.messages.get(id.index()).and_then(Option::as_ref),
@@ -472,8 +464,12 @@ struct Walk {
 }
 
 impl Walk {
-    /// Whether the value at hand is a field of a message.
-    fn in_field(&self) -> bool {
-        self.outer.is_some()
+    /// Takes all elements, if the value at hand is a list.
+    fn take_all(&mut self) {
+        if let Type::List(of) = &self.place.ty {
+            self.place.ty = (**of).clone();
+            self.place.steps.push(Step::Each);
+            self.place.many = true;
+        }
     }
 }

@@ -261,7 +261,7 @@ impl<'a> Resolver<'a> {
         let (parts, count) = match &expression.kind {
             ExpressionKind::All(parts) | ExpressionKind::Any(parts) => (parts, None),
             ExpressionKind::AtLeast(count, parts) => (parts, Some(*count)),
-            ExpressionKind::Field(path) if path.fields.is_empty() => {
+            ExpressionKind::Field(path) if path.is_name() => {
                 return self.gate_member(eddi, members, &path.topic);
             }
             _ => {

@@ -323,7 +323,7 @@ impl<'a> Resolver<'a> {
 
     /// Whether a path is the simulation time, and not something that the space declares.
     pub(super) fn is_time(&self, path: &Path) -> bool {
-        path.topic.text == "time" && path.fields.is_empty() && !self.names.contains_key("time")
+        path.topic.text == "time" && path.is_name() && !self.names.contains_key("time")
     }
 
     /// The unit of a number in a formula, where `2rad*link0` is a likely mistake.

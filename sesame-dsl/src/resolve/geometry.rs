@@ -117,9 +117,8 @@ impl<'a> Resolver<'a> {
     /// The path of an argument, and its field if it is a point without mistakes. Reports nothing.
     fn group_of(&mut self, argument: &'a ast::Expression) -> Option<(&'a Path, FieldPath)> {
         let (ExpressionKind::Field(path) | ExpressionKind::Members(_, _, path)) = &argument.kind else { return None };
-        let in_list = !path.elements.is_empty();
-        let is_point = !in_list && matches!(self.type_at(&path.topic, &path.fields), Some(Type::Point(_)));
-        is_point.then_some(())?;
+        let is_point = matches!(self.type_read(path, None), Some(Type::Point(_)));
+        (is_point && path.elements.is_empty()).then_some(())?;
         Some((path, self.field(path)?.0))
     }
 

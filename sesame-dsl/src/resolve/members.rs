@@ -21,7 +21,7 @@ impl<'a> Resolver<'a> {
         let Some((members, word)) = members else { return Some(Members::Min) };
         self.is_group(path, field, members, word)?;
         Some(match members {
-            // What is of lists only was refused before.
+            // The three words for lists alone were refused before.
             ast::Members::Min | ast::Members::Mean | ast::Members::Count | ast::Members::Length => Members::Min,
             ast::Members::Max => Members::Max,
             ast::Members::Sum => Members::Sum,

@@ -161,7 +161,7 @@ impl<'a> Resolver<'a> {
     /// The position of a monitor.
     fn monitor_named(&mut self, of: &'a ast::Expression, expected: &str) -> Option<usize> {
         match &of.kind {
-            ExpressionKind::Field(path) if path.fields.is_empty() => self.find(&path.topic, Kind::Monitor),
+            ExpressionKind::Field(path) if path.is_name() => self.find(&path.topic, Kind::Monitor),
             _ => {
                 self.not_named(of.span, expected);
                 None
@@ -171,7 +171,7 @@ impl<'a> Resolver<'a> {
 
     fn requirement_named(&mut self, of: &'a ast::Expression) -> Option<RequirementId> {
         match &of.kind {
-            ExpressionKind::Field(path) if path.fields.is_empty() => {
+            ExpressionKind::Field(path) if path.is_name() => {
                 let index = self.find(&path.topic, Kind::Requirement)?;
                 Some(RequirementId(u32::try_from(index).expect("a file has fewer than 2^32 declarations")))
             }
@@ -183,19 +183,16 @@ impl<'a> Resolver<'a> {
     }
 
     fn part_named(&mut self, of: &'a ast::Expression, expected: &str) -> Option<(usize, MonitorPart, Span)> {
-        match &of.kind {
-            ExpressionKind::Field(Path { topic, fields, elements, span: _ })
-                if fields.len() == 1 && elements.is_empty() =>
-            {
-                let part = &fields[0];
-                let (eddi, found) = self.part((&topic.text, topic.span), (&part.text, part.span))?;
-                Some((eddi, found, part.span))
-            }
-            _ => {
-                self.not_named(of.span, expected);
-                None
-            }
-        }
+        let named = match &of.kind {
+            ExpressionKind::Field(path) => path.part().map(|part| (&path.topic, part)),
+            _ => None,
+        };
+        let Some((topic, part)) = named else {
+            self.not_named(of.span, expected);
+            return None;
+        };
+        let (eddi, found) = self.part((&topic.text, topic.span), (&part.text, part.span))?;
+        Some((eddi, found, part.span))
     }
 
     fn not_named(&mut self, span: Span, expected: &str) {
@@ -252,7 +249,7 @@ impl<'a> Resolver<'a> {
 
     /// Whether a path means a part of a monitor. Reports nothing.
     pub(super) fn is_part(&self, path: &Path) -> bool {
-        if path.fields.len() != 1 {
+        if path.part().is_none() {
             return false;
         }
         match self.names.get(path.topic.text.as_str()) {
@@ -263,7 +260,7 @@ impl<'a> Resolver<'a> {
 
     /// The metric of a part of a monitor, of which a path [is](Self::is_part) one.
     pub(super) fn metric_of_path(&mut self, path: &'a Path) -> Option<usize> {
-        let [part] = path.fields.as_slice() else { return None };
+        let part = path.part()?;
         let part = self.part((&path.topic.text, path.topic.span), (&part.text, part.span))?;
         self.parts.get(&part).copied()
     }

@@ -165,12 +165,10 @@ impl<'a> Resolver<'a> {
     /// What a path refers to: its topic, and the type at its end. `None` was reported, here or before.
     pub(super) fn field(&mut self, path: &'a ast::Path) -> Option<(model::FieldPath, Type)> {
         let index = self.find(&path.topic, Kind::Topic)?;
-        if let Some(ast::Step::Element(_, span) | ast::Step::Elements(_, _, span) | ast::Step::Each(span)) =
-            path.elements.first()
-        {
+        if let Some(step) = path.elements.first() {
             let title = format!("`{}` is in a list, but a field is needed", self.text(path.span));
             let label = "elements of a list cannot be used here";
-            self.report(Diagnostic::new(Code::WRONG_TYPE, *span, title).label(label));
+            self.report(Diagnostic::new(Code::WRONG_TYPE, step.span(), title).label(label));
             return None;
         }
         let topic = self.system.topics[index].as_ref()?;
@@ -207,17 +205,6 @@ impl<'a> Resolver<'a> {
                 "to name one of them, declare `{member}` as a topic of its own, instead of a member of the group"
             ));
         }
-    }
-
-    /// The type of a topic or field; `None` also for one that does not exist. Reports nothing.
-    pub(super) fn type_at(&self, topic: &Name, fields: &[Name]) -> Option<&Type> {
-        let definition = self.names.get(topic.text.as_str()).filter(|found| found.kind == Kind::Topic)?;
-        let topic = self.system.topics.get(definition.index)?.as_ref()?;
-        fields.iter().try_fold(&topic.ty, |ty, name| {
-            let Type::Message(id) = ty else { return None };
-            let message = self.system.messages.get(id.index())?.as_ref()?;
-            message.fields.iter().find(|field| field.declaration.name == name.text).map(|field| &field.ty)
-        })
     }
 
     /// The type of a field of a value of this type; `holder` is that value in words.

@@ -16,9 +16,9 @@ const DEEPEST: usize = 6;
 /// A file by which colcon, catkin or ament leave a folder out.
 const LEFT_OUT: [&str; 3] = ["COLCON_IGNORE", "CATKIN_IGNORE", "AMENT_IGNORE"];
 
-/// The packages below a folder, by their names. Of two with one name the first counts, in the order of their paths.
-/// A package is a folder with a `package.xml`, and contains no other. No link is followed, and what lies beyond the
-/// limits is not found: a folder such as `/usr/share` has packages and much else.
+/// The packages below a folder, by their names. If two have the same name, the first counts, in the order of their
+/// paths. A package is a folder with a `package.xml`, and contains no other. No link is followed, and what lies beyond
+/// the limits is not found: a folder such as `/usr/share` has packages and much else.
 pub(super) fn packages(folder: &Path) -> BTreeMap<String, PathBuf> {
     let mut found = BTreeMap::new();
     let mut left = MOST_FOLDERS;

@@ -16,7 +16,6 @@ pub fn idl(text: &str) -> Result<Vec<Definition>, DefinitionError> {
         modules: Vec::new(),
         typedefs: BTreeMap::new(),
         lengths: BTreeMap::new(),
-        bits: None,
     };
     let (mut found, mut constants) = (Vec::new(), BTreeMap::new());
     parser.members(&mut found, &mut constants)?;
@@ -45,8 +44,6 @@ struct Parser {
     typedefs: BTreeMap<String, WireType>,
     /// The constants that can be lengths.
     lengths: BTreeMap<String, u32>,
-    /// What `@bit_bound` says about the next declaration.
-    bits: Option<u32>,
 }
 
 type Constants = BTreeMap<String, Vec<Constant>>;
@@ -126,14 +123,17 @@ impl Parser {
     }
 
     fn members(&mut self, found: &mut Vec<Definition>, constants: &mut Constants) -> Result<(), DefinitionError> {
+        // What `@bit_bound` says about the next declaration.
+        let mut bound = None;
         while let Some(token) = self.peek() {
+            let bits = bound.take();
             match token {
                 Token::Sign('}') if !self.modules.is_empty() => return Ok(()),
-                Token::Sign('@') => self.annotation()?,
+                Token::Sign('@') => bound = self.annotation()?.or(bits),
                 Token::Word(word) => match word.as_str() {
                     "module" => self.module(found, constants)?,
                     "struct" => found.push(self.structure()?),
-                    "enum" => self.enumeration()?,
+                    "enum" => self.enumeration(bits)?,
                     "const" => {
                         let constant = self.constant()?;
                         if let Some(length) = constant.value.parse().ok().filter(|length| LENGTHS.contains(length)) {
@@ -230,9 +230,9 @@ impl Parser {
     }
 
     /// An enumeration. On the wire it is a number of as many bits as it needs, 32 unless `@bit_bound` says less.
-    fn enumeration(&mut self) -> Result<(), DefinitionError> {
+    fn enumeration(&mut self, bits: Option<u32>) -> Result<(), DefinitionError> {
         self.at += 1;
-        let primitive = match self.bits.take() {
+        let primitive = match bits {
             None | Some(17..=32) => Primitive::Int32,
             Some(9..=16) => Primitive::Int16,
             Some(1..=8) => Primitive::Int8,
@@ -255,9 +255,10 @@ impl Parser {
         Ok(())
     }
 
-    /// `@name` with its arguments in parentheses. Only `@bit_bound` means anything on the wire.
-    fn annotation(&mut self) -> Result<(), DefinitionError> {
+    /// `@name` with its arguments in parentheses. Only `@bit_bound` means anything on the wire: its number is returned.
+    fn annotation(&mut self) -> Result<Option<u32>, DefinitionError> {
         self.at += 1;
+        let mut bits = None;
         let bounds_bits = self.word()? == "bit_bound";
         if self.takes('(') {
             let mut open = 1;
@@ -265,13 +266,13 @@ impl Parser {
                 match self.next() {
                     Some(Token::Sign('(')) => open += 1,
                     Some(Token::Sign(')')) => open -= 1,
-                    Some(Token::Literal(text)) if bounds_bits => self.bits = text.parse().ok(),
+                    Some(Token::Literal(text)) if bounds_bits => bits = text.parse().ok(),
                     Some(_) => {}
                     None => return self.wrong("the file ends inside of an annotation"),
                 }
             }
         }
-        Ok(())
+        Ok(bits)
     }
 
     /// `[N]` behind a name.

@@ -178,6 +178,8 @@ module cell {
   @bit_bound(8) enum Grip { OPEN, @value(5) CLOSED };
   module msg {
     enum Mode { IDLE, MOVING };
+    @bit_bound(8) struct Other { @bit_bound(16) short one; };
+    enum Wide { ON, OFF };
     typedef double pair[WIDTH], single;
     struct Arm {
       short one, two[cell::DEPTH], three;
@@ -185,8 +187,9 @@ module cell {
       string<WIDTH> text;
       single value;
       wchar letter;
-      @key Mode mode;
+      @key @bit_bound(16) Mode mode;
       ::cell::Grip grip[2];
+      Wide wide;
     };
   };
 };

@@ -56,6 +56,21 @@ pub(crate) struct Count {
     pub(crate) span: Span,
 }
 
+impl Path {
+    /// Whether it is a name alone.
+    pub(crate) fn is_name(&self) -> bool {
+        self.fields.is_empty() && self.elements.is_empty()
+    }
+
+    /// What stands behind the dot, if it is two names alone.
+    pub(crate) fn part(&self) -> Option<&Name> {
+        match (self.fields.as_slice(), self.elements.as_slice()) {
+            ([part], []) => Some(part),
+            _ => None,
+        }
+    }
+}
+
 /// One step into a message.
 #[derive(Debug, Clone)]
 pub(crate) enum Step {
@@ -70,7 +85,18 @@ pub(crate) enum Step {
     Filter(Box<Filter>),
 }
 
-/// Of which elements of a list something holds.
+impl Step {
+    /// Where it is written.
+    pub(crate) fn span(&self) -> Span {
+        match self {
+            Step::Field(name) => name.span,
+            Step::Element(_, span) | Step::Elements(_, _, span) | Step::Each(span) => *span,
+            Step::Filter(filter) => filter.span,
+        }
+    }
+}
+
+/// Which elements of a list pass.
 #[derive(Debug, Clone)]
 pub(crate) struct Filter {
     /// What is compared: the element itself, or the field at the end of this path.
