@@ -103,7 +103,9 @@ impl<'a> Group<'a> {
 
     /// What is known of the values of an input.
     pub(super) fn values(&self, input: &plan::Input) -> Values {
-        let group = self.topic(&input.field).is_some_and(|topic| topic.paths.len() > 1);
+        // What holds of several elements of a list is like what holds of the members of a group.
+        let elements = input.list.as_ref().is_some_and(|list| list.reduction != plan::Reduction::First);
+        let group = elements || self.topic(&input.field).is_some_and(|topic| topic.paths.len() > 1);
         let range = match self.value(&input.field) {
             Some(Type::Bool) => Values { least: 0.0, greatest: 1.0, whole: true, ..Values::ANY },
             // A sum of whole numbers may be beyond those that a message can carry.
@@ -120,9 +122,12 @@ impl<'a> Group<'a> {
     pub(super) fn input_text(&self, input: &plan::Input) -> (String, Option<Unit>) {
         let name = self.topic(&input.field).map_or("", |topic| topic.declaration.name.as_str());
         let path: Vec<&str> = std::iter::once(name).chain(input.field.path.iter().map(String::as_str)).collect();
-        let path = format!("`{}`", path.join("."));
+        let steps = input.list.as_ref().map_or(&[][..], |list| &list.steps);
+        let path = format!("`{}{}`", path.join("."), plan::value_path_in_words(steps));
+        let reduction = input.list.as_ref().map(|list| list.reduction);
+        let least = matches!(reduction, None | Some(plan::Reduction::First | plan::Reduction::Min));
         let text = match input.members {
-            plan::Members::Min if self.values(input).group => format!("the least {path}"),
+            plan::Members::Min if least && self.values(input).group => format!("the least {path}"),
             plan::Members::Max => format!("the greatest {path}"),
             plan::Members::Sum => format!("the sum of {path}"),
             _ => path,
