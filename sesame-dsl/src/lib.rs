@@ -6,6 +6,7 @@
 mod check;
 pub mod diagnostic;
 pub mod format;
+pub mod groups;
 mod import;
 pub mod index;
 pub mod interfaces;

@@ -32,8 +32,8 @@ pub use sesame_plan::stl::Interval;
 pub use sesame_plan::{
     Aggregate, Averaging, BinaryFunction, BoostedChildren, Bound, Channel, Choice, ChoiceKind, Clock, Comparison,
     Condition, Confirmation, Copies, Dimension, Direction, Distance, Distribution, Drain, Exploration, Expression,
-    Interface, Members, MessageRun, Messages, Moment, NotFinite, OperationKind, OwnSetting, Point, Recorded, Region,
-    Ros, Setting, SignedDistance, Statistic, Step, StepBy, Stepping, StopRule, Strategy, StrategyKind,
+    Interface, Members, MembersOf, MessageRun, Messages, Moment, NotFinite, OperationKind, OwnSetting, Point, Recorded,
+    Region, Ros, Setting, SignedDistance, Statistic, Step, StepBy, Stepping, StopRule, Strategy, StrategyKind,
     StrategyProperties, TextTest, Transport, Trend, UnaryFunction, ValueMode,
 };
 

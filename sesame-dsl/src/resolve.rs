@@ -1,13 +1,14 @@
 //! From syntax to model, in passes:
 //!
 //! 1. [`collect`] collects names, and reports duplicates and missing declarations
-//! 2. [`system`] resolves message types (ordered so that each follows those it contains), topics, nodes, the simulator;
-//!    [`ros2`], [`ros_types`] and [`services`] those of ROS, [`bus`] addresses, [`mavlink`] what its files define
+//! 2. [`system`] resolves message types (ordered so that each follows those it contains), topics, the simulator, and
+//!    [`nodes`] nodes; [`groups`] says what paths stand for; [`ros2`], [`ros_types`] and [`services`] resolve those of
+//!    ROS, [`bus`] addresses, [`mavlink`] what its files define
 //! 3. [`eddi`] resolves runtime monitors, with their [`evidence`]
 //! 4. [`metrics`] resolves metrics and requirements; [`formula`] resolves formulas, with [`function`], [`geometry`],
 //!    [`region`] and [`members`]; [`score`] what is said of monitors
-//! 5. [`fuzz`] resolves operations ([`disturbance`] their targets and parameters, [`custom`] those in the user's code)
-//!    and tests
+//! 5. [`fuzz`] resolves operations ([`disturbance`] their targets and parameters, [`chosen`] the members of groups on
+//!    which they act, [`custom`] those in the user's code) and tests
 //! 6. [`campaign`] resolves campaigns, whose inherited clauses [`inherit`] has copied before all else; [`condition`]
 //!    resolves the conditions of tests and the building blocks of campaigns' conditions, by what is [`known`] of
 //!    metrics; [`contained`] what operations require of such conditions
@@ -21,6 +22,7 @@ mod boolean;
 mod bus;
 mod campaign;
 mod certificates;
+mod chosen;
 mod collect;
 mod condition;
 mod confirmation;
@@ -38,6 +40,7 @@ mod formula;
 mod function;
 mod fuzz;
 mod geometry;
+mod groups;
 mod inherit;
 mod known;
 mod lengths;
@@ -78,7 +81,7 @@ use crate::span::{FileId, Span};
 use crate::syntax::ast::{self, Name};
 
 use ros_types::RosTypes;
-use words::list;
+pub(crate) use words::list;
 
 /// Resolves the files of a space. `None` exactly when there is an error, be it in `diagnostics` before or after. Adds
 /// to `undecided` what could not be decided about monitors, whose certificates are checked only if it is there.
@@ -184,7 +187,10 @@ struct SystemPart {
     /// Per message in the order of the file: its id.
     message_ids: Vec<model::MessageId>,
     topics: Vec<Option<model::Topic>>,
+    /// Of a group of nodes, each member is a node.
     nodes: Vec<Option<model::Node>>,
+    /// Per declared node: the positions of its members in `nodes`, before these are there.
+    node_ids: Vec<std::ops::Range<usize>>,
 }
 
 struct Resolver<'a> {

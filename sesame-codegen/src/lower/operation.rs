@@ -16,6 +16,7 @@ pub(super) fn operation(
         name: operation.declaration.name.clone(),
         doc: operation.declaration.doc.clone(),
         topic: operation.topic().map(topic_id),
+        members: operation.members.clone(),
         from: operation.from.iter().map(|&id| node_id(id)).collect(),
         to: operation.to.iter().map(|&id| node_id(id)).collect(),
         places: operation.target.iter().flat_map(|target| &target.places).cloned().collect(),

@@ -64,7 +64,7 @@ fn wiring(space: &Space, topic: TopicId, stepped: bool) -> plan::Wiring {
     };
     let in_step = |node: &model::Node| {
         let answers = node.answers.iter().any(|&(_, with)| with == topic);
-        answers || !node.answers.is_empty() && node.subscribes.contains(&topic)
+        answers || !node.answers.is_empty() && node.subscribes.iter().any(|used| used.topic == topic)
     };
     plan::Wiring {
         cut: on_it().next().is_some() || by_monitor(space, topic) || stepped && space.nodes.values().any(in_step),

@@ -40,6 +40,7 @@ pub(super) fn topic(space: &Space, topic: &model::Topic) -> plan::Topic {
         name: topic.declaration.name.clone(),
         doc: topic.declaration.doc.clone(),
         paths: topic.paths.clone(),
+        members: topic.members.clone(),
         ty: ty(&topic.ty),
         interface,
         channel: topic.channel,
@@ -50,8 +51,8 @@ pub(super) fn node(node: &model::Node) -> plan::Node {
     plan::Node {
         name: node.declaration.name.clone(),
         doc: node.declaration.doc.clone(),
-        publishes: node.publishes.iter().map(|&id| topic_id(id)).collect(),
-        subscribes: node.subscribes.iter().map(|&id| topic_id(id)).collect(),
+        publishes: node.publishes.iter().map(topic_members).collect(),
+        subscribes: node.subscribes.iter().map(topic_members).collect(),
         named: node.named.clone(),
         launch: node.launch.as_ref().map(launch),
         answers: node
@@ -60,6 +61,14 @@ pub(super) fn node(node: &model::Node) -> plan::Node {
             .map(|&(to, with)| plan::Answer { to: topic_id(to), with: topic_id(with) })
             .collect(),
         every_step: node.every_step.iter().map(|&id| topic_id(id)).collect(),
+    }
+}
+
+fn topic_members(of: &model::TopicMembers) -> plan::TopicMembers {
+    let topic = topic_id(of.topic);
+    match &of.members {
+        None => plan::TopicMembers::All(topic),
+        Some(members) => plan::TopicMembers::Only { topic, members: members.clone() },
     }
 }
 

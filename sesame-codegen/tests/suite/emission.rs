@@ -57,7 +57,7 @@ fn a_simulator_that_is_a_program_needs_its_transport_and_no_crate() {
 #[test]
 fn a_runner_of_a_ros_system_has_its_transport_and_says_how_nodes_are_remapped() {
     let mut runner = with_program("c");
-    runner.plan.nodes = vec![sesame_plan::Node { publishes: vec![sesame_plan::TopicId(0)], ..node("arm") }];
+    runner.plan.nodes = vec![sesame_plan::Node { publishes: sesame_plan::testing::topics(&[0]), ..node("arm") }];
     let path = format!("/{}", runner.plan.topics[0].paths[0]);
     runner.plan.topics[0].paths = vec![path.clone()];
     let cut = |cut| sesame_plan::Wiring { cut, ..sesame_plan::Wiring::default() };

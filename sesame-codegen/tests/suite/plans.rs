@@ -71,7 +71,11 @@ pub(crate) fn small(campaign: &str) -> RunnerPlan {
                 topic("zones", "", &["safetyzones/Z1", "safetyzones/Z2"], Type::Message { id: MessageId(0) }),
                 topic("speed", "Of the fastest gripper.", &["cell/gripper_speed"], real("m/s")),
             ],
-            nodes: vec![Node { publishes: vec![TopicId(0)], subscribes: vec![TopicId(1)], ..testing::node("plc") }],
+            nodes: vec![Node {
+                publishes: testing::topics(&[0]),
+                subscribes: testing::topics(&[1]),
+                ..testing::node("plc")
+            }],
             metrics: vec![Metric {
                 unit: Some("s".into()),
                 direction: Some(Direction::Minimise),

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{Declaration, MetricSource, Space, TopicId};
+use crate::resolve::list;
 
 /// Operations whose name ends with the name of a topic that they do not disturb.
 pub(super) fn misnamed_operations(space: &Space, diagnostics: &mut Vec<Diagnostic>) {
@@ -32,7 +33,8 @@ pub(super) fn misnamed_operations(space: &Space, diagnostics: &mut Vec<Diagnosti
 /// Operations on topics without a subscriber, if nodes say what they subscribe to: no node subscribes to the topic, no
 /// monitor needs it, and no outbound metric reads it.
 pub(super) fn unheard_operations(space: &Space, diagnostics: &mut Vec<Diagnostic>) {
-    let mut heard: BTreeSet<TopicId> = space.nodes.values().flat_map(|node| &node.subscribes).copied().collect();
+    let subscribed = space.nodes.values().flat_map(|node| &node.subscribes).map(|used| used.topic);
+    let mut heard: BTreeSet<TopicId> = subscribed.collect();
     if heard.is_empty() {
         return;
     }
@@ -65,31 +67,90 @@ pub(super) fn unheard_operations(space: &Space, diagnostics: &mut Vec<Diagnostic
     }
 }
 
-/// Topics that more than one node or monitor publishes.
+/// The names of topics that have many publishers by design, without their namespaces.
+const SHARED: [&str; 5] = ["tf", "tf_static", "diagnostics", "rosout", "parameter_events"];
+
+/// Topics, or members of groups, that more than one declared node or monitor publishes. The members of one group of
+/// nodes share a topic because it is declared so.
 pub(super) fn two_publishers(space: &Space, diagnostics: &mut Vec<Diagnostic>) {
-    let mut publishers: BTreeMap<TopicId, Vec<(&str, &Declaration)>> = BTreeMap::new();
-    for node in space.nodes.values() {
-        for &topic in &node.publishes {
-            publishers.entry(topic).or_default().push(("node", &node.declaration));
+    for (id, topic) in space.topics.iter() {
+        let is_shared = |path: &String| path.rsplit('/').next().is_some_and(|last| SHARED.contains(&last));
+        if topic.paths.iter().all(is_shared) {
+            continue;
         }
-    }
-    for eddi in space.eddis.values() {
-        if let Some(topic) = eddi.publishes {
-            publishers.entry(topic).or_default().push(("monitor", &eddi.declaration));
+        let publishers = publishers(space, id);
+        let mut together: Vec<&Publisher<'_>> = Vec::new();
+        for (at, later) in publishers.iter().enumerate() {
+            let Some(earlier) = publishers[..at].iter().find(|earlier| earlier.shares(later)) else { continue };
+            for one in [earlier, later] {
+                if together.iter().all(|known| known.declaration.span != one.declaration.span) {
+                    together.push(one);
+                }
+            }
         }
-    }
-    for (topic, publishers) in publishers {
-        let [(of_first, first), (of_second, second), ..] = publishers[..] else { continue };
-        let topic = &space.topics[topic].declaration;
-        let title = if of_first == of_second {
-            format!("{of_first}s `{}` and `{}` both publish `{}`", first.name, second.name, topic.name)
+        let [first, second, further @ ..] = together.as_slice() else { continue };
+        let (topic, kind) = (&topic.declaration, first.kind);
+        let title = if !further.is_empty() {
+            let names: Vec<&str> = together.iter().map(|one| one.name).collect();
+            format!("{} all publish `{}`", list(&names), topic.name)
+        } else if kind == second.kind {
+            let (first, second) = (first.name, second.name);
+            format!("{kind}s `{first}` and `{second}` both publish `{}`", topic.name)
         } else {
-            format!("{of_first} `{}` and {of_second} `{}` both publish `{}`", first.name, second.name, topic.name)
+            let [first, second] = [first, second].map(|one| format!("{} `{}`", one.kind, one.name));
+            format!("{first} and {second} both publish `{}`", topic.name)
         };
-        let diagnostic = Diagnostic::new(Code::TWO_PUBLISHERS, second.span, title)
+        let mut diagnostic = Diagnostic::new(Code::TWO_PUBLISHERS, second.declaration.span, title)
             .label("also publishes it")
-            .secondary(first.span, "publishes it")
-            .secondary(topic.span, "the topic is declared here");
-        diagnostics.push(diagnostic);
+            .secondary(first.declaration.span, "publishes it");
+        for further in further {
+            diagnostic = diagnostic.secondary(further.declaration.span, "publishes it as well");
+        }
+        diagnostics.push(diagnostic.secondary(topic.span, "the topic is declared here"));
     }
+}
+
+/// A declared node, with all members of a group of nodes, or a monitor.
+struct Publisher<'a> {
+    kind: &'static str,
+    declaration: &'a Declaration,
+    /// Its name, or that of the group of nodes.
+    name: &'a str,
+    /// The members of the topic that it publishes; `None` for all of them.
+    members: Option<BTreeSet<u32>>,
+}
+
+impl Publisher<'_> {
+    fn shares(&self, other: &Publisher<'_>) -> bool {
+        match (&self.members, &other.members) {
+            (Some(one), Some(other)) => !one.is_disjoint(other),
+            _ => true,
+        }
+    }
+}
+
+/// Who publishes a topic, in the order of their declarations.
+fn publishers(space: &Space, topic: TopicId) -> Vec<Publisher<'_>> {
+    let mut publishers: Vec<Publisher<'_>> = Vec::new();
+    for node in space.nodes.values() {
+        let Some(used) = node.publishes.iter().find(|used| used.topic == topic) else { continue };
+        let members = used.members.as_ref().map(|members| members.iter().copied().collect());
+        match publishers.last_mut().filter(|last| last.declaration.span == node.declaration.span) {
+            Some(Publisher { members: Some(known), .. }) if members.is_some() => {
+                known.extend(members.into_iter().flatten())
+            }
+            Some(Publisher { members: known, .. }) => *known = None,
+            None => {
+                let declaration = &node.declaration;
+                let name = declaration.name.split('[').next().unwrap_or_default();
+                publishers.push(Publisher { kind: "node", declaration, name, members });
+            }
+        }
+    }
+    let eddis = space.eddis.values().filter(|eddi| eddi.publishes == Some(topic));
+    publishers.extend(eddis.map(|eddi| {
+        let declaration = &eddi.declaration;
+        Publisher { kind: "monitor", declaration, name: &declaration.name, members: None }
+    }));
+    publishers
 }

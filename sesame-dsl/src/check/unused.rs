@@ -90,8 +90,7 @@ pub(super) fn topics(space: &Space, root: FileId, diagnostics: &mut Vec<Diagnost
 fn used_topics(space: &Space) -> BTreeSet<TopicId> {
     let mut used = BTreeSet::new();
     for node in space.nodes.values() {
-        used.extend(&node.publishes);
-        used.extend(&node.subscribes);
+        used.extend(node.publishes.iter().chain(&node.subscribes).map(|used| used.topic));
     }
     used.extend(space.operations.values().filter_map(Operation::topic));
     for metric in space.metrics.values() {

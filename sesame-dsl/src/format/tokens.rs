@@ -103,7 +103,9 @@ impl<'t> Walk<'t> {
             Rule::doc => self.token(start, pair.as_str(), Kind::Doc, false),
             Rule::quantity | Rule::number => self.token(start, pair.as_str(), Kind::Quantity, glued),
             Rule::text => self.token(start, pair.as_str(), Kind::Text, glued),
-            Rule::path | Rule::target | Rule::unit => self.token(start, pair.as_str(), Kind::Word, glued),
+            Rule::path | Rule::target | Rule::with_member | Rule::unit => {
+                self.token(start, pair.as_str(), Kind::Word, glued)
+            }
             _ if pair.clone().into_inner().all(|inner| inner.as_rule() == Rule::COMMENT) => self.leaf(pair, glued),
             _ => self.inner(pair, glued),
         }
@@ -153,7 +155,7 @@ impl<'t> Walk<'t> {
                 before = Some(rule);
             }
         }
-        self.after_names |= matches!(pair.as_rule(), Rule::names | Rule::metric_names);
+        self.after_names |= matches!(pair.as_rule(), Rule::names | Rule::metric_names | Rule::with_members);
     }
 
     fn token(&mut self, start: usize, text: &'t str, kind: Kind, glued: bool) {

@@ -405,8 +405,9 @@ impl<'a> Indexer<'a> {
             self.type_of(&topic.ty, id);
         }
         for (node, &id) in nodes.iter().zip(&ids.nodes) {
-            self.mention_all(&node.publishes, id);
-            self.mention_all(&node.subscribes, id);
+            for listed in [&node.publishes, &node.subscribes].into_iter().flatten().flat_map(|(_, listed)| listed) {
+                self.mention(&listed.name, id);
+            }
             self.mention_all(&node.every_step, id);
             for answer in node.answers.iter().flat_map(|(_, answers)| answers) {
                 self.mention(&answer.to, id);
@@ -473,13 +474,11 @@ impl<'a> Indexer<'a> {
         for place in target.iter().flat_map(|target| &target.places) {
             self.path(place, id);
         }
-        if let Some(Resource { parameter: _, node, span: _ }) = resource {
-            self.mention(node, id);
+        if let Some(Resource { parameter: _, node, chosen: _, span: _ }) = resource {
+            self.mention(&node.name, id);
         }
-        for (_, names) in from.iter().chain(to) {
-            for name in names {
-                self.mention(name, id);
-            }
+        for node in from.iter().chain(to).flat_map(|(_, nodes)| nodes) {
+            self.mention(&node.name, id);
         }
         for contained in contains.iter().flat_map(|(_, contained)| contained) {
             if let Contained::Variable(name) = contained {

@@ -1,7 +1,7 @@
 //! Fuzzing operations and the known tests that apply them.
 
 use super::condition::{Condition, Constraint};
-use sesame_plan::{Bound, Choice, ChoiceKind, Messages, Moment, OperationKind, Step};
+use sesame_plan::{Bound, Choice, ChoiceKind, MembersOf, Messages, Moment, OperationKind, Step};
 
 use super::declaration::Declaration;
 use super::ids::{MetricId, NodeId, OperationId, TopicId};
@@ -16,6 +16,9 @@ pub struct Operation {
     /// What it disturbs; `None` exactly for one that acts on no messages: a custom one before the start or after the
     /// end, or one on a node or its parameters, which [`OperationKind::node`] names by its position in the space.
     pub target: Option<Target>,
+    /// Of a group of topics or nodes, the members on which it acts, by their positions; `None` for all topics of a group,
+    /// or for what is no group.
+    pub members: Option<MembersOf>,
     /// Only messages that these nodes publish, in written order; none for all messages.
     pub from: Vec<NodeId>,
     /// Only messages on their way to these nodes, in written order; none for all messages.
@@ -57,6 +60,8 @@ impl Operation {
 pub struct Target {
     /// The topic.
     pub topic: TopicId,
+    /// Of a group, the members that are named, by their positions in ascending order; none for all.
+    pub named: Vec<u32>,
     /// The values in each message that it changes, in written order, all of one type; none exactly where it acts on
     /// whole messages.
     pub places: Vec<Vec<Step>>,

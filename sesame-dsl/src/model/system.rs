@@ -141,21 +141,40 @@ pub struct Topic {
     /// Names on the wire: one, or the members of the group in written order. No other topic of this channel has any of
     /// them. In ROS they are absolute.
     pub paths: Vec<String>,
+    /// The names of the members of the group, in the order of the paths; none for a single topic.
+    pub members: Vec<String>,
     /// What it carries; in ROS a message with an interface.
     pub ty: Type,
     /// Whether it is a topic of the middleware, or one direction of a service.
     pub channel: Channel,
 }
 
+/// A topic, or some members of a group of topics.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TopicMembers {
+    /// The topic.
+    pub topic: TopicId,
+    /// The positions of the members, in ascending order; `None` for all of them.
+    pub members: Option<Vec<u32>>,
+}
+
+impl TopicMembers {
+    /// Whether it has this member.
+    pub fn has(&self, member: u32) -> bool {
+        self.members.as_ref().is_none_or(|members| members.contains(&member))
+    }
+}
+
 /// A node: a program that publishes and subscribes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Node {
-    /// Its name and doc comment.
+    /// Its name and doc comment. That of a member of a group of nodes has the member behind the name of the group, in
+    /// brackets, and the place of the group.
     pub declaration: Declaration,
-    /// Topics it publishes.
-    pub publishes: Vec<TopicId>,
-    /// Topics it subscribes to.
-    pub subscribes: Vec<TopicId>,
+    /// Topics it publishes: none twice.
+    pub publishes: Vec<TopicMembers>,
+    /// Topics it subscribes to: none twice.
+    pub subscribes: Vec<TopicMembers>,
     /// Its name in the middleware, where one is written.
     pub named: Option<String>,
     /// What starts it; `None` for a node that others start.

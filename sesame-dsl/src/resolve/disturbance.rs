@@ -1,5 +1,7 @@
 //! What operations disturb, and what tests may choose: each kind with its units and bounds.
 
+use std::collections::BTreeMap;
+
 use sesame_grammar::Rule;
 
 use super::Resolver;
@@ -23,6 +25,16 @@ const MOST_COPIES: f64 = 100.0;
 enum Held {
     Number { unit: Option<Unit>, integer: bool },
     Point { unit: Option<Unit> },
+}
+
+/// A place that an operation changes.
+#[derive(Clone)]
+struct Disturbed {
+    topic: TopicId,
+    /// The member of a group that is named.
+    only: Option<u32>,
+    steps: Vec<Step>,
+    ty: Type,
 }
 
 /// What an operation disturbs, how, and with which parameters.
@@ -370,15 +382,16 @@ impl<'a> Resolver<'a> {
     /// Whole messages of one topic.
     pub(super) fn whole_messages(&mut self, target: &'a ast::Target, does: &str) -> Option<Target> {
         let (found, _) = self.values(target, does, "whole messages", |_| true)?;
-        let [place] = target.places.as_slice() else {
+        let [steps] = found.places.as_slice() else {
             let title = format!("{does} whole messages of one topic");
             let diagnostic = Diagnostic::new(Code::WRONG_TYPE, target.span, title).label("expected one topic");
             self.report(diagnostic);
             return None;
         };
-        if place.is_name() {
-            return Some(Target { topic: found.topic, places: Vec::new() });
+        if steps.is_empty() {
+            return Some(Target { places: Vec::new(), ..found });
         }
+        let place = target.places.first()?;
         let parts = Span { lo: place.topic.span.hi, ..place.span };
         let title = format!("{does} whole messages, not parts of them");
         let diagnostic = Diagnostic::new(Code::WRONG_TYPE, parts, title).label("expected a topic").suggest(
@@ -399,27 +412,29 @@ impl<'a> Resolver<'a> {
         wants: &str,
         is_for: impl Fn(&Type) -> bool,
     ) -> Option<(Target, Type)> {
-        let mut found: Vec<(TopicId, Vec<Step>, Type)> = Vec::new();
+        let mut found: Vec<Disturbed> = Vec::new();
         let mut first_words = "";
         let mut complete = true;
         for place in &target.places {
-            let Some((topic, steps, ty)) = self.disturbed(place) else {
+            let Some(disturbed) = self.disturbed(place) else {
                 complete = false;
                 continue;
             };
+            let Disturbed { topic, only, steps, ty } = &disturbed;
             let written = self.text(place.span);
-            if let Some((first_topic, _, first_type)) = found.first() {
-                let wrong = if *first_topic != topic {
+            if let Some(Disturbed { topic: first_topic, ty: first_type, .. }) = found.first() {
+                let same_place = |before: &Disturbed| before.only == *only && before.steps == *steps;
+                let wrong = if first_topic != topic {
                     Some((
                         Code::WRONG_TYPE,
                         format!("`{written}` and `{first_words}` are on different topics"),
                         "an operation acts on one topic; declare another operation for this one".to_owned(),
                     ))
-                } else if *first_type != ty {
+                } else if first_type != ty {
                     let label =
-                        format!("this is {}, but `{first_words}` is {}", type_in_words(&ty), type_in_words(first_type));
+                        format!("this is {}, but `{first_words}` is {}", type_in_words(ty), type_in_words(first_type));
                     Some((Code::WRONG_TYPE, format!("`{written}` and `{first_words}` have different types"), label))
-                } else if found.iter().any(|(_, before, _)| *before == steps) {
+                } else if found.iter().any(same_place) {
                     Some((Code::LISTED_TWICE, format!("`{written}` is listed twice"), "listed again here".to_owned()))
                 } else {
                     None
@@ -432,19 +447,34 @@ impl<'a> Resolver<'a> {
             } else {
                 first_words = written;
             }
-            if !is_for(&ty) {
-                self.report_unfit(place, user, wants, &ty, &is_for);
+            if !is_for(ty) {
+                self.report_unfit(place, user, wants, ty, &is_for);
                 complete = false;
             }
-            found.push((topic, steps, ty));
+            found.push(disturbed);
         }
-        let (topic, _, ty) = found.first().filter(|_| complete).cloned()?;
-        Some((Target { topic, places: found.into_iter().map(|(_, steps, _)| steps).collect() }, ty))
+        let Disturbed { topic, ty, .. } = found.first().filter(|_| complete).cloned()?;
+        // Each member with its places, which are the same for all.
+        let mut by_member: BTreeMap<Option<u32>, Vec<Vec<Step>>> = BTreeMap::new();
+        for Disturbed { only, steps, .. } in found {
+            by_member.entry(only).or_default().push(steps);
+        }
+        let mut all = by_member.values();
+        let places = all.next()?.clone();
+        if all.any(|other| *other != places) || by_member.len() > 1 && by_member.contains_key(&None) {
+            let diagnostic =
+                Diagnostic::new(Code::WRONG_TYPE, target.span, "an operation changes the same in each member")
+                    .label("these are different values of different members")
+                    .note("declare another operation for the other values");
+            self.report(diagnostic);
+            return None;
+        }
+        Some((Target { topic, named: by_member.into_keys().flatten().collect(), places }, ty))
     }
 
     /// Where a place is that an operation changes, and its type.
-    fn disturbed(&mut self, path: &'a ast::Path) -> Option<(TopicId, Vec<Step>, Type)> {
-        let Place { topic, fields, steps, point, ty, .. } = self.place(path, false)?;
+    fn disturbed(&mut self, path: &'a ast::Path) -> Option<Disturbed> {
+        let Place { topic, only, fields, steps, point, ty, .. } = self.place(path, false)?;
         if let Some(holder) = point {
             let in_list = path.elements.iter().rev().find_map(|step| match step {
                 ast::Step::Field(name) => Some(name),
@@ -456,7 +486,7 @@ impl<'a> Resolver<'a> {
             self.report(Diagnostic::new(Code::WRONG_TYPE, span, title).label(label));
             return None;
         }
-        Some((topic, fields.into_iter().map(Step::Field).chain(steps).collect(), ty))
+        Some(Disturbed { topic, only, steps: fields.into_iter().map(Step::Field).chain(steps).collect(), ty })
     }
 
     fn report_unfit(&mut self, place: &ast::Path, user: &str, wants: &str, ty: &Type, is_for: impl Fn(&Type) -> bool) {

@@ -15,6 +15,8 @@ use crate::syntax::ast::{self, ComparedWith, Name, Path};
 /// Where a path leads.
 pub(super) struct Place {
     pub(super) topic: TopicId,
+    /// The member of a group that the path names.
+    pub(super) only: Option<u32>,
     /// Fields up to the first list whose elements are chosen.
     pub(super) fields: Vec<String>,
     /// From that list on.
@@ -63,7 +65,7 @@ impl<'a> Resolver<'a> {
     /// What a formula reads at a path, with the word before it.
     pub(super) fn reading(&mut self, path: &'a Path, word: Option<(ast::Members, Span)>) -> Option<Reading> {
         let before = word.map(|(word, _)| word);
-        let Place { topic, fields, steps, many, ty, .. } = self.place(path, takes_all(before))?;
+        let Place { topic, only, fields, steps, many, ty, .. } = self.place(path, takes_all(before))?;
         let field = FieldPath { topic, fields };
         let of_list = many || (before == Some(ast::Members::Length) && matches!(ty, Type::List(_)));
         let whole = word.map_or(path.span, |(_, word)| word.to(path.span));
@@ -78,7 +80,7 @@ impl<'a> Resolver<'a> {
                 self.report(Diagnostic::new(Code::WRONG_TYPE, whole, title).label(label));
                 return None;
             }
-            let members = self.members(path, &field, word)?;
+            let members = self.members(path, &field, only, word)?;
             let list = (!steps.is_empty()).then_some(InList { steps, reduction: Reduction::First });
             return Some(Reading { field, members, list, ty });
         };
@@ -87,13 +89,14 @@ impl<'a> Resolver<'a> {
             Reduction::Sum => Members::Sum,
             _ => Members::Min,
         };
+        let members = only.map_or(members, Members::Only);
         let of_group = matches!(reduction, Reduction::Min | Reduction::Max | Reduction::Sum);
-        if self.members_of(&field) > 1 && !of_group {
+        if self.members_of(&field) > 1 && only.is_none() && !of_group {
             let title = format!("`{}` is a group of topics, each with a list", path.topic.text);
             let diagnostic = Diagnostic::new(Code::UNPAIRED, whole, title)
                 .label("whose elements are meant is not clear")
                 .note("`min of`, `max of` and `sum of` are over the elements of all members")
-                .note("to read the list of one member, declare it as a topic of its own");
+                .note(format!("to read the list of one member, write its name: {}", self.example_of_member(topic)));
             self.report(diagnostic);
             return None;
         }
@@ -133,8 +136,10 @@ impl<'a> Resolver<'a> {
         let topic = self.system.topics[index].as_ref()?;
         let of_group = topic.paths.len() > 1;
         let ty = topic.ty.clone();
+        let (only, elements) = self.member_of_path(TopicId::from_index(index), path)?;
         let place = Place {
             topic: TopicId::from_index(index),
+            only,
             fields: Vec::new(),
             steps: Vec::new(),
             many: false,
@@ -145,7 +150,7 @@ impl<'a> Resolver<'a> {
         for name in &path.fields {
             self.step_into_field(&mut walk, name, all, index)?;
         }
-        for step in &path.elements {
+        for step in elements {
             match step {
                 ast::Step::Field(name) => self.step_into_field(&mut walk, name, all, index)?,
                 step => {
@@ -223,10 +228,11 @@ impl<'a> Resolver<'a> {
             let label = format!("it is {}", type_in_words(&walk.place.ty));
             let mut diagnostic = Diagnostic::new(Code::WRONG_TYPE, span, title).label(label);
             if group.is_some() {
-                diagnostic = diagnostic.note(
-                    "members of a group have no index: `each of` stands for each of them, `max of` for the greatest \
-                     value, and the name alone for the least",
-                );
+                let example = group.map_or(String::new(), |path| self.example_of_path(path));
+                diagnostic = diagnostic.note(format!(
+                    "a member of a group is chosen by its name: {example}; `each of` stands for each of them, `max \
+                     of` for the greatest value, and the name alone for the least"
+                ));
             }
             self.report(diagnostic);
             return None;
@@ -400,6 +406,14 @@ impl<'a> Resolver<'a> {
         let definition = self.names.get(path.topic.text.as_str()).filter(|found| found.kind == Kind::Topic)?;
         let mut ty = self.system.topics.get(definition.index)?.as_ref()?.ty.clone();
         let all = takes_all(word);
+        let elements = match path.elements.as_slice() {
+            [ast::Step::Element(..), rest @ ..]
+                if self.may_name_a_member(TopicId::from_index(definition.index), path) =>
+            {
+                rest
+            }
+            elements => elements,
+        };
         let element = |ty: Type| match ty {
             Type::List(of) if all => *of,
             other => other,
@@ -411,7 +425,7 @@ impl<'a> Resolver<'a> {
         for name in &path.fields {
             ty = field(ty, name)?;
         }
-        for step in &path.elements {
+        for step in elements {
             ty = match (step, ty) {
                 (ast::Step::Field(name), ty) => field(ty, name)?,
                 (_, Type::List(of)) => *of,

@@ -46,11 +46,23 @@ impl<'a> Resolver<'a> {
         self.at_most_one(&body.untimed, "untimed");
         let between = self.between_nodes(body);
         let constraints = self.constraints(&body.contains);
-        let (target, kind, parameters) = what?;
+        let (target, kind, mut parameters) = what?;
+        let (members, choice) = self.members_acted_on(body, target.as_ref())?;
+        if let Some(choice) = choice {
+            if parameters.iter().any(|parameter| parameter.name == choice.name) {
+                let title = format!("this operation has a parameter `{}` of its own", choice.name);
+                let diagnostic = Diagnostic::new(Code::DEFINED_TWICE, operation.head.name.span, title)
+                    .label("a test chooses the members of the group by this name; rename the parameter");
+                self.report(diagnostic);
+                return None;
+            }
+            parameters.push(choice);
+        }
         let [from, to] = between?;
         Some(model::Operation {
             declaration: self.declaration(&operation.head),
             target,
+            members,
             from,
             to,
             kind,
@@ -292,7 +304,7 @@ impl<'a> Resolver<'a> {
             self.report(diagnostic.label("remove this list"));
             return None;
         };
-        let wires = self.system.topics.get(topic.index())?.as_ref()?.paths.len() * operation.to.len().max(1);
+        let wires = self.wires_acted_on(topic, operation)?;
         let mut runs = Vec::new();
         for run in &test.messages {
             let (from, to) = (run.first.value?, run.last.map_or(run.first.value, |last| last.value)?);

@@ -5,7 +5,7 @@ use super::elements::Reading;
 use super::formula::{Number, position};
 use super::region::scaled;
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
-use crate::model::{Distance, Expression, FieldPath, Input, Point, SignedDistance, Type};
+use crate::model::{self, Distance, Expression, FieldPath, Input, Point, SignedDistance, Type};
 use crate::span::Span;
 use crate::synonyms::region_otherwise;
 use crate::syntax::ast::{self, ExpressionKind, Members, Path};
@@ -34,6 +34,10 @@ impl<'a> Resolver<'a> {
                 }
                 self.one_point(call, pairs);
                 return None;
+            }
+            [pairs, other] if matches!(pairs.kind, ExpressionKind::Members(Members::EachPair, ..)) => {
+                let ExpressionKind::Members(_, word, path) = &pairs.kind else { return None };
+                return self.pairs_of_two(inputs, path, *word, other);
             }
             [from, to] => (from, to),
             _ => {
@@ -97,9 +101,55 @@ impl<'a> Resolver<'a> {
             self.report(Diagnostic::new(Code::UNPAIRED, word.to(path.span), title).label(label));
             return None;
         }
-        let [first, second] = self.pair_of(path, &read.field, word)?;
+        let [first, second] = self.pair_of((path, &read.field), None, word)?;
         let [from, to] = [first, second].map(|input| Point::Input(position(inputs, input)));
         Some((between(from, to, 1.0), unit))
+    }
+
+    /// The distances of each member of a group from each member of another: `distance(each pair of robots, people)`.
+    fn pairs_of_two(
+        &mut self,
+        inputs: &mut Vec<Input>,
+        path: &'a Path,
+        word: Span,
+        other: &'a ast::Expression,
+    ) -> Option<Number> {
+        let whole = word.to(other.span);
+        let ExpressionKind::Field(of_other) = &other.kind else {
+            let title = format!("`{}` is not a group of topics", self.text(other.span));
+            let diagnostic = Diagnostic::new(Code::UNPAIRED, other.span, title)
+                .label("expected the name of a group")
+                .note("`each pair of` combines each member of one group with each member of another");
+            self.report(diagnostic);
+            return None;
+        };
+        let (left, right) = (self.point_read(path, None), self.point_read(of_other, None));
+        let ((left, unit), (right, right_unit)) = (left?, right?);
+        let one = left.list.is_some() || right.list.is_some() || left.field.topic == right.field.topic;
+        if one || self.members_of(&right.field) < 2 || right.members != model::Members::Min {
+            let title = format!("`{}` is not another group of topics", self.text(other.span));
+            let diagnostic = Diagnostic::new(Code::UNPAIRED, whole, title)
+                .label("expected a group in addition to the first one")
+                .note("for one topic, write `each of` before the group; for pairs of one group, write it alone");
+            self.report(diagnostic);
+            return None;
+        }
+        let [found, wanted] = [dimension(right_unit.as_ref()), dimension(unit.as_ref())];
+        if found != wanted {
+            let title = format!(
+                "`{}` is {}, but `{}` is {}",
+                self.text(other.span),
+                found.name(),
+                path.topic.text,
+                wanted.name()
+            );
+            let label = format!("expected {}", wanted.name());
+            self.report(Diagnostic::new(Code::WRONG_UNIT, other.span, title).label(label));
+            return None;
+        }
+        let [first, second] = self.pair_of((path, &left.field), Some(&right.field), word)?;
+        let [from, to] = [first, second].map(|input| Point::Input(position(inputs, input)));
+        Some((between(from, to, convert(1.0, right_unit.as_ref(), unit.as_ref())), unit))
     }
 
     fn one_point(&mut self, call: Span, argument: &'a ast::Expression) {
@@ -118,7 +168,7 @@ impl<'a> Resolver<'a> {
     fn group_of(&mut self, argument: &'a ast::Expression) -> Option<(&'a Path, FieldPath)> {
         let (ExpressionKind::Field(path) | ExpressionKind::Members(_, _, path)) = &argument.kind else { return None };
         let is_point = matches!(self.type_read(path, None), Some(Type::Point(_)));
-        (is_point && path.elements.is_empty()).then_some(())?;
+        (is_point && path.elements.is_empty() && path.member.is_none()).then_some(())?;
         Some((path, self.field(path)?.0))
     }
 
@@ -170,7 +220,11 @@ impl<'a> Resolver<'a> {
             }
         };
         let (read, unit) = self.point_read(path, members)?;
-        if self.members_of(&read.field) > 1 && !matches!(members, Some((Members::Each | Members::EachPair, _))) {
+        let is_one = matches!(read.members, model::Members::Only(_));
+        if self.members_of(&read.field) > 1
+            && !is_one
+            && !matches!(members, Some((Members::Each | Members::EachPair, _)))
+        {
             let title = format!("`{}` is a group of topics, but a single point is needed", path.topic.text);
             let diagnostic = Diagnostic::new(Code::WRONG_TYPE, expression.span, title)
                 .label("expected one point")

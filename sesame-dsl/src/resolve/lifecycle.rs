@@ -11,7 +11,6 @@ use crate::units::Unit;
 
 /// What a node says in addition to its topics.
 pub(super) struct RestOfNode {
-    pub(super) named: Option<String>,
     pub(super) launch: Option<model::Launch>,
     pub(super) answers: Vec<(TopicId, TopicId)>,
     pub(super) every_step: Vec<TopicId>,
@@ -25,11 +24,11 @@ impl<'a> Resolver<'a> {
         let terminates = self.one_of_all(systems, |system| &system.terminates, "terminate");
         let budgets = self.one_of_all(systems, |system| &system.relay_budgets, "relay budget");
         let launch = match launches {
-            Some((span, launch)) => self.launch(*span, launch).map(Some),
+            Some((span, launch)) => self.launch(*span, launch, Purpose::Argument).map(Some),
             None => Some(None),
         };
         let terminate = match terminates {
-            Some((span, command)) => self.command(*span, command).map(Some),
+            Some((span, command)) => self.command(*span, command, Purpose::Argument).map(Some),
             None => Some(None),
         };
         let relay_budget = match budgets {
@@ -77,25 +76,23 @@ impl<'a> Resolver<'a> {
         publishes: Option<&[TopicId]>,
         subscribes: Option<&[TopicId]>,
     ) -> Option<RestOfNode> {
-        let named = match &node.named {
-            Some(written) => match self.other_than_ros() {
-                Some((kind, simulator)) => {
-                    let title = format!("simulator kind `{kind}` has no names of nodes");
-                    let diagnostic = Diagnostic::new(Code::NOT_ROS, written.span, title)
-                        .label("only nodes of a simulator of ROS have a name beside their own; remove it")
-                        .secondary(simulator, "the simulator is declared here");
-                    self.report(diagnostic);
-                    None
-                }
-                None => self.ros_name(written, "node").map(Some),
-            },
-            None => Some(None),
-        };
+        let is_group = node.named.as_ref().is_some_and(|named| named.text.contains('{'));
+        let mut has_name = true;
+        if let (Some(written), false, Some((kind, simulator))) = (&node.named, is_group, self.other_than_ros()) {
+            let title = format!("simulator kind `{kind}` has no names of nodes");
+            let diagnostic = Diagnostic::new(Code::NOT_ROS, written.span, title)
+                .label("only nodes of a simulator of ROS have a name in addition to their own; remove it")
+                .secondary(simulator, "the simulator is declared here")
+                .note("a name with braces, such as `\"{r1,r2}\"`, declares a group of nodes");
+            self.report(diagnostic);
+            has_name = false;
+        }
         let launch = match self.single(&node.launches, "launch") {
             Some(launch) => {
                 let span = node.launches[0].0;
                 self.has_programs(span, "launch");
-                self.launch(span, launch).map(Some)
+                let purpose = if is_group { Purpose::ArgumentOfMember } else { Purpose::Argument };
+                self.launch(span, launch, purpose).map(Some)
             }
             None => Some(None),
         };
@@ -117,8 +114,7 @@ impl<'a> Resolver<'a> {
         }
         let broker = self.broker_of(node);
         Some(RestOfNode {
-            named: named?,
-            launch: launch?,
+            launch: launch.filter(|_| has_name)?,
             answers: answers?,
             every_step: every_step?,
             broker: broker.ok()?,
@@ -182,8 +178,8 @@ impl<'a> Resolver<'a> {
         None
     }
 
-    fn launch(&mut self, span: Span, launch: &'a written::Launch) -> Option<model::Launch> {
-        let command = self.command(span, &launch.command);
+    fn launch(&mut self, span: Span, launch: &'a written::Launch, purpose: Purpose) -> Option<model::Launch> {
+        let command = self.command(span, &launch.command, purpose);
         let ready = match self.single(&launch.ready, "ready when") {
             Some(ready) => self.ready(ready).map(Some),
             None => Some(None),
@@ -191,8 +187,8 @@ impl<'a> Resolver<'a> {
         Some(model::Launch { command: command?, ready: ready? })
     }
 
-    fn command(&mut self, span: Span, command: &'a written::Command) -> Option<model::Command> {
-        let sound = command.arguments.iter().map(|argument| self.placeholders(argument, Purpose::Argument));
+    fn command(&mut self, span: Span, command: &'a written::Command, purpose: Purpose) -> Option<model::Command> {
+        let sound = command.arguments.iter().map(|argument| self.placeholders(argument, purpose));
         let sound = sound.fold(true, |all, one| all & one);
         // Empty texts were reported where they were read.
         let arguments = command.arguments.iter().map(|argument| argument.text.clone()).collect();

@@ -1,9 +1,8 @@
 //! Members of groups in formulas: which of them an input reads, and which of several groups belong together.
 
 use super::Resolver;
-use super::system::members_of_path;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{FieldPath, Id as _, Input, Members, TopicId};
+use crate::model::{FieldPath, Id as _, Input, Members, TopicId, Type};
 use crate::span::Span;
 use crate::syntax::ast::{self, Path};
 
@@ -11,14 +10,19 @@ use crate::syntax::ast::{self, Path};
 const MOST_PAIRS: usize = 100_000;
 
 impl<'a> Resolver<'a> {
-    /// Which members of a group a path stands for.
+    /// Which members of a group a path stands for, of which `only` may be named.
     pub(super) fn members(
         &mut self,
         path: &'a Path,
         field: &FieldPath,
+        only: Option<u32>,
         members: Option<(ast::Members, Span)>,
     ) -> Option<Members> {
-        let Some((members, word)) = members else { return Some(Members::Min) };
+        let Some((members, word)) = members else { return Some(only.map_or(Members::Min, Members::Only)) };
+        if only.is_some() {
+            self.is_one(self.text(path.span), members, word.to(path.span), word);
+            return None;
+        }
         self.is_group(path, field, members, word)?;
         Some(match members {
             // The three words for lists alone were refused before.
@@ -45,33 +49,74 @@ impl<'a> Resolver<'a> {
         if count != 1 {
             return Some(());
         }
-        let title = format!("`{}` is one topic, not a group", path.topic.text);
+        self.is_one(&path.topic.text, members, span, word);
+        None
+    }
+
+    /// Reports a word for the members of a group before one topic, or one member.
+    fn is_one(&mut self, what: &str, members: ast::Members, span: Span, word: Span) {
+        let title = format!("`{what}` is one topic, not a group");
         if matches!(members, ast::Members::EachPair) {
             let diagnostic = Diagnostic::new(Code::UNPAIRED, span, title)
                 .label("a pair needs a group of two or more members")
                 .note("a group is a topic with several paths, such as `\"poses/{a,b}\"`");
             self.report(diagnostic);
-            return None;
+            return;
         }
         let diagnostic = Diagnostic::new(Code::IDLE_CLAUSE, span, title)
             .label(format!("`{} of` combines the members of a group", self.text(word)));
         let remove = format!("remove `{} of`", self.text(word));
-        self.report(diagnostic.suggest(remove, Span { hi: path.span.lo, ..word }, ""));
-        None
+        // Up to the path, which is what is left of it.
+        let behind = self.text(span)[(word.hi - word.lo) as usize..].trim_start();
+        let behind = behind.strip_prefix("of").map_or(behind, str::trim_start);
+        let path = span.hi - u32::try_from(behind.len()).expect("files are small");
+        self.report(diagnostic.suggest(remove, Span { hi: path, ..word }, ""));
     }
 
-    /// The two inputs of each pair of a group's members.
-    pub(super) fn pair_of(&mut self, path: &'a Path, field: &FieldPath, word: Span) -> Option<[Input; 2]> {
+    /// The member of a group that a path names, and what is left of its choices of elements. A number is a member
+    /// directly behind the name of a group whose topics are no lists.
+    pub(super) fn member_of_path(&mut self, topic: TopicId, path: &'a Path) -> Option<(Option<u32>, &'a [ast::Step])> {
+        let elements = path.elements.as_slice();
+        if let Some(member) = &path.member {
+            return Some((self.named_member(topic, &path.topic, member)?, elements));
+        }
+        match elements {
+            [ast::Step::Element(count, span), rest @ ..] if self.may_name_a_member(topic, path) => {
+                let member = ast::Member { name: Some(self.text(count.span).to_owned()), span: *span };
+                Some((self.named_member(topic, &path.topic, &member)?, rest))
+            }
+            _ => Some((None, elements)),
+        }
+    }
+
+    /// Whether a number behind the name of a topic is a member.
+    pub(super) fn may_name_a_member(&self, topic: TopicId, path: &Path) -> bool {
+        let topic = self.system.topics.get(topic.index()).and_then(Option::as_ref);
+        let of_group = topic.is_some_and(|topic| topic.paths.len() > 1 && !matches!(topic.ty, Type::List(_)));
+        of_group && path.fields.is_empty()
+    }
+
+    /// The two inputs of each pair of a group's members or, with the members of another group, of each member of one
+    /// with each of the other.
+    pub(super) fn pair_of(
+        &mut self,
+        (path, field): (&'a Path, &FieldPath),
+        other: Option<&FieldPath>,
+        word: Span,
+    ) -> Option<[Input; 2]> {
         self.is_group(path, field, ast::Members::EachPair, word)?;
         let count = self.members_of(field);
-        let pairs = count * count.saturating_sub(1) / 2;
+        let pairs = match other {
+            None => count * count.saturating_sub(1) / 2,
+            Some(other) => count.saturating_mul(self.members_of(other)),
+        };
         if pairs > MOST_PAIRS {
             let title = format!("`{}` has {pairs} pairs of members, but the limit is {MOST_PAIRS}", path.topic.text);
             self.report(Diagnostic::new(Code::TOO_LARGE, word.to(path.span), title).label("too many pairs"));
             return None;
         }
-        let of = |members| Input { field: field.clone(), members, list: None, text: None };
-        Some([of(Members::First), of(Members::Second)])
+        let of = |field: &FieldPath, members| Input { field: field.clone(), members, list: None, text: None };
+        Some([of(field, Members::First), of(other.unwrap_or(field), Members::Second)])
     }
 
     /// Checks that the members which a formula reads one by one belong together: those of one group, those at the same
@@ -86,15 +131,17 @@ impl<'a> Resolver<'a> {
             }
             topics
         };
-        let (each, pairs) = (topics(&[Members::Each]), topics(&[Members::First, Members::Second]));
-        if !pairs.is_empty() && (pairs.len() > 1 || !each.is_empty()) {
-            let title = if each.is_empty() {
-                "`each pair of` refers to two groups in one formula"
+        let each = topics(&[Members::Each]);
+        let [first, second] = [Members::First, Members::Second].map(|side| topics(&[side]));
+        let several = first.len() > 1 || second.len() > 1;
+        if several || !first.is_empty() && !each.is_empty() {
+            let title = if several {
+                "`each pair of` refers to different groups in one formula"
             } else {
                 "`each pair of` and `each of` cannot be combined in one formula"
             };
             let diagnostic = Diagnostic::new(Code::UNPAIRED, whole, title)
-                .label("expected the pairs of one group")
+                .label("expected the same pairs in all of it")
                 .note("the formula is evaluated for each pair of members");
             self.report(diagnostic);
             return None;
@@ -114,9 +161,10 @@ impl<'a> Resolver<'a> {
         let mut diagnostic = Diagnostic::new(Code::UNPAIRED, whole, title).label("the members cannot be paired");
         for (topic, names) in [(first, &of_first), (other, &of_other)] {
             let span = self.path_of_topic(topic)?.span;
-            diagnostic = diagnostic.secondary(span, format!("with the members {}", super::words::list(names)));
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            diagnostic = diagnostic.secondary(span, format!("with the members {}", super::words::list(&names)));
         }
-        let sorted = |mut names: Vec<&'a str>| {
+        let sorted = |mut names: Vec<String>| {
             names.sort_unstable();
             names
         };
@@ -129,7 +177,8 @@ impl<'a> Resolver<'a> {
         None
     }
 
-    fn names_of_members(&self, topic: TopicId) -> Vec<&'a str> {
-        self.path_of_topic(topic).map_or(Vec::new(), |path| members_of_path(&path.text))
+    fn names_of_members(&self, topic: TopicId) -> Vec<String> {
+        let members = self.members_of_topic(topic);
+        if members.len() < 2 { Vec::new() } else { members.into_iter().map(|member| member.name).collect() }
     }
 }

@@ -260,14 +260,19 @@ impl<'a> Resolver<'a> {
         match fit {
             written::Fit::Delay(target, range) => {
                 let topic = match target {
-                    Some(target) => self.whole_messages(target, "a relay delays").map(|found| Some(found.topic)),
+                    Some(target) => self.whole_messages(target, "a relay delays").and_then(|found| {
+                        self.of_all_members(&found, target.span)?;
+                        Some(Some(found.topic))
+                    }),
                     None => Some(None),
                 };
                 let delay = self.times(range, "the delay of a relay");
                 Some(Fit::RelayDelay(topic?, delay?))
             }
             written::Fit::Relay { rule, target, amounts } => {
+                let span = target.span;
                 let (target, kind, parameters) = self.plain(target, *rule, Some(amounts))?;
+                self.of_all_members(&target, span)?;
                 match parameters.as_slice() {
                     [Parameter { domain: Domain::Number { range, .. }, .. }] => {
                         Some(Fit::Relay { kind, target, range: *range })

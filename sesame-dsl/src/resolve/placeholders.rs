@@ -10,11 +10,16 @@ use crate::syntax::ast::Text;
 /// What a worker has of its own.
 const KNOWN: [&str; 6] = ["worker", "domain", "port", "folder", "seed", "ros-args"];
 
+/// These, and what a member of a group of nodes has of its own.
+const OF_MEMBERS: [&str; 7] = ["member", "worker", "domain", "port", "folder", "seed", "ros-args"];
+
 /// What a text is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Purpose {
     /// An argument of a program.
     Argument,
+    /// An argument of a program that is started for each member of a group of nodes.
+    ArgumentOfMember,
     /// The number of a port.
     Port,
 }
@@ -24,6 +29,7 @@ impl Resolver<'_> {
     pub(super) fn placeholders(&mut self, text: &Text, purpose: Purpose) -> bool {
         let permitted = match purpose {
             Purpose::Argument => &KNOWN[..],
+            Purpose::ArgumentOfMember => &OF_MEMBERS[..],
             Purpose::Port => &["worker", "port"],
         };
         let mut sound = true;
@@ -32,7 +38,9 @@ impl Resolver<'_> {
             if !permitted.contains(&word) {
                 let title = format!("there is no placeholder `{{{word}}}`");
                 let mut diagnostic = Diagnostic::new(Code::PLACEHOLDER, span, title).label("unknown placeholder");
-                diagnostic = if let Some(similar) = most_similar(word, permitted.iter().copied()) {
+                diagnostic = if word == "member" {
+                    diagnostic.note("only a node that is a group, such as `\"/{r1,r2}/vehicle\"`, has members")
+                } else if let Some(similar) = most_similar(word, permitted.iter().copied()) {
                     diagnostic.did_you_mean(span, format!("{{{similar}}}"))
                 } else {
                     let braced: Vec<String> = permitted.iter().map(|word| format!("{{{word}}}")).collect();

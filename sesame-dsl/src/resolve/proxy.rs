@@ -4,21 +4,22 @@ use std::collections::BTreeMap;
 
 use sesame_plan::{Identity, Proxy, Schemes, SimulatorKind};
 
+use super::Resolver;
 use super::bus::is_here;
 use super::nodes::node_of_plans;
-use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::span::Span;
 use crate::syntax::ast;
 
 impl<'a> Resolver<'a> {
     pub(super) fn proxies(&mut self, written: &'a [ast::Proxy], kind: SimulatorKind) -> Option<Vec<Proxy>> {
-        let mut nodes: BTreeMap<&str, Span> = BTreeMap::new();
+        let mut nodes: BTreeMap<sesame_plan::NodeId, Span> = BTreeMap::new();
         let mut addresses: BTreeMap<&str, Span> = BTreeMap::new();
         let mut proxies = Some(Vec::new());
         for proxy in written {
             let mut resolved = self.proxy(proxy, kind);
-            if let Some(first) = nodes.insert(&proxy.node.text, proxy.node.span) {
+            let twice = resolved.as_ref().and_then(|resolved| nodes.insert(resolved.node, proxy.node.span));
+            if let Some(first) = twice {
                 self.listed_twice(proxy.node.span, first);
                 resolved = None;
             }
@@ -39,7 +40,7 @@ impl<'a> Resolver<'a> {
     }
 
     fn proxy(&mut self, proxy: &'a ast::Proxy, kind: SimulatorKind) -> Option<Proxy> {
-        let node = self.find(&proxy.node, Kind::Node).map(node_of_plans);
+        let node = self.node_named(&proxy.node).map(node_of_plans);
         let address = self.well_formed(&proxy.address, kind);
         let token = self.secret(&proxy.secrets, "token");
         let certificate = self.single(&proxy.certificates, "certificate").map(|file| file.text.clone());

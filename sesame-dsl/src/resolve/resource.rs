@@ -6,7 +6,7 @@ use super::disturbance::number;
 use super::nodes::node_of_plans;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{OperationKind, Parameter, Range};
+use crate::model::{Id as _, NodeId, OperationKind, Parameter, Range};
 use crate::span::Span;
 use crate::syntax::ast;
 
@@ -24,7 +24,7 @@ impl<'a> Resolver<'a> {
     ) -> Option<(OperationKind, Vec<Parameter>)> {
         let has_nodes = self.has_nodes(resource);
         let (rule, amounts) = self.kind_for(resource, body)?;
-        let found = self.find(&resource.node, Kind::Node);
+        let found = self.nodes_named(&resource.node);
         let parameters = match (rule, amounts) {
             (Rule::set_parameter, Some(ast::Amounts::Range(range))) => {
                 Some(vec![number("value", None, self.range(range, None, "the parameter")?)])
@@ -33,7 +33,8 @@ impl<'a> Resolver<'a> {
             (_, None) => Some(Vec::new()),
             (rule, Some(_)) => unreachable!("the grammar has no operation on a node that is {rule:?} with this amount"),
         };
-        let node = found?;
+        // The members of a group follow each other.
+        let node = *found?.first()?;
         if !has_nodes {
             return None;
         }
@@ -73,7 +74,7 @@ impl<'a> Resolver<'a> {
         resource: &ast::Resource,
         body: &'a ast::OperationBody,
     ) -> Option<(Rule, Option<&'a ast::Amounts>)> {
-        let node = &resource.node.text;
+        let node = &resource.node.name.text;
         let kind = match &body.kind {
             ast::OperationKind::Plain { rule, amounts } if acts_on_nodes(*rule) => Some((*rule, amounts.as_ref())),
             _ => None,
@@ -146,8 +147,8 @@ impl<'a> Resolver<'a> {
     }
 
     /// Reports a node that the runner does not launch, so that it has no process to stop.
-    fn is_launched(&mut self, resource: &ast::Resource, node: usize, word: Span) -> bool {
-        let Some(node) = self.system.nodes[node].as_ref() else { return false };
+    fn is_launched(&mut self, resource: &ast::Resource, node: NodeId, word: Span) -> bool {
+        let Some(node) = self.system.nodes[node.index()].as_ref() else { return false };
         if node.launch.is_some() {
             return true;
         }

@@ -18,7 +18,7 @@ impl<'a> Resolver<'a> {
         let mut paths: std::collections::BTreeMap<String, Span> = std::collections::BTreeMap::new();
         for service in self.ast_services() {
             let members = self.topic_paths(&service.path, "service");
-            for member in members.iter().flatten() {
+            for member in members.iter().flat_map(|(paths, _)| paths) {
                 match paths.get(member) {
                     Some(&first) => self.same_path("services", member, service.path.span, first),
                     None => _ = paths.insert(member.clone(), service.path.span),
@@ -28,10 +28,11 @@ impl<'a> Resolver<'a> {
             let topics = members.zip(directions);
             for (at, channel) in [Channel::Request, Channel::Reply].into_iter().enumerate() {
                 let head = if at == 0 { &service.request } else { &service.reply };
-                let topic = topics.as_ref().map(|(paths, types)| model::Topic {
+                let topic = topics.as_ref().map(|((paths, members), types)| model::Topic {
                     declaration: self.declaration(head),
                     written: service.path.text.clone(),
                     paths: paths.clone(),
+                    members: members.clone(),
                     ty: types[at].clone(),
                     channel,
                 });

@@ -1,12 +1,12 @@
 //! Topics and nodes of the system, and the fields that paths into messages lead to.
 
-use std::collections::{BTreeMap, HashSet};
-use std::hash::Hash;
+use std::collections::BTreeMap;
 
 use super::elements::Reading;
 use super::words::type_in_words;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
+use crate::groups::in_brackets;
 use crate::model::{self, Channel, Id as _, Simulator, TopicId, Type};
 use crate::similar::most_similar;
 use crate::span::Span;
@@ -27,6 +27,7 @@ impl<'a> Resolver<'a> {
     }
 
     pub(super) fn system(&mut self) -> Option<Simulator> {
+        self.count_nodes();
         let simulator = self.simulators().next().and_then(|simulator| self.simulator(simulator));
         self.messages();
         self.topics();
@@ -42,17 +43,18 @@ impl<'a> Resolver<'a> {
             let ty = self.type_of(&topic.ty);
             let ty = ty.filter(|ty| self.has_a_layout(topic, ty));
             let members = self.topic_paths(&topic.path, "topic");
-            for member in members.iter().flatten() {
+            for member in members.iter().flat_map(|(paths, _)| paths) {
                 if let Some(&first) = paths.get(member) {
                     self.same_path("topics", member, topic.path.span, first);
                 } else {
                     paths.insert(member.clone(), topic.path.span);
                 }
             }
-            let resolved = ty.zip(members).map(|(ty, paths)| model::Topic {
+            let resolved = ty.zip(members).map(|(ty, (paths, members))| model::Topic {
                 declaration: self.declaration(&topic.head),
                 written: topic.path.text.clone(),
                 paths,
+                members,
                 ty,
                 channel: Channel::Topic,
             });
@@ -114,45 +116,21 @@ impl<'a> Resolver<'a> {
         false
     }
 
-    /// The paths of a topic or service: one, or the members of its group. In ROS they are absolute.
-    pub(super) fn topic_paths(&mut self, path: &ast::Text, what: &str) -> Option<Vec<String>> {
+    /// The paths of a topic or service: one, or those of the members of its group, with their names. In ROS the paths are
+    /// absolute.
+    pub(super) fn topic_paths(&mut self, path: &ast::Text, what: &str) -> Option<(Vec<String>, Vec<String>)> {
         if path.text.trim().is_empty() {
             return None;
         }
-        match expand_group(&path.text) {
-            Ok(paths) if self.is_of_ros() => paths.iter().map(|name| self.absolute(name, path.span, what)).collect(),
-            Ok(paths) => Some(paths),
-            Err(why) => {
-                let title = format!("`{}` is not the path of a {what}", path.text);
-                self.report(Diagnostic::new(Code::BAD_PATH, path.span, title).label(why));
-                None
-            }
+        let members = self.expanded(path, what)?;
+        let is_group = members.len() > 1;
+        let (mut paths, names): (Vec<String>, Vec<String>) =
+            members.into_iter().map(|member| (member.path, member.name)).unzip();
+        if self.is_of_ros() {
+            let absolute = paths.iter().map(|name| self.absolute(name, path.span, what));
+            paths = absolute.collect::<Option<_>>()?;
         }
-    }
-
-    fn nodes(&mut self) {
-        for node in self.ast_nodes() {
-            let mut topics = |clauses: &'a [(Span, Vec<Name>)], word: &str| -> Option<Vec<TopicId>> {
-                let Some(names) = self.single(clauses, word) else { return Some(vec![]) };
-                let found = self.find_all(names, Kind::Topic)?;
-                Some(found.into_iter().map(TopicId::from_index).collect())
-            };
-            let publishes = topics(&node.publishes, "publishes");
-            let subscribes = topics(&node.subscribes, "subscribes");
-            let rest = self.rest_of_node(node, publishes.as_deref(), subscribes.as_deref());
-            let lists = publishes.zip(subscribes).zip(rest);
-            let resolved = lists.map(|((publishes, subscribes), rest)| model::Node {
-                declaration: self.declaration(&node.head),
-                publishes,
-                subscribes,
-                named: rest.named,
-                launch: rest.launch,
-                answers: rest.answers,
-                every_step: rest.every_step,
-                broker: rest.broker,
-            });
-            self.system.nodes.push(resolved);
-        }
+        Some((paths, if is_group { names } else { Vec::new() }))
     }
 
     /// The path of a topic as it is written.
@@ -165,6 +143,12 @@ impl<'a> Resolver<'a> {
     /// What a path refers to: its topic, and the type at its end. `None` was reported, here or before.
     pub(super) fn field(&mut self, path: &'a ast::Path) -> Option<(model::FieldPath, Type)> {
         let index = self.find(&path.topic, Kind::Topic)?;
+        if let Some(member) = &path.member {
+            let title = format!("`{}` is one member of a group, which cannot be used here", self.text(path.span));
+            let label = "expected the topic without a member";
+            self.report(Diagnostic::new(Code::UNPAIRED, member.span, title).label(label));
+            return None;
+        }
         if let Some(step) = path.elements.first() {
             let title = format!("`{}` is in a list, but a field is needed", self.text(path.span));
             let label = "elements of a list cannot be used here";
@@ -201,9 +185,8 @@ impl<'a> Resolver<'a> {
                  the greatest value, and `{group}` alone for the least",
                 topic.paths.len()
             ));
-            last.notes.push(format!(
-                "to name one of them, declare `{member}` as a topic of its own, instead of a member of the group"
-            ));
+            let named = topic.paths.iter().position(|path| path == member).and_then(|at| topic.members.get(at));
+            last.notes.extend(named.map(|named| format!("`{group}[{}]` is this one alone", in_brackets(named))));
         }
     }
 
@@ -285,97 +268,5 @@ impl<'a> Resolver<'a> {
         }
         self.report(diagnostic);
         None
-    }
-}
-
-/// The members of the group in a path without mistakes; none if there is no group.
-pub(super) fn members_of_path(path: &str) -> Vec<&str> {
-    let group = path.split_once('{').and_then(|(_, rest)| rest.split_once('}'));
-    group.map_or(Vec::new(), |(members, _)| members.split(',').collect())
-}
-
-/// Expands a path with at most one group, `zones/{A,B}/level`.
-fn expand_group(path: &str) -> Result<Vec<String>, String> {
-    if let Some(c) = path.chars().find(|c| c.is_whitespace() || c.is_control()) {
-        return Err(format!("a path cannot contain {}", if c == ' ' { "spaces".to_owned() } else { format!("{c:?}") }));
-    }
-    let Some((before, rest)) = path.split_once('{') else {
-        return if path.contains('}') {
-            Err("`}` without a matching `{`".to_owned())
-        } else {
-            Ok(vec![path.to_owned()])
-        };
-    };
-    if before.contains('}') {
-        return Err("`}` without a matching `{`".to_owned());
-    }
-    let Some((group, after)) = rest.split_once('}') else { return Err("the group is not closed".to_owned()) };
-    if group.contains('{') || after.contains(['{', '}']) {
-        return Err("a path can have at most one group, as in `zones/{Z1,Z2}`".to_owned());
-    }
-    let members: Vec<&str> = group.split(',').collect();
-    if members.contains(&"") {
-        return Err("the group has an empty member".to_owned());
-    }
-    if let Some(member) = first_twice(&members) {
-        return Err(format!("the group lists `{member}` twice"));
-    }
-    Ok(members.into_iter().map(|member| format!("{before}{member}{after}")).collect())
-}
-
-/// The first member that occurs a second time.
-fn first_twice<T: Hash + Eq>(members: &[T]) -> Option<&T> {
-    let mut known = HashSet::with_capacity(members.len());
-    members.iter().find(|&member| !known.insert(member))
-}
-
-#[cfg(test)]
-mod tests {
-    use std::cell::Cell;
-    use std::hash::{Hash, Hasher};
-
-    use super::{expand_group, first_twice};
-
-    /// A member that counts how often it is compared.
-    struct Counted<'a>(usize, &'a Cell<usize>);
-
-    impl PartialEq for Counted<'_> {
-        fn eq(&self, other: &Self) -> bool {
-            self.1.set(self.1.get() + 1);
-            self.0 == other.0
-        }
-    }
-
-    impl Eq for Counted<'_> {}
-
-    impl Hash for Counted<'_> {
-        fn hash<H: Hasher>(&self, state: &mut H) {
-            self.0.hash(state);
-        }
-    }
-
-    #[test]
-    fn work_on_a_group_grows_with_its_members_and_not_with_their_square() {
-        let compared = Cell::new(0);
-        let count = 100_000;
-        let mut members: Vec<Counted<'_>> = (0..count).map(|n| Counted(n, &compared)).collect();
-        assert!(first_twice(&members).is_none());
-        members.push(Counted(7, &compared));
-        assert_eq!(first_twice(&members).map(|member| member.0), Some(7));
-        assert!(compared.get() < count, "{} comparisons", compared.get());
-    }
-
-    #[test]
-    fn a_group_is_written_out_in_order() {
-        assert_eq!(expand_group("a/{Z2,Z1}/x").unwrap(), ["a/Z2/x", "a/Z1/x"]);
-        assert_eq!(expand_group("/plain").unwrap(), ["/plain"]);
-        assert_eq!(expand_group("{one}").unwrap(), ["one"]);
-    }
-
-    #[test]
-    fn malformed_groups_are_refused() {
-        for path in ["a b", "a/{", "a/}", "}{", "{a,}", "{}", "{a,a}", "{a}{b}", "{a{b}}", "a\tb"] {
-            assert!(expand_group(path).is_err(), "{path}");
-        }
     }
 }

@@ -9,7 +9,7 @@ pub(super) fn quoted(names: &[&str]) -> Vec<String> {
 }
 
 /// Names in backquotes, joined for a sentence.
-pub(super) fn list(names: &[&str]) -> String {
+pub(crate) fn list(names: &[&str]) -> String {
     let quoted = quoted(names);
     match quoted.split_last() {
         Some((last, [])) => last.clone(),

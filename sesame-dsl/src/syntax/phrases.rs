@@ -36,6 +36,8 @@ pub(super) fn phrases_of(rule: Rule) -> Vec<String> {
         Rule::close => &["`}`"],
         Rule::name
         | Rule::names
+        | Rule::with_member
+        | Rule::with_members
         | Rule::path
         | Rule::target
         | Rule::targets
@@ -186,6 +188,9 @@ pub(super) fn phrases_of(rule: Rule) -> Vec<String> {
         | Rule::element_filter
         | Rule::element_key
         | Rule::element_range
+        | Rule::one_member
+        | Rule::member_name
+        | Rule::chosen
         | Rule::of_these
         | Rule::reduction
         | Rule::formula_within => &[],

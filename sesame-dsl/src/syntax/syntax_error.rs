@@ -286,8 +286,8 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
     diagnostic = rewritten(diagnostic, foreign::notation(text, from, found.lo, part));
     if part == Expected::Operator && found.text == "[" && is_index(text, found) {
         diagnostic = diagnostic.note(
-            "members of a group have no index: `each of` stands for each of them, `max of` for the greatest value, and \
-             the name alone for the least",
+            "brackets stand directly behind the name of a group or a list; `each of` stands for each member, `max of` for \
+             the greatest value, and the name alone for the least",
         );
     }
     let open = open_bracket(text, from, found.lo);
@@ -297,8 +297,7 @@ fn explained(file: FileId, text: &str, region: Span, block: &Block, previous: Op
     }
     if counts(Rule::each_element) && found.kind == TokenKind::Word || open.is_some() && counts(Rule::equal_to) {
         diagnostic = diagnostic.note(
-            "brackets choose elements of a list; to disturb one member of a group, remove it from the group and declare \
-             it as a topic of its own",
+            "brackets choose elements of a list, such as `[0]`, or a member of a group by its name, such as `odom[r1]`",
         );
     }
     let mut region = tokens(text, from, found.lo).skip_while(|token| token.text != "signed_distance");

@@ -1,51 +1,72 @@
-//! Topics that differ in one part of their paths, as one group: `/workers/{a,b}/distance`.
+//! What differs in one part of its path, as one group: `/workers/{a,b}/distance`.
 
 use std::collections::BTreeMap;
 
-use sesame_scan::FoundTopic;
+use sesame_scan::{FoundService, FoundTopic};
 
-/// A topic of the space: one that was found, or several.
+/// One that was found, or several as a group.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Line<'a> {
+pub(super) struct Line<T> {
     /// The path as it is written.
     pub(super) path: String,
     /// What its name is made of: the path without the part that differs.
     pub(super) name: String,
-    /// Those that it stands for.
-    pub(super) topics: Vec<&'a FoundTopic>,
+    /// Those that it stands for, in the order of its members.
+    pub(super) of: Vec<T>,
 }
-
-/// What the members of a group have in common: the parts before and after the one that differs, the type, who
-/// publishes and who subscribes, and with which quality.
-type Common<'a> = (Vec<&'a str>, Vec<&'a str>, Option<&'a str>, &'a [String], &'a [String], Quality);
 
 /// Whether it is reliable, transient local, latched, retained, and can be cut; and its quality of service.
 type Quality = ([Option<bool>; 5], Option<u8>);
 
 /// Folds topics into groups: if they have the same type, publishers, subscribers and quality, and differ in one part of
-/// their paths other than the last, which says what is published.
-pub(super) fn fold<'a>(topics: &[&'a FoundTopic]) -> Vec<Line<'a>> {
-    let mut groups = BTreeMap::<Common<'a>, Vec<(usize, &'a str)>>::new();
-    for (at, topic) in topics.iter().enumerate() {
-        let parts: Vec<&str> = topic.path.split('/').collect();
+/// their paths other than the last, which says what is published. Publishers that differ in the same part as their
+/// topics, as those of robots in namespaces do, are the same.
+pub(super) fn fold<'a>(topics: &[&'a FoundTopic]) -> Vec<Line<&'a FoundTopic>> {
+    fold_by(
+        topics,
+        |topic| topic.path.clone(),
+        |topic, part| {
+            let nodes = [&topic.publishers, &topic.subscribers].map(|nodes| without(nodes, part));
+            (topic.ty.clone(), nodes, quality(topic))
+        },
+    )
+}
+
+/// Folds services into groups in the same way.
+pub(super) fn fold_services<'a>(services: &[&'a FoundService]) -> Vec<Line<&'a FoundService>> {
+    fold_by(
+        services,
+        |service| service.path.clone(),
+        |service, part| {
+            let nodes = [&service.servers, &service.clients].map(|nodes| without(nodes, part));
+            (service.ty.clone(), nodes)
+        },
+    )
+}
+
+/// Folds things into groups whose paths differ in one part other than the last, and which have in common what `common`
+/// says of a thing with this part.
+pub(super) fn fold_by<T: Copy, C: Ord>(
+    things: &[T],
+    path: impl Fn(T) -> String,
+    common: impl Fn(T, &str) -> C,
+) -> Vec<Line<T>> {
+    let paths: Vec<String> = things.iter().map(|&thing| path(thing)).collect();
+    let mut groups = BTreeMap::<(Vec<&str>, Vec<&str>, C), Vec<(usize, &str)>>::new();
+    for (at, path) in paths.iter().enumerate() {
+        let parts: Vec<&str> = path.split('/').collect();
         for differs in (0..parts.len() - 1).filter(|differs| is_member(parts[*differs])) {
-            let common = (
-                parts[..differs].to_vec(),
-                parts[differs + 1..].to_vec(),
-                topic.ty.as_deref(),
-                topic.publishers.as_slice(),
-                topic.subscribers.as_slice(),
-                quality(topic),
-            );
-            groups.entry(common).or_default().push((at, parts[differs]));
+            let common = common(things[at], parts[differs]);
+            let key = (parts[..differs].to_vec(), parts[differs + 1..].to_vec(), common);
+            groups.entry(key).or_default().push((at, parts[differs]));
         }
     }
     let mut groups: Vec<_> = groups.into_iter().filter(|(_, members)| members.len() > 1).collect();
-    // A topic that fits into several goes into the largest.
+    // What fits into several groups goes into the largest.
     groups.sort_by_key(|(_, members)| std::cmp::Reverse(members.len()));
-    let mut lines: BTreeMap<usize, Line<'a>> = BTreeMap::new();
-    let mut grouped = vec![false; topics.len()];
-    for ((before, after, ..), mut members) in groups {
+    let mut lines: BTreeMap<usize, Line<T>> = BTreeMap::new();
+    let mut grouped = vec![false; things.len()];
+    for ((before, after, _), mut members) in groups {
         members.retain(|(at, _)| !grouped[*at]);
         let [(first, _), _, ..] = members[..] else { continue };
         for (at, _) in &members {
@@ -54,15 +75,23 @@ pub(super) fn fold<'a>(topics: &[&'a FoundTopic]) -> Vec<Line<'a>> {
         let differing: Vec<&str> = members.iter().map(|(_, part)| *part).collect();
         let group = format!("{{{}}}", differing.join(","));
         let parts: Vec<&str> = before.iter().copied().chain([group.as_str()]).chain(after.iter().copied()).collect();
-        let path = parts.join("/");
         let name: Vec<&str> = before.iter().chain(&after).copied().filter(|part| !part.is_empty()).collect();
-        let name = name.join("/");
-        lines.insert(first, Line { path, name, topics: members.iter().map(|(at, _)| topics[*at]).collect() });
+        let of = members.iter().map(|(at, _)| things[*at]).collect();
+        lines.insert(first, Line { path: parts.join("/"), name: name.join("/"), of });
     }
-    for (at, topic) in topics.iter().enumerate().filter(|(at, _)| !grouped[*at]) {
-        lines.insert(at, Line { path: topic.path.clone(), name: topic.path.clone(), topics: vec![*topic] });
+    for (at, path) in paths.iter().enumerate().filter(|(at, _)| !grouped[*at]) {
+        lines.insert(at, Line { path: path.clone(), name: path.clone(), of: vec![things[at]] });
     }
     lines.into_values().collect()
+}
+
+/// Names of nodes, in which one part of a path stands for any.
+fn without(nodes: &[String], part: &str) -> Vec<String> {
+    let generic = |node: &String| {
+        let parts: Vec<&str> = node.split('/').map(|of| if of == part { "*" } else { of }).collect();
+        parts.join("/")
+    };
+    nodes.iter().map(generic).collect()
 }
 
 /// Whether a part of a path can be written between the braces of a group.
@@ -89,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn topics_that_differ_in_one_part_are_a_group_if_the_same_nodes_use_them() {
+    fn topics_that_differ_in_one_part_are_a_group_if_the_same_nodes_use_them_or_each_has_its_own() {
         let topics = [
             topic("/cell/distance", "cell"),
             topic("/cell/force", "cell"),
@@ -99,6 +128,9 @@ mod tests {
             topic("/robots/r2/state", "r2"),
             topic("/robots/r3/pose", "cell"),
             topic("/zones/r3/pose", "cell"),
+            topic("/zones/r1/level", "/zones/r1/meter"),
+            topic("/zones/r2/level", "/zones/r2/meter"),
+            topic("/zones/r4/level", "/zones/r5/meter"),
             topic("fleet/a/state", "cell"),
             topic("fleet/b/state", "cell"),
             topic("fleet/c,d/state", "cell"),
@@ -106,7 +138,7 @@ mod tests {
         ];
         let lines = fold(&topics.iter().collect::<Vec<_>>());
         let lines: Vec<(&str, &str, usize)> =
-            lines.iter().map(|line| (line.path.as_str(), line.name.as_str(), line.topics.len())).collect();
+            lines.iter().map(|line| (line.path.as_str(), line.name.as_str(), line.of.len())).collect();
         let expected = [
             ("/cell/distance", "/cell/distance", 1),
             ("/cell/force", "/cell/force", 1),
@@ -114,6 +146,8 @@ mod tests {
             ("/robots/r1/state", "/robots/r1/state", 1),
             ("/robots/r2/state", "/robots/r2/state", 1),
             ("/zones/r3/pose", "/zones/r3/pose", 1),
+            ("/zones/{r1,r2}/level", "zones/level", 2),
+            ("/zones/r4/level", "/zones/r4/level", 1),
             ("fleet/{a,b}/state", "fleet/state", 2),
             ("fleet/c,d/state", "fleet/c,d/state", 1),
             ("fleet//state", "fleet//state", 1),

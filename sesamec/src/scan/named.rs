@@ -5,11 +5,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use heck::ToUpperCamelCase as _;
 use sesame_legacy::Names;
 use sesame_notation::quoted;
-use sesame_scan::{Facts, FoundNode, FoundService, FoundTopic};
+use sesame_scan::{Facts, FoundService, FoundTopic};
 
 use super::comments::LeftOut;
 use super::expressible::is_ros_name;
-use super::groups::{Line, fold};
+use super::groups::{Line, fold, fold_services};
+use super::nodes::{Node, fold_nodes, lists_of_nodes};
 use super::simulator::words_of_topic;
 
 /// All names.
@@ -18,17 +19,18 @@ pub(super) struct Named<'a> {
     /// Messages by their types.
     pub(super) messages: BTreeMap<&'a str, String>,
     /// Topics as the space has them.
-    pub(super) topics: Vec<(String, Line<'a>)>,
-    pub(super) services: Vec<(String, &'a FoundService)>,
-    pub(super) nodes: Vec<(String, &'a FoundNode)>,
+    pub(super) topics: Vec<(String, Line<&'a FoundTopic>)>,
+    pub(super) services: Vec<(String, Line<&'a FoundService>)>,
+    pub(super) nodes: Vec<(String, Line<Node<'a>>)>,
 }
 
-/// Names all that the space can say; nodes that it cannot become comments.
+/// Names all that the space can say; nodes that it cannot become comments. What nodes list is kept in `lists`.
 pub(super) fn name_all<'a>(
     facts: &'a Facts,
     needed: &[&'a str],
     topics: &[&'a FoundTopic],
     services: &[&'a FoundService],
+    lists: &'a mut Vec<[Vec<String>; 2]>,
     left_out: &mut LeftOut,
 ) -> Named<'a> {
     let mut names = Names::default();
@@ -39,15 +41,19 @@ pub(super) fn name_all<'a>(
     };
     let topics = fold(topics).into_iter();
     let topics: Vec<_> = topics.map(|line| (names.take(&words_of_topic(system, &line.name), "topic"), line)).collect();
-    let services: Vec<_> = services.iter().map(|service| (service_name(&mut names, &service.path), *service)).collect();
-    let mut nodes = Vec::new();
+    let services = fold_services(services).into_iter();
+    let services: Vec<_> = services.map(|line| (service_name(&mut names, &line.name), line)).collect();
+    let mut expressible = Vec::new();
     for node in &facts.nodes {
         if !system.is_ros() || is_ros_name(&node.name) {
-            nodes.push((names.take(&node.name, "node"), node));
+            expressible.push(node);
         } else {
             left_out.decide(&format!("node {} has no name of ROS", quoted(&node.name)));
         }
     }
+    *lists = lists_of_nodes(&expressible, &topics, &services);
+    let nodes = fold_nodes(system, &expressible, lists).into_iter();
+    let nodes: Vec<_> = nodes.map(|line| (names.take(&line.name, "node"), line)).collect();
     let simulator = names.take("robots", "simulator");
     // Messages differ from each other in more than case, but from all else only as texts.
     let others: BTreeSet<&str> = topics

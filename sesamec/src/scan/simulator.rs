@@ -4,10 +4,12 @@ use std::fmt::Write as _;
 
 use sesame_notation::quoted;
 use sesame_plan::Dialect;
-use sesame_scan::{CLOCK, Facts, FoundNode, FoundService, System};
+use sesame_scan::{CLOCK, Facts, FoundService, System};
 
 use super::comments::{LeftOut, on_one_line};
 use super::expressible::is_ros_name;
+use super::groups::Line;
+use super::nodes::Node;
 use super::origin::Origin;
 
 /// What a space says of a kind of system that was scanned, besides what it says of all.
@@ -158,7 +160,7 @@ pub(super) fn block(
     facts: &Facts,
     origin: Origin<'_>,
     clock: Option<&str>,
-    nodes: &[(String, &FoundNode)],
+    nodes: &[(String, Line<Node<'_>>)],
 ) -> String {
     let Row { launch, head, settings, proxies, .. } = row(&facts.system);
     // A scan sees what runs, not how that began.
@@ -185,12 +187,13 @@ pub(super) fn block(
 pub(super) const UNHEARD: &str = "vehicle";
 
 /// A proxy for each node that publishes, at the ports after that of an address.
-fn lines_of_proxies(url: &str, nodes: &[(String, &FoundNode)]) -> String {
+fn lines_of_proxies(url: &str, nodes: &[(String, Line<Node<'_>>)]) -> String {
     let port = url.rsplit(':').next().and_then(|port| port.trim_end_matches('/').parse::<u16>().ok());
     // With room for all that a scan keeps.
     let port = port.filter(|port| *port < 60_000).unwrap_or(14_550);
+    let publishes = |line: &Line<Node<'_>>| line.of.iter().any(|node| !node.found.publishes.is_empty());
     let mut names: Vec<&str> =
-        nodes.iter().filter(|(_, node)| !node.publishes.is_empty()).map(|(name, _)| name.as_str()).collect();
+        nodes.iter().filter(|(_, line)| publishes(line)).map(|(name, _)| name.as_str()).collect();
     if names.is_empty() {
         names.push(UNHEARD);
     }

@@ -28,7 +28,8 @@ pub(super) fn space(facts: &Facts, types: &Types, origin: Origin<'_>) -> String 
         ));
     }
     let needed = types.needed(topics.iter().filter_map(|topic| topic.ty.as_deref()));
-    let named = name_all(facts, &needed, &topics, &services, &mut left_out);
+    let mut lists = Vec::new();
+    let named = name_all(facts, &needed, &topics, &services, &mut lists, &mut left_out);
     simulator::unseen(facts, &mut left_out);
 
     let mut text = simulator::heading(facts);

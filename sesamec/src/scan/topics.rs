@@ -12,8 +12,8 @@ use super::types::Types;
 /// A line for each topic or group of topics.
 pub(super) fn topic_lines(system: &System, types: &Types, named: &Named<'_>) -> String {
     let lines = named.topics.iter().map(|(name, line)| {
-        let ty = topic_type(types, &named.messages, line.topics[0].ty.as_deref().unwrap_or_default());
-        format!("topic {name} = {} : {ty}  // {}\n", quoted(&line.path), topic_comment(system, &line.topics))
+        let ty = topic_type(types, &named.messages, line.of[0].ty.as_deref().unwrap_or_default());
+        format!("topic {name} = {} : {ty}  // {}\n", quoted(&line.path), topic_comment(system, &line.of))
     });
     lines.collect()
 }
@@ -53,14 +53,15 @@ fn topic_comment(system: &System, topics: &[&FoundTopic]) -> String {
 
 /// A line for each service.
 pub(super) fn service_lines(system: &System, named: &Named<'_>) -> String {
-    let lines = named.services.iter().map(|(name, service)| {
+    let lines = named.services.iter().map(|(name, line)| {
+        let Some(service) = line.of.first() else { return String::new() };
         let mut who = vec![counted(service.servers.len() as u64, "server")];
         // Only ROS 2 knows the clients of a service.
         if matches!(system, System::Ros2 { .. }) {
             who.push(counted(service.clients.len() as u64, "client"));
         }
         let ty = service.ty.as_deref().unwrap_or_default();
-        format!("service {name} = {} : {}  // {}\n", quoted(&service.path), quoted(ty), who.join(", "))
+        format!("service {name} = {} : {}  // {}\n", quoted(&line.path), quoted(ty), who.join(", "))
     });
     lines.collect()
 }

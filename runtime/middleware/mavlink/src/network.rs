@@ -402,7 +402,7 @@ impl Network {
             return vec![way];
         }
         let topic = self.topics[line].line.topic;
-        let subscribes = |node: NodeId| self.plan.node(node).subscribes.contains(&topic);
+        let subscribes = |node: NodeId| self.plan.node(node).subscribes(topic);
         let numbers = (0..).zip(&self.links);
         let down = numbers.filter(|(_, link)| subscribes(self.proxies[link.proxy].node));
         let down: Vec<Way> = down.map(|(link, _)| Way { link, to: End::Vehicle }).collect();

@@ -72,11 +72,18 @@ pub fn distrust(plan: &CampaignPlan, silences: &[Silence], metrics: &mut [Metric
     if silences.iter().all(|silence| silence.to.is_some()) {
         return;
     }
-    let topics = wires(plan);
+    let members = (0..).map(TopicId).zip(&plan.topics);
+    let members = members.flat_map(|(id, topic)| (0u32..).zip(&topic.paths).map(move |(member, _)| (id, member)));
+    let members: Vec<(TopicId, u32)> = members.collect();
     for (at, observed) in (0..).zip(metrics) {
-        let read = topics_of(plan, MetricId(at));
+        let sources = sources_of(plan, MetricId(at));
         let silent = silences.iter().filter(|silence| silence.to.is_none());
-        let reads = |silence: &&Silence| topics.get(silence.wire).is_some_and(|(topic, _)| read.contains(topic));
+        let reads = |silence: &&Silence| {
+            let of = members.get(silence.wire);
+            of.is_some_and(|of| {
+                sources.iter().any(|(topic, only)| *topic == of.0 && only.is_none_or(|only| only == of.1))
+            })
+        };
         let since = silent.filter(reads).map(|silence| silence.from).min_by(f64::total_cmp);
         if let Some(since) = since {
             let known = known_at(plan.metric(MetricId(at)), observed, since);
@@ -91,23 +98,19 @@ pub fn wires(plan: &CampaignPlan) -> Vec<(TopicId, &str)> {
     topics.flat_map(|(id, topic)| topic.paths.iter().map(move |path| (id, path.as_str()))).collect()
 }
 
-/// The topics that a metric reads, itself or by the metric whose hazards it counts.
-fn topics_of(plan: &CampaignPlan, metric: MetricId) -> Vec<TopicId> {
+/// What a metric reads, itself or by the metric whose hazards it counts.
+fn sources_of(plan: &CampaignPlan, metric: MetricId) -> Vec<(TopicId, Option<u32>)> {
     match &plan.metric(metric).source {
-        MetricSource::Hook { topics } => topics.clone(),
-        MetricSource::FuzzingTime => Vec::new(),
-        MetricSource::Last { input } => vec![input.topic],
-        MetricSource::Robustness { robustness } => robustness.inputs.iter().map(|input| input.field.topic).collect(),
-        MetricSource::Formula { formula } => formula.inputs.iter().map(|input| input.field.topic).collect(),
         // What a monitor makes of silence is its own affair; what is a hazard is not.
         MetricSource::Monitor { score, .. } => score.requirement().map_or_else(Vec::new, |requirement| {
             let of = plan.requirement(requirement).metric;
             if matches!(plan.metric(of).source, MetricSource::Monitor { .. }) {
                 Vec::new()
             } else {
-                topics_of(plan, of)
+                sources_of(plan, of)
             }
         }),
+        source => source.sources(),
     }
 }
 

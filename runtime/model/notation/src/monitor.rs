@@ -205,6 +205,11 @@ impl<'a> Names<'a> {
     fn input(&self, at: u32) -> String {
         let Some(Input { field, members, list, text }) = self.inputs.get(at as usize) else { return "?".to_owned() };
         let mut name = name_of_field(self.plan, field);
+        if let Members::Only(member) = members {
+            let topic = self.plan.topic(field.topic);
+            let behind = name.strip_prefix(topic.name.as_str()).unwrap_or_default();
+            name = format!("{}[{}]{behind}", topic.name, topic.member_in_words(*member));
+        }
         if let Some(InList { steps, reduction }) = list {
             name.push_str(&value_path_in_words(steps));
             name = match reduction {
@@ -223,7 +228,7 @@ impl<'a> Names<'a> {
                 Members::Min => name = format!("min({name})"),
                 Members::Max => name = format!("max({name})"),
                 Members::Sum => name = format!("sum({name})"),
-                Members::Each | Members::First | Members::Second => {}
+                Members::Each | Members::First | Members::Second | Members::Only(_) => {}
             }
         }
         match text {

@@ -2,8 +2,8 @@
 
 use sesame_plan::condition::{Constraint, Integers};
 use sesame_plan::{
-    CampaignPlan, Distribution, Domain, Drain, Lengths, Metric, Operation, OperationKind, Parameter, Span,
-    value_path_in_words,
+    CampaignPlan, Distribution, Domain, Drain, Lengths, MembersOf, Metric, Operation, OperationKind, Parameter, Span,
+    Topic, value_path_in_words,
 };
 
 use crate::text::{list, one_of, quoted};
@@ -13,13 +13,7 @@ use crate::unit::Unit;
 pub fn operation(plan: &CampaignPlan, operation: &Operation) -> String {
     let mut line = format!("operation {}", operation.name);
     if let Some(topic) = operation.topic {
-        let topic = plan.topic(topic).name.as_str();
-        let mut targets: Vec<String> =
-            operation.places.iter().map(|place| format!("{topic}{}", value_path_in_words(place))).collect();
-        if targets.is_empty() {
-            targets.push(topic.to_owned());
-        }
-        line = format!("{line} on {}", targets.join(", "));
+        line = format!("{line} on {}{}", chosen(operation), targets(plan.topic(topic), operation).join(", "));
     }
     if let Some(resource) = resource(plan, operation) {
         line = format!("{line} on {resource}");
@@ -41,9 +35,44 @@ pub fn operation(plan: &CampaignPlan, operation: &Operation) -> String {
     format!("{line} = {}{}", disturbance(operation), clauses.write())
 }
 
-/// The node or the parameter on which an operation acts, if it acts on one instead of messages.
+/// The places in the messages of a topic that an operation changes, with the members of a group on which it acts.
+fn targets(topic: &Topic, operation: &Operation) -> Vec<String> {
+    let name = &topic.name;
+    let candidates: Vec<u32> = (0u32..).zip(&topic.paths).map(|(member, _)| member).collect();
+    let candidates = candidates.into_iter().filter(|&member| operation.may_act_on(member as usize));
+    let candidates: Vec<u32> = candidates.collect();
+    let topics: Vec<String> = if candidates.len() == topic.paths.len() {
+        vec![name.clone()]
+    } else {
+        candidates.into_iter().map(|member| format!("{name}[{}]", topic.member_in_words(member))).collect()
+    };
+    let places = || operation.places.iter().map(|place| value_path_in_words(place));
+    match operation.places.is_empty() {
+        true => topics,
+        false => topics.iter().flat_map(|topic| places().map(move |place| format!("{topic}{place}"))).collect(),
+    }
+}
+
+/// How many members of a group a test chooses, as it is written before their names; empty where it chooses none.
+fn chosen(operation: &Operation) -> String {
+    let Some(MembersOf::Chosen(choices)) = &operation.members else { return String::new() };
+    let sizes = || choices.iter().map(Vec::len);
+    match (sizes().min().unwrap_or(1), sizes().max().unwrap_or(1)) {
+        (1, 1) => "one of ".to_owned(),
+        (least, most) if least == most => format!("{least} of "),
+        (least, most) => format!("{least}..{most} of "),
+    }
+}
+
+/// The node or the parameter on which an operation acts, if it acts on one instead of messages: with how many of the
+/// members of a group a test chooses.
 pub fn resource(plan: &CampaignPlan, operation: &Operation) -> Option<String> {
-    let node = &plan.node(operation.kind.node()?).name;
+    let node = plan.node(operation.kind.node()?).name.as_str();
+    let node = match &operation.members {
+        None => node.to_owned(),
+        // Of a group its name alone.
+        Some(_) => format!("{}{}", chosen(operation), node.split('[').next().unwrap_or(node)),
+    };
     Some(match &operation.kind {
         OperationKind::Set { parameter, .. } => format!("parameter {} of {node}", quoted(parameter)),
         _ => format!("node {node}"),
@@ -98,13 +127,16 @@ pub fn integer_constraint(bounds: Integers) -> String {
 /// What an operation does and permits.
 fn disturbance(operation: &Operation) -> String {
     let words = operation.kind.words();
-    let permitted: Vec<String> = match (&operation.kind, axes(&operation.parameters)) {
+    // Which members a test chooses stands before their names.
+    let own = operation.parameters.len() - usize::from(matches!(operation.members, Some(MembersOf::Chosen(_))));
+    let parameters = &operation.parameters[..own];
+    let permitted: Vec<String> = match (&operation.kind, axes(parameters)) {
         (OperationKind::RandomValue { .. }, Some((unit, low, high))) => vec![unit.corners(low, high)],
-        _ => operation.parameters.iter().map(|parameter| permitted(&operation.kind, parameter)).collect(),
+        _ => parameters.iter().map(|parameter| permitted(&operation.kind, parameter)).collect(),
     };
     match &operation.kind {
         OperationKind::Custom { .. } => {
-            let parameters = operation.parameters.iter().map(|parameter| {
+            let parameters = parameters.iter().map(|parameter| {
                 format!(
                     "{}: {}  ",
                     parameter.name,
@@ -115,11 +147,8 @@ fn disturbance(operation: &Operation) -> String {
         }
         OperationKind::RandomText { texts } => format!("{words} {}", list(texts)),
         OperationKind::BurstLoss => {
-            let clauses = operation
-                .parameters
-                .iter()
-                .zip(&permitted)
-                .map(|(parameter, range)| format!("{} {range}  ", parameter.name));
+            let clauses =
+                parameters.iter().zip(&permitted).map(|(parameter, range)| format!("{} {range}  ", parameter.name));
             format!("{words} {{ {}}}", clauses.collect::<String>())
         }
         OperationKind::Latency { distribution, drain } => {

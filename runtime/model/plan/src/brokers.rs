@@ -27,12 +27,12 @@ impl Mqtt {
 
     /// The brokers of a topic's publishers; that of the simulator if no node says that it publishes it.
     pub fn publishers(&self, plan: &CampaignPlan, topic: TopicId) -> BTreeSet<BrokerAt> {
-        self.brokers_of(plan, |node| node.publishes.contains(&topic))
+        self.brokers_of(plan, |node| node.publishes(topic))
     }
 
     /// The brokers of a topic's subscribers; that of the simulator if no node says that it subscribes to it.
     pub fn subscribers(&self, plan: &CampaignPlan, topic: TopicId) -> BTreeSet<BrokerAt> {
-        self.brokers_of(plan, |node| node.subscribes.contains(&topic))
+        self.brokers_of(plan, |node| node.subscribes(topic))
     }
 
     fn brokers_of(&self, plan: &CampaignPlan, is: impl Fn(&crate::Node) -> bool) -> BTreeSet<BrokerAt> {

@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{FieldRef, Step};
+use crate::{FieldRef, Step, TopicId};
 
 /// A metric computed from messages without any code of the user.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -46,6 +46,19 @@ pub struct Input {
     /// For a field that is a text: the input is whether this holds of it. `None` for all others, and then not written.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub text: Option<TextTest>,
+}
+
+impl Input {
+    /// Whether it reads the messages of a path of a topic, by its position.
+    pub fn reads(&self, topic: TopicId, member: usize) -> bool {
+        let of_member = |only: u32| only as usize == member;
+        self.field.topic == topic && self.only().is_none_or(of_member)
+    }
+
+    /// The only member that it reads.
+    pub fn only(&self) -> Option<u32> {
+        if let Members::Only(member) = self.members { Some(member) } else { None }
+    }
 }
 
 /// Values in a list. For what reads them, a message without any is as if it had not come; only their number and their
@@ -103,10 +116,14 @@ pub enum Members {
     Sum,
     /// The latest. Those of several groups are of members at the same position.
     Each,
-    /// The first member of a pair: the formula is that of each pair of different members of one group.
+    /// The first member of a pair: the formula is that of each pair of different members of one group or, if the second
+    /// ones are of another group, of each member of one with each of the other.
     First,
     /// The second member of a pair.
     Second,
+    /// This one only, by its position. Where a formula reads a member of a group and each member too, these are all
+    /// others.
+    Only(u32),
 }
 
 /// How a formula's values become the metric's.

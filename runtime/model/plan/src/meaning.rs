@@ -98,8 +98,9 @@ fn forget_what_is_for_people(plan: &mut CampaignPlan) {
             doc.clear();
         }
     }
-    for Topic { name: _, doc, paths: _, ty: _, interface: _, channel: _ } in topics {
+    for Topic { name: _, doc, paths: _, members, ty: _, interface: _, channel: _ } in topics {
         doc.clear();
+        members.clear();
     }
     for Node { name: _, doc, publishes: _, subscribes: _, named: _, launch: _, answers: _, every_step: _ } in nodes {
         doc.clear();
@@ -128,6 +129,7 @@ fn forget_what_is_for_people(plan: &mut CampaignPlan) {
             name: _,
             doc,
             topic: _,
+            members: _,
             from: _,
             to: _,
             places: _,
@@ -253,13 +255,14 @@ mod tests {
     #[test]
     fn what_is_only_for_people_is_not_part_of_the_meaning() {
         let plan = whole();
-        let changes: [fn(&mut CampaignPlan); 19] = [
+        let changes: [fn(&mut CampaignPlan); 20] = [
             |plan| plan.generator = "sesamec 9.9.9".to_owned(),
             |plan| plan.source = "moved.sesame".to_owned(),
             |plan| plan.doc = "Corrected.".to_owned(),
             |plan| plan.messages[0].doc = "Corrected.".to_owned(),
             |plan| plan.messages[0].fields[1].doc = "Corrected.".to_owned(),
             |plan| plan.topics[1].doc = "Corrected.".to_owned(),
+            |plan| plan.topics[1].members.push("other".to_owned()),
             |plan| plan.nodes[0].doc = "Corrected.".to_owned(),
             |plan| plan.metrics[1].doc = "Corrected.".to_owned(),
             |plan| plan.metrics[1].line += 7,

@@ -89,6 +89,22 @@ pub enum MetricSource {
     },
 }
 
+impl MetricSource {
+    /// The topics that it reads itself, each with the only member that it reads, if that is not the whole group. A topic
+    /// may be there several times.
+    pub fn sources(&self) -> Vec<(TopicId, Option<u32>)> {
+        match self {
+            MetricSource::Hook { topics } => topics.iter().map(|&topic| (topic, None)).collect(),
+            MetricSource::FuzzingTime | MetricSource::Monitor { .. } => Vec::new(),
+            MetricSource::Last { input } => vec![(input.topic, None)],
+            MetricSource::Robustness { robustness: Robustness { inputs, .. } }
+            | MetricSource::Formula { formula: Formula { inputs, .. } } => {
+                inputs.iter().map(|input| (input.field.topic, input.only())).collect()
+            }
+        }
+    }
+}
+
 /// What must hold of a metric's value. Bounds are in the metric's unit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]

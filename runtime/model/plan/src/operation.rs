@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::condition::Constraint;
-use crate::{Comparison, NodeId, OperationKind, TopicId};
+use crate::{Choice, Comparison, NodeId, OperationKind, TopicId};
 
 /// A fuzzing operation with its permitted ranges. A test holds instances of it, see [`crate::TestOperation`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -15,6 +15,10 @@ pub struct Operation {
     /// The topic whose messages it disturbs; `None` exactly for one that acts on no messages: a custom operation before
     /// the start or after the end, or one on a node.
     pub topic: Option<TopicId>,
+    /// Of a group of topics or nodes, the members on which it acts; `None` for all topics of a group, or for what is no
+    /// group. The nodes of a group follow each other, and that of the kind is the first of them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub members: Option<MembersOf>,
     /// Only messages that these nodes publish; none for all messages.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub from: Vec<NodeId>,
@@ -45,6 +49,59 @@ pub struct Operation {
     pub timed: bool,
     /// What its start conditions contain where a search grows them.
     pub constraints: Vec<Constraint>,
+}
+
+impl Operation {
+    /// Whether some test makes it act on a member of its group, by its position.
+    pub fn may_act_on(&self, member: usize) -> bool {
+        match &self.members {
+            None => true,
+            Some(MembersOf::These(these)) => is_among(member, these),
+            Some(MembersOf::Chosen(choices)) => choices.iter().any(|these| is_among(member, these)),
+        }
+    }
+
+    /// Whether it acts on a member of its group, by its position, with these choices of a test.
+    pub fn acts_on(&self, member: usize, choices: &[Choice]) -> bool {
+        self.members_of_test(choices).is_none_or(|these| is_among(member, these))
+    }
+
+    /// The members of its group on which it acts with these choices of a test; `None` for all topics of a group, or for
+    /// what is no group. A choice that its parameter does not permit is of none.
+    pub fn members_of_test(&self, choices: &[Choice]) -> Option<&[u32]> {
+        let permitted = match self.members.as_ref()? {
+            MembersOf::These(these) => return Some(these),
+            MembersOf::Chosen(permitted) => permitted,
+        };
+        let chosen = || {
+            let texts = self.parameters.last()?.domain.items()?;
+            let Some(Choice::Text { text }) = choices.get(self.parameters.len() - 1) else { return None };
+            permitted.get(texts.iter().position(|item| item == text)?)
+        };
+        Some(chosen().map_or(&[], Vec::as_slice))
+    }
+
+    /// The nodes on which it acts with these choices of a test, if it acts on nodes.
+    pub fn nodes_of_test(&self, choices: &[Choice]) -> Vec<NodeId> {
+        let Some(NodeId(first)) = self.kind.node() else { return Vec::new() };
+        let members = self.members_of_test(choices).unwrap_or(&[0]);
+        members.iter().map(|member| NodeId(first.saturating_add(*member))).collect()
+    }
+}
+
+fn is_among(member: usize, these: &[u32]) -> bool {
+    these.iter().any(|&one| one as usize == member)
+}
+
+/// Members of a group, by their positions.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MembersOf {
+    /// These: at least one, in ascending order.
+    These(Vec<u32>),
+    /// Those that a test chooses by the last parameter, a text: for each of its texts the members, as with
+    /// [`MembersOf::These`].
+    Chosen(Vec<Vec<u32>>),
 }
 
 fn timed() -> bool {

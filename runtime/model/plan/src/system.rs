@@ -71,6 +71,9 @@ pub struct Topic {
     pub doc: String,
     /// Names on the wire, matched exactly: one, or the written-out members of a group.
     pub paths: Vec<String>,
+    /// What people call the members of a group, in the order of the paths; none for a single topic.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub members: Vec<String>,
     /// What it carries.
     #[serde(rename = "type")]
     pub ty: Type,
@@ -81,6 +84,18 @@ pub struct Topic {
     /// Whether it is a topic of the middleware, or one direction of a service.
     #[serde(default, skip_serializing_if = "Channel::is_default")]
     pub channel: Channel,
+}
+
+impl Topic {
+    /// A member of a group as a `.sesame` file has it between brackets: its name, as a text where that is no word and no
+    /// number; its position in a plan without names.
+    pub fn member_in_words(&self, member: u32) -> String {
+        let Some(name) = self.members.get(member as usize) else { return member.to_string() };
+        let plain = name.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
+        let is_name = plain && !name.starts_with(|first: char| first.is_ascii_digit());
+        let is_number = name.bytes().all(|byte| byte.is_ascii_digit());
+        if is_name || is_number { name.clone() } else { format!("{name:?}") }
+    }
 }
 
 /// What carries the messages of a topic.
@@ -106,14 +121,14 @@ impl Channel {
 /// A node: a program that publishes and subscribes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Node {
-    /// Its name in the space.
+    /// Its name in the space; that of a member of a group of nodes has the member behind it: `vehicle[r1]`.
     pub name: String,
     /// Its doc comment.
     pub doc: String,
-    /// Topics it publishes.
-    pub publishes: Vec<TopicId>,
-    /// Topics it subscribes to.
-    pub subscribes: Vec<TopicId>,
+    /// Topics it publishes: none twice.
+    pub publishes: Vec<TopicMembers>,
+    /// Topics it subscribes to: none twice.
+    pub subscribes: Vec<TopicMembers>,
     /// Its name in the middleware where that differs from its name in the space.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub named: Option<String>,
@@ -123,9 +138,80 @@ pub struct Node {
     /// What it publishes in answer to what it receives, so that a lock-stepped run knows what to wait for.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub answers: Vec<Answer>,
-    /// The topics on which it publishes one message in every step, on each of their paths, for the same reason.
+    /// The topics on which it publishes one message in every step, on each of the paths that it publishes, for the same
+    /// reason.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub every_step: Vec<TopicId>,
+}
+
+impl Node {
+    /// Whether it publishes a topic, or any member of a group.
+    pub fn publishes(&self, topic: TopicId) -> bool {
+        self.publishes.iter().any(|published| published.topic() == topic)
+    }
+
+    /// Whether it publishes on this path of a topic, by its position.
+    pub fn publishes_on(&self, topic: TopicId, member: usize) -> bool {
+        self.publishes.iter().any(|published| published.topic() == topic && published.has(member))
+    }
+
+    /// Whether it subscribes to a topic, or to any member of a group.
+    pub fn subscribes(&self, topic: TopicId) -> bool {
+        self.subscribes.iter().any(|subscribed| subscribed.topic() == topic)
+    }
+
+    /// Whether it subscribes to this path of a topic, by its position.
+    pub fn subscribes_to(&self, topic: TopicId, member: usize) -> bool {
+        self.subscribes.iter().any(|subscribed| subscribed.topic() == topic && subscribed.has(member))
+    }
+
+    /// Its name as a part of a path: that of `vehicle[r1]` is `vehicle/r1`.
+    pub fn name_in_paths(&self) -> String {
+        self.name.replace('[', "/").replace(']', "")
+    }
+}
+
+/// A topic, or some members of a group of topics.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum TopicMembers {
+    /// The topic, with all members if it is a group.
+    All(TopicId),
+    /// Some of a group.
+    Only {
+        /// The group.
+        topic: TopicId,
+        /// Their positions among the paths of the group, in ascending order: at least one, and not all.
+        members: Vec<u32>,
+    },
+}
+
+impl TopicMembers {
+    /// The topic.
+    pub fn topic(&self) -> TopicId {
+        match self {
+            TopicMembers::All(topic) | TopicMembers::Only { topic, .. } => *topic,
+        }
+    }
+
+    /// Whether a member, by its position among the paths of the topic, is one of them.
+    pub fn has(&self, member: usize) -> bool {
+        match self {
+            TopicMembers::All(_) => true,
+            TopicMembers::Only { members, .. } => members.iter().any(|&at| at as usize == member),
+        }
+    }
+
+    /// Whether both have a path in common.
+    pub fn meets(&self, other: &TopicMembers) -> bool {
+        let shares = || match (self, other) {
+            (TopicMembers::Only { members, .. }, TopicMembers::Only { members: others, .. }) => {
+                members.iter().any(|member| others.contains(member))
+            }
+            _ => true,
+        };
+        self.topic() == other.topic() && shares()
+    }
 }
 
 /// For each message that a node receives on one topic, it publishes exactly one on another.

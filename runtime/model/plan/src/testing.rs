@@ -12,7 +12,7 @@ use crate::{
     Guarantee, Input, KnownTest, Lab, LabCost, Members, MessageId, MessageType, Metric, MetricId, MetricSource,
     Monitor, MonitorId, Node, Operation, OperationId, OperationKind, Parameter, Remote, Requirement, Ros, Ros1, Ros2,
     Rosbridge, SCHEMA, SafeState, Score, Search, Side, Simlog, SimlogVersion, Simulator, Span, Step, Strategy, Test,
-    TestOperation, Topic, TopicId, Transport, Type, ValueMode, WireNames, Wiring, formula,
+    TestOperation, Topic, TopicId, TopicMembers, Transport, Type, ValueMode, WireNames, Wiring, formula,
 };
 
 /// The smallest valid plan: a simulator, and [a campaign](campaign) that may not use anything.
@@ -124,10 +124,16 @@ pub fn topic(name: &str, paths: &[&str], ty: Type) -> Topic {
         name: name.to_owned(),
         doc: String::new(),
         paths: paths.iter().map(|&path| path.to_owned()).collect(),
+        members: Vec::new(),
         ty,
         interface: None,
         channel: Channel::default(),
     }
+}
+
+/// These topics, each with all members.
+pub fn topics(ids: &[u32]) -> Vec<TopicMembers> {
+    ids.iter().map(|&id| TopicMembers::All(TopicId(id))).collect()
 }
 
 /// A node that neither publishes nor subscribes.
@@ -249,6 +255,7 @@ pub fn operation_with(name: &str, topic: u32, kind: OperationKind, parameters: V
         name: name.to_owned(),
         doc: String::new(),
         topic: kind.acts_on_messages().then_some(TopicId(topic)),
+        members: None,
         from: Vec::new(),
         to: Vec::new(),
         places: Vec::new(),

@@ -19,9 +19,9 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::condition::{Condition, Constraint, Operand};
 use crate::{
-    Activation, Bound, CampaignPlan, Choice, Domain, Failing, FieldRef, KnownTest, KnownTestId, LabTask, MessageId,
-    Messages, Metric, MetricId, MetricSource, Operation, OperationId, OperationKind, RequirementId, SCHEMA, Shrinking,
-    Span, Task, Test, TopicId, Type, Undisturbed, Variations,
+    Activation, Bound, CampaignPlan, Choice, Domain, Failing, FieldRef, KnownTest, KnownTestId, LabTask, MembersOf,
+    MessageId, Messages, Metric, MetricId, MetricSource, Operation, OperationId, OperationKind, RequirementId, SCHEMA,
+    Shrinking, Span, Task, Test, TopicId, Type, Undisturbed, Variations,
 };
 
 use check::{
@@ -178,6 +178,7 @@ impl CampaignPlan {
         at("name", name(&operation.name))?;
         let beside = !operation.kind.acts_on_messages();
         at("kind.node", operation.kind.node().map_or(Ok(()), |id| self.has_node(id)))?;
+        at("members", operation.members.as_ref().map_or(Ok(()), |members| self.sound_members(operation, members)))?;
         at("topic", operation.topic.map_or(Ok(()), |id| self.has_topic(id)))?;
         at(
             "topic",
@@ -203,6 +204,32 @@ impl CampaignPlan {
             Constraint::Variable { metric } => at("metric", self.has_metric(*metric)),
             Constraint::Integer { bounds } => at("bounds", integers(*bounds)),
         })
+    }
+
+    /// That the members on which an operation acts are there, with a text for each choice of them.
+    fn sound_members(&self, operation: &Operation, members: &MembersOf) -> Checked {
+        let count = match (operation.topic, operation.kind.node()) {
+            (Some(topic), _) => {
+                self.has_topic(topic)?;
+                self.topic(topic).paths.len()
+            }
+            (None, Some(first)) => self.nodes.len() - first.index(),
+            (None, None) => 0,
+        };
+        let these = |these: &Vec<u32>| {
+            filled(these)?;
+            require(these.is_sorted_by(|one, other| one < other), || "are not in ascending order".to_owned())?;
+            these.iter().try_for_each(|&member| id("member", member as usize, count))
+        };
+        match members {
+            MembersOf::These(members) => these(members),
+            MembersOf::Chosen(choices) => {
+                let texts = operation.parameters.last().and_then(|parameter| parameter.domain.items());
+                let fits = texts.is_some_and(|texts| texts.len() == choices.len());
+                require(fits, || "are not chosen by the last parameter".to_owned())?;
+                choices.iter().try_for_each(these)
+            }
+        }
     }
 
     fn sound_known_test(&self, known: &KnownTest) -> Checked {

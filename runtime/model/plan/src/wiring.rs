@@ -43,29 +43,39 @@ impl CampaignPlan {
             return remappings;
         }
         for (topic, declared, wiring) in self.cut() {
-            let Some(end) = end(node, id, topic, declared.channel, wiring) else { continue };
-            if end == "undisturbed" && !self.shares_broker(self.broker_of(id), topic) {
-                continue;
+            for (member, path) in declared.paths.iter().enumerate() {
+                let Some(end) = end(node, id, (topic, member), declared.channel, wiring) else { continue };
+                if end == "undisturbed" && !self.shares_broker(self.broker_of(id), topic) {
+                    continue;
+                }
+                let new = Remapping { from: path.clone(), to: format!("{path}/{end}") };
+                if remappings.iter().all(|known| known.from != new.from) {
+                    remappings.push(new);
+                }
             }
-            let ends = declared.paths.iter().map(|path| Remapping { from: path.clone(), to: format!("{path}/{end}") });
-            let new: Vec<Remapping> =
-                ends.filter(|new| remappings.iter().all(|known| known.from != new.from)).collect();
-            remappings.extend(new);
         }
         remappings
     }
 
-    /// The names of the wires that an operation acts on, in their order: those of its topic, or of the ways to the
+    /// The names of the wires that an operation may act on, in their order: those of its topic, or of the ways to the
     /// subscribers that it names.
     pub fn wires_of(&self, operation: &Operation) -> Vec<String> {
         let Some(id) = operation.topic else { return Vec::new() };
-        let paths = self.topic(id).paths.iter();
+        let paths = self.topic(id).paths.iter().enumerate().filter(|(member, _)| operation.may_act_on(*member));
         if operation.to.is_empty() {
-            return paths.cloned().collect();
+            return paths.map(|(_, path)| path.clone()).collect();
         }
-        let distinguished = self.simulator.wiring.get(id.index()).map_or(&[][..], |wiring| &wiring.subscribers);
-        let named = || distinguished.iter().filter(|subscriber| operation.to.contains(subscriber));
-        paths.flat_map(|path| named().map(move |&to| format!("{path}/to/{}", self.node(to).name))).collect()
+        let to_members = |(member, path): (usize, &String)| {
+            let named = self.told_apart(id, member).filter(|subscriber| operation.to.contains(subscriber));
+            named.map(|to| format!("{path}/to/{}", self.node(to).name_in_paths())).collect::<Vec<String>>()
+        };
+        paths.flat_map(to_members).collect()
+    }
+
+    /// The subscribers of one path of a topic that operations tell apart from the others.
+    pub fn told_apart(&self, topic: TopicId, member: usize) -> impl Iterator<Item = NodeId> {
+        let distinguished = self.simulator.wiring.get(topic.index()).map_or(&[][..], |wiring| &wiring.subscribers);
+        distinguished.iter().copied().filter(move |&to| self.node(to).subscribes_to(topic, member))
     }
 
     /// The proxy at which the programs of a node connect, if there is one.
@@ -80,21 +90,21 @@ impl CampaignPlan {
         let node = &self.nodes[id.index()];
         let mut renamed = Renamed::default();
         for (topic, declared, wiring) in self.cut() {
-            let named = |end: &str| {
-                let end = |path: &String| Remapping { from: path.clone(), to: format!("{path}/{end}") };
-                declared.paths.iter().map(end).collect::<Vec<_>>()
-            };
-            if declared.channel != Channel::Topic {
-                renamed.serves.extend(named("undisturbed"));
-                continue;
-            }
-            if wiring.publishers.contains(&id) {
-                renamed.publishes.extend(named(&format!("from/{}", node.name)));
-            } else if wiring.publishers.is_empty() || node.publishes.contains(&topic) {
-                renamed.publishes.extend(named("undisturbed"));
-            }
-            if wiring.subscribers.contains(&id) {
-                renamed.subscribes.extend(named(&format!("to/{}", node.name)));
+            for (member, path) in declared.paths.iter().enumerate() {
+                let named = |end: &str| Remapping { from: path.clone(), to: format!("{path}/{end}") };
+                if declared.channel != Channel::Topic {
+                    renamed.serves.push(named("undisturbed"));
+                    continue;
+                }
+                let publishes = node.publishes_on(topic, member);
+                if publishes && wiring.publishers.contains(&id) {
+                    renamed.publishes.push(named(&format!("from/{}", node.name_in_paths())));
+                } else if publishes || wiring.publishers.is_empty() {
+                    renamed.publishes.push(named("undisturbed"));
+                }
+                if self.told_apart(topic, member).any(|subscriber| subscriber == id) {
+                    renamed.subscribes.push(named(&format!("to/{}", node.name_in_paths())));
+                }
             }
         }
         renamed
@@ -136,19 +146,23 @@ impl CampaignPlan {
             return unclaimed;
         }
         for (topic, declared, _) in self.cut() {
-            let claimed = self.nodes.iter().any(|node| is_source(node, topic, declared.channel))
-                || self.is_published_by_monitor(topic);
-            // The server may be known by the other direction of its service.
-            let served = declared.channel != Channel::Topic
-                && (0..).map(TopicId).zip(&self.topics).any(|(other, topic)| {
-                    topic.channel != Channel::Topic
-                        && topic.paths == declared.paths
-                        && self.nodes.iter().any(|node| is_source(node, other, topic.channel))
-                });
-            if claimed || served || !self.shares_broker(0, topic) {
+            let by_a_node = |topic: TopicId, member: usize, channel: Channel| {
+                self.nodes.iter().any(|node| is_source(node, (topic, member), channel))
+            };
+            if self.is_published_by_monitor(topic) || !self.shares_broker(0, topic) {
                 continue;
             }
-            for path in &declared.paths {
+            for (member, path) in declared.paths.iter().enumerate() {
+                // The server may be known by the other direction of its service.
+                let served = declared.channel != Channel::Topic
+                    && (0..).map(TopicId).zip(&self.topics).any(|(other, topic)| {
+                        topic.channel != Channel::Topic
+                            && topic.paths == declared.paths
+                            && by_a_node(other, member, topic.channel)
+                    });
+                if served || by_a_node(topic, member, declared.channel) {
+                    continue;
+                }
                 let kind = if declared.channel == Channel::Topic { Channel::Topic } else { Channel::Request };
                 let new = (kind, Remapping { from: path.clone(), to: format!("{path}/undisturbed") });
                 if !unclaimed.contains(&new) {
@@ -164,7 +178,7 @@ impl CampaignPlan {
     pub fn needed_in_step(&self, id: TopicId) -> bool {
         let needs = |node: &Node| {
             let answers = node.answers.iter().any(|answer| answer.with == id);
-            answers || !node.answers.is_empty() && node.subscribes.contains(&id)
+            answers || !node.answers.is_empty() && node.subscribes(id)
         };
         self.simulator.stepping().is_some() && self.nodes.iter().any(needs)
     }
@@ -233,36 +247,39 @@ impl Node {
     }
 }
 
+/// A path of a topic, by its position.
+type At = (TopicId, usize);
+
 /// What is written after a name for a node, if the node is remapped.
-fn end(node: &Node, id: NodeId, topic: TopicId, channel: Channel, wiring: &Wiring) -> Option<String> {
-    if is_source(node, topic, channel) {
+fn end(node: &Node, id: NodeId, (topic, member): At, channel: Channel, wiring: &Wiring) -> Option<String> {
+    if is_source(node, (topic, member), channel) {
         let distinguished = channel == Channel::Topic && wiring.publishers.contains(&id);
-        return Some(if distinguished { format!("from/{}", node.name) } else { "undisturbed".to_owned() });
+        return Some(if distinguished { format!("from/{}", node.name_in_paths()) } else { "undisturbed".to_owned() });
     }
     let distinguished = channel == Channel::Topic && wiring.subscribers.contains(&id);
-    (distinguished && node.subscribes.contains(&topic)).then(|| format!("to/{}", node.name))
+    (distinguished && node.subscribes_to(topic, member)).then(|| format!("to/{}", node.name_in_paths()))
 }
 
-/// Whether a node publishes a topic, or is the server of a service.
-fn is_source(node: &Node, topic: TopicId, channel: Channel) -> bool {
+/// Whether a node publishes on a path, or is the server of a service.
+fn is_source(node: &Node, (topic, member): At, channel: Channel) -> bool {
     match channel {
-        Channel::Topic | Channel::Reply => node.publishes.contains(&topic),
-        Channel::Request => node.subscribes.contains(&topic),
+        Channel::Topic | Channel::Reply => node.publishes_on(topic, member),
+        Channel::Request => node.subscribes_to(topic, member),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{self, minimal, topic};
+    use crate::testing::{self, minimal, topic, topics};
     use crate::{Ros, Type};
 
     fn plan() -> CampaignPlan {
         let mut plan = minimal();
         let of = |name, paths: &[&str], channel| Topic { channel, ..topic(name, paths, Type::Bool) };
         let node = |name, publishes: &[u32], subscribes: &[u32]| Node {
-            publishes: publishes.iter().copied().map(TopicId).collect(),
-            subscribes: subscribes.iter().copied().map(TopicId).collect(),
+            publishes: topics(publishes),
+            subscribes: topics(subscribes),
             ..testing::node(name)
         };
         plan.topics = vec![

@@ -29,7 +29,9 @@ mod stale;
 mod stuck_at;
 
 use sesame_base::time::SimTime;
-use sesame_plan::{Activation, Choice, ChoiceKind, Domain, Drain, Operation, OperationKind, TestOperation, ValueMode};
+use sesame_plan::{
+    Activation, Choice, ChoiceKind, Domain, Drain, NodeId, Operation, OperationKind, TestOperation, ValueMode,
+};
 
 use crate::value::{Text, Value};
 
@@ -99,8 +101,8 @@ pub enum Disturbance {
     Duplicate(u32),
     /// Drops all messages.
     Blackhole,
-    /// It acts on a node instead of messages.
-    Resource(Resource),
+    /// It acts on nodes instead of messages.
+    Resources(Vec<Resource>),
     /// Calls the user's code.
     Custom(Custom),
 }
@@ -130,6 +132,9 @@ impl Disturbance {
         let lacks = |name: &str| ChoiceError {
             operation: operation.name.clone(),
             reason: format!("has no parameter `{name}` of the expected kind: run `sesamec generate` again"),
+        };
+        let on_nodes = |resource: &dyn Fn(NodeId) -> Resource| {
+            Disturbance::Resources(operation.nodes_of_test(&test.parameters).into_iter().map(resource).collect())
         };
         let number = |name: &str| match chosen(name) {
             Some(Choice::Value { value }) => Ok(*value),
@@ -191,16 +196,16 @@ impl Disturbance {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` clamps")]
             OperationKind::Duplicate => Disturbance::Duplicate(number("copies")? as u32),
             OperationKind::Blackhole => Disturbance::Blackhole,
-            OperationKind::Set { node, parameter } => Disturbance::Resource(Resource::Set {
-                node: *node,
-                parameter: parameter.clone(),
-                value: number("value")?,
-            }),
-            OperationKind::Pause { node } => Disturbance::Resource(Resource::Pause { node: *node }),
-            OperationKind::Slow { node } => {
-                Disturbance::Resource(Resource::Slow { node: *node, share: number("share")? })
+            OperationKind::Set { parameter, .. } => {
+                let value = number("value")?;
+                on_nodes(&|node| Resource::Set { node, parameter: parameter.clone(), value })
             }
-            OperationKind::Kill { node } => Disturbance::Resource(Resource::Kill { node: *node }),
+            OperationKind::Pause { .. } => on_nodes(&|node| Resource::Pause { node }),
+            OperationKind::Slow { .. } => {
+                let share = number("share")?;
+                on_nodes(&|node| Resource::Slow { node, share })
+            }
+            OperationKind::Kill { .. } => on_nodes(&|node| Resource::Kill { node }),
             OperationKind::Custom { moment } => match Custom::new(operation, *moment, &test.parameters, hooks) {
                 Some(custom) => Disturbance::Custom(custom),
                 None => return refuse("has no hook in this runner: run `sesamec generate` again".to_owned()),
@@ -268,7 +273,7 @@ impl Disturbance {
             Disturbance::Reorder(operation) => operation.apply(at.draws),
             Disturbance::Duplicate(copies) => Action::Duplicated(*copies),
             Disturbance::Blackhole => Action::Dropped,
-            Disturbance::Resource(_) | Disturbance::Custom(_) => Action::Unchanged,
+            Disturbance::Resources(_) | Disturbance::Custom(_) => Action::Unchanged,
         }
     }
 }

@@ -18,6 +18,8 @@ mod growth;
 mod held;
 #[cfg(test)]
 mod list_tests;
+#[cfg(test)]
+mod member_tests;
 mod probe;
 mod region;
 mod robustness;

@@ -105,21 +105,15 @@ impl Listeners {
 
 /// The wires of the topics that evidence reads.
 fn read_by<'a>(evidence: &'a Evidence, wires: &'a WireTable) -> impl Iterator<Item = Wire> + use<'a> {
-    let reads = |topic| evidence.inputs.iter().any(|input| input.field.topic == topic);
-    wires.iter().filter(move |&wire| reads(wires.topic(wire)))
+    let reads = |wire| evidence.inputs.iter().any(|input| input.reads(wires.topic(wire), wires.member(wire)));
+    wires.iter().filter(move |&wire| reads(wire))
 }
 
 impl<'p> Monitors<'p> {
     /// The monitors of the plan of these metrics, at time zero; `None` for a plan without monitors.
     pub(crate) fn new(metrics: &Metrics<'p>, wires: &'p WireTable) -> Option<Self> {
         let (plan, network) = (metrics.plan(), metrics.network()?);
-        let mut counts = vec![0; plan.topics.len()];
-        let members = wires.iter().map(|wire| {
-            let topic = wires.topic(wire);
-            counts[topic.index()] += 1;
-            (topic, counts[topic.index()] - 1)
-        });
-        let members = members.collect();
+        let members = wires.iter().map(|wire| (wires.topic(wire), wires.member(wire))).collect();
         let all = (0..).take(network.evidence_count()).map(|at| network.owner(EvidenceId(at)));
         let evidence = all.map(|(monitor, at)| &plan.monitor(monitor).evidence[at as usize]);
         let state = |evidence: &'p Evidence| EvidenceState::new(evidence, plan, read_by(evidence, wires));

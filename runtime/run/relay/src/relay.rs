@@ -44,7 +44,7 @@ use sesame_plan::condition::{Condition, Operand};
 use sesame_plan::{CampaignPlan, Copies, Drain, MetricId, MetricSource, Moment, NodeId, Side, Test};
 
 use crate::files::SpaceFiles;
-use crate::fuzz::{ChoiceError, Disturbance, KeyedRng, OperationEntry, Order, RunContext};
+use crate::fuzz::{ChoiceError, Disturbance, KeyedRng, OperationEntry, Order, Resource, RunContext};
 use crate::metric::Metrics;
 use crate::monitor::Monitors;
 use crate::value::Value;
@@ -174,9 +174,12 @@ impl<'a> Relay<'a> {
         }
         let mut pipelines = vec![Vec::new(); wires.len_with_links()];
         for &at in &order {
-            let acted_on = wires.acted_on(plan.operation(test.operations[at].operation));
-            for (member, wire) in (0u64..).zip(acted_on) {
-                pipelines[wire.index()].push((at, member));
+            let used = &test.operations[at];
+            let operation = plan.operation(used.operation);
+            for (place, wire) in (0u64..).zip(wires.acted_on(operation)) {
+                if operation.acts_on(wires.member(wire), &used.parameters) {
+                    pipelines[wire.index()].push((at, place));
+                }
             }
         }
         let conditional = (0..operations.len()).filter(|&at| operations[at].activity.is_conditional()).collect();
@@ -444,8 +447,9 @@ impl<'a> Relay<'a> {
 
     /// Tells the transport what an operation on a node does, or that it has ended.
     fn order(&mut self, at: usize, begins: bool) {
-        if let Disturbance::Resource(resource) = &self.operations[at].disturbance {
-            self.orders.push(Order { operation: at, resource: resource.clone(), begins });
+        if let Disturbance::Resources(resources) = &self.operations[at].disturbance {
+            let order = |resource: &Resource| Order { operation: at, resource: resource.clone(), begins };
+            self.orders.extend(resources.iter().map(order));
         }
     }
 

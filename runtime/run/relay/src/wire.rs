@@ -28,9 +28,18 @@ impl Wire {
 /// [`Link`]s.
 #[derive(Debug, Clone)]
 pub struct WireTable {
-    paths: Vec<(String, TopicId)>,
+    paths: Vec<Path>,
     by_path: BTreeMap<String, Wire>,
     links: Vec<Link>,
+}
+
+/// A path of a topic.
+#[derive(Debug, Clone)]
+struct Path {
+    name: String,
+    topic: TopicId,
+    /// Its position among the paths of the topic.
+    member: usize,
 }
 
 /// The way of a wire's messages to one subscriber, where operations tell it apart from the others (`to NODE`). Its
@@ -51,17 +60,19 @@ impl WireTable {
     pub fn new(plan: &CampaignPlan) -> Self {
         let paths: Vec<_> = (0u32..)
             .zip(&plan.topics)
-            .flat_map(|(id, topic)| topic.paths.iter().map(move |path| (path.clone(), TopicId(id))))
+            .flat_map(|(id, topic)| {
+                let path =
+                    move |(member, name): (usize, &String)| Path { name: name.clone(), topic: TopicId(id), member };
+                topic.paths.iter().enumerate().map(path)
+            })
             .collect();
-        let by_path = (0u32..).zip(&paths).map(|(at, (path, _))| (path.clone(), Wire(at))).collect();
+        let by_path = (0u32..).zip(&paths).map(|(at, path)| (path.name.clone(), Wire(at))).collect();
         let mut table = WireTable { paths, by_path, links: Vec::new() };
-        let wiring = &plan.simulator.wiring;
         let mut links = Vec::new();
         for of in table.iter() {
-            let distinguished = wiring.get(table.topic(of).index()).into_iter().flat_map(|wiring| &wiring.subscribers);
-            for &to in distinguished {
+            for to in plan.told_apart(table.topic(of), table.member(of)) {
                 let wire = Wire(u32::try_from(table.len() + links.len()).unwrap_or(u32::MAX));
-                let path = format!("{}/to/{}", table.path(of), plan.node(to).name);
+                let path = format!("{}/to/{}", table.path(of), plan.node(to).name_in_paths());
                 links.push(Link { wire, of, to, path });
             }
         }
@@ -100,20 +111,31 @@ impl WireTable {
 
     /// The name of a wire.
     pub fn path(&self, wire: Wire) -> &str {
-        self.link(wire).map_or_else(|| self.paths[wire.index()].0.as_str(), |link| &link.path)
+        self.link(wire).map_or_else(|| self.paths[wire.index()].name.as_str(), |link| &link.path)
     }
 
     /// The topic a wire belongs to.
     pub fn topic(&self, wire: Wire) -> TopicId {
-        self.paths[self.link(wire).map_or(wire, |link| link.of).index()].1
+        self.of_topic(wire).topic
     }
 
-    /// The wires on whose messages an operation acts: the links to the subscribers that it names, or else the wires of
-    /// its topic.
+    /// The position of a wire's path among those of its topic: which member of a group it is.
+    pub fn member(&self, wire: Wire) -> usize {
+        self.of_topic(wire).member
+    }
+
+    /// The path from which a link branches off, or a wire's own.
+    fn of_topic(&self, wire: Wire) -> &Path {
+        &self.paths[self.link(wire).map_or(wire, |link| link.of).index()]
+    }
+
+    /// The wires on whose messages an operation may act: the links to the subscribers that it names, or else the wires of
+    /// its topic; of a group, those of the members that it may act on.
     pub fn acted_on(&self, operation: &Operation) -> impl Iterator<Item = Wire> {
         let links = self.links.iter().filter(|link| operation.to.contains(&link.to)).map(|link| link.wire);
         let own = self.iter().filter(|_| operation.to.is_empty());
-        own.chain(links).filter(|&wire| operation.topic == Some(self.topic(wire)))
+        let acts = |wire| operation.topic == Some(self.topic(wire)) && operation.may_act_on(self.member(wire));
+        own.chain(links).filter(move |&wire| acts(wire))
     }
 
     /// All wires of topics, in order, without links.

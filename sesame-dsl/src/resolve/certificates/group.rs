@@ -8,6 +8,7 @@ use sesame_monitor::truth::Truth;
 use sesame_plan as plan;
 use sesame_plan::{Gate, MonitorId};
 
+use crate::groups::in_brackets;
 use crate::model::eddi::{Eddi, Evidence};
 use crate::model::{Id as _, Topic, Type};
 use crate::resolve::SystemPart;
@@ -105,7 +106,8 @@ impl<'a> Group<'a> {
     pub(super) fn values(&self, input: &plan::Input) -> Values {
         // What holds of several elements of a list is like what holds of the members of a group.
         let elements = input.list.as_ref().is_some_and(|list| list.reduction != plan::Reduction::First);
-        let group = elements || self.topic(&input.field).is_some_and(|topic| topic.paths.len() > 1);
+        let members = self.topic(&input.field).is_some_and(|topic| topic.paths.len() > 1);
+        let group = elements || members && input.only().is_none();
         let range = match self.value(&input.field) {
             Some(Type::Bool) => Values { least: 0.0, greatest: 1.0, whole: true, ..Values::ANY },
             // A sum of whole numbers may be beyond those that a message can carry.
@@ -121,7 +123,10 @@ impl<'a> Group<'a> {
     /// An input as text, and the unit of its numbers.
     pub(super) fn input_text(&self, input: &plan::Input) -> (String, Option<Unit>) {
         let name = self.topic(&input.field).map_or("", |topic| topic.declaration.name.as_str());
-        let path: Vec<&str> = std::iter::once(name).chain(input.field.path.iter().map(String::as_str)).collect();
+        let only = input.only().and_then(|only| self.topic(&input.field)?.members.get(only as usize));
+        let name = only.map_or_else(|| name.to_owned(), |member| format!("{name}[{}]", in_brackets(member)));
+        let fields = input.field.path.iter().map(String::as_str);
+        let path: Vec<&str> = std::iter::once(name.as_str()).chain(fields).collect();
         let steps = input.list.as_ref().map_or(&[][..], |list| &list.steps);
         let path = format!("`{}{}`", path.join("."), plan::value_path_in_words(steps));
         let reduction = input.list.as_ref().map(|list| list.reduction);

@@ -2,7 +2,7 @@
 
 use sesame_grammar::Rule;
 
-use super::words::{Head, Name, Path, Point, Quantity, Range, Text, UnitName};
+use super::words::{Count, Head, Name, Path, Point, Quantity, Range, Text, UnitName, WithMember};
 use crate::span::Span;
 
 #[derive(Debug)]
@@ -17,8 +17,8 @@ pub(crate) struct OperationBody {
     pub(crate) target: Option<Target>,
     /// What it acts on instead of messages; not together with a target.
     pub(crate) resource: Option<Resource>,
-    pub(crate) from: Option<(Span, Vec<Name>)>,
-    pub(crate) to: Option<(Span, Vec<Name>)>,
+    pub(crate) from: Option<(Span, Vec<WithMember>)>,
+    pub(crate) to: Option<(Span, Vec<WithMember>)>,
     pub(crate) kind: OperationKind,
     /// The first word of the kind.
     pub(crate) kind_word: Span,
@@ -38,6 +38,16 @@ pub(crate) struct Target {
     pub(crate) topic: Name,
     /// At least one.
     pub(crate) places: Vec<Path>,
+    /// How many members of the group a test chooses.
+    pub(crate) chosen: Option<Chosen>,
+    pub(crate) span: Span,
+}
+
+/// How many members of a group a test chooses: `one of`, `1..2 of`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Chosen {
+    pub(crate) least: Count,
+    pub(crate) most: Count,
     pub(crate) span: Span,
 }
 
@@ -45,7 +55,9 @@ pub(crate) struct Target {
 #[derive(Debug)]
 pub(crate) struct Resource {
     pub(crate) parameter: Option<Text>,
-    pub(crate) node: Name,
+    pub(crate) node: WithMember,
+    /// How many members of the group a test chooses.
+    pub(crate) chosen: Option<Chosen>,
     pub(crate) span: Span,
 }
 

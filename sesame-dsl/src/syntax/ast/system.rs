@@ -1,7 +1,7 @@
 //! The system under test: simulator, messages, topics, nodes.
 
 use super::lifecycle::{Command, Launch, RelayBudget};
-use super::words::{Count, Head, Name, Quantity, Text, UnitName};
+use super::words::{Count, Head, Name, Quantity, Text, UnitName, WithMember};
 use crate::span::Span;
 use sesame_plan::{Compression, Dialect, Quality, SimulatorKind};
 
@@ -84,7 +84,7 @@ pub(crate) struct Settings {
 /// An address at which clients of a bridge are one node.
 #[derive(Debug)]
 pub(crate) struct Proxy {
-    pub(crate) node: Name,
+    pub(crate) node: WithMember,
     pub(crate) address: Text,
     /// What clients have to show.
     pub(crate) secrets: Vec<(Span, Secret)>,
@@ -187,10 +187,10 @@ pub(crate) struct Service {
 #[derive(Debug)]
 pub(crate) struct Node {
     pub(crate) head: Head,
-    /// Its name in the middleware.
+    /// Its name in the middleware, or those of a group of nodes.
     pub(crate) named: Option<Text>,
-    pub(crate) publishes: Vec<(Span, Vec<Name>)>,
-    pub(crate) subscribes: Vec<(Span, Vec<Name>)>,
+    pub(crate) publishes: Vec<(Span, Vec<WithMember>)>,
+    pub(crate) subscribes: Vec<(Span, Vec<WithMember>)>,
     pub(crate) launches: Vec<(Span, Launch)>,
     pub(crate) answers: Vec<(Span, Vec<Answer>)>,
     pub(crate) every_step: Vec<(Span, Vec<Name>)>,

@@ -10,6 +10,24 @@ pub(crate) struct Name {
     pub(crate) span: Span,
 }
 
+/// A topic or node, and perhaps which member of a group.
+#[derive(Debug, Clone)]
+pub(crate) struct WithMember {
+    pub(crate) name: Name,
+    pub(crate) member: Option<Member>,
+    /// All of it.
+    pub(crate) span: Span,
+}
+
+/// Which member of a group, in brackets.
+#[derive(Debug, Clone)]
+pub(crate) struct Member {
+    /// Its name; `None` for all of them, which is written `[*]`.
+    pub(crate) name: Option<String>,
+    /// With the brackets.
+    pub(crate) span: Span,
+}
+
 /// The head of a declaration.
 #[derive(Debug, Clone)]
 pub(crate) struct Head {
@@ -59,13 +77,13 @@ pub(crate) struct Count {
 impl Path {
     /// Whether it is a name alone.
     pub(crate) fn is_name(&self) -> bool {
-        self.fields.is_empty() && self.elements.is_empty()
+        self.fields.is_empty() && self.elements.is_empty() && self.member.is_none()
     }
 
     /// What stands behind the dot, if it is two names alone.
     pub(crate) fn part(&self) -> Option<&Name> {
         match (self.fields.as_slice(), self.elements.as_slice()) {
-            ([part], []) => Some(part),
+            ([part], []) if self.member.is_none() => Some(part),
             _ => None,
         }
     }
@@ -133,6 +151,8 @@ pub(crate) struct Path {
     pub(crate) fields: Vec<Name>,
     /// From the first choice of elements on.
     pub(crate) elements: Vec<Step>,
+    /// The member of a group, if its name is in brackets. A number may be one too; then it is the first of `elements`.
+    pub(crate) member: Option<Member>,
     pub(crate) span: Span,
 }
 

@@ -6,8 +6,8 @@ use super::reader::{Pair, Reader, child, children, expect_child, first_of};
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::span::Span;
 use crate::syntax::ast::{
-    Amounts, Contained, Custom, CustomParameter, Distribution, Domain, Drain, Moment, NotFinite, Operation,
-    OperationBody, OperationKind, Path, Point, Range, Resource, Stuck, Target, Text, UnitName,
+    Amounts, Chosen, Contained, Count, Custom, CustomParameter, Distribution, Domain, Drain, Moment, NotFinite,
+    Operation, OperationBody, OperationKind, Path, Point, Range, Resource, Stuck, Target, Text, UnitName,
 };
 
 impl Reader<'_> {
@@ -36,10 +36,11 @@ impl Reader<'_> {
             .map(|clause| (self.keyword_span(&clause), self.contained(&clause)))
             .collect();
         let untimed = children(pair, Rule::untimed).map(|untimed| self.span(&untimed)).collect();
-        let mut nodes = |rule| child(pair, rule).map(|nodes| (self.keyword_span(&nodes), self.names(&nodes)));
+        let mut nodes = |rule| child(pair, rule).map(|nodes| (self.keyword_span(&nodes), self.with_members(&nodes)));
         let from = nodes(Rule::from_nodes);
         let to = nodes(Rule::to_nodes);
-        let target = child(pair, Rule::targets).map(|targets| self.target(&targets));
+        let chosen = child(pair, Rule::chosen).map(|chosen| self.chosen(&chosen));
+        let target = child(pair, Rule::targets).map(|targets| Target { chosen, ..self.target(&targets) });
         let resource = first_of(pair, &[Rule::on_node, Rule::on_parameter]).map(|resource| self.resource(&resource));
         let body = OperationBody {
             target,
@@ -61,15 +62,25 @@ impl Reader<'_> {
     fn resource(&mut self, pair: &Pair<'_>) -> Resource {
         Resource {
             parameter: child(pair, Rule::text).map(|parameter| self.text_of(&parameter)),
-            node: self.name(&expect_child(pair, Rule::name)),
+            node: self.with_member(&expect_child(pair, Rule::with_member)),
+            chosen: child(pair, Rule::chosen).map(|chosen| self.chosen(&chosen)),
             span: self.span(pair),
         }
+    }
+
+    /// How many members of a group a test chooses.
+    fn chosen(&mut self, pair: &Pair<'_>) -> Chosen {
+        let span = self.span(pair);
+        let mut numbers = children(pair, Rule::number).map(|number| self.count(&number));
+        let least = numbers.next().unwrap_or(Count { value: Some(1), span });
+        let most = numbers.next().unwrap_or(least);
+        Chosen { least, most, span }
     }
 
     pub(super) fn target(&mut self, pair: &Pair<'_>) -> Target {
         let places: Vec<Path> = children(pair, Rule::target).map(|place| self.path(&place)).collect();
         let topic = places.first().expect("an operation has a target").topic.clone();
-        Target { topic, places, span: self.span(pair) }
+        Target { topic, places, chosen: None, span: self.span(pair) }
     }
 
     fn operation_kind(&mut self, kind: &Pair<'_>) -> OperationKind {

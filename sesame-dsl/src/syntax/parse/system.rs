@@ -133,7 +133,7 @@ impl Reader<'_> {
 
     fn proxy(&mut self, pair: &Pair<'_>) -> Proxy {
         let mut proxy = Proxy {
-            node: self.name(&expect_child(pair, Rule::name)),
+            node: self.with_member(&expect_child(pair, Rule::with_member)),
             address: self.text_of(&expect_child(pair, Rule::text)),
             secrets: vec![],
             certificates: vec![],
@@ -249,8 +249,8 @@ impl Reader<'_> {
         self.members(pair, |reader, member| {
             let span = reader.keyword_span(&member);
             match member.as_rule() {
-                Rule::publishes => node.publishes.push((span, reader.names(&member))),
-                Rule::subscribes => node.subscribes.push((span, reader.names(&member))),
+                Rule::publishes => node.publishes.push((span, reader.with_members(&member))),
+                Rule::subscribes => node.subscribes.push((span, reader.with_members(&member))),
                 Rule::launch => node.launches.push((span, reader.launch(&member))),
                 Rule::every_step => node.every_step.push((span, reader.names(&member))),
                 Rule::broker => node.brokers.push((span, reader.text_of(&expect_child(&member, Rule::text)))),

@@ -6,7 +6,8 @@ use super::reader::{Pair, Reader, child, children, comparison, expect_child};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::span::Span;
 use crate::syntax::ast::{
-    ComparedWith, Count, Filter, Head, Name, Path, Point, Quantity, Range, Relation, Step, Text, UnitName,
+    ComparedWith, Count, Filter, Head, Member, Name, Path, Point, Quantity, Range, Relation, Step, Text, UnitName,
+    WithMember,
 };
 
 impl Reader<'_> {
@@ -31,6 +32,29 @@ impl Reader<'_> {
     pub(super) fn names(&mut self, pair: &Pair<'_>) -> Vec<Name> {
         let names = expect_child(pair, Rule::names);
         children(&names, Rule::name).map(|name| self.name(&name)).collect()
+    }
+
+    pub(super) fn with_members(&mut self, pair: &Pair<'_>) -> Vec<WithMember> {
+        let listed = expect_child(pair, Rule::with_members);
+        children(&listed, Rule::with_member).map(|one| self.with_member(&one)).collect()
+    }
+
+    pub(super) fn with_member(&mut self, pair: &Pair<'_>) -> WithMember {
+        let member = child(pair, Rule::one_member).map(|member| {
+            let name = match (child(&member, Rule::member_name), child(&member, Rule::number)) {
+                (Some(name), _) => Some(self.member_name(&name)),
+                (None, number) => number.map(|number| number.as_str().to_owned()),
+            };
+            Member { name, span: self.span(&member) }
+        });
+        WithMember { name: self.name(&expect_child(pair, Rule::name)), member, span: self.span(pair) }
+    }
+
+    fn member_name(&mut self, pair: &Pair<'_>) -> String {
+        match child(pair, Rule::text) {
+            Some(text) => self.text_of(&text).text,
+            None => pair.as_str().to_owned(),
+        }
     }
 
     pub(super) fn metric_names(&mut self, pair: &Pair<'_>) -> Vec<Name> {
@@ -77,10 +101,22 @@ impl Reader<'_> {
             topic: self.name(&expect_child(pair, Rule::name)),
             fields: Vec::new(),
             elements: Vec::new(),
+            member: None,
             span: self.span(pair),
         };
         for step in pair.clone().into_inner() {
             match step.as_rule() {
+                Rule::element if child(&step, Rule::member_name).is_some() => {
+                    let name = self.member_name(&expect_child(&step, Rule::member_name));
+                    let member = Member { name: Some(name), span: self.span(&step) };
+                    if let Some(first) = path.member.replace(member) {
+                        let title = "a path is of one member of a group";
+                        let diagnostic = Diagnostic::new(Code::LISTED_TWICE, self.span(&step), title)
+                            .label("another member")
+                            .secondary(first.span, "the first one");
+                        self.report(diagnostic);
+                    }
+                }
                 Rule::field_name if path.elements.is_empty() => path.fields.push(self.field_name(&step)),
                 Rule::field_name => path.elements.push(Step::Field(self.field_name(&step))),
                 Rule::element => path.elements.push(self.element(&step)),

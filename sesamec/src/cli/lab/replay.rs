@@ -6,7 +6,7 @@
 
 use std::collections::BTreeSet;
 
-use sesame_plan::{CampaignPlan, LabShape, NodeId, ShapeForm, ShapePlace, TopicId};
+use sesame_plan::{CampaignPlan, LabShape, NodeId, ShapeForm, ShapePlace, TopicId, TopicMembers};
 use sesame_safety::Vector;
 use sesame_safety::body::{Body, BodyError, Placement, Shape, ShapeError};
 use sesame_safety::contact::{ContactError, Contacts, TOLERANCE, contacts};
@@ -155,9 +155,11 @@ fn meeting(one: &Recorded, other: &Recorded) -> Result<Meeting, ReplayError> {
 /// `None` if the space does not say who publishes them, or one node publishes both.
 pub(super) fn reads_the_other(plan: &CampaignPlan, one: &str, other: &str) -> Option<bool> {
     let publishers = |pose: &str| -> Option<BTreeSet<usize>> {
-        let (topic, _) = topic_of(plan, pose)?;
-        let is_it = |id: &TopicId| std::ptr::eq(plan.topic(*id), topic);
-        let nodes = plan.nodes.iter().enumerate().filter(|(_, node)| node.publishes.iter().any(is_it));
+        let (topic, behind) = topic_of(plan, pose)?;
+        let path = &pose[..pose.len() - behind.len()];
+        let member = topic.paths.iter().position(|of_topic| of_topic == path)?;
+        let id = (0u32..).map(TopicId).find(|id| std::ptr::eq(plan.topic(*id), topic))?;
+        let nodes = plan.nodes.iter().enumerate().filter(|(_, node)| node.publishes_on(id, member));
         let nodes: BTreeSet<usize> = nodes.map(|(at, _)| at).collect();
         (!nodes.is_empty()).then_some(nodes)
     };
@@ -176,7 +178,8 @@ fn heard_by(plan: &CampaignPlan, nodes: &BTreeSet<usize>) -> BTreeSet<usize> {
     while let Some(at) = open.pop() {
         let reads = &plan.node(NodeId(u32::try_from(at).expect("a plan has fewer nodes"))).subscribes;
         for (from, node) in plan.nodes.iter().enumerate() {
-            if node.publishes.iter().any(|topic| reads.contains(topic)) && reached.insert(from) {
+            let is_read = |published: &TopicMembers| reads.iter().any(|read| read.meets(published));
+            if node.publishes.iter().any(is_read) && reached.insert(from) {
                 open.push(from);
             }
         }

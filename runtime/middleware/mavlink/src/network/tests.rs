@@ -3,8 +3,8 @@ use std::cell::RefCell;
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 use sesame_base::time::SimTime;
-use sesame_plan::testing::{field, message, minimal, node, topic};
-use sesame_plan::{MessageId, Node, Proxy as Declared, Simulator, TopicId, Type, Wiring};
+use sesame_plan::testing::{field, message, minimal, node, topic, topics};
+use sesame_plan::{MessageId, Node, Proxy as Declared, Simulator, TopicId, TopicMembers, Type, Wiring};
 use sesame_relay::wire::{WireTable, lines};
 
 use super::*;
@@ -25,7 +25,7 @@ fn plan(station: SocketAddr, paths: &[&str]) -> CampaignPlan {
     let proxy =
         Declared { node: NodeId(0), url: "udp://127.0.0.1:0".to_owned(), token: None, identity: None, public: false };
     let topics: Vec<_> = paths.iter().map(|path| topic(path, &[path], ty.clone())).collect();
-    let all: Vec<TopicId> = (0..).map(TopicId).take(topics.len()).collect();
+    let all: Vec<TopicMembers> = (0..).map(TopicId).map(TopicMembers::All).take(topics.len()).collect();
     CampaignPlan {
         messages: vec![message("Heartbeat", vec![field("custom_mode", Type::Int { unit: None })])],
         nodes: vec![Node { publishes: all.clone(), ..node("drone") }, Node { subscribes: all, ..node("station") }],
@@ -148,8 +148,8 @@ fn a_message_that_the_runner_makes_goes_to_its_subscribers() {
     let mut system = System::of(|station| {
         let mut plan = plan(station, &["255/HEARTBEAT"]);
         let [drone, station] = &mut plan.nodes[..] else { panic!("there are two nodes") };
-        (drone.publishes, drone.subscribes) = (Vec::new(), vec![TopicId(0)]);
-        (station.publishes, station.subscribes) = (vec![TopicId(0)], Vec::new());
+        (drone.publishes, drone.subscribes) = (Vec::new(), topics(&[0]));
+        (station.publishes, station.subscribes) = (topics(&[0]), Vec::new());
         plan
     })
     .unwrap();
@@ -166,7 +166,7 @@ fn a_message_that_the_runner_makes_goes_to_its_subscribers() {
 
 #[test]
 fn nodes_are_distinguished_by_their_proxies() {
-    let all = vec![TopicId(0)];
+    let all = topics(&[0]);
     let mut system = System::of(|station| {
         let mut plan = plan(station, &["HEARTBEAT"]);
         for node in &mut plan.nodes {

@@ -51,8 +51,8 @@ fn sources(bus: &Ros1Bus, node: &Node, wired: &Wired, missing: &mut Vec<String>)
 }
 
 fn sinks(bus: &Ros1Bus, node: &Node, wired: &Wired, missing: &mut Vec<String>) {
-    let topic = wired.line.topic;
-    let subscribers = (0u32..).map(NodeId).zip(&bus.plan.nodes).filter(|(_, node)| node.subscribes.contains(&topic));
+    let (topic, member) = (wired.line.topic, wired.line.member);
+    let subscribers = (0u32..).map(NodeId).zip(&bus.plan.nodes).filter(|(_, node)| node.subscribes_to(topic, member));
     for (sink, &at) in wired.line.sinks.iter().zip(&wired.sinks) {
         let expected: Vec<String> = subscribers
             .clone()

@@ -4,7 +4,7 @@ use sesame_base::time::SimTime;
 use sesame_lifecycle::launch::Part;
 use sesame_plan::testing::{minimal, node, test_of, topic};
 use sesame_plan::{
-    Command, Interface, InterfaceField, Launch, Node, NodeId, Ready, ReadyWhen, Ros1, TopicId, Type, WireType, Wiring,
+    Command, Interface, InterfaceField, Launch, Node, NodeId, Ready, ReadyWhen, Ros1, Type, WireType, Wiring,
 };
 use sesame_relay::metric::MetricTable;
 use sesame_relay::relay::{Exchange as _, Relay};
@@ -22,8 +22,8 @@ fn plan() -> CampaignPlan {
     plan.topics =
         vec![sesame_plan::Topic { interface: Some(string.to_owned()), ..topic("peer", &["/peer"], Type::Bool) }];
     plan.nodes = vec![
-        Node { publishes: vec![TopicId(0)], ..node("publisher") },
-        Node { subscribes: vec![TopicId(0)], ..node("subscriber") },
+        Node { publishes: sesame_plan::testing::topics(&[0]), ..node("publisher") },
+        Node { subscribes: sesame_plan::testing::topics(&[0]), ..node("subscriber") },
     ];
     let data = InterfaceField { name: "data".to_owned(), ty: WireType::String };
     let interfaces = vec![Interface { name: string.to_owned(), fields: vec![data] }];

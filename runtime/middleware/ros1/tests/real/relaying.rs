@@ -4,8 +4,7 @@ use std::time::Instant;
 
 use sesame_plan::testing::{at, evidence_above, field, guarantee, message, monitor, node, operation, test_of, use_of};
 use sesame_plan::{
-    CampaignPlan, Channel, Choice, Clock, Gate, MessageId, Node, NodeId, Operation, OperationKind, Test, TextTest,
-    TopicId, Type,
+    CampaignPlan, Channel, Choice, Clock, Gate, MessageId, Node, NodeId, Operation, OperationKind, Test, TextTest, Type,
 };
 
 use crate::core::{Core, Program};
@@ -428,8 +427,8 @@ fn a_state_reaches_its_subscribers_although_no_publisher_says_of_which_type_it_i
         topic.ty = Type::Message { id: MessageId(0) };
     }
     plan.nodes = vec![
-        Node { publishes: vec![TopicId(0)], ..node("publisher") },
-        Node { subscribes: vec![TopicId(1)], ..node("subscriber") },
+        Node { publishes: sesame_plan::testing::topics(&[0]), ..node("publisher") },
+        Node { subscribes: sesame_plan::testing::topics(&[1]), ..node("subscriber") },
     ];
     let mut third = evidence_above("third", 0, 0.5);
     third.inputs[0].field.path = vec!["data".to_owned()];

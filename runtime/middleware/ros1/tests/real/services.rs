@@ -2,7 +2,7 @@
 
 use sesame_plan::Channel::{Reply, Request};
 use sesame_plan::testing::test_of;
-use sesame_plan::{Node, TopicId, testing};
+use sesame_plan::{Node, testing};
 
 use crate::core::Core;
 use crate::system::{System, plan, remapped, ros};
@@ -19,8 +19,11 @@ fn clients_call_servers_through_the_runner() {
             ("question", "/ask", "std_srvs/srv/Trigger_Request", Request),
         ],
     );
-    plan.nodes =
-        vec![Node { publishes: vec![TopicId(1)], subscribes: vec![TopicId(0), TopicId(2)], ..testing::node("server") }];
+    plan.nodes = vec![Node {
+        publishes: testing::topics(&[1]),
+        subscribes: testing::topics(&[0, 2]),
+        ..testing::node("server")
+    }];
     ros(&mut plan).reset = Some("/reset".to_owned());
     let remapped = remapped(&plan, 0);
     assert_eq!(remapped, ["/switch:=/switch/undisturbed", "/ask:=/ask/undisturbed"]);

@@ -5,8 +5,8 @@ use std::time::Instant;
 use sesame_base::time::SimTime;
 use sesame_plan::testing::{minimal, node, topic};
 use sesame_plan::{
-    CampaignPlan, Channel, Interface, InterfaceField, Node, NodeId, Primitive, Ros, Ros1, Test, TopicId, Transport,
-    Type, WireType, Wiring,
+    CampaignPlan, Channel, Interface, InterfaceField, Node, NodeId, Primitive, Ros, Ros1, Test, Transport, Type,
+    WireType, Wiring,
 };
 use sesame_relay::metric::MetricTable;
 use sesame_relay::relay::{Exchange as _, Finished, Relay};
@@ -79,8 +79,8 @@ pub(crate) fn plan(master: &str, topics: &[(&str, &str, &str, Channel)]) -> Camp
 pub(crate) fn peers(master: &str, interface: &str) -> CampaignPlan {
     let mut plan = plan(master, &[("peer", "/peer", interface, Channel::Topic)]);
     plan.nodes = vec![
-        Node { publishes: vec![TopicId(0)], ..node("publisher") },
-        Node { subscribes: vec![TopicId(0)], ..node("subscriber") },
+        Node { publishes: sesame_plan::testing::topics(&[0]), ..node("publisher") },
+        Node { subscribes: sesame_plan::testing::topics(&[0]), ..node("subscriber") },
     ];
     plan
 }

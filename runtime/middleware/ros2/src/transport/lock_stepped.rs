@@ -224,7 +224,7 @@ impl Session {
 mod tests {
     use std::sync::Arc;
 
-    use sesame_plan::testing::{minimal, node, topic};
+    use sesame_plan::testing::{minimal, node, topic, topics};
     use sesame_plan::{Node, TopicId, Type};
     use sesame_relay::transport::round::Promises;
     use sesame_relay::wire::WireTable;
@@ -236,7 +236,7 @@ mod tests {
     fn a_node_that_publishes_twice_never_ends_a_step_early() {
         let mut plan = minimal();
         plan.topics = vec![topic("states", &["left/states", "right/states"], Type::Bool)];
-        plan.nodes = vec![Node { every_step: vec![TopicId(0)], ..node("arms") }];
+        plan.nodes = vec![Node { every_step: vec![TopicId(0)], publishes: topics(&[0]), ..node("arms") }];
         let wires = WireTable::new(&plan);
         let mut round = Round::default();
         round.owed.extend(Promises::new(&plan, &wires).every_step().iter().copied());

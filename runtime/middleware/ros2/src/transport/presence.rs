@@ -7,8 +7,9 @@ use std::time::{Duration, Instant};
 use rustdds::GUID;
 use sesame_base::gathered::gathered;
 use sesame_lifecycle::launch::LaunchError;
-use sesame_plan::{CampaignPlan, NodeId, TopicId};
+use sesame_plan::{CampaignPlan, NodeId};
 use sesame_relay::transport::TransportError;
+use sesame_relay::wire::Line;
 
 use super::served::Served;
 use super::session::{ClockReader, Connected, Session, Stepper};
@@ -68,7 +69,7 @@ impl Session {
             endpoints.push(DeclaredEndpoint { role, path: path.to_owned(), topic, most });
         };
         for Connected { line, .. } in &self.lines {
-            let declared = declared(plan, line.topic);
+            let declared = declared(plan, line);
             for source in &line.sources {
                 let most = if source.publisher.is_some() { 1 } else { declared };
                 declare(Role::Publishes, &line.path, names::topic(&source.path), Some(most));
@@ -151,8 +152,8 @@ impl Session {
                     missing.push(format!("{who} `{}`", source.path));
                 }
             }
-            let topic = line.topic;
-            let declared = (0u32..).map(NodeId).zip(&plan.nodes).filter(|(_, node)| node.subscribes.contains(&topic));
+            let (topic, member) = (line.topic, line.member);
+            let declared = (0u32..).map(NodeId).zip(&plan.nodes).filter(|(_, node)| node.subscribes_to(topic, member));
             for sink in &line.sinks {
                 let expected: Vec<String> = declared
                     .clone()
@@ -247,7 +248,7 @@ impl Session {
             return crowded;
         }
         for Connected { line, .. } in &self.lines {
-            let declared = declared(plan, line.topic);
+            let declared = declared(plan, line);
             for source in &line.sources {
                 let topic = names::topic(&source.path);
                 let there: Vec<&Endpoint> = publishers.iter().filter(|endpoint| endpoint.topic == topic).collect();
@@ -283,7 +284,7 @@ impl Session {
     }
 }
 
-/// How many nodes publish on a topic, by what the space declares; without nodes one.
-fn declared(plan: &CampaignPlan, topic: TopicId) -> usize {
-    plan.nodes.iter().filter(|node| node.publishes.contains(&topic)).count().max(1)
+/// How many nodes publish on a line, by what the space declares; without nodes one.
+fn declared(plan: &CampaignPlan, line: &Line) -> usize {
+    plan.nodes.iter().filter(|node| node.publishes_on(line.topic, line.member)).count().max(1)
 }

@@ -9,7 +9,7 @@ impl CampaignPlan {
     pub(super) fn sound_formula(&self, formula: &Formula) -> Checked {
         let inputs = formula.inputs.len();
         at("inputs", filled(&formula.inputs))?;
-        each("inputs", &formula.inputs, |input| at("field", self.field(&input.field)))?;
+        each("inputs", &formula.inputs, |input| self.sound_input(input))?;
         at("inputs", self.one_pair(&formula.inputs))?;
         let paired = formula.inputs.iter().any(|input| input.members == Members::First);
         at("per", require(!paired || formula.per.is_none(), || "pairs have no keys".to_owned()))?;
@@ -28,7 +28,7 @@ impl CampaignPlan {
     pub(super) fn sound_robustness(&self, robustness: &Robustness) -> Checked {
         let inputs = robustness.inputs.len();
         at("inputs", filled(&robustness.inputs))?;
-        each("inputs", &robustness.inputs, |input| at("field", self.field(&input.field)))?;
+        each("inputs", &robustness.inputs, |input| self.sound_input(input))?;
         at("inputs", self.one_pair(&robustness.inputs))?;
         let mut groups = robustness.inputs.iter().filter(|input| input.members == Members::Each);
         let members = |input: &Input| self.topic(input.field.topic).paths.len();
@@ -43,23 +43,39 @@ impl CampaignPlan {
     pub(super) fn sound_condition(&self, inputs: &[Input], condition: &crate::formula::Condition) -> Checked {
         at("inputs", filled(inputs))?;
         each("inputs", inputs, |input| {
-            at("field", self.field(&input.field))?;
-            let one = matches!(input.members, Members::Min | Members::Max | Members::Sum);
+            self.sound_input(input)?;
+            let one = matches!(input.members, Members::Min | Members::Max | Members::Sum | Members::Only(_));
             at("members", require(one, || "are not taken together".to_owned()))
         })?;
         at("condition", proposition(condition, inputs.len()))
     }
 
-    /// Inputs that are of a pair are of pairs of one group, and no others are of each member.
+    fn sound_input(&self, input: &Input) -> Checked {
+        at("field", self.field(&input.field))?;
+        let members = self.topic(input.field.topic).paths.len();
+        at("members", input.only().map_or(Ok(()), |only| id("member", only as usize, members)))
+    }
+
+    /// Inputs that are of a pair are of pairs of one group, or of one group and another, and no others are of each
+    /// member.
     fn one_pair(&self, inputs: &[Input]) -> Checked {
-        let of_pair = |input: &&Input| matches!(input.members, Members::First | Members::Second);
-        let Some(first) = inputs.iter().find(of_pair) else { return Ok(()) };
-        let group = first.field.topic;
-        let several = inputs.iter().filter(of_pair).any(|input| input.field.topic != group)
+        let [mut first, mut second] = [Members::First, Members::Second].map(|side| {
+            let of_side = inputs.iter().filter(move |input| input.members == side);
+            of_side.map(|input| input.field.topic)
+        });
+        let (one, other) = match (first.next(), second.next()) {
+            (None, None) => return Ok(()),
+            (one, other) => {
+                let group = one.or(other).expect("there is one of them");
+                (one.unwrap_or(group), other.unwrap_or(group))
+            }
+        };
+        let several = first.any(|topic| topic != one)
+            || second.any(|topic| topic != other)
             || inputs.iter().any(|input| input.members == Members::Each);
         require(!several, || "members of more than one group are to be paired".to_owned())?;
-        let members = self.topic(group).paths.len();
-        require(members >= 2, || format!("there is no pair in a group of {members}"))
+        let members = self.topic(one).paths.len();
+        require(members >= 2 || one != other, || format!("there is no pair in a group of {members}"))
     }
 }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::check::{Checked, at, each, id, name, positive, require};
 use crate::{
     CampaignPlan, Channel, Interface, Launch, Lifecycle, Node, NodeId, ReadyWhen, Ros, Ros2, Simlog, SimlogVersion,
-    Simulator, Transport, WireType, Wiring,
+    Simulator, TopicMembers, Transport, WireType, Wiring,
 };
 
 /// The highest domain of ROS whose ports exist on every system.
@@ -96,8 +96,8 @@ impl CampaignPlan {
 
     pub(super) fn sound_node(&self, node: &Node) -> Checked {
         at("name", name(&node.name))?;
-        each("publishes", &node.publishes, |&id| self.has_topic(id))?;
-        each("subscribes", &node.subscribes, |&id| self.has_topic(id))?;
+        each("publishes", &node.publishes, |published| self.has_members(published))?;
+        each("subscribes", &node.subscribes, |subscribed| self.has_members(subscribed))?;
         at("named", node.named.as_ref().map_or(Ok(()), |named| name(named)))?;
         at("launch", node.launch.as_ref().map_or(Ok(()), |launch| self.sound_launch(launch)))?;
         each("every_step", &node.every_step, |&id| self.has_topic(id))?;
@@ -105,6 +105,15 @@ impl CampaignPlan {
             at("to", self.has_topic(answer.to))?;
             at("with", self.has_topic(answer.with))
         })
+    }
+
+    fn has_members(&self, of: &TopicMembers) -> Checked {
+        let TopicMembers::Only { topic, members } = of else { return self.has_topic(of.topic()) };
+        at("topic", self.has_topic(*topic))?;
+        let count = self.topic(*topic).paths.len();
+        each("members", members, |&member| id("member", member as usize, count))?;
+        let some = (1..count).contains(&members.len()) && members.is_sorted_by(|one, other| one < other);
+        at("members", require(some, || "are not some of a group, in ascending order".to_owned()))
     }
 
     fn sound_launch(&self, launch: &Launch) -> Checked {

@@ -55,19 +55,35 @@ pub(super) struct FormulaState<'p> {
 enum Of {
     /// The values of its inputs.
     Inputs,
-    /// Each of so many members of its groups.
-    Members(usize),
-    /// Each pair of different members of its group.
-    Pairs(Vec<(usize, usize)>),
+    /// Each of these members of its groups.
+    Members(Vec<usize>),
+    /// Each pair of different members of its group, or of each member of one group with each of another.
+    Pairs(Pairs),
+}
+
+/// Pairs of members, each once.
+pub(super) struct Pairs {
+    /// The first and the second member of each.
+    pairs: Vec<(usize, usize)>,
+    /// The group of the second members, if it is another one than that of the first.
+    other: Option<TopicId>,
 }
 
 impl Of {
-    /// How many states there are.
+    /// For how many values it is evaluated.
     fn count(&self) -> usize {
         match self {
             Of::Inputs => 1,
-            Of::Members(count) => *count,
-            Of::Pairs(pairs) => pairs.len(),
+            Of::Members(members) => members.len(),
+            Of::Pairs(of) => of.pairs.len(),
+        }
+    }
+
+    /// How many states there are: that of a member is at its position in the group.
+    fn states(&self) -> usize {
+        match self {
+            Of::Members(members) => members.last().map_or(1, |last| last + 1),
+            Of::Inputs | Of::Pairs(_) => self.count(),
         }
     }
 }
@@ -84,17 +100,20 @@ impl<'p> FormulaState<'p> {
     pub(super) fn new(formula: &'p Formula, plan: &CampaignPlan) -> Self {
         let each = formula.inputs.iter().find(|input| input.members == Members::Each);
         let pairs: Vec<(usize, usize)> = pairs_of(&formula.inputs, plan).collect();
+        let other = groups_of_pairs(&formula.inputs).and_then(|(one, other)| (one != other).then_some(other));
         let of = match each {
-            _ if !pairs.is_empty() => Of::Pairs(pairs),
-            Some(input) => Of::Members(plan.topic(input.field.topic).paths.len()),
+            _ if !pairs.is_empty() => Of::Pairs(Pairs { pairs, other }),
+            Some(input) => Of::Members(each_of(&formula.inputs, input.field.topic, plan)),
             None => Of::Inputs,
         };
         let timed = changes_with_time(formula);
-        let topics = || formula.inputs.iter().map(|input| input.field.topic);
-        let combined =
-            |input: &Input| !matches!(input.members, Members::Each) && plan.topic(input.field.topic).paths.len() > 1;
+        let sources = || formula.inputs.iter().map(|input| (input.field.topic, input.only()));
+        let combined = |input: &Input| {
+            let one = matches!(input.members, Members::Each | Members::Only(_));
+            !one && plan.topic(input.field.topic).paths.len() > 1
+        };
         let several =
-            timed || topics().any(|topic| Some(topic) != topics().next()) || formula.inputs.iter().any(combined);
+            timed || sources().any(|source| Some(source) != sources().next()) || formula.inputs.iter().any(combined);
         // Without these, one state for the values of all members gives the same count, extreme, mean and last value.
         let apart = match of {
             Of::Inputs => false,
@@ -105,7 +124,7 @@ impl<'p> FormulaState<'p> {
             formula,
             several,
             timed,
-            common: Stream::new(HeldInputs::new(&formula.inputs, plan), if apart { of.count() } else { 1 }),
+            common: Stream::new(HeldInputs::new(&formula.inputs, plan), if apart { of.states() } else { 1 }),
             of,
             keys: BTreeMap::new(),
             attendance: several.then(|| Attendance::new(&formula.inputs, plan)),
@@ -120,7 +139,7 @@ impl<'p> FormulaState<'p> {
         if let Some(attendance) = &mut self.attendance {
             attendance.heard(context.now, topic, member);
         }
-        match hear(&self.formula.inputs, topic, value, &mut self.heard) {
+        match hear(&self.formula.inputs, (topic, member), value, &mut self.heard) {
             Ok(true) => {}
             Ok(false) => context.read_not_finite(),
             Err(lacking) => {
@@ -135,8 +154,10 @@ impl<'p> FormulaState<'p> {
             return false;
         }
         let of_members = |input: &Input| matches!(input.members, Members::Each | Members::First | Members::Second);
-        let mut read = self.formula.inputs.iter().filter(|input| input.field.topic == topic);
-        let spoken = Spoken { member: read.clone().any(of_members).then_some(member), all: !read.all(of_members) };
+        let mut read = self.formula.inputs.iter().filter(|input| input.reads(topic, member));
+        let second = matches!(&self.of, Of::Pairs(Pairs { other: Some(other), .. }) if *other == topic);
+        let spoken =
+            Spoken { member: read.clone().any(of_members).then_some((member, second)), all: !read.all(of_members) };
         match &self.formula.per {
             None => {
                 self.common.held.hold(&self.formula.inputs, &self.heard, member);
@@ -337,18 +358,39 @@ fn changes_with_time(formula: &Formula) -> bool {
     reads_time || formula.when.as_ref().is_some_and(Condition::reads_time)
 }
 
-/// The pairs of different members of the group whose pairs a formula is of, each once.
+/// The pairs of different members of the group whose pairs a formula is of, each once; or those of two groups.
 pub(super) fn pairs_of(inputs: &[Input], plan: &CampaignPlan) -> impl Iterator<Item = (usize, usize)> {
-    let group = inputs.iter().find(|input| input.members == Members::First).map(|input| input.field.topic);
-    let count = group.map_or(0, |topic| plan.topic(topic).paths.len());
-    (0..count).flat_map(move |first| (first + 1..count).map(move |second| (first, second)))
+    let groups = groups_of_pairs(inputs);
+    let count = |topic: TopicId| plan.topic(topic).paths.len();
+    let (firsts, seconds) = groups.map_or((0, 0), |(one, other)| (count(one), count(other)));
+    let other = groups.is_some_and(|(one, other)| one != other);
+    let begin = move |first| if other { 0 } else { first + 1 };
+    (0..firsts).flat_map(move |first| (begin(first)..seconds).map(move |second| (first, second)))
+}
+
+/// The groups of the first and the second members of pairs, if a formula is of pairs.
+fn groups_of_pairs(inputs: &[Input]) -> Option<(TopicId, TopicId)> {
+    let group = |side| inputs.iter().find(|input| input.members == side).map(|input| input.field.topic);
+    let (one, other) = (group(Members::First), group(Members::Second));
+    Some((one.or(other)?, other.or(one)?))
+}
+
+/// The members of a group that a formula over each of them is of: all without those that it reads by their names.
+pub(super) fn each_of(inputs: &[Input], group: TopicId, plan: &CampaignPlan) -> Vec<usize> {
+    let each = |input: &&Input| input.members == Members::Each;
+    let paired: Vec<TopicId> = inputs.iter().filter(each).map(|input| input.field.topic).collect();
+    let named = |member: usize| {
+        let is_it = |input: &Input| input.only().is_some_and(|only| only as usize == member);
+        inputs.iter().any(|input| is_it(input) && paired.contains(&input.field.topic))
+    };
+    (0..plan.topic(group).paths.len()).filter(|&member| !named(member)).collect()
 }
 
 /// Whose values a message changed.
 #[derive(Debug, Clone, Copy)]
 struct Spoken {
-    /// The values of this member.
-    member: Option<usize>,
+    /// The values of this member; with whether it is of the second group of pairs of two groups.
+    member: Option<(usize, bool)>,
     /// The values of every member.
     all: bool,
 }
@@ -367,8 +409,9 @@ struct Stream {
     heard: bool,
     /// Whether one of them changed the values of every member.
     others: bool,
-    /// The members from which one came, each once, the latest last.
-    spoke: Vec<usize>,
+    /// The members from which one came, each once, the latest last; with whether they are of the second group of pairs
+    /// of two groups.
+    spoke: Vec<(usize, bool)>,
 }
 
 impl Stream {
@@ -401,23 +444,33 @@ impl Stream {
         }
         match of {
             Of::Inputs => self.step(formula, 0, context),
-            Of::Members(count) => {
+            Of::Members(members) => {
+                let size = members.last().map_or(0, |last| last + 1);
+                let mut silent = vec![false; size];
+                members.iter().for_each(|&member| silent[member] = true);
+                let mut spoke = Vec::with_capacity(self.spoke.len());
+                for &(member, _) in &self.spoke {
+                    if silent.get_mut(member).is_some_and(std::mem::take) {
+                        spoke.push(member);
+                    }
+                }
                 if self.others {
-                    let mut silent = vec![true; *count];
-                    self.spoke.iter().for_each(|&member| silent[member] = false);
-                    for member in (0..*count).filter(|&member| silent[member]) {
+                    for member in (0..size).filter(|&member| silent[member]) {
                         self.step_of_member(formula, member, context);
                     }
                 }
-                for at in 0..self.spoke.len() {
-                    self.step_of_member(formula, self.spoke[at], context);
+                for member in spoke {
+                    self.step_of_member(formula, member, context);
                 }
             }
-            Of::Pairs(pairs) => {
-                // The last pair has the last member.
-                let mut concerned = vec![self.others; pairs.last().map_or(0, |pair| pair.1 + 1)];
-                self.spoke.iter().for_each(|&member| concerned[member] = true);
-                for (at, &pair) in pairs.iter().enumerate().filter(|(_, pair)| concerned[pair.0] || concerned[pair.1]) {
+            Of::Pairs(Pairs { pairs, other }) => {
+                // The last pair has the last members.
+                let (first, second) = pairs.last().map_or((0, 0), |pair| (pair.0 + 1, pair.1 + 1));
+                let mut concerned = [vec![self.others; first.max(second)], vec![self.others; second]];
+                self.spoke.iter().for_each(|&(member, of_second)| concerned[usize::from(of_second)][member] = true);
+                let second = usize::from(other.is_some());
+                let concerns = |pair: &(usize, usize)| concerned[0][pair.0] || concerned[second][pair.1];
+                for (at, &pair) in pairs.iter().enumerate().filter(|(_, pair)| concerns(pair)) {
                     if self.held.turn_to_pair(&formula.inputs, pair) {
                         self.step(formula, at, context);
                     }
@@ -460,8 +513,8 @@ impl Stream {
         let mut held = self.held.clone();
         let known = match of {
             Of::Inputs => true,
-            Of::Members(_) => held.turn_to(&formula.inputs, at),
-            Of::Pairs(pairs) => held.turn_to_pair(&formula.inputs, pairs[at]),
+            Of::Members(members) => held.turn_to(&formula.inputs, members[at]),
+            Of::Pairs(Pairs { pairs, .. }) => held.turn_to_pair(&formula.inputs, pairs[at]),
         };
         let values = |held: &HeldInputs| held.values().map(<[Held]>::to_vec);
         if !known {

@@ -3,13 +3,16 @@
 //! If a run breaks off, its last instant may be incomplete: what was still to come in it is not known. It counts if
 //! each wire that was heard at every earlier instant was heard in it too.
 
+use std::collections::BTreeMap;
+
 use sesame_base::time::SimTime;
 use sesame_plan::{CampaignPlan, Input, TopicId};
 
 /// The instants of one formula.
 pub(super) struct Attendance {
-    /// Per topic of the inputs and per member: the number of instants in which it was heard, and the last of them.
-    topics: Vec<(TopicId, Vec<(u64, SimTime)>)>,
+    /// Per topic of the inputs and per member that they read: the number of instants in which it was heard, and the last
+    /// of them.
+    topics: Vec<(TopicId, BTreeMap<usize, (u64, SimTime)>)>,
     /// The number of instants at which anything was heard, and the last of them.
     instants: (u64, SimTime),
 }
@@ -17,10 +20,12 @@ pub(super) struct Attendance {
 impl Attendance {
     /// Before the first message.
     pub(super) fn new(inputs: &[Input], plan: &CampaignPlan) -> Self {
-        let mut topics: Vec<(TopicId, Vec<(u64, SimTime)>)> = Vec::new();
+        let mut topics: Vec<(TopicId, BTreeMap<usize, (u64, SimTime)>)> = Vec::new();
         for topic in inputs.iter().map(|input| input.field.topic) {
             if topics.iter().all(|(known, _)| *known != topic) {
-                topics.push((topic, vec![(0, SimTime::ZERO); plan.topic(topic).paths.len()]));
+                let is_read = |member: &usize| inputs.iter().any(|input| input.reads(topic, *member));
+                let members = (0..plan.topic(topic).paths.len()).filter(is_read);
+                topics.push((topic, members.map(|member| (member, (0, SimTime::ZERO))).collect()));
             }
         }
         Attendance { topics, instants: (0, SimTime::ZERO) }
@@ -35,7 +40,7 @@ impl Attendance {
         };
         count(&mut self.instants);
         let members = self.topics.iter_mut().find(|(known, _)| *known == topic).map(|(_, members)| members);
-        if let Some(wire) = members.and_then(|members| members.get_mut(member)) {
+        if let Some(wire) = members.and_then(|members| members.get_mut(&member)) {
             count(wire);
         }
     }
@@ -48,7 +53,7 @@ impl Attendance {
     /// Whether the last instant is complete, as far as can be told.
     pub(super) fn is_complete(&self) -> bool {
         let (instants, now) = self.instants;
-        let wires = self.topics.iter().flat_map(|(_, members)| members);
+        let wires = self.topics.iter().flat_map(|(_, members)| members.values());
         instants > 0 && wires.copied().all(|(heard, last)| (heard > 0 && last == now) || heard + 1 < instants)
     }
 }

@@ -7,10 +7,7 @@ use sesame_base::time::SimTime;
 use sesame_base::verdict::{breaks, ends};
 use sesame_monitor::{Invalid, Network};
 use sesame_plan::condition::Operand;
-use sesame_plan::stl::Robustness;
-use sesame_plan::{
-    Bound, CampaignPlan, Formula, Members, MetricId, MetricSource, RequirementId, Side, Span, TopicId, Trend,
-};
+use sesame_plan::{Bound, CampaignPlan, Members, MetricId, MetricSource, RequirementId, Side, Span, TopicId, Trend};
 
 use crate::metric::aggregate::FormulaState;
 use crate::metric::robustness::RobustnessState;
@@ -69,15 +66,7 @@ impl<'p> MetricTable<'p> {
         let mut taps = vec![Vec::new(); wires.len()];
         let mut delivered = vec![Vec::new(); wires.len()];
         for (at, metric) in plan.metrics.iter().enumerate() {
-            let topics: Vec<TopicId> = match &metric.source {
-                MetricSource::Hook { topics } => topics.clone(),
-                MetricSource::FuzzingTime | MetricSource::Monitor { .. } => Vec::new(),
-                MetricSource::Last { input } => vec![input.topic],
-                MetricSource::Robustness { robustness: Robustness { inputs, .. } }
-                | MetricSource::Formula { formula: Formula { inputs, .. } } => {
-                    inputs.iter().map(|input| input.field.topic).collect()
-                }
-            };
+            let sources = metric.source.sources();
             let outbound = match &metric.source {
                 MetricSource::Robustness { robustness } => robustness.side == Side::Outbound,
                 MetricSource::Formula { formula } => formula.side == Side::Outbound,
@@ -95,7 +84,10 @@ impl<'p> MetricTable<'p> {
                 RobustnessState::new(robustness, plan, false).map_err(refused)?;
             }
             for wire in wires.iter() {
-                let input = topics.iter().position(|&topic| topic == wires.topic(wire));
+                let is_it = |only: u32| only as usize == wires.member(wire);
+                let reads =
+                    |&(topic, only): &(TopicId, Option<u32>)| topic == wires.topic(wire) && only.is_none_or(is_it);
+                let input = sources.iter().position(reads);
                 if outbound {
                     delivered[wire.index()].extend(input.map(|_| at));
                     continue;
@@ -110,13 +102,7 @@ impl<'p> MetricTable<'p> {
                 _ => None,
             });
         }
-        let mut members = vec![0; plan.topics.len()];
-        let wires = wires.iter().map(|wire| {
-            let topic = wires.topic(wire);
-            let member = members[topic.index()];
-            members[topic.index()] += 1;
-            (Text::from(wires.path(wire)), topic, member)
-        });
+        let wires = wires.iter().map(|wire| (Text::from(wires.path(wire)), wires.topic(wire), wires.member(wire)));
         let network = (!plan.monitors.is_empty()).then(|| Network::new(&plan.monitors));
         let network = network.transpose().map_err(MetricError::Monitors)?.map(Arc::new);
         Ok(MetricTable { plan, hooks: found, taps, delivered, wires: wires.collect(), network, step: step_of(plan) })

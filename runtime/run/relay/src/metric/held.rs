@@ -40,14 +40,19 @@ impl HeardValues {
     }
 }
 
-/// Reads the values of the inputs that a message on a topic has, and returns whether all of them are finite. The error
-/// is a missing field.
-pub(crate) fn hear(inputs: &[Input], topic: TopicId, value: &Value, heard: &mut HeardValues) -> Result<bool, String> {
+/// Reads the values of the inputs that a message on the `member`th path of a topic has, and returns whether all of them
+/// are finite. The error is a missing field.
+pub(crate) fn hear(
+    inputs: &[Input],
+    (topic, member): (TopicId, usize),
+    value: &Value,
+    heard: &mut HeardValues,
+) -> Result<bool, String> {
     heard.values.clear();
     heard.lists.clear();
     heard.several = None;
     let mut all_finite = true;
-    for (at, input) in inputs.iter().enumerate().filter(|(_, input)| input.field.topic == topic) {
+    for (at, input) in inputs.iter().enumerate().filter(|(_, input)| input.reads(topic, member)) {
         let path = &input.field.path;
         let held = match (&input.list, value.at(path)) {
             (Some(list), Some(found)) => match in_list(list, input, value, found, at, heard) {
@@ -156,6 +161,11 @@ fn truth(holds: bool) -> Held {
     [f64::from(u8::from(holds)), 0.0, 0.0]
 }
 
+/// Of how many members an input holds the last value.
+fn members_of(input: &Input, plan: &CampaignPlan) -> usize {
+    if input.only().is_some() { 1 } else { plan.topic(input.field.topic).paths.len() }
+}
+
 /// The last values of the inputs of a formula.
 #[derive(Debug, Clone)]
 pub(crate) struct HeldInputs {
@@ -173,7 +183,7 @@ impl HeldInputs {
     /// Before the first message.
     pub(crate) fn new(inputs: &[Input], plan: &CampaignPlan) -> Self {
         HeldInputs {
-            members: inputs.iter().map(|input| vec![None; plan.topic(input.field.topic).paths.len()]).collect(),
+            members: inputs.iter().map(|input| vec![None; members_of(input, plan)]).collect(),
             inputs: vec![[0.0; 3]; inputs.len()],
             known: vec![false; inputs.len()],
             lists: (0..inputs.len()).filter(|&at| is_each(&inputs[at])).map(|at| (at, Vec::new())).collect(),
@@ -227,7 +237,7 @@ impl HeldInputs {
                 *last = Some(value);
             }
             let join: fn(f64, f64) -> f64 = match inputs[at].members {
-                Members::Each | Members::First | Members::Second => {
+                Members::Each | Members::First | Members::Second | Members::Only(_) => {
                     self.inputs[at] = value;
                     continue;
                 }

@@ -10,7 +10,7 @@ use sesame_plan::stl::Robustness;
 use sesame_plan::{Bound, CampaignPlan, Expression, Members, TopicId};
 
 use crate::metric::Context;
-use crate::metric::aggregate::pairs_of;
+use crate::metric::aggregate::{each_of, pairs_of};
 use crate::metric::attendance::Attendance;
 use crate::metric::expression::{Moment, least, number};
 use crate::metric::held::{HeardValues, HeldInputs, hear};
@@ -145,8 +145,8 @@ impl<'p> RobustnessState<'p> {
         };
         let mut instances: Vec<Instance> = pairs_of(&robustness.inputs, plan).map(instance).collect();
         if instances.is_empty() {
-            let count = each.map_or(1, |topic| plan.topic(topic).paths.len());
-            instances = (0..count).map(|member| instance((member, member))).collect();
+            let members = each.map_or(vec![0], |topic| each_of(&robustness.inputs, topic, plan));
+            instances = members.into_iter().map(|member| instance((member, member))).collect();
         }
         let attendance = Attendance::new(&robustness.inputs, plan);
         Ok(RobustnessState {
@@ -165,7 +165,7 @@ impl<'p> RobustnessState<'p> {
     pub(super) fn message(&mut self, topic: TopicId, member: usize, value: &Value, context: &mut Context) {
         let Robustness { inputs, signals, .. } = self.robustness;
         self.attendance.heard(context.now, topic, member);
-        match hear(inputs, topic, value, &mut self.heard) {
+        match hear(inputs, (topic, member), value, &mut self.heard) {
             Ok(true) => {}
             Ok(false) => context.read_not_finite(),
             Err(lacking) => {
@@ -187,7 +187,7 @@ impl<'p> RobustnessState<'p> {
             let mut concerned = false;
             for &(input, value) in self.heard.values() {
                 let own = match inputs[input].members {
-                    Members::Min | Members::Max | Members::Sum => true,
+                    Members::Min | Members::Max | Members::Sum | Members::Only(_) => true,
                     Members::Each | Members::First => member == of.0,
                     Members::Second => member == of.1,
                 };

@@ -36,7 +36,7 @@ impl<'p> EvidenceState<'p> {
         now: SimTime,
         value: &Value,
     ) -> Result<Came, String> {
-        hear(&self.evidence.inputs, topic, value, &mut self.heard)?;
+        hear(&self.evidence.inputs, (topic, member), value, &mut self.heard)?;
         if self.heard.is_nothing() {
             return Ok(Came::Nothing);
         }

@@ -57,19 +57,13 @@ pub struct Heard {
 impl<'p> RecordedMonitors<'p> {
     /// Before the first message. The network is that of the plan's monitors.
     pub(crate) fn new(plan: &'p CampaignPlan, wires: &'p WireTable, network: Arc<Network>) -> Self {
-        let mut counts = vec![0; plan.topics.len()];
-        let members = wires.iter().map(|wire| {
-            let count = &mut counts[wires.topic(wire).index()];
-            *count += 1;
-            *count - 1
-        });
-        let members = members.collect();
+        let members = wires.iter().map(|wire| wires.member(wire)).collect();
         let (mut streams, mut of_wire) = (Vec::<Stream>::new(), vec![[None; 2]; wires.len()]);
         let mut read = vec![Vec::new(); network.evidence_count()];
         for wire in wires.iter() {
             for id in (0..).map(EvidenceId).take(network.evidence_count()) {
                 let evidence = evidence_of(plan, &network, id);
-                if !evidence.inputs.iter().any(|input| input.field.topic == wires.topic(wire)) {
+                if !evidence.inputs.iter().any(|input| input.reads(wires.topic(wire), wires.member(wire))) {
                     continue;
                 }
                 let stream = *of_wire[wire.index()][place(evidence.side)].get_or_insert_with(|| {
@@ -99,10 +93,10 @@ impl<'p> RecordedMonitors<'p> {
     pub(crate) fn add(&mut self, at: SimTime, side: Side, wire: Wire, index: u64, value: &Value) {
         let Some(stream) = self.of_wire[wire.index()][place(side)] else { return };
         let mut content: Vec<Content> = Vec::new();
-        let topic = self.wires.topic(wire);
+        let of = (self.wires.topic(wire), self.wires.member(wire));
         for id in self.streams[stream as usize].evidence.clone() {
             let mut heard = HeardValues::default();
-            match hear(&evidence_of(self.plan, &self.network, id).inputs, topic, value, &mut heard) {
+            match hear(&evidence_of(self.plan, &self.network, id).inputs, of, value, &mut heard) {
                 Ok(_) if heard.is_nothing() => {}
                 Ok(_) => content.push((id, heard)),
                 Err(lacking) => self.note(id, wire, &lacking),

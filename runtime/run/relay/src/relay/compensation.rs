@@ -52,7 +52,7 @@ impl Relay<'_> {
         };
         let concerned = |topic: TopicId| match what.topic() {
             Some(only) => topic == only,
-            None => plan.nodes.iter().any(|node| node.subscribes.contains(&topic)),
+            None => plan.nodes.iter().any(|node| node.subscribes(topic)),
         };
         // Longer than any run, so that it never ends within one.
         let always = Span { start: 0.0, end: plan.campaign.end_after + 1.0 };
@@ -106,7 +106,7 @@ fn drawn(levels: &[f64], seed: u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use sesame_plan::testing::{node, operation, plan, test_of, use_of};
-    use sesame_plan::{Adjustment, Choice, Node, OperationKind};
+    use sesame_plan::{Adjustment, Choice, Node, OperationKind, TopicMembers};
 
     use super::*;
     use crate::metric::MetricTable;
@@ -129,7 +129,7 @@ mod tests {
     /// A plan with a node that receives commands.
     fn model() -> CampaignPlan {
         let mut plan = plan(vec![operation(0, OperationKind::Bias)]);
-        plan.nodes = vec![Node { subscribes: vec![COMMAND], ..node("drive") }];
+        plan.nodes = vec![Node { subscribes: vec![TopicMembers::All(COMMAND)], ..node("drive") }];
         plan
     }
 

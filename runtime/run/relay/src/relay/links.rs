@@ -2,8 +2,8 @@
 
 use sesame_base::observation::Counters;
 use sesame_base::time::SimTime;
-use sesame_plan::testing::{latency, node, operation, plan, ros2, test_of, use_of};
-use sesame_plan::{CampaignPlan, Choice, Distribution, Drain, NodeId, Operation, OperationKind, Test, Wiring};
+use sesame_plan::testing::{latency, node, operation, plan, ros2, test_of, topics, use_of};
+use sesame_plan::{CampaignPlan, Choice, Distribution, Drain, Node, NodeId, Operation, OperationKind, Test, Wiring};
 
 use crate::metric::MetricTable;
 use crate::relay::{Exchange, Finished, Relay};
@@ -17,7 +17,7 @@ const RIGHT: NodeId = NodeId(1);
 /// A plan of these operations in which the nodes `left` and `right` are told apart as subscribers of the commands.
 fn plan_of(operations: Vec<Operation>) -> CampaignPlan {
     let mut plan = plan(operations);
-    plan.nodes = vec![node("left"), node("right")];
+    plan.nodes = ["left", "right"].map(|name| Node { subscribes: topics(&[0]), ..node(name) }).to_vec();
     let mut wiring = vec![Wiring::default(); plan.topics.len()];
     wiring[0] = Wiring { cut: true, publishers: vec![LEFT], subscribers: vec![LEFT, RIGHT], joined: false };
     plan.simulator = ros2(0, wiring);

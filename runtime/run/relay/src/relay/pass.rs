@@ -27,7 +27,7 @@ impl Relay<'_> {
         let index = self.published[wire.index()];
         self.published[wire.index()] += 1;
         if self.traffic.is_awaited(wire) {
-            self.traffic.meets(now, self.wires, wire, publisher);
+            self.traffic.meets(now, wire, publisher);
         }
         if !by_monitor {
             self.traffic.heard(now, wire);

@@ -2,7 +2,7 @@
 
 use sesame_base::observation::{Traffic, Unreached};
 use sesame_base::time::SimTime;
-use sesame_plan::{CampaignPlan, NodeId, OperationId, Span, Test, TopicId};
+use sesame_plan::{CampaignPlan, NodeId, OperationId, Span, Test};
 
 use crate::wire::{Wire, WireTable};
 
@@ -38,7 +38,8 @@ struct Sample {
 /// What an operation would have met.
 struct Reached {
     operation: OperationId,
-    topic: TopicId,
+    /// Whether it may act on a wire.
+    wires: Vec<bool>,
     from: Vec<NodeId>,
     within: (SimTime, SimTime),
     /// The message that is nearest to `within`, and how far away it is.
@@ -50,16 +51,19 @@ impl Recorder {
         let operations = (0..).map(OperationId).zip(&plan.operations).filter(|_| test.operations.is_empty());
         let unreached = operations.filter_map(|(id, operation)| {
             let Span { start, end } = operation.within;
-            Some(Reached {
+            let mut reached = vec![false; wires.len()];
+            let member = |wire| operation.topic == Some(wires.topic(wire)) && operation.may_act_on(wires.member(wire));
+            wires.iter().for_each(|wire| reached[wire.index()] = member(wire));
+            operation.topic.map(|_| Reached {
                 operation: id,
-                topic: operation.topic?,
+                wires: reached,
                 from: operation.from.clone(),
                 within: (SimTime::from_seconds(start), SimTime::from_seconds(end)),
                 nearest: None,
             })
         });
         let unreached: Vec<Reached> = unreached.collect();
-        let waits = |wire: Wire| unreached.iter().any(|reached| reached.topic == wires.topic(wire));
+        let waits = |wire: Wire| unreached.iter().any(|reached| reached.wires[wire.index()]);
         Recorder { wires: wires.iter().map(|_| None).collect(), awaited: wires.iter().map(waits).collect(), unreached }
     }
 
@@ -71,10 +75,10 @@ impl Recorder {
 
     /// A message was published on a wire, by a node or by a monitor of the runner: operations act on both.
     #[inline(never)]
-    pub(super) fn meets(&mut self, now: SimTime, wires: &WireTable, wire: Wire, publisher: Option<NodeId>) {
-        let topic = wires.topic(wire);
-        self.unreached.retain_mut(|reached| reached.topic != topic || !reached.is_met(now, publisher));
-        self.awaited[wire.index()] = self.unreached.iter().any(|reached| reached.topic == topic);
+    pub(super) fn meets(&mut self, now: SimTime, wire: Wire, publisher: Option<NodeId>) {
+        let at = wire.index();
+        self.unreached.retain_mut(|reached| !reached.wires[at] || !reached.is_met(now, publisher));
+        self.awaited[at] = self.unreached.iter().any(|reached| reached.wires[at]);
     }
 
     /// The system said something. What monitors of the runner publish is no sign of life.
@@ -194,8 +198,8 @@ impl Sample {
 mod tests {
     use proptest::prelude::*;
 
-    use sesame_plan::OperationKind;
     use sesame_plan::testing::{operation, plan};
+    use sesame_plan::{OperationKind, TopicId};
 
     use super::*;
 
@@ -241,7 +245,7 @@ mod tests {
             let mut times = times;
             times.sort_unstable();
             for &time in &times {
-                recorder.meets(at(time), &wires, wire, None);
+                recorder.meets(at(time), wire, None);
             }
             let inside = times.iter().any(|time| (start..start + length).contains(time));
             let unreached = recorder.unreached();
@@ -271,10 +275,10 @@ mod tests {
         let wires = WireTable::new(&plan);
         let mut recorder = Recorder::new(&plan, &wires, &Test::default());
         let wire = wires.iter().find(|&wire| wires.topic(wire) == TopicId(0)).unwrap();
-        recorder.meets(at(5), &wires, wire, Some(NodeId(0)));
-        recorder.meets(at(5), &wires, wire, None);
+        recorder.meets(at(5), wire, Some(NodeId(0)));
+        recorder.meets(at(5), wire, None);
         assert_eq!(recorder.unreached().len(), 1);
-        recorder.meets(at(6), &wires, wire, Some(NodeId(1)));
+        recorder.meets(at(6), wire, Some(NodeId(1)));
         assert_eq!(recorder.unreached(), []);
     }
 }

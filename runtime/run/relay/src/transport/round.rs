@@ -4,16 +4,17 @@
 //! step have come. Nodes say it: what they publish `every step`, and what they publish in answer to what (`answers`).
 //! From that follows how many messages are owed on each wire, and a step is over when none is.
 //!
-//! - In each step, a node owes one message on each wire of a topic that it publishes `every step`.
+//! - In each step, a node owes one message on each wire that it publishes on of a topic that it publishes `every step`.
 //! - For each message that is delivered to a node which answers its topic, the node owes one: if both topics are groups
-//!   of the same size, the member at the same place answers, otherwise all members of the answering topic do.
+//!   of the same size, the member at the same place answers, otherwise all members of the answering topic that the node
+//!   publishes do.
 //! - A message pays for one that is owed on its own wire when it comes. If none is owed there, it pays for nothing,
 //!   neither on another wire nor later. So a node that publishes twice never ends a step in which a message of another
 //!   one is missing.
 
 use std::collections::btree_map::{BTreeMap, Entry};
 
-use sesame_plan::{CampaignPlan, NodeId, TopicId};
+use sesame_plan::{CampaignPlan, Node, NodeId, TopicId};
 
 use crate::wire::{Wire, WireTable};
 
@@ -31,17 +32,26 @@ pub struct Promises {
 impl Promises {
     /// The promises of a plan's nodes, over the wires of its topics.
     pub fn new(plan: &CampaignPlan, wires: &WireTable) -> Self {
-        let published = || plan.nodes.iter().flat_map(|node| &node.every_step).copied();
-        let answers = || plan.nodes.iter().flat_map(|node| &node.answers);
-        let topics = || wires.iter().map(|wire| wires.topic(wire));
+        let each_step = |node: &Node| node.every_step.iter().flat_map(|&topic| published(wires, node, topic)).collect();
+        let every_step: Vec<Wire> = plan.nodes.iter().flat_map(|node| -> Vec<Wire> { each_step(node) }).collect();
+        let answered = |wire: Wire| {
+            let (topic, member) = (wires.topic(wire), wires.member(wire));
+            plan.nodes
+                .iter()
+                .any(|node| node.subscribes_to(topic, member) && node.answers.iter().any(|answer| answer.to == topic))
+        };
+        let answers_on = |wire: Wire| {
+            let (topic, member) = (wires.topic(wire), wires.member(wire));
+            plan.nodes
+                .iter()
+                .any(|node| node.publishes_on(topic, member) && node.answers.iter().any(|answer| answer.with == topic))
+        };
         let all = wires.iter().chain(wires.links().iter().map(|link| link.wire));
         Promises {
-            every_step: published().flat_map(|topic| members(wires, topic)).collect(),
             answers: all.map(|wire| answers_to(plan, wires, wire)).collect(),
-            answered: topics().map(|topic| answers().any(|answer| answer.to == topic)).collect(),
-            counted: topics()
-                .map(|topic| published().any(|other| other == topic) || answers().any(|answer| answer.with == topic))
-                .collect(),
+            answered: wires.iter().map(answered).collect(),
+            counted: wires.iter().map(|wire| every_step.contains(&wire) || answers_on(wire)).collect(),
+            every_step,
         }
     }
 
@@ -74,23 +84,25 @@ fn answers_to(plan: &CampaignPlan, wires: &WireTable, delivered: Wire) -> Vec<(N
         Some(link) => link.to == node,
         None => !wires.links().iter().any(|link| link.of == delivered && link.to == node),
     };
-    let group: Vec<Wire> = members(wires, wires.topic(of)).collect();
-    let place = group.iter().position(|&wire| wire == of);
+    let (topic, place) = (wires.topic(of), wires.member(of));
     let mut answers = Vec::new();
     for (id, node) in (0u32..).map(NodeId).zip(&plan.nodes).filter(|(id, _)| hears(*id)) {
-        for answer in node.answers.iter().filter(|answer| answer.to == wires.topic(of)) {
-            let with: Vec<Wire> = members(wires, answer.with).collect();
-            let alike = with.len() == group.len();
-            let owing = with.into_iter().enumerate().filter(|(member, _)| !alike || Some(*member) == place);
-            answers.extend(owing.map(|(_, with)| (id, with)));
+        if !node.subscribes_to(topic, place) {
+            continue;
+        }
+        for answer in node.answers.iter().filter(|answer| answer.to == topic) {
+            let alike = plan.topic(answer.with).paths.len() == plan.topic(topic).paths.len();
+            let owing = published(wires, node, answer.with).filter(|&with| !alike || wires.member(with) == place);
+            answers.extend(owing.map(|with| (id, with)));
         }
     }
     answers
 }
 
-/// The wires of a topic, in the order of its paths.
-fn members(wires: &WireTable, topic: TopicId) -> impl Iterator<Item = Wire> {
-    wires.iter().filter(move |&wire| wires.topic(wire) == topic)
+/// The wires of a topic that a node publishes on, in the order of its paths.
+fn published(wires: &WireTable, node: &Node, topic: TopicId) -> impl Iterator<Item = Wire> {
+    let of_topic = wires.iter().filter(move |&wire| wires.topic(wire) == topic);
+    of_topic.filter(move |&wire| node.publishes_on(topic, wires.member(wire)))
 }
 
 /// How many messages are still owed in a step, by wire.

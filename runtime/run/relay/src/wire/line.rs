@@ -34,6 +34,8 @@ pub struct Line {
     pub wire: Wire,
     /// The topic that it belongs to.
     pub topic: TopicId,
+    /// The position of its name among the paths of that topic: which member of a group it is.
+    pub member: usize,
     /// Whether it is a topic, or one direction of a service.
     pub channel: Channel,
     /// Its own name.
@@ -79,7 +81,7 @@ pub fn service_lines(plan: &CampaignPlan, wires: &WireTable) -> Vec<Line> {
         let [from, to] = if channel == Channel::Request { [&path, &server] } else { [&server, &path] };
         let sources = vec![Source { wire, path: from.clone(), publisher: None }];
         let sinks = vec![Sink { wire, path: to.clone(), subscriber: None }];
-        Line { wire, topic, channel, path, cut: true, sources, sinks }
+        Line { wire, topic, member: wires.member(wire), channel, path, cut: true, sources, sinks }
     };
     services.iter().copied().filter(|&wire| is_cut(wire)).map(line).collect()
 }
@@ -89,39 +91,41 @@ fn wiring(plan: &CampaignPlan, topic: TopicId) -> Wiring {
 }
 
 fn line(plan: &CampaignPlan, wires: &WireTable, wire: Wire) -> Line {
-    let (topic, channel, path) = (wires.topic(wire), Channel::Topic, wires.path(wire).to_owned());
+    let (topic, member) = (wires.topic(wire), wires.member(wire));
+    let (channel, path) = (Channel::Topic, wires.path(wire).to_owned());
     let Wiring { cut, publishers, joined, .. } = wiring(plan, topic);
     let source = |path: String, publisher| Source { wire, path, publisher };
     if joined {
         let heard = plan.is_read_by_monitor(topic).then(|| source(path.clone(), None));
         let sinks = vec![Sink { wire, path: path.clone(), subscriber: None }];
-        return Line { wire, topic, channel, cut, sources: heard.into_iter().collect(), sinks, path };
+        return Line { wire, topic, member, channel, cut, sources: heard.into_iter().collect(), sinks, path };
     }
     if !cut {
-        return Line { wire, topic, channel, cut, sources: vec![source(path.clone(), None)], sinks: Vec::new(), path };
+        let sources = vec![source(path.clone(), None)];
+        return Line { wire, topic, member, channel, cut, sources, sinks: Vec::new(), path };
     }
-    let from = |&node: &NodeId| source(format!("{path}/from/{}", plan.node(node).name), Some(node));
-    let mut sources: Vec<Source> = publishers.iter().map(from).collect();
+    let publishes_here = |node: &NodeId| plan.node(*node).publishes_on(topic, member);
+    let from = |&node: &NodeId| source(format!("{path}/from/{}", plan.node(node).name_in_paths()), Some(node));
+    let mut sources: Vec<Source> = publishers.iter().filter(|node| publishes_here(node)).map(from).collect();
     // Nobody but the runner publishes what monitors say, unless the space names who does.
-    let of_runner =
-        plan.is_published_by_monitor(topic) && !plan.nodes.iter().any(|node| node.publishes.contains(&topic));
-    let distinguished = |node: NodeId| publishers.contains(&node) || !plan.node(node).publishes.contains(&topic);
-    let mut nodes = (0u32..).map(NodeId).take(plan.nodes.len());
+    let of_runner = plan.is_published_by_monitor(topic) && !plan.nodes.iter().any(|node| node.publishes(topic));
+    let mut others =
+        (0u32..).map(NodeId).take(plan.nodes.len()).filter(|node| publishes_here(node) && !publishers.contains(node));
     // Whoever is not named, if only because no node is declared to publish it.
-    if !of_runner && (publishers.is_empty() || !nodes.all(distinguished)) {
+    if !of_runner && (sources.is_empty() || others.next().is_some()) {
         sources.push(source(format!("{path}/undisturbed"), None));
     }
     let mut sinks = vec![Sink { wire, path: path.clone(), subscriber: None }];
     for link in wires.links().iter().filter(|link| link.of == wire) {
         sinks.push(Sink { wire: link.wire, path: wires.path(link.wire).to_owned(), subscriber: Some(link.to) });
     }
-    Line { wire, topic, channel, path, cut, sources, sinks }
+    Line { wire, topic, member, channel, path, cut, sources, sinks }
 }
 
 #[cfg(test)]
 mod tests {
     use sesame_base::time::SimTime;
-    use sesame_plan::testing::{evidence_above, guarantee, minimal, monitor, node, ros2, topic};
+    use sesame_plan::testing::{evidence_above, guarantee, minimal, monitor, node, ros2, topic, topics};
     use sesame_plan::{FieldRef, Gate, Mitigation, MitigationValue, MonitorId, Node, Type};
 
     use super::*;
@@ -142,7 +146,7 @@ mod tests {
         };
         let level = (vec!["level".to_owned()], 0);
         assert_eq!(ends(&plan), [level.clone(), (Vec::new(), 1)]);
-        plan.nodes = vec![Node { publishes: vec![TopicId(1)], ..node("arm") }];
+        plan.nodes = vec![Node { publishes: topics(&[1]), ..node("arm") }];
         assert_eq!(ends(&plan), [level.clone(), (vec!["safe/undisturbed".to_owned()], 1)]);
         // The same holds for what is to bring the system into a safe state.
         let field = FieldRef { topic: TopicId(1), path: Vec::new() };

@@ -50,8 +50,12 @@ pub(super) fn triggers(plan: &CampaignPlan, course: &Course, search: &Shrink) ->
             let tried = varied.into_iter().map(|&Varied { window, fails, .. }| TriedWindow { window, fails });
             tried.collect::<Vec<_>>()
         });
-        let own: Vec<u32> =
-            (0..).zip(&wires).filter(|(_, (of, _))| Some(*of) == operation.topic).map(|(at, _)| at).collect();
+        let is_acted_on = |topic, path: &str| {
+            let member = plan.topic(topic).paths.iter().position(|of_topic| of_topic == path);
+            Some(topic) == operation.topic && member.is_some_and(|at| operation.acts_on(at, &used.parameters))
+        };
+        let own = (0..).zip(&wires).filter(|&(_, &(topic, path))| is_acted_on(topic, path)).map(|(at, _)| at);
+        let own: Vec<u32> = own.collect();
         let holds = |of: Agreement| of.right * HOLDS.1 >= of.of * HOLDS.0;
         let described = describe(course, plan.campaign.end_after, &own, window, &made_of, &fresh);
         let (made_of, fresh) = described.as_ref().map(|found| (found.made_of, found.fresh)).unwrap_or_default();

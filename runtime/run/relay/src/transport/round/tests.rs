@@ -2,8 +2,8 @@
 
 use proptest::collection::vec;
 use proptest::prelude::*;
-use sesame_plan::testing::{minimal, node, ros2, topic};
-use sesame_plan::{Answer, Node, Type, Wiring};
+use sesame_plan::testing::{self, minimal, node, ros2, topic};
+use sesame_plan::{Answer, Node, TopicMembers, Type, Wiring};
 
 use super::*;
 
@@ -32,8 +32,14 @@ fn answers(pairs: &[(u32, u32)]) -> Vec<Answer> {
 
 #[test]
 fn a_node_that_publishes_twice_never_ends_a_step_early() {
-    let both = Node { every_step: topics(&[0]), ..node("robots") };
-    let plan = plan(&[2, 1], vec![both, Node { answers: answers(&[(1, 0)]), ..node("arms") }], &[]);
+    let both = Node { every_step: topics(&[0]), publishes: testing::topics(&[0]), ..node("robots") };
+    let answering = Node {
+        answers: answers(&[(1, 0)]),
+        publishes: testing::topics(&[0]),
+        subscribes: testing::topics(&[1]),
+        ..node("arms")
+    };
+    let plan = plan(&[2, 1], vec![both, answering], &[]);
     let wires = WireTable::new(&plan);
     let [first, second, asked] = wires.iter().collect::<Vec<_>>()[..] else { panic!("there are three wires") };
     let promises = Promises::new(&plan, &wires);
@@ -53,7 +59,9 @@ fn a_node_that_publishes_twice_never_ends_a_step_early() {
 
 #[test]
 fn a_member_answers_a_member_of_a_group_of_the_same_size_and_otherwise_all_do() {
-    let arms = Node { answers: answers(&[(0, 1), (0, 2), (2, 0)]), ..node("arms") };
+    let all = testing::topics(&[0, 1, 2]);
+    let arms =
+        Node { answers: answers(&[(0, 1), (0, 2), (2, 0)]), publishes: all.clone(), subscribes: all, ..node("arms") };
     let plan = plan(&[2, 2, 1], vec![arms], &[]);
     let wires = WireTable::new(&plan);
     let promises = Promises::new(&plan, &wires);
@@ -70,6 +78,35 @@ fn a_member_answers_a_member_of_a_group_of_the_same_size_and_otherwise_all_do() 
     assert_eq!(said(Promises::is_counted), [true; 5], "of each of them nodes say how many messages it has");
 }
 
+#[test]
+fn a_robot_answers_on_its_own_member() {
+    let own = |member| {
+        vec![0, 1].into_iter().map(TopicId).map(move |topic| TopicMembers::Only { topic, members: vec![member] })
+    };
+    let robot = |member| Node {
+        answers: answers(&[(0, 1)]),
+        every_step: topics(&[1]),
+        publishes: own(member).skip(1).collect(),
+        subscribes: own(member).take(1).collect(),
+        ..node("robot")
+    };
+    let plan = plan(&[3, 3], vec![robot(0), robot(2)], &[vec![NodeId(1)], vec![]]);
+    let wires = WireTable::new(&plan);
+    let promises = Promises::new(&plan, &wires);
+    let paths = |of: &[Wire]| of.iter().map(|&wire| wires.path(wire).to_owned()).collect::<Vec<_>>();
+    assert_eq!(paths(promises.every_step()), ["t1/0", "t1/2"]);
+    let links: Vec<Wire> = wires.links().iter().map(|link| link.wire).collect();
+    assert_eq!(paths(&links), ["t0/2/to/robot"], "only the way of its own member leads to it");
+    let owed = |wire: Wire| {
+        let with = promises.answers(wire).iter().map(|&(_, with)| with);
+        paths(&with.collect::<Vec<_>>())
+    };
+    assert_eq!(
+        wires.iter().chain(links.iter().copied()).map(owed).collect::<Vec<_>>(),
+        [vec!["t1/0"], vec![], vec![], vec![], vec![], vec![], vec!["t1/2"],]
+    );
+}
+
 /// A member of a group: the position of its topic, and its own.
 type Member = (usize, usize);
 
@@ -82,16 +119,30 @@ enum Event {
     Comes(Member),
 }
 
+/// Whether a node lists a member.
+fn lists(of: &[TopicMembers], (topic, member): Member) -> bool {
+    of.iter().any(|listed| match listed {
+        TopicMembers::All(id) => id.index() == topic,
+        TopicMembers::Only { topic: id, members } => id.index() == topic && members.contains(&(member as u32)),
+    })
+}
+
 /// How many messages of a member are owed after all these events, from what nodes declare and nothing else.
 fn naive(plan: &CampaignPlan, links: &[Vec<NodeId>], events: &[Event], (topic, member): Member) -> u32 {
     let mut owed: u32 = 0;
     for &event in events {
         for (at, node) in (0u32..).map(NodeId).zip(&plan.nodes) {
+            if !lists(&node.publishes, (topic, member)) {
+                continue;
+            }
             match event {
                 Event::Begins => {
                     owed += node.every_step.iter().map(|expected| u32::from(expected.index() == topic)).sum::<u32>();
                 }
-                Event::Delivered(to, only) if only == Some(at) || only.is_none() && !links[to.0].contains(&at) => {
+                Event::Delivered(to, only)
+                    if lists(&node.subscribes, to)
+                        && (only == Some(at) || only.is_none() && !links[to.0].contains(&at)) =>
+                {
                     let sizes = [topic, to.0].map(|topic| plan.topics[topic].paths.len());
                     let is_its = sizes[0] != sizes[1] || member == to.1;
                     let answer = |answer: &Answer| answer.to.index() == to.0 && answer.with.index() == topic && is_its;
@@ -113,12 +164,26 @@ proptest! {
         sizes in vec(1usize..4, 1..5),
         nodes in vec((vec(any::<prop::sample::Index>(), 0..3), vec(any::<[prop::sample::Index; 2]>(), 0..4)), 1..4),
         told_apart in vec(vec(any::<bool>(), 4), 5),
+        used in vec(vec([1u32..8, 1u32..8], 5), 4),
         happens in vec((0..3, any::<prop::sample::Index>()), 0..30),
     ) {
         let some = |index: &prop::sample::Index| TopicId(u32::try_from(index.index(sizes.len())).unwrap());
-        let nodes: Vec<Node> = nodes.iter().map(|(every_step, pairs)| Node {
+        // Of each topic, the members whose bits are set; all where no other is left out.
+        let members_of = |of: &[[u32; 2]], side: usize| -> Vec<TopicMembers> {
+            (0u32..).map(TopicId).zip(&sizes).zip(of).map(|((topic, &size), bits)| {
+                let members: Vec<u32> = (0..size as u32).filter(|member| bits[side] & (1 << member) != 0).collect();
+                match members.len() {
+                    0 => TopicMembers::All(topic),
+                    count if count == size => TopicMembers::All(topic),
+                    _ => TopicMembers::Only { topic, members },
+                }
+            }).collect()
+        };
+        let nodes: Vec<Node> = nodes.iter().zip(&used).map(|((every_step, pairs), used)| Node {
             every_step: every_step.iter().map(some).collect(),
             answers: pairs.iter().map(|[to, with]| Answer { to: some(to), with: some(with) }).collect(),
+            publishes: members_of(used, 0),
+            subscribes: members_of(used, 1),
             ..node("one")
         }).collect();
         let links: Vec<Vec<NodeId>> = told_apart[..sizes.len()].iter().map(|told_apart| {
@@ -131,7 +196,9 @@ proptest! {
             sizes.iter().enumerate().flat_map(|(topic, &size)| (0..size).map(move |member| (topic, member))).collect();
         let wire = |(topic, member): Member| wires.find(&format!("t{topic}/{member}")).unwrap();
         let reached: Vec<(Member, Option<NodeId>)> = members.iter().flat_map(|&member| {
-            std::iter::once((member, None)).chain(links[member.0].iter().map(move |&node| (member, Some(node))))
+            let subscribed = |node: &&NodeId| lists(&plan.node(**node).subscribes, member);
+            let by_links = links[member.0].iter().filter(subscribed).map(|&node| (member, Some(node)));
+            std::iter::once((member, None)).chain(by_links.collect::<Vec<_>>())
         }).collect();
 
         let (mut owed, mut events) = (Owed::default(), Vec::new());
