@@ -8,7 +8,7 @@
 //! 4. [`metrics`] resolves metrics and requirements; [`formula`] resolves formulas, with [`function`], [`geometry`],
 //!    [`region`] and [`members`]; [`score`] what is said of monitors
 //! 5. [`fuzz`] resolves operations ([`disturbance`] their targets and parameters, [`chosen`] the members of groups on
-//!    which they act, [`custom`] those in the user's code) and tests
+//!    which they act, [`custom`] those in the user's code, [`scene`] what a scenario is) and tests
 //! 6. [`campaign`] resolves campaigns, whose inherited clauses [`inherit`] has copied before all else; [`condition`]
 //!    resolves the conditions of tests and the building blocks of campaigns' conditions, by what is [`known`] of
 //!    metrics; [`contained`] what operations require of such conditions
@@ -60,6 +60,7 @@ mod resource;
 mod robustness;
 mod ros2;
 mod ros_types;
+mod scene;
 mod score;
 mod services;
 mod simulator;

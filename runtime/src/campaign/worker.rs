@@ -36,7 +36,7 @@ pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: &Address) -> io::
     let metrics = MetricTable::new(plan, &wires, runner.hooks).map_err(io::Error::other)?;
     let jobs = read_jobs(stream.try_clone()?);
     let space = runner.directory.join(&runner.space);
-    let may_change = plan.operations.iter().any(|operation| operation.kind.is_offline());
+    let may_change = plan.operations.iter().any(|operation| operation.kind.calls_code_outside_the_run());
     let files = if may_change { ChangedFiles::for_worker(&space) } else { Ok(ChangedFiles::unlocked(&space)) };
     let mut custom = Custom { hooks: runner.operations, files: Box::new(files.map_err(io::Error::other)?) };
     let mut transport = Some(transport);

@@ -187,7 +187,7 @@ pub(super) fn refuse_unfilled(runner: &Runner, plan: &CampaignPlan, allowed: boo
 /// change files. A file that a test may choose and that is not there ends the run before it starts.
 pub(super) fn claim_files(runner: &Runner, plan: &CampaignPlan) -> Result<Files, Failure> {
     let space = runner.directory.join(&runner.space);
-    let may_change = plan.operations.iter().any(|operation| operation.kind.is_offline());
+    let may_change = plan.operations.iter().any(|operation| operation.kind.calls_code_outside_the_run());
     let (files, restored) = ChangedFiles::for_supervisor(&space, may_change)?;
     for path in restored {
         say(format_args!("note: an earlier run was ended while {} was changed; it has been restored", path.display()));

@@ -1,7 +1,7 @@
 //! Fuzzing operations and the known tests that apply them.
 
 use super::condition::{Condition, Constraint};
-use sesame_plan::{Bound, Choice, ChoiceKind, MembersOf, Messages, Moment, OperationKind, Step};
+use sesame_plan::{Bound, Choice, ChoiceKind, MembersOf, Messages, OperationKind, Step};
 
 use super::declaration::Declaration;
 use super::ids::{MetricId, NodeId, OperationId, TopicId};
@@ -51,7 +51,7 @@ impl Operation {
 
     /// Whether it acts before the start or after the end: a test then chooses no window for it.
     pub fn is_offline(&self) -> bool {
-        matches!(&self.kind, OperationKind::Custom { moment: Moment::BeforeStart | Moment::AfterEnd })
+        self.kind.is_offline()
     }
 }
 

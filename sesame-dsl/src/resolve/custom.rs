@@ -143,7 +143,7 @@ impl<'a> Resolver<'a> {
 
     /// The first unit that is written, if any; the outer `None` for one that does not exist.
     #[expect(clippy::option_option, reason = "the outer `None` means a mistake")]
-    fn declared_unit(&mut self, written: [Option<&ast::UnitName>; 3]) -> Option<Option<Unit>> {
+    pub(super) fn declared_unit(&mut self, written: [Option<&ast::UnitName>; 3]) -> Option<Option<Unit>> {
         match written.into_iter().flatten().next() {
             Some(name) => self.unit(name).map(Some),
             None => Some(None),
@@ -200,13 +200,12 @@ impl<'a> Resolver<'a> {
         index: usize,
         operation: &model::Operation,
     ) -> bool {
-        let OperationKind::Custom { moment } = &operation.kind else {
-            return self.no_moment(test, index);
-        };
-        let declared = match moment {
-            Moment::OnMessage => return self.no_moment(test, index),
-            Moment::BeforeStart => ast::Moment::BeforeStart,
-            Moment::AfterEnd => ast::Moment::AfterEnd,
+        let declared = match &operation.kind {
+            OperationKind::Custom { moment: Moment::BeforeStart } | OperationKind::Scene { .. } => {
+                ast::Moment::BeforeStart
+            }
+            OperationKind::Custom { moment: Moment::AfterEnd } => ast::Moment::AfterEnd,
+            _ => return self.no_moment(test, index),
         };
         let span = match &test.activation {
             ast::Activation::Moment(_, written) if *written == declared => return true,

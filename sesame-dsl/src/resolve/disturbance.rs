@@ -103,7 +103,9 @@ impl<'a> Resolver<'a> {
                 let window = number("window", Some(Unit::seconds()), self.times(range, "the window")?);
                 Some((target?, OperationKind::Reorder { drain }, vec![window]))
             }
-            ast::OperationKind::Custom(_) => unreachable!("custom operations are resolved apart"),
+            ast::OperationKind::Custom(_) | ast::OperationKind::Scene(_) => {
+                unreachable!("what acts on no messages is resolved apart")
+            }
         }
     }
 

@@ -48,7 +48,9 @@ fn use_in_a_test(operation: &model::Operation) -> Option<String> {
         return None;
     }
     words.push(match &operation.kind {
-        OperationKind::Custom { moment: Moment::BeforeStart } => "before start".to_owned(),
+        OperationKind::Custom { moment: Moment::BeforeStart } | OperationKind::Scene { .. } => {
+            "before start".to_owned()
+        }
         OperationKind::Custom { moment: Moment::AfterEnd } => "after end".to_owned(),
         _ => {
             let within = operation.within.unwrap_or(ALL_ALONG);

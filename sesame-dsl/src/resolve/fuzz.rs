@@ -26,7 +26,12 @@ impl<'a> Resolver<'a> {
 
     fn operation(&mut self, operation: &'a ast::Operation) -> Option<model::Operation> {
         let body = &operation.body;
-        let what = self.target_and_kind(body);
+        let what = match &body.kind {
+            ast::OperationKind::Scene(scene) => {
+                self.scene(&operation.head.name, scene).map(|(kind, value)| (None, kind, vec![value]))
+            }
+            _ => self.target_and_kind(body),
+        };
         let within = match self.single(&body.within, "within") {
             Some(range) => self.within(range).map(Some),
             None => Some(None),

@@ -127,6 +127,7 @@ pub(super) const BLOCKS: &[Block] = &[
             Member::new(Rule::system, "system"),
             Member::declaration(Rule::metric, "metric"),
             Member::declaration(Rule::requirement, "requirement"),
+            Member::declaration(Rule::scene_parameter, "parameter"),
             Member::declaration(Rule::operation, "operation"),
             Member::declaration(Rule::test, "test"),
             Member::declaration(Rule::campaign, "campaign"),

@@ -69,6 +69,10 @@ impl Reader<'_> {
                 let requirement = reader.requirement(&item);
                 reader.out.requirements.push(requirement);
             }
+            Rule::scene_parameter => {
+                let parameter = reader.scene_parameter(&item);
+                reader.out.operations.push(parameter);
+            }
             Rule::operation => {
                 let operation = reader.operation(&item);
                 reader.out.operations.push(operation);

@@ -11,6 +11,9 @@ use crate::unit::Unit;
 
 /// An operation of a plan in one line, with every clause that it can have: no default is left out.
 pub fn operation(plan: &CampaignPlan, operation: &Operation) -> String {
+    if let OperationKind::Scene { parameter, usual } = &operation.kind {
+        return scene(operation, parameter, *usual);
+    }
     let mut line = format!("operation {}", operation.name);
     if let Some(topic) = operation.topic {
         line = format!("{line} on {}{}", chosen(operation), targets(plan.topic(topic), operation).join(", "));
@@ -33,6 +36,19 @@ pub fn operation(plan: &CampaignPlan, operation: &Operation) -> String {
         start_contains: operation.constraints.iter().map(|comparison| constraint(comparison, &plan.metrics)).collect(),
     };
     format!("{line} = {}{}", disturbance(operation), clauses.write())
+}
+
+/// A parameter of the simulator that tests choose.
+fn scene(operation: &Operation, known_as: &str, usual: Option<f64>) -> String {
+    let known_as = if known_as == operation.name { String::new() } else { format!(" {}", quoted(known_as)) };
+    let domain = operation.parameters.first().map(|value| {
+        let unit = Unit::named(value.unit.as_deref());
+        let Domain::Number { low, high, integer, .. } = &value.domain else { return String::new() };
+        let of = value.unit.as_ref().map_or(String::new(), |unit| format!("[{unit}]"));
+        let usual = usual.map_or(String::new(), |usual| format!(" default {}", unit.number(usual)));
+        format!("{}{of} in {}{usual}", if *integer { "int" } else { "real" }, unit.range(*low, *high))
+    });
+    format!("parameter {}{known_as}: {}", operation.name, domain.unwrap_or_default())
 }
 
 /// The places in the messages of a topic that an operation changes, with the members of a group on which it acts.

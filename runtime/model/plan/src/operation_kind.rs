@@ -103,6 +103,14 @@ pub enum OperationKind {
         /// The node, which the runner launches.
         node: NodeId,
     },
+    /// Sets a parameter of the simulator for the whole run, when that begins anew: what the scenario is. One parameter
+    /// `value`.
+    Scene {
+        /// The name of the parameter in the simulator.
+        parameter: String,
+        /// Its value in runs that do not set it; `None` where only the simulator knows it.
+        usual: Option<f64>,
+    },
     /// The user's Rust code, with parameters as declared.
     Custom {
         /// When it is called.
@@ -138,6 +146,11 @@ impl OperationKind {
     /// Whether it acts outside the run, before its start or after its end: its activation in a test is then
     /// [`crate::Activation::Offline`], and it has no observed intervals.
     pub fn is_offline(&self) -> bool {
+        matches!(self, OperationKind::Scene { .. }) || self.calls_code_outside_the_run()
+    }
+
+    /// Whether it calls the user's code before the start of a run, or after its end.
+    pub fn calls_code_outside_the_run(&self) -> bool {
         matches!(self, OperationKind::Custom { moment: Moment::BeforeStart | Moment::AfterEnd })
     }
 
@@ -189,7 +202,8 @@ impl OperationKind {
             | OperationKind::Set { .. }
             | OperationKind::Pause { .. }
             | OperationKind::Slow { .. }
-            | OperationKind::Kill { .. } => false,
+            | OperationKind::Kill { .. }
+            | OperationKind::Scene { .. } => false,
         }
     }
 
@@ -219,8 +233,8 @@ impl OperationKind {
             | OperationKind::Stale
             | OperationKind::Pause { .. }
             | OperationKind::Slow { .. } => Class::Delay,
-            // What the user's code does is not known.
-            OperationKind::Custom { .. } => Class::Other,
+            // What the user's code does is not known, and a scene does nothing to messages.
+            OperationKind::Custom { .. } | OperationKind::Scene { .. } => Class::Other,
         }
     }
 
@@ -237,9 +251,11 @@ impl OperationKind {
     /// | duplicate | one copy |
     /// | custom | 0, since what the user's code does is not known |
     /// | slow | 1: all of the time |
+    /// | scene | its usual value; none where only the simulator knows that |
     /// | set, random absolute, stuck at | none: of a sub-range only a narrower one is milder |
     pub fn neutral_value(&self, parameter: &str) -> Option<f64> {
         match self {
+            OperationKind::Scene { usual, .. } => *usual,
             OperationKind::RandomValue { mode: ValueMode::Absolute, .. }
             | OperationKind::StuckAt { .. }
             | OperationKind::RandomText { .. }
@@ -298,6 +314,7 @@ impl OperationKind {
             OperationKind::Pause { .. } => "pause",
             OperationKind::Slow { .. } => "slow",
             OperationKind::Kill { .. } => "kill",
+            OperationKind::Scene { .. } => "parameter",
             OperationKind::Custom { moment: Moment::OnMessage } => "custom",
             OperationKind::Custom { moment: Moment::BeforeStart } => "custom before start",
             OperationKind::Custom { moment: Moment::AfterEnd } => "custom after end",

@@ -323,6 +323,8 @@ pub struct SimulatorProperties {
     /// Whether the runner reaches its nodes themselves: it sets their parameters, pauses, slows and kills them, and
     /// asks them for a step.
     pub reaches_nodes: bool,
+    /// Whether a run can begin with other values of the simulator's parameters.
+    pub takes_parameters: bool,
 }
 
 impl SimulatorKind {
@@ -346,14 +348,17 @@ impl SimulatorKind {
     /// What is fixed for it.
     pub const fn properties(self) -> SimulatorProperties {
         match self {
-            SimulatorKind::InProcess => SimulatorProperties { in_runner: true, ..properties("in_process") },
-            SimulatorKind::Process => properties("process"),
+            SimulatorKind::InProcess => {
+                SimulatorProperties { in_runner: true, takes_parameters: true, ..properties("in_process") }
+            }
+            SimulatorKind::Process => SimulatorProperties { takes_parameters: true, ..properties("process") },
             SimulatorKind::Ros2 => SimulatorProperties {
                 feature: Some("ros2"),
                 bus: Some("as a node of ROS 2"),
                 ros: Some(Dialect::Ros2),
                 renames: true,
                 reaches_nodes: true,
+                takes_parameters: true,
                 ..properties("ros2")
             },
             SimulatorKind::Rosbridge => SimulatorProperties {
@@ -425,6 +430,7 @@ const fn properties(keyword: &'static str) -> SimulatorProperties {
         renames: false,
         named_messages: false,
         reaches_nodes: false,
+        takes_parameters: false,
     }
 }
 

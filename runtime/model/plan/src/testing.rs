@@ -321,7 +321,9 @@ pub fn operation(topic: u32, kind: OperationKind) -> Operation {
         OperationKind::Latency { .. } => vec![range("delay", 0.0, 5.0)],
         OperationKind::Bias => vec![value("bias", -9.0, 9.0)],
         OperationKind::ClockSkew => vec![value("skew", -9.0, 9.0)],
-        OperationKind::StuckAt { truth: None } | OperationKind::Set { .. } => vec![value("value", -9.0, 9.0)],
+        OperationKind::StuckAt { truth: None } | OperationKind::Set { .. } | OperationKind::Scene { .. } => {
+            vec![value("value", -9.0, 9.0)]
+        }
         OperationKind::Drift => vec![value("rate", -9.0, 9.0)],
         OperationKind::Noise | OperationKind::RandomWalk => vec![value("sigma", 0.0, 9.0)],
         OperationKind::Scale => vec![value("factor", -9.0, 9.0)],

@@ -86,7 +86,7 @@ pub fn evaluate_tapped(
         Ok(driven) => driven.err(),
         Err(_) => Some(Failure::crash(panic_capture::take())),
     };
-    if plan.operations.iter().any(|operation| operation.kind.is_offline())
+    if plan.operations.iter().any(|operation| operation.kind.calls_code_outside_the_run())
         && let Err(error) = custom.files.restore()
     {
         failure.get_or_insert_with(|| Failure::crash(error.to_string()));

@@ -103,6 +103,8 @@ pub enum Disturbance {
     Blackhole,
     /// It acts on nodes instead of messages.
     Resources(Vec<Resource>),
+    /// The simulator has another value of a parameter, during the whole run.
+    Scene(f64),
     /// Calls the user's code.
     Custom(Custom),
 }
@@ -206,6 +208,7 @@ impl Disturbance {
                 on_nodes(&|node| Resource::Slow { node, share })
             }
             OperationKind::Kill { .. } => on_nodes(&|node| Resource::Kill { node }),
+            OperationKind::Scene { .. } => Disturbance::Scene(number("value")?),
             OperationKind::Custom { moment } => match Custom::new(operation, *moment, &test.parameters, hooks) {
                 Some(custom) => Disturbance::Custom(custom),
                 None => return refuse("has no hook in this runner: run `sesamec generate` again".to_owned()),
@@ -273,7 +276,7 @@ impl Disturbance {
             Disturbance::Reorder(operation) => operation.apply(at.draws),
             Disturbance::Duplicate(copies) => Action::Duplicated(*copies),
             Disturbance::Blackhole => Action::Dropped,
-            Disturbance::Resources(_) | Disturbance::Custom(_) => Action::Unchanged,
+            Disturbance::Resources(_) | Disturbance::Scene(_) | Disturbance::Custom(_) => Action::Unchanged,
         }
     }
 }

@@ -41,7 +41,9 @@ use sesame_base::condition::holds;
 use sesame_base::observation::Counters;
 use sesame_base::time::SimTime;
 use sesame_plan::condition::{Condition, Operand};
-use sesame_plan::{CampaignPlan, Copies, Drain, MetricId, MetricSource, Moment, NodeId, Side, Test};
+use sesame_plan::{
+    CampaignPlan, Copies, Drain, MetricId, MetricSource, Moment, NodeId, OperationId, OperationKind, Side, Test,
+};
 
 use crate::files::SpaceFiles;
 use crate::fuzz::{ChoiceError, Disturbance, KeyedRng, OperationEntry, Order, Resource, RunContext};
@@ -172,6 +174,9 @@ impl<'a> Relay<'a> {
                 unheard: BTreeMap::new(),
             });
         }
+        for stage in operations.iter_mut().filter(|stage| matches!(stage.disturbance, Disturbance::Scene(_))) {
+            stage.counters.side_effects = 1;
+        }
         let mut pipelines = vec![Vec::new(); wires.len_with_links()];
         for &at in &order {
             let used = &test.operations[at];
@@ -195,7 +200,7 @@ impl<'a> Relay<'a> {
         Ok(Relay {
             wires,
             disturbed_by: pipelines.iter().map(Vec::len).collect(),
-            parameters: Vec::new(),
+            parameters: scene(plan, &operations),
             heard: wires.iter().map(hears).chain(wires.links().iter().map(|_| false)).collect(),
             acted_on: plan.operations.iter().flat_map(|operation| wires.acted_on(operation)).collect(),
             conditions: Conditions {
@@ -474,6 +479,21 @@ impl<'a> Relay<'a> {
             self.operations[at].tail_since = Some(now);
         }
     }
+}
+
+/// The values of the simulator's parameters with which a run begins: those that the test chooses, and the usual values
+/// of the others.
+fn scene(plan: &CampaignPlan, operations: &[Stage]) -> Vec<(String, f64)> {
+    let parameters = (0..).map(OperationId).zip(&plan.operations).filter_map(|(id, operation)| {
+        let OperationKind::Scene { parameter, usual } = &operation.kind else { return None };
+        let chosen =
+            operations.iter().filter(|stage| stage.operation == id).find_map(|stage| match stage.disturbance {
+                Disturbance::Scene(value) => Some(value),
+                _ => None,
+            });
+        Some((parameter.clone(), chosen.or(*usual)?))
+    });
+    parameters.collect()
 }
 
 impl Exchange for Relay<'_> {

@@ -31,6 +31,26 @@ pub(crate) struct OperationBody {
     pub(crate) contains: Vec<(Span, Vec<Contained>)>,
 }
 
+impl OperationBody {
+    /// What has nothing but a kind.
+    pub(crate) fn of_kind(kind: OperationKind, kind_word: Span) -> Self {
+        OperationBody {
+            target: None,
+            resource: None,
+            from: None,
+            to: None,
+            kind,
+            kind_word,
+            within: vec![],
+            lengths: vec![],
+            priority: vec![],
+            inclusion: vec![],
+            untimed: vec![],
+            contains: vec![],
+        }
+    }
+}
+
 /// What an operation disturbs.
 #[derive(Debug)]
 pub(crate) struct Target {
@@ -102,6 +122,19 @@ pub(crate) enum OperationKind {
         drain: Vec<(Span, Drain)>,
     },
     Custom(Custom),
+    Scene(Scene),
+}
+
+/// A parameter of the simulator that is chosen for a whole run.
+#[derive(Debug)]
+pub(crate) struct Scene {
+    /// Its name in the simulator, if that is another one.
+    pub(crate) known_as: Option<Text>,
+    pub(crate) integer: bool,
+    pub(crate) unit: Option<UnitName>,
+    pub(crate) range: Range,
+    /// Its value in runs that choose none.
+    pub(crate) usual: Option<Quantity>,
 }
 
 impl OperationKind {
@@ -113,7 +146,9 @@ impl OperationKind {
                 Some(amounts.span())
             }
             OperationKind::StuckAt(Stuck::Texts(texts)) => Some(texts.first()?.span.to(texts.last()?.span)),
-            OperationKind::Latency { range, .. } | OperationKind::Reorder { range, .. } => Some(range.span),
+            OperationKind::Latency { range, .. }
+            | OperationKind::Reorder { range, .. }
+            | OperationKind::Scene(Scene { range, .. }) => Some(range.span),
             OperationKind::BurstLoss { enter, leave, loss, .. } => {
                 let written = match parameter {
                     "enter" => enter,

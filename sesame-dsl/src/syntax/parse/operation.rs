@@ -7,7 +7,7 @@ use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::span::Span;
 use crate::syntax::ast::{
     Amounts, Chosen, Contained, Count, Custom, CustomParameter, Distribution, Domain, Drain, Moment, NotFinite,
-    Operation, OperationBody, OperationKind, Path, Point, Range, Resource, Stuck, Target, Text, UnitName,
+    Operation, OperationBody, OperationKind, Path, Point, Range, Resource, Scene, Stuck, Target, Text, UnitName,
 };
 
 impl Reader<'_> {
@@ -57,6 +57,21 @@ impl Reader<'_> {
             contains,
         };
         Operation { head, body }
+    }
+
+    /// A parameter of the simulator, which a test chooses like an operation before the start of its run.
+    pub(super) fn scene_parameter(&mut self, pair: &Pair<'_>) -> Operation {
+        let ty = expect_child(pair, Rule::scene_type);
+        let unit = child(&ty, Rule::unit_in_brackets).map(|unit| self.unit(&expect_child(&unit, Rule::unit)));
+        let usual = child(pair, Rule::default_value).map(|usual| self.signed(&expect_child(&usual, Rule::signed)));
+        let kind = OperationKind::Scene(Scene {
+            known_as: child(pair, Rule::text).map(|name| self.text_of(&name)),
+            integer: child(&ty, Rule::k_int).is_some(),
+            unit,
+            range: self.only_range(pair),
+            usual,
+        });
+        Operation { head: self.head(pair), body: OperationBody::of_kind(kind, self.keyword_span(pair)) }
     }
 
     fn resource(&mut self, pair: &Pair<'_>) -> Resource {
