@@ -42,6 +42,8 @@ mod physical;
 mod preparation;
 mod random_models;
 mod regeneration;
+#[cfg(unix)]
+mod scenes;
 mod search;
 mod select;
 mod served;

@@ -111,8 +111,9 @@ impl Interleaved {
     /// A search before its first test.
     pub(crate) fn new(plan: &CampaignPlan, space: TestSpace, evaluations: u32, avoids_causes: bool, seed: u64) -> Self {
         let nothing = Observation::without_run(sesame_base::observation::Outcome::Completed);
-        let moments = Moments::from_reference(plan, &space, &nothing);
         let domain = space.conditions().is_none().then(|| TestDomain::new(space.clone(), seed));
+        let space = space.with_members_apart(plan);
+        let moments = Moments::from_reference(plan, &space, &nothing);
         let mut search = Interleaved {
             setting: Setting::new(plan.clone(), space, moments, None),
             domain,

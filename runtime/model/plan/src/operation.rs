@@ -73,12 +73,16 @@ impl Operation {
             MembersOf::These(these) => return Some(these),
             MembersOf::Chosen(permitted) => permitted,
         };
-        let chosen = || {
-            let texts = self.parameters.last()?.domain.items()?;
-            let Some(Choice::Text { text }) = choices.get(self.parameters.len() - 1) else { return None };
-            permitted.get(texts.iter().position(|item| item == text)?)
-        };
-        Some(chosen().map_or(&[], Vec::as_slice))
+        let chosen = self.choice_of_members(choices).and_then(|choice| permitted.get(choice as usize));
+        Some(chosen.map_or(&[], Vec::as_slice))
+    }
+
+    /// Which of the permitted choices of members a test makes; `None` for an operation whose tests choose none.
+    pub fn choice_of_members(&self, choices: &[Choice]) -> Option<u32> {
+        let Some(MembersOf::Chosen(_)) = &self.members else { return None };
+        let texts = self.parameters.last()?.domain.items()?;
+        let Some(Choice::Text { text }) = choices.get(self.parameters.len() - 1) else { return None };
+        u32::try_from(texts.iter().position(|item| item == text)?).ok()
     }
 
     /// The nodes on which it acts with these choices of a test, if it acts on nodes.

@@ -16,13 +16,38 @@ use sesame_search::test_key::TestKey;
 
 use crate::{Datum, Selection, Table};
 
+/// An operation as tests use it: of one whose tests choose members of a group, each choice is another one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Act {
+    /// The operation.
+    pub operation: OperationId,
+    /// Which of the permitted choices of members; `None` for an operation whose tests choose none.
+    pub members: Option<u32>,
+}
+
+impl Act {
+    /// What an operation of a test is.
+    pub fn of(plan: &CampaignPlan, used: &TestOperation) -> Act {
+        let members = plan.operation(used.operation).choice_of_members(&used.parameters);
+        Act { operation: used.operation, members }
+    }
+
+    /// Its name, with the members in brackets: `late[r2]`.
+    pub fn name(self, plan: &CampaignPlan) -> String {
+        let operation = plan.operation(self.operation);
+        let items = operation.parameters.last().and_then(|parameter| parameter.domain.items());
+        let members = self.members.and_then(|members| items?.get(members as usize));
+        members.map_or_else(|| operation.name.clone(), |members| format!("{}[{members}]", operation.name))
+    }
+}
+
 /// A requirement with a smallest set of operations that violates it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cause {
     /// The requirement.
     pub requirement: RequirementId,
     /// The operations, in order of declaration; at least one.
-    pub operations: BTreeSet<OperationId>,
+    pub operations: BTreeSet<Act>,
     /// The numbers of the tests that violate the requirement and hold these operations, in rising order.
     pub violating: Vec<u32>,
     /// How many conclusive tests hold these operations.
@@ -86,7 +111,7 @@ pub struct Unseen {
 /// What a test says about a requirement, and by which operations.
 struct Judged<'a> {
     row: &'a TestRow,
-    operations: BTreeSet<OperationId>,
+    operations: BTreeSet<Act>,
     violates: bool,
 }
 
@@ -98,9 +123,8 @@ struct Harmless<'a> {
 }
 
 impl<'a> Harmless<'a> {
-    fn of(plan: &'a CampaignPlan, judged: &[Judged<'_>], smallest: &[&BTreeSet<OperationId>]) -> Self {
-        let is_part =
-            |held: &BTreeSet<OperationId>| smallest.iter().any(|set| held.len() < set.len() && held.is_subset(set));
+    fn of(plan: &'a CampaignPlan, judged: &[Judged<'_>], smallest: &[&BTreeSet<Act>]) -> Self {
+        let is_part = |held: &BTreeSet<Act>| smallest.iter().any(|set| held.len() < set.len() && held.is_subset(set));
         let is_whole = |test: &&Judged<'_>| test.row.left_out == 0;
         let harmless = judged.iter().filter(is_whole).filter(|test| !test.violates && is_part(&test.operations));
         // Operations without effect make no difference: a test stands for the one without them, too.
@@ -114,7 +138,7 @@ impl<'a> Harmless<'a> {
         // One that did more than its operations say is not the test of these operations.
         test.row.left_out == 0
             && test.operations.iter().all(|&left_out| {
-                let others = acting.operations.iter().filter(|used| used.operation != left_out);
+                let others = acting.operations.iter().filter(|used| Act::of(self.plan, used) != left_out);
                 let fewer = Test { operations: others.cloned().collect() };
                 self.keys.contains(&TestKey::of_disturbance(self.plan, &fewer))
             })
@@ -205,7 +229,7 @@ pub fn table(plan: &CampaignPlan, causes: &[Cause]) -> Table {
     let columns = ["requirement", "operations", "violating", "of", "first", "smallest", "fewer"].map(str::to_owned);
     let mut table = Table::new(columns);
     for cause in causes {
-        let names: Vec<&str> = cause.operations.iter().map(|&id| plan.operation(id).name.as_str()).collect();
+        let names: Vec<String> = cause.operations.iter().map(|act| act.name(plan)).collect();
         table.row([
             Datum::text(&plan.requirement(cause.requirement).name),
             Datum::Text(names.join(" + ")),
@@ -234,21 +258,21 @@ fn judged<'a>(
                 Verdict::Satisfied => false,
                 Verdict::Inconclusive => return None,
             };
-            Some(Judged { row, operations: acting(row), violates })
+            Some(Judged { row, operations: acting(plan, row), violates })
         })
         .collect()
 }
 
 fn of_requirement(plan: &CampaignPlan, judged: &[Judged<'_>], requirement: RequirementId) -> Vec<Cause> {
-    let sets: BTreeSet<&BTreeSet<OperationId>> = judged
+    let sets: BTreeSet<&BTreeSet<Act>> = judged
         .iter()
         .filter(|test| test.violates && !test.operations.is_empty())
         .map(|test| &test.operations)
         .collect();
     // Small ones first, so that each needs to be compared with the smallest ones only.
-    let mut sets: Vec<&BTreeSet<OperationId>> = sets.into_iter().collect();
+    let mut sets: Vec<&BTreeSet<Act>> = sets.into_iter().collect();
     sets.sort_by_key(|set| set.len());
-    let mut smallest: Vec<&BTreeSet<OperationId>> = Vec::new();
+    let mut smallest: Vec<&BTreeSet<Act>> = Vec::new();
     for set in sets {
         if !smallest.iter().any(|known| known.is_subset(set)) {
             smallest.push(set);
@@ -262,8 +286,8 @@ fn of_requirement(plan: &CampaignPlan, judged: &[Judged<'_>], requirement: Requi
 }
 
 /// The operations of a test, without those that are known to have had no effect.
-fn acting(row: &TestRow) -> BTreeSet<OperationId> {
-    acting_uses(row).map(|used| used.operation).collect()
+fn acting(plan: &CampaignPlan, row: &TestRow) -> BTreeSet<Act> {
+    acting_uses(row).map(|used| Act::of(plan, used)).collect()
 }
 
 /// A test without the operations that are known to have had no effect.
@@ -281,8 +305,8 @@ fn cause(
     harmless: &Harmless<'_>,
     judged: &[Judged<'_>],
     requirement: RequirementId,
-    set: &BTreeSet<OperationId>,
-    all: &[&BTreeSet<OperationId>],
+    set: &BTreeSet<Act>,
+    all: &[&BTreeSet<Act>],
 ) -> Cause {
     let holding = || judged.iter().filter(|test| set.is_subset(&test.operations));
     let violating: Vec<u32> = holding().filter(|test| test.violates).map(|test| test.row.number).collect();
@@ -344,10 +368,10 @@ mod tests {
             let declared = plan.requirement(requirement);
             let violates =
                 |row: &&TestRow| row.origin != Origin::Reference && judge.verdict(row, declared) == Verdict::Violated;
-            for row in rows.iter().filter(violates).filter(|row| !acting(row).is_empty()) {
-                assert!(of.iter().any(|cause| cause.operations.is_subset(&acting(row))), "{}", row.number);
+            for row in rows.iter().filter(violates).filter(|row| !acting(plan, row).is_empty()) {
+                assert!(of.iter().any(|cause| cause.operations.is_subset(&acting(plan, row))), "{}", row.number);
                 assert!(!of.iter().any(|cause| {
-                    acting(row).len() < cause.operations.len() && acting(row).is_subset(&cause.operations)
+                    acting(plan, row).len() < cause.operations.len() && acting(plan, row).is_subset(&cause.operations)
                 }));
                 explained += 1;
             }
@@ -387,8 +411,8 @@ mod tests {
         let plan = sample::plan();
         let both = row(1, &[0, 1], 10.0);
         let known = |others: &[TestRow]| {
-            let violating = Judged { row: &both, operations: acting(&both), violates: true };
-            let others = others.iter().map(|row| Judged { row, operations: acting(row), violates: false });
+            let violating = Judged { row: &both, operations: acting(&plan, &both), violates: true };
+            let others = others.iter().map(|row| Judged { row, operations: acting(&plan, row), violates: false });
             let judged: Vec<Judged<'_>> = std::iter::once(violating).chain(others).collect();
             let found = of_requirement(&plan, &judged, RequirementId(0));
             assert_eq!(found.len(), 1);

@@ -163,8 +163,9 @@ fn found_by_cause(
     let mut gathered: Vec<Gathered> = causes
         .iter()
         .map(|CauseAlone { cause, .. }| {
-            let features = features_in_units(plan, &cause.operations);
-            let names = cause.operations.iter().map(|&id| plan.operation(id).name.clone()).collect();
+            let operations = cause.operations.iter().map(|act| act.operation).collect();
+            let features = features_in_units(plan, &operations);
+            let names = cause.operations.iter().map(|act| act.name(plan)).collect();
             let targets = [Target::Requirement(cause.requirement)];
             Gathered { cause: Some(names), ..Gathered::empty(features, targets) }
         })

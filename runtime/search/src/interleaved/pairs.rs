@@ -40,7 +40,9 @@ impl Pairs {
                 // What acts before the start or after the end has no part in any part of the run.
                 let offline =
                     [first, second].iter().any(|&kind| setting.kind(kind).activation == ActivationSpace::Offline);
-                if is_known(first, second) || (offline && level > 1) {
+                // Two choices of members of one operation are copies of it, which need not be permitted together.
+                let copies = setting.kind(first).operation == setting.kind(second).operation;
+                if is_known(first, second) || copies || (offline && level > 1) {
                     continue;
                 }
                 let of_parts = (0..parts).map(|part| (level, first, second, part));

@@ -51,7 +51,7 @@ impl Setting {
     /// Per operation of a test, which one of the test space it is.
     pub(super) fn kinds_of(&self, test: &Test) -> Vec<usize> {
         let kinds = self.space.operations();
-        let place = |used: &TestOperation| kinds.iter().position(|kind| kind.operation == used.operation);
+        let place = |used: &TestOperation| kinds.iter().position(|kind| kind.is_of(used));
         test.operations.iter().filter_map(place).collect()
     }
 

@@ -96,11 +96,12 @@ pub(super) fn reduce<A: Oracle>(
 impl<A: Oracle> Reduction<'_, A> {
     fn all_the_way(&mut self) -> Result<(), Pending> {
         self.fewer_operations()?;
+        while self.fewer_members()? {}
         self.shrink_along(Phase::Windows, axis::times(&self.test))?;
         self.simpler_conditions()?;
         self.shrink_along(Phase::Parameters, axis::parameters(&self.test))?;
         self.round_numbers()?;
-        while self.single_steps()? || self.round_numbers()? {}
+        while self.fewer_members()? || self.single_steps()? || self.round_numbers()? {}
         Ok(())
     }
 
@@ -146,6 +147,21 @@ impl<A: Oracle> Reduction<'_, A> {
         self.fewer(Phase::Operations, operations, usize::MAX, &|kept| {
             (kept.len() >= fewest).then(|| Test { operations: kept.to_vec() })
         })
+    }
+
+    /// Lets operations act on fewer members of their groups, on as few as the rest fails with. Returns whether one does.
+    fn fewer_members(&mut self) -> Result<bool, Pending> {
+        let (space, whole) = (self.space, &self.test);
+        let with_fewer = |(place, used): (usize, &TestOperation)| {
+            let choices = space.fewer_members(used);
+            choices.into_iter().map(move |choice| {
+                let mut test = whole.clone();
+                test.operations[place].parameters = choice;
+                test
+            })
+        };
+        let tests: Vec<Test> = self.test.operations.iter().enumerate().flat_map(with_fewer).collect();
+        Ok(!tests.is_empty() && self.first_failing(Phase::Operations, tests)?.is_some())
     }
 
     /// Leaves out messages that operations alter as long as the rest fails.

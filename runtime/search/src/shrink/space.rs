@@ -2,8 +2,8 @@
 
 use sesame_plan::condition::{Condition, ConditionSpace};
 use sesame_plan::{
-    Activation, ActivationMode, CampaignPlan, Choice, ChoiceKind, Copies, Domain, Lengths, OperationId, Test,
-    TestOperation,
+    Activation, ActivationMode, CampaignPlan, Choice, ChoiceKind, Copies, Domain, Lengths, MembersOf, OperationId,
+    Test, TestOperation,
 };
 
 use crate::space::condition::is_allowed;
@@ -33,6 +33,8 @@ struct Bounds {
     lengths: Option<Lengths>,
     constraints: Vec<sesame_plan::condition::Constraint>,
     parameters: Vec<Option<Parameter>>,
+    /// For an operation whose tests choose members of a group: each choice with its members.
+    members: Vec<(Choice, Vec<u32>)>,
 }
 
 /// A parameter that can be made milder.
@@ -66,6 +68,14 @@ impl ShrinkSpace {
                 let end = operation.within.end.min(campaign.end_after).max(operation.within.start);
                 Range::window(operation.within.start, end)
             };
+            let texts = operation.parameters.last().and_then(|parameter| parameter.domain.items()).unwrap_or_default();
+            let members = match &operation.members {
+                Some(MembersOf::Chosen(choices)) => {
+                    let texts = texts.iter().map(|text| Choice::Text { text: text.clone() });
+                    texts.zip(choices.iter().cloned()).collect()
+                }
+                _ => Vec::new(),
+            };
             let parameters = operation.parameters.iter().map(|parameter| {
                 let neutral = |range: Range, shape| {
                     let step = (range.high - range.low) * resolution;
@@ -90,6 +100,7 @@ impl ShrinkSpace {
                 lengths: operation.lengths,
                 constraints: operation.constraints.clone(),
                 parameters: parameters.collect(),
+                members,
             }
         });
         ShrinkSpace {
@@ -103,6 +114,18 @@ impl ShrinkSpace {
 
     fn bounds(&self, operation: OperationId) -> &Bounds {
         &self.operations[operation.index()]
+    }
+
+    /// The choices of an operation of a test with fewer of the members of its group, none of them another one: those
+    /// with the fewest first.
+    pub(super) fn fewer_members(&self, used: &TestOperation) -> Vec<Vec<Choice>> {
+        let members = &self.bounds(used.operation).members;
+        let Some((chosen, others)) = used.parameters.split_last() else { return Vec::new() };
+        let Some((_, of_test)) = members.iter().find(|(choice, _)| choice == chosen) else { return Vec::new() };
+        let is_fewer = |these: &Vec<u32>| these.len() < of_test.len() && these.iter().all(|one| of_test.contains(one));
+        let mut fewer: Vec<&(Choice, Vec<u32>)> = members.iter().filter(|(_, these)| is_fewer(these)).collect();
+        fewer.sort_by_key(|(_, these)| these.len());
+        fewer.into_iter().map(|(choice, _)| [others, std::slice::from_ref(choice)].concat()).collect()
     }
 
     /// The windows that an operation may have.

@@ -15,7 +15,8 @@ use std::collections::BTreeSet;
 use sesame_base::observation::Observation;
 use sesame_plan::condition::{Condition, ConditionEnd, ConditionSpace, Constraint};
 use sesame_plan::{
-    Activation, ActivationMode, CampaignPlan, Copies, Count, Lengths, OperationId, Test, TestOperation, Times,
+    Activation, ActivationMode, CampaignPlan, Choice, Copies, Count, Lengths, MembersOf, OperationId, Test,
+    TestOperation, Times,
 };
 use sesame_rng::Stream;
 
@@ -74,6 +75,17 @@ pub enum ActivationSpace {
         /// A start condition and an end condition that are permitted, for when many tries give no others.
         first: Box<[Condition; 2]>,
     },
+}
+
+impl OperationSpace {
+    /// Whether an operation of a test is one of these, also as to the members of a group that it acts on.
+    pub(crate) fn is_of(&self, used: &TestOperation) -> bool {
+        let members = match (self.parameters.last(), used.parameters.last()) {
+            (Some(ParameterSpace::Items(items)), Some(Choice::Text { text })) => items.contains(text),
+            _ => true,
+        };
+        self.operation == used.operation && members
+    }
 }
 
 impl ActivationSpace {
@@ -160,6 +172,34 @@ impl TestSpace {
             return Err(SearchError::TooFew { campaign: name(), min: count.min, most });
         }
         Ok(test_space)
+    }
+
+    /// The same space, with an operation of its own for each choice of members of an operation whose tests choose
+    /// members of a group: one robot's radio is another danger than another's. Operations with very many choices stay
+    /// one.
+    #[must_use]
+    pub(crate) fn with_members_apart(mut self, plan: &CampaignPlan) -> Self {
+        /// The most choices of which each is an operation of its own.
+        const MOST_APART: usize = 24;
+        let apart = |kind: OperationSpace| {
+            let operation = plan.operation(kind.operation);
+            let chosen = matches!(operation.members, Some(MembersOf::Chosen(_)));
+            let Some(ParameterSpace::Items(items)) = kind.parameters.last().filter(|_| chosen) else {
+                return vec![kind];
+            };
+            if items.len() > MOST_APART {
+                return vec![kind];
+            }
+            let of = |item: &String| {
+                let mut one = kind.clone();
+                *one.parameters.last_mut().expect("it has one") = ParameterSpace::Items(vec![item.clone()]);
+                one.strongest = Strongest::of(operation, &one.parameters);
+                one
+            };
+            items.iter().map(of).collect()
+        };
+        self.operations = self.operations.into_iter().flat_map(apart).collect();
+        self
     }
 
     /// Learns from the reference run when there are messages to disturb.

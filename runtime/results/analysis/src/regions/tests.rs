@@ -292,14 +292,14 @@ fn by_cause_the_tests_that_hold_no_other_cause_are_divided_in_units() {
     assert_eq!(found.len(), causes.len());
     for (cause, regions) in causes.iter().zip(&found) {
         let plan = repository.plan();
-        let names: Vec<String> = cause.operations.iter().map(|&id| plan.operation(id).name.clone()).collect();
+        let names: Vec<String> = cause.operations.iter().map(|act| act.name(plan)).collect();
         assert_eq!(regions.cause.as_ref(), Some(&names));
         assert_eq!(regions.target, plan.requirement(cause.requirement).name);
         let others = causes.iter().filter(|other| other.requirement == cause.requirement && *other != cause);
         let others: Vec<_> = others.map(|other| &other.operations).collect();
         assert_counted(&repository, regions, |row| {
             let acts = row.test.operations.iter().zip(&row.idle).filter(|(_, idle)| !**idle);
-            let acts: BTreeSet<OperationId> = acts.map(|(used, _)| used.operation).collect();
+            let acts: BTreeSet<crate::causes::Act> = acts.map(|(used, _)| crate::causes::Act::of(plan, used)).collect();
             let holds = cause.operations.is_subset(&acts) && !others.iter().any(|set| set.is_subset(&acts));
             holds.then(|| violates(&repository, &regions.target, row)).flatten()
         });

@@ -118,7 +118,7 @@ fn summarise(
     Ok(CauseSummary {
         requirement: requirement.name.clone(),
         text: requirement.text.clone(),
-        operations: cause.operations.iter().map(|&id| plan.operation(id).name.clone()).collect(),
+        operations: cause.operations.iter().map(|act| act.name(plan)).collect(),
         test: TestNumber(cause.smallest),
         acting: acting(plan, &record),
         metric: metric.name.clone(),

@@ -117,7 +117,13 @@ fn draw(body: &mut Markup, plan: &CampaignPlan, pairs: &PairsSummary, summary: &
 /// The names of each cause's operations, with the name of its requirement.
 fn causes_by_operations(summary: &Summary) -> Vec<(BTreeSet<&str>, &str)> {
     let causes = summary.causes.iter().flat_map(|found| &found.causes);
-    causes.map(|cause| (cause.operations.iter().map(String::as_str).collect(), cause.requirement.as_str())).collect()
+    // A pair is of operations, whatever members of a group they act on.
+    causes.map(|cause| (cause.operations.iter().map(without_members).collect(), cause.requirement.as_str())).collect()
+}
+
+/// The name of an operation without the members of a group on which it acts.
+fn without_members(operation: &String) -> &str {
+    operation.split('[').next().unwrap_or(operation)
 }
 
 /// A name that is not too long.
