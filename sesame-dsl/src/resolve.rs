@@ -188,7 +188,7 @@ struct SystemPart {
     /// Per message in the order of the file: its id.
     message_ids: Vec<model::MessageId>,
     topics: Vec<Option<model::Topic>>,
-    /// Of a group of nodes, each member is a node.
+    /// Each member of a group of nodes is a node.
     nodes: Vec<Option<model::Node>>,
     /// Per declared node: the positions of its members in `nodes`, before these are there.
     node_ids: Vec<std::ops::Range<usize>>,

@@ -8,6 +8,7 @@ mod blocks;
 mod checked;
 mod comments;
 mod expressible;
+mod grouped_nodes;
 mod groups;
 mod named;
 mod nodes;

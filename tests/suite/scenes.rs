@@ -1,5 +1,5 @@
-//! What a scenario is varies from test to test: parameters of a simulator in Python, and one robot of several, which are
-//! searched for together.
+//! What a scenario is varies from test to test: parameters of a simulator in Python, and one robot of several, which
+//! are searched for together.
 
 use std::fs;
 

@@ -124,7 +124,7 @@ impl<'a> Evaluator<'a> {
         planned: Vec<PlannedTest>,
         each: &mut dyn FnMut(&TestRecord),
     ) -> Result<(), Halt> {
-        self.evaluate_awaited(planned, each, &mut || {})
+        self.evaluate_awaited(planned, each, &mut |_| {})
     }
 
     /// As [`Evaluator::evaluate`]; `awaited` is called several times a second while no test ends.
@@ -132,7 +132,7 @@ impl<'a> Evaluator<'a> {
         &mut self,
         planned: Vec<PlannedTest>,
         each: &mut dyn FnMut(&TestRecord),
-        awaited: &mut dyn FnMut(),
+        awaited: &mut dyn FnMut(Option<&str>),
     ) -> Result<(), Halt> {
         let mut waiting = BTreeMap::new();
         let mut duplicates = Vec::new();
@@ -194,8 +194,9 @@ impl<'a> Evaluator<'a> {
         Ok(u32::try_from(self.recorder.repository().evaluated()?).unwrap_or(u32::MAX))
     }
 
-    /// Waits for the next result of the executor; `awaited` is called several times a second meanwhile.
-    pub(super) fn next(&mut self, awaited: &mut dyn FnMut()) -> Result<JobResult, Halt> {
+    /// Waits for the next result of the executor; `awaited` is called several times a second meanwhile, with what
+    /// the start of a system waits for.
+    pub(super) fn next(&mut self, awaited: &mut dyn FnMut(Option<&str>)) -> Result<JobResult, Halt> {
         loop {
             if self.interrupted.load(Ordering::Relaxed) {
                 return Err(Halt::Stopped);
@@ -206,7 +207,7 @@ impl<'a> Evaluator<'a> {
                 }
                 return Ok(result);
             }
-            awaited();
+            awaited(self.executor.waits().as_deref());
         }
     }
 

@@ -16,6 +16,8 @@ pub enum CampaignEvent<'a> {
         waited: Duration,
         /// After how long it is stopped.
         limit: Duration,
+        /// What the start of the system waits for, if that takes long.
+        missing: Option<&'a str>,
     },
     /// The first reference run has shown something that a user should know before the search. It is recorded too.
     Warned {

@@ -25,6 +25,11 @@ pub trait Executor {
 
     /// Whether the simulators are stepped, so that equal tests give equal results.
     fn lock_stepped(&self) -> bool;
+
+    /// What the start of a system waits for, if it takes long, in a sentence.
+    fn waits(&self) -> Option<String> {
+        None
+    }
 }
 
 /// A test to be run.

@@ -18,7 +18,7 @@ use sesame_lifecycle::process_group::was_killed;
 
 use crate::campaign::executor::{Executor, ExecutorError, Job, JobResult};
 use crate::campaign::link::{self, Stream};
-use crate::campaign::protocol::{self, Hello, Reply};
+use crate::campaign::protocol::{self, Hello, Reply, Said};
 use crate::campaign::traces;
 use crate::campaign::worker_process::{WORKER, WorkerProcess};
 use crate::campaign::worker_program::WorkerProgram;
@@ -55,6 +55,8 @@ pub struct Pool {
     /// Wall time after which a test is stopped, in milliseconds.
     timeout: Arc<AtomicU64>,
     lock_stepped: bool,
+    /// What the start of a worker's system waits for, if one said so.
+    waits: Arc<Mutex<Option<String>>>,
 }
 
 impl Pool {
@@ -66,10 +68,12 @@ impl Pool {
         let stop = Arc::new(AtomicBool::new(false));
         let timeout = Arc::new(AtomicU64::new(millis(settings.timeout)));
         // Dropped if a worker cannot be started, which ends those that were.
-        let mut pool = Pool { jobs: Some(jobs), results, slots: Vec::new(), stop, timeout, lock_stepped: true };
+        let waits = Arc::default();
+        let mut pool = Pool { jobs: Some(jobs), results, slots: Vec::new(), stop, timeout, lock_stepped: true, waits };
         for number in 1..=settings.workers.max(1) {
             let (stop, timeout) = (Arc::clone(&pool.stop), Arc::clone(&pool.timeout));
-            let mut slot = WorkerSlot { number, settings: settings.clone(), worker: None, stop, timeout };
+            let waits = Arc::clone(&pool.waits);
+            let mut slot = WorkerSlot { number, settings: settings.clone(), worker: None, stop, timeout, waits };
             let worker = slot.start()?;
             pool.lock_stepped &= worker.lock_stepped;
             slot.worker = Some(worker);
@@ -97,6 +101,10 @@ impl Executor for Pool {
     fn lock_stepped(&self) -> bool {
         self.lock_stepped
     }
+
+    fn waits(&self) -> Option<String> {
+        self.waits.lock().ok()?.clone()
+    }
 }
 
 impl Drop for Pool {
@@ -118,6 +126,7 @@ struct WorkerSlot {
     worker: Option<Worker>,
     stop: Arc<AtomicBool>,
     timeout: Arc<AtomicU64>,
+    waits: Arc<Mutex<Option<String>>>,
 }
 
 impl WorkerSlot {
@@ -193,7 +202,13 @@ impl WorkerSlot {
         let timeout = Duration::from_millis(self.timeout.load(Ordering::Relaxed));
         let mut killed = None;
         let mut added = Vec::new();
-        let (observation, notes, trace_failure) = match worker.ask(job, timeout, &self.stop) {
+        let listener = Arc::clone(&self.waits);
+        let mut waits = |missing| {
+            if let Ok(mut of_pool) = listener.lock() {
+                *of_pool = missing;
+            }
+        };
+        let (observation, notes, trace_failure) = match worker.ask(job, timeout, &self.stop, &mut waits) {
             Ok(reply) => {
                 self.worker = Some(worker);
                 added = reply.added;
@@ -291,11 +306,30 @@ impl Worker {
         }
     }
 
-    /// Runs a test. The error is `TimedOut` when it took too long or the pool was told to stop.
-    fn ask(&mut self, job: &Job, timeout: Duration, stop: &AtomicBool) -> io::Result<Reply> {
-        let stream = &mut self.stream;
-        protocol::send(stream, job)?;
+    /// Runs a test; `waits` gets what the start of the system waits for meanwhile. The error is `TimedOut` when it took
+    /// too long or the pool was told to stop.
+    fn ask(
+        &mut self,
+        job: &Job,
+        timeout: Duration,
+        stop: &AtomicBool,
+        waits: &mut dyn FnMut(Option<String>),
+    ) -> io::Result<Reply> {
+        protocol::send(&mut self.stream, job)?;
         let asked = Instant::now();
+        loop {
+            match self.hear(asked, timeout, stop)? {
+                Said::Waits(missing) => waits(Some(missing)),
+                Said::Reply(reply) => {
+                    waits(None);
+                    return Ok(*reply);
+                }
+            }
+        }
+    }
+
+    fn hear(&mut self, asked: Instant, timeout: Duration, stop: &AtomicBool) -> io::Result<Said> {
+        let stream = &mut self.stream;
         // Short waits for the first byte, so that a stop is noticed; then the frame is read in one go.
         stream.set_read_timeout(Some(Duration::from_millis(100)))?;
         let mut first = [0];

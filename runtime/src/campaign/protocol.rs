@@ -29,6 +29,15 @@ pub(super) struct Hello {
     pub(super) token: Option<String>,
 }
 
+/// What the worker says while it runs a test, and at its end.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) enum Said {
+    /// The start of the system waits for this, and has for a while.
+    Waits(String),
+    /// The test has ended.
+    Reply(Box<Reply>),
+}
+
 /// What the worker answers.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Reply {

@@ -126,8 +126,8 @@ impl<'a, 'l> Campaign<'a, 'l> {
         let (total, earlier) = (task.evaluations(plan), evaluator.earlier()?);
         let begun = Progress { done: 0, total, earlier, confirmation_runs: 0, front: &front, coverage: None };
         let (started, limit) = (Instant::now(), settings.first_timeout());
-        let reference = reference_run(&mut evaluator, &mut numbering, &mut || {
-            listener(CampaignEvent::ReferenceRunAwaited { waited: started.elapsed(), limit }, begun);
+        let reference = reference_run(&mut evaluator, &mut numbering, &mut |missing| {
+            listener(CampaignEvent::ReferenceRunAwaited { waited: started.elapsed(), limit, missing }, begun);
         })?;
         match &reference.outcome {
             outcome @ Outcome::Timeout { .. } => {
@@ -208,7 +208,7 @@ impl<'a, 'l> Campaign<'a, 'l> {
         if self.evaluator.recorder.repository().task().undisturbed().is_some() {
             return Ok(reason);
         }
-        let last = reference_run(&mut self.evaluator, &mut self.numbering, &mut || {})?;
+        let last = reference_run(&mut self.evaluator, &mut self.numbering, &mut |_| {})?;
         let lock_stepped = self.evaluator.executor.lock_stepped();
         if let Some(text) = reference::difference(self.plan, lock_stepped, &self.reference, &last) {
             self.evaluator.warn(Some(self.numbering.last()), text)?;
@@ -334,7 +334,7 @@ fn coverage(observers: &[Box<dyn Observer>]) -> Option<&search::coverage::Covera
 fn reference_run(
     evaluator: &mut Evaluator<'_>,
     numbering: &mut Numbering,
-    awaited: &mut dyn FnMut(),
+    awaited: &mut dyn FnMut(Option<&str>),
 ) -> Result<Observation, Halt> {
     let mut shown = None;
     let planned = vec![numbering.reference_run()];

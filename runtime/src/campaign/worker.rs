@@ -1,6 +1,6 @@
 //! A worker process: runs the tests it is sent, one after another, until the supervisor is gone.
 
-use std::sync::{Mutex, mpsc};
+use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::time::Duration;
 use std::{io, thread};
 
@@ -13,7 +13,7 @@ use sesame_relay::wire::WireTable;
 
 use crate::campaign::executor::Job;
 use crate::campaign::link::{self, Address, Stream};
-use crate::campaign::protocol::{self, Reply};
+use crate::campaign::protocol::{self, Reply, Said};
 use crate::campaign::traces;
 use crate::changed_files::ChangedFiles;
 use crate::runner::Runner;
@@ -25,8 +25,11 @@ use crate::runner::Runner;
 /// simulator.
 pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: &Address) -> io::Result<()> {
     // Nothing is started before the first test.
-    let transport = runner.connect.transport(plan);
-    let mut stream = link::connect(supervisor, transport.capabilities().lock_stepped, end_limit(plan))?;
+    let mut transport = runner.connect.transport(plan);
+    let stream = link::connect(supervisor, transport.capabilities().lock_stepped, end_limit(plan))?;
+    let jobs = read_jobs(stream.try_clone()?);
+    let stream = Arc::new(Mutex::new(stream));
+    transport.tell_waiting(says_waiting(&stream));
     panic_capture::install();
     // So that what leaves its parents can be found when it is to end. Where the system cannot do that, groups have to
     // do.
@@ -34,7 +37,6 @@ pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: &Address) -> io::
 
     let wires = WireTable::new(plan);
     let metrics = MetricTable::new(plan, &wires, runner.hooks).map_err(io::Error::other)?;
-    let jobs = read_jobs(stream.try_clone()?);
     let space = runner.directory.join(&runner.space);
     let may_change = plan.operations.iter().any(|operation| operation.kind.calls_code_outside_the_run());
     let files = if may_change { ChangedFiles::for_worker(&space) } else { Ok(ChangedFiles::unlocked(&space)) };
@@ -43,7 +45,11 @@ pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: &Address) -> io::
     let directory = std::env::current_dir()?;
     let mut compensated = plan.clone();
     for job in jobs {
-        let simulator = transport.get_or_insert_with(|| runner.connect.transport(plan));
+        let simulator = transport.get_or_insert_with(|| {
+            let mut transport = runner.connect.transport(plan);
+            transport.tell_waiting(says_waiting(&stream));
+            transport
+        });
         compensated.compensation.clone_from(&job.compensation);
         let (observation, trace_failure) =
             traces::run(&compensated, &wires, &metrics, simulator.as_mut(), &job, &directory, &mut custom);
@@ -52,13 +58,26 @@ pub fn serve(runner: &Runner, plan: &CampaignPlan, supervisor: &Address) -> io::
             transport = None;
         }
         let reply = Reply { number: job.number, observation, trace_failure, incidents, added };
-        let sent = protocol::send(&mut stream, &reply);
+        let sent = say(&stream, &Said::Reply(Box::new(reply)));
         if sent.is_err() {
             end_what_was_started();
             return sent;
         }
     }
     unreachable!("jobs come until the process is ended")
+}
+
+/// Tells the supervisor something.
+fn say(stream: &Mutex<Stream>, said: &Said) -> io::Result<()> {
+    // A frame that was broken off by a panic makes the rest unreadable: the supervisor then replaces this worker.
+    protocol::send(&mut *stream.lock().unwrap_or_else(PoisonError::into_inner), said)
+}
+
+/// Tells the supervisor what the start of a system waits for.
+fn says_waiting(stream: &Arc<Mutex<Stream>>) -> Box<dyn FnMut(&str) + Send> {
+    let stream = Arc::clone(stream);
+    // If the supervisor is gone, the worker ends anyway.
+    Box::new(move |missing| _ = say(&stream, &Said::Waits(missing.to_owned())))
 }
 
 /// How long it may take to end the programs that the plan starts.

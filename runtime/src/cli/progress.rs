@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use sesame_base::visible::visible_lines;
 use sesame_plan::{CampaignPlan, Direction, MetricSource};
 use sesame_record::TestRecord;
 use sesame_report::{quantity, readable_sentence};
@@ -33,6 +34,8 @@ pub(super) struct Display<'a> {
     last_line: Instant,
     /// When it is next said that the reference run is awaited.
     awaited_due: Duration,
+    /// What the start of the system was last said to wait for.
+    missing: String,
     worst: Vec<Option<f64>>,
 }
 
@@ -45,13 +48,27 @@ impl<'a> Display<'a> {
         });
         let now = Instant::now();
         let worst = vec![None; plan.campaign.objectives.len()];
-        Display { plan, seed, workers, bar, began: now, last_line: now, awaited_due: Duration::ZERO, worst }
+        Display {
+            plan,
+            seed,
+            workers,
+            bar,
+            began: now,
+            last_line: now,
+            awaited_due: Duration::ZERO,
+            missing: String::new(),
+            worst,
+        }
     }
 
     pub(super) fn update(&mut self, event: CampaignEvent<'_>, progress: Progress<'_>) {
         let name = &self.plan.campaign.name;
         match event {
-            CampaignEvent::ReferenceRunAwaited { waited, limit } => {
+            CampaignEvent::ReferenceRunAwaited { waited, limit, missing } => {
+                if let Some(missing) = missing.filter(|missing| *missing != self.missing) {
+                    missing.clone_into(&mut self.missing);
+                    self.say(&format!("{name}: the system is not complete yet: {}", visible_lines(missing)));
+                }
                 match &self.bar {
                     Some(bar) if waited >= COUNT_DOWN_AFTER => {
                         bar.set_message(countdown(name, waited, limit, columns()));

@@ -16,8 +16,8 @@ pub struct Operation {
     /// What it disturbs; `None` exactly for one that acts on no messages: a custom one before the start or after the
     /// end, or one on a node or its parameters, which [`OperationKind::node`] names by its position in the space.
     pub target: Option<Target>,
-    /// Of a group of topics or nodes, the members on which it acts, by their positions; `None` for all topics of a group,
-    /// or for what is no group.
+    /// The members of a group of topics or nodes on which it acts, by their positions; `None` for all topics of a
+    /// group, or for what is no group.
     pub members: Option<MembersOf>,
     /// Only messages that these nodes publish, in written order; none for all messages.
     pub from: Vec<NodeId>,
@@ -60,7 +60,7 @@ impl Operation {
 pub struct Target {
     /// The topic.
     pub topic: TopicId,
-    /// Of a group, the members that are named, by their positions in ascending order; none for all.
+    /// The members of a group that are named, by their positions in ascending order; none for all.
     pub named: Vec<u32>,
     /// The values in each message that it changes, in written order, all of one type; none exactly where it acts on
     /// whole messages.

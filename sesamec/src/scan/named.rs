@@ -9,8 +9,8 @@ use sesame_scan::{Facts, FoundService, FoundTopic};
 
 use super::comments::LeftOut;
 use super::expressible::is_ros_name;
+use super::grouped_nodes::{Node, fold_nodes, lists_of_nodes};
 use super::groups::{Line, fold, fold_services};
-use super::nodes::{Node, fold_nodes, lists_of_nodes};
 use super::simulator::words_of_topic;
 
 /// All names.

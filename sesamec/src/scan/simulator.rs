@@ -8,8 +8,8 @@ use sesame_scan::{CLOCK, Facts, FoundService, System};
 
 use super::comments::{LeftOut, on_one_line};
 use super::expressible::is_ros_name;
+use super::grouped_nodes::Node;
 use super::groups::Line;
-use super::nodes::Node;
 use super::origin::Origin;
 
 /// What a space says of a kind of system that was scanned, besides what it says of all.

@@ -84,8 +84,9 @@ fn leaves(at: &str, value: &Value) -> Vec<String> {
 /// Whether what is there in a plan is only for people.
 fn is_for_people(pointer: &str) -> bool {
     let of_requirement = pointer.starts_with("/requirements/") && pointer.ends_with("/text");
+    let names = pointer.starts_with("/topics/") && pointer.contains("/members/");
     let places = pointer.ends_with("/doc") || pointer.ends_with("/line");
-    of_requirement || places || ["/generator", "/source"].contains(&pointer)
+    of_requirement || names || places || ["/generator", "/source"].contains(&pointer)
 }
 
 #[test]

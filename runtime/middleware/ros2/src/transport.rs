@@ -218,6 +218,10 @@ impl Transport for System {
         self.now
     }
 
+    fn tell_waiting(&mut self, tell: Box<dyn FnMut(&str) + Send>) {
+        self.launched.tell_waiting(tell);
+    }
+
     fn close(&mut self) {
         self.changes.clear();
         self.judge_budget();

@@ -86,7 +86,7 @@ pub fn resource(plan: &CampaignPlan, operation: &Operation) -> Option<String> {
     let node = plan.node(operation.kind.node()?).name.as_str();
     let node = match &operation.members {
         None => node.to_owned(),
-        // Of a group its name alone.
+        // A group is written by its name alone.
         Some(_) => format!("{}{}", chosen(operation), node.split('[').next().unwrap_or(node)),
     };
     Some(match &operation.kind {

@@ -90,8 +90,8 @@ pub enum MetricSource {
 }
 
 impl MetricSource {
-    /// The topics that it reads itself, each with the only member that it reads, if that is not the whole group. A topic
-    /// may be there several times.
+    /// The topics that it reads itself, each with the only member that it reads, if that is not the whole group. A
+    /// topic may be there several times.
     pub fn sources(&self) -> Vec<(TopicId, Option<u32>)> {
         match self {
             MetricSource::Hook { topics } => topics.iter().map(|&topic| (topic, None)).collect(),

@@ -15,7 +15,7 @@ pub struct Operation {
     /// The topic whose messages it disturbs; `None` exactly for one that acts on no messages: a custom operation before
     /// the start or after the end, or one on a node.
     pub topic: Option<TopicId>,
-    /// Of a group of topics or nodes, the members on which it acts; `None` for all topics of a group, or for what is no
+    /// The members of a group of topics or nodes on which it acts; `None` for all topics of a group, or for what is no
     /// group. The nodes of a group follow each other, and that of the kind is the first of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub members: Option<MembersOf>,

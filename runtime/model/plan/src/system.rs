@@ -87,8 +87,8 @@ pub struct Topic {
 }
 
 impl Topic {
-    /// A member of a group as a `.sesame` file has it between brackets: its name, as a text where that is no word and no
-    /// number; its position in a plan without names.
+    /// A member of a group as a `.sesame` file has it between brackets: its name, as a text where that is no word and
+    /// no number; its position in a plan without names.
     pub fn member_in_words(&self, member: u32) -> String {
         let Some(name) = self.members.get(member as usize) else { return member.to_string() };
         let plain = name.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');

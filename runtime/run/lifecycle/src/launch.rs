@@ -10,12 +10,13 @@ mod placeholders;
 mod port;
 mod signals;
 mod terminate;
+mod waiting;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use sesame_plan::{CampaignPlan, Command, Launch, NodeId, ReadyWhen, TopicId};
 use thiserror::Error;
@@ -24,10 +25,12 @@ use self::part::{Problem, Started};
 use self::placeholders::{Own, asks_for_port};
 use self::port::Port;
 use self::terminate::Terminate;
+use self::waiting::Waiting;
 use crate::limits::END_LIMIT;
 use crate::program::{Alarm, Program};
 
 pub use self::terminate::terminate_all;
+pub use self::waiting::Tell;
 
 /// How often it is looked whether a program is ready.
 const PAUSE: Duration = Duration::from_millis(10);
@@ -163,6 +166,7 @@ pub struct Launched {
     alarm: Alarm,
     killed: bool,
     notes: Vec<String>,
+    waiting: Waiting,
 }
 
 impl Launched {
@@ -189,7 +193,19 @@ impl Launched {
             alarm: Alarm::default(),
             killed: false,
             notes: Vec::new(),
+            waiting: Waiting::default(),
         }
+    }
+
+    /// Calls this from now on when a start takes long, with what it waits for.
+    pub fn tell_waiting(&mut self, tell: Tell) {
+        self.waiting.tell(tell);
+    }
+
+    /// Notes what the system lacks before a run can begin, each in a phrase. Call it again and again, the last time with
+    /// nothing.
+    pub fn lacks(&mut self, missing: &[String]) {
+        self.waiting.lacks(missing, Instant::now());
     }
 
     /// Whether the plan launches nothing.

@@ -68,6 +68,12 @@ pub trait Transport {
     /// Ends the connection, and everything that the transport started.
     fn close(&mut self);
 
+    /// Calls this from now on when the start of the system takes long, with what it waits for. Transports that wait for
+    /// their simulator alone never call it.
+    fn tell_waiting(&mut self, tell: Box<dyn FnMut(&str) + Send>) {
+        drop(tell);
+    }
+
     /// What happened to the simulator's process since the last call.
     fn incidents(&mut self) -> Incidents {
         Incidents::default()

@@ -129,8 +129,8 @@ impl WireTable {
         &self.paths[self.link(wire).map_or(wire, |link| link.of).index()]
     }
 
-    /// The wires on whose messages an operation may act: the links to the subscribers that it names, or else the wires of
-    /// its topic; of a group, those of the members that it may act on.
+    /// The wires on whose messages an operation may act: the links to the subscribers that it names, or else the wires
+    /// of its topic; of a group, those of the members that it may act on.
     pub fn acted_on(&self, operation: &Operation) -> impl Iterator<Item = Wire> {
         let links = self.links.iter().filter(|link| operation.to.contains(&link.to)).map(|link| link.wire);
         let own = self.iter().filter(|_| operation.to.is_empty());

@@ -149,7 +149,8 @@ impl<A: Oracle> Reduction<'_, A> {
         })
     }
 
-    /// Lets operations act on fewer members of their groups, on as few as the rest fails with. Returns whether one does.
+    /// Lets operations act on fewer members of their groups, on as few as the rest fails with. Returns whether one
+    /// does.
     fn fewer_members(&mut self) -> Result<bool, Pending> {
         let (space, whole) = (self.space, &self.test);
         let with_fewer = |(place, used): (usize, &TestOperation)| {

@@ -126,6 +126,7 @@ impl Session {
             }
             launched.check()?;
             let missing = self.missing(plan);
+            launched.lacks(&missing);
             if let Some(since) = ready_since {
                 if missing.is_empty() && changed.elapsed() >= SETTLE {
                     break;

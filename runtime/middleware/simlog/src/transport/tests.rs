@@ -83,7 +83,11 @@ mod real {
 fn what_a_step_waits_for_is_named_by_its_path() {
     let mut plan = minimal();
     plan.topics = vec![topic("states", &["left/states", "right/states"], Type::Bool)];
-    plan.nodes = vec![sesame_plan::Node { every_step: vec![TopicId(0)], ..node("arms") }];
+    plan.nodes = vec![sesame_plan::Node {
+        every_step: vec![TopicId(0)],
+        publishes: sesame_plan::testing::topics(&[0]),
+        ..node("arms")
+    }];
     let wires = WireTable::new(&plan);
     let mut round = Round::new(&Promises::new(&plan, &wires), None, None);
     assert_eq!(round.awaited(&wires), "the end of a step");

@@ -10,8 +10,8 @@ use sesame_plan::{CampaignPlan, Input, TopicId};
 
 /// The instants of one formula.
 pub(super) struct Attendance {
-    /// Per topic of the inputs and per member that they read: the number of instants in which it was heard, and the last
-    /// of them.
+    /// Per topic of the inputs and per member that they read: the number of instants in which it was heard, and the
+    /// last of them.
     topics: Vec<(TopicId, BTreeMap<usize, (u64, SimTime)>)>,
     /// The number of instants at which anything was heard, and the last of them.
     instants: (u64, SimTime),

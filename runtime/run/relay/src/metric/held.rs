@@ -161,7 +161,7 @@ fn truth(holds: bool) -> Held {
     [f64::from(u8::from(holds)), 0.0, 0.0]
 }
 
-/// Of how many members an input holds the last value.
+/// The number of members whose last values an input holds.
 fn members_of(input: &Input, plan: &CampaignPlan) -> usize {
     if input.only().is_some() { 1 } else { plan.topic(input.field.topic).paths.len() }
 }

@@ -210,6 +210,7 @@ impl System {
                 self.connected = self.bus.connect(&self.lines, &|address| launched.fill(address))?;
             }
             let missing = if self.connected { self.bus.missing() } else { vec![self.unreachable()] };
+            self.launched.lacks(&missing);
             if ready_since.is_some() && missing.is_empty() {
                 return Ok(());
             }
@@ -482,6 +483,10 @@ impl Transport for System {
         }
         let away = self.away();
         Err(self.fail(away))
+    }
+
+    fn tell_waiting(&mut self, tell: Box<dyn FnMut(&str) + Send>) {
+        self.launched.tell_waiting(tell);
     }
 
     fn close(&mut self) {

@@ -168,7 +168,7 @@ proptest! {
         happens in vec((0..3, any::<prop::sample::Index>()), 0..30),
     ) {
         let some = |index: &prop::sample::Index| TopicId(u32::try_from(index.index(sizes.len())).unwrap());
-        // Of each topic, the members whose bits are set; all where no other is left out.
+        // The members of each topic whose bits are set; all where none is left out.
         let members_of = |of: &[[u32; 2]], side: usize| -> Vec<TopicMembers> {
             (0u32..).map(TopicId).zip(&sizes).zip(of).map(|((topic, &size), bits)| {
                 let members: Vec<u32> = (0..size as u32).filter(|member| bits[side] & (1 << member) != 0).collect();

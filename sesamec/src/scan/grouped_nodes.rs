@@ -1,0 +1,100 @@
+//! Nodes that are found, as groups where they are the robots of a fleet.
+
+use std::collections::BTreeMap;
+
+use sesame_dsl::groups::{expand, in_brackets, own_members};
+use sesame_scan::{FoundNode, FoundService, FoundTopic, System};
+
+use super::groups::{Line, fold_by};
+
+/// A node as the space has it, or the member of a group.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Node<'a> {
+    pub(super) found: &'a FoundNode,
+    /// What it publishes, and what it subscribes to, as a node lists it.
+    pub(super) lists: &'a [Vec<String>; 2],
+}
+
+/// What each node publishes, and what it subscribes to, services included, as a node lists it.
+pub(super) fn lists_of_nodes(
+    nodes: &[&FoundNode],
+    topics: &[(String, Line<&FoundTopic>)],
+    services: &[(String, Line<&FoundService>)],
+) -> Vec<[Vec<String>; 2]> {
+    let mut lists: BTreeMap<&str, [BTreeMap<String, Vec<u32>>; 2]> = BTreeMap::new();
+    // The path that each name in the lists stands for.
+    let mut paths: BTreeMap<String, &str> = BTreeMap::new();
+    for (name, line) in topics {
+        paths.insert(name.clone(), &line.path);
+        for (member, topic) in (0u32..).zip(&line.of) {
+            for (side, nodes) in [&topic.publishers, &topic.subscribers].into_iter().enumerate() {
+                for node in nodes {
+                    lists.entry(node).or_default()[side].entry(name.clone()).or_default().push(member);
+                }
+            }
+        }
+    }
+    for (name, line) in services {
+        let [request, reply] = ["request", "reply"].map(|end| format!("{name}_{end}"));
+        paths.insert(request.clone(), &line.path);
+        paths.insert(reply.clone(), &line.path);
+        for (member, service) in (0u32..).zip(&line.of) {
+            for (nodes, ends) in [(&service.servers, [&reply, &request]), (&service.clients, [&request, &reply])] {
+                for node in nodes {
+                    for (side, end) in ends.into_iter().enumerate() {
+                        lists.entry(node).or_default()[side].entry(end.clone()).or_default().push(member);
+                    }
+                }
+            }
+        }
+    }
+    let none = [BTreeMap::new(), BTreeMap::new()];
+    let listed = |node: &&FoundNode| {
+        let of_node = lists.get(node.name.as_str()).unwrap_or(&none);
+        let list = |side: &BTreeMap<String, Vec<u32>>| {
+            side.iter().flat_map(|(name, members)| words(name, paths[name], members, &node.name)).collect()
+        };
+        [list(&of_node[0]), list(&of_node[1])]
+    };
+    nodes.iter().map(listed).collect()
+}
+
+/// How a node lists a topic or group of which it uses these members.
+fn words(name: &str, path: &str, used: &[u32], node: &str) -> Vec<String> {
+    let members = expand(path).unwrap_or_default();
+    let all = used.len() == members.len();
+    match own_members(&members, node) {
+        _ if members.len() < 2 => vec![name.to_owned()],
+        Some(own) if own == used => vec![name.to_owned()],
+        None if all => vec![name.to_owned()],
+        Some(_) if all => vec![format!("{name}[*]")],
+        _ => used.iter().map(|&at| format!("{name}[{}]", in_brackets(&members[at as usize].name))).collect(),
+    }
+}
+
+/// Folds nodes of ROS into groups: if they list the same, and differ in their namespaces.
+pub(super) fn fold_nodes<'a>(
+    system: &System,
+    nodes: &[&'a FoundNode],
+    lists: &'a [[Vec<String>; 2]],
+) -> Vec<Line<Node<'a>>> {
+    let nodes: Vec<Node<'a>> = nodes.iter().zip(lists).map(|(found, lists)| Node { found, lists }).collect();
+    if !system.is_ros() {
+        let alone = |node: Node<'a>| {
+            let path = node.found.name.clone();
+            Line { name: path.clone(), path, of: vec![node] }
+        };
+        return nodes.into_iter().map(alone).collect();
+    }
+    fold_by(
+        &nodes,
+        |node| node.found.name.clone(),
+        |node, _| {
+            let FoundNode { name, count, answers, .. } = node.found;
+            // A group says the same of all its members, and nothing of one.
+            let names_a_member =
+                node.lists.iter().flatten().any(|listed| listed.contains('[') && !listed.ends_with("[*]"));
+            (node.lists, *count, *answers, names_a_member.then_some(name))
+        },
+    )
+}
