@@ -13,6 +13,7 @@ mod budget;
 mod codec;
 mod examples;
 mod faults;
+mod fleet;
 mod links;
 mod lock_step;
 mod monitor;

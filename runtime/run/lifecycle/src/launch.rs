@@ -202,8 +202,8 @@ impl Launched {
         self.waiting.tell(tell);
     }
 
-    /// Notes what the system lacks before a run can begin, each in a phrase. Call it again and again, the last time with
-    /// nothing.
+    /// Notes what the system lacks before a run can begin, each in a phrase. Call it again and again, the last time
+    /// with nothing.
     pub fn lacks(&mut self, missing: &[String]) {
         self.waiting.lacks(missing, Instant::now());
     }

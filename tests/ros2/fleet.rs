@@ -1,0 +1,104 @@
+//! A fleet in namespaces, of nodes that know nothing of it: each has its own member of a group, one of them is
+//! disturbed by its name or by the choice of a test, and a start that waits for one says so.
+
+use std::fs;
+use std::path::PathBuf;
+
+use serde_json::Value;
+use sesame_tests::{Done, command, done, fresh_folder, sesamec, workspace};
+
+use crate::environment::{Domain, Vendor};
+
+/// Two carts and their manager.
+struct Fleet {
+    folder: PathBuf,
+    /// Held for as long as it is used.
+    _domain: Domain,
+}
+
+impl Fleet {
+    /// With further declarations of its system.
+    fn new(name: &str, more: &str) -> Option<Fleet> {
+        let python = Vendor::Jazzy.python()?.display().to_string();
+        let (folder, domain) = (fresh_folder(name), Domain::free());
+        let program = workspace().join("tests/ros2/peers/cart.py").display().to_string();
+        let ready = "{ ready when line \"up\" within 120s }";
+        let text = format!(
+            "space carts\n\
+             system {{\n\
+               simulator carts = ros2 {{ domain {domain} }}\n\
+               message Place = \"std_msgs/msg/Float64\" {{ data: real[m] }}\n\
+               message Speed = \"std_msgs/msg/Float64\" {{ data: real[m/s] }}\n\
+               topic place = \"/{{r1,r2}}/place\" : Place\n\
+               topic speed = \"/{{r1,r2}}/speed\" : Speed\n\
+               node cart \"/{{r1,r2}}/cart\" {{\n\
+                 launch {python:?} {program:?} \"cart\" \"{{ros-args}}\" \"--ros-args\" \"-r\" \"__ns:=/{{member}}\" {ready}\n\
+                 publishes place  subscribes speed\n\
+               }}\n\
+               node manager \"/manager\" {{\n\
+                 launch {python:?} {program:?} \"manager\" \"r1\" \"r2\" \"{{ros-args}}\" {ready}\n\
+                 publishes speed  subscribes place\n\
+               }}\n\
+               {more}\n\
+             }}\n\
+             metric ahead  maximise default 0m = max(place[r2].data - place[r1].data) outbound\n\
+             metric behind maximise default 0m = max(place[r1].data - place[r2].data) outbound\n\
+             metric apart  maximise default 0m = max(max of place.data - place.data) outbound\n\
+             operation slip on place[r2].data from cart = bias [0m, 9m]\n\
+             operation deaf on one of speed.data to cart = stuck at [0m/s, 1m/s]\n\
+             operation stop on node one of cart = pause\n\
+             test slips {{ slip bias 9m from 1s to 2s }}\n\
+             test stands {{ stop member \"r1\" from 1s to 3s }}\n\
+             test hears_nothing {{ deaf value 0m/s member \"r2\" from 1s to 4s }}\n\
+             campaign first {{\n\
+               objectives apart\n\
+               observes   ahead, behind\n\
+               operations slip, deaf, stop 1 per test\n\
+               search     random {{ evaluations 2 }}\n\
+               end        after 4s\n\
+             }}\n",
+            domain = domain.number,
+        );
+        fs::write(folder.join("carts.sesame"), text).expect("a space can be written");
+        Some(Fleet { folder, _domain: domain })
+    }
+
+    fn sesamec(&self, arguments: &[&str]) -> Done {
+        done(command(sesamec()).args(arguments).current_dir(&self.folder))
+    }
+}
+
+#[test]
+fn each_cart_has_its_own_topics_and_one_of_them_is_disturbed() {
+    let Some(fleet) = Fleet::new("fleet_in_namespaces", "") else { return };
+    let checked = fleet.sesamec(&["check", "carts.sesame"]).expect(0);
+    assert!(!checked.err.contains("W0013"), "each publishes for itself: {}", checked.err);
+    let wiring = fleet.sesamec(&["explain", "wiring", "carts.sesame"]).expect(0).out;
+    for line in ["-r /r1/place:=/r1/place/from/cart/r1 -r /r1/speed:=/r1/speed/to/cart/r1", "/r2/speed/to/cart/r2"] {
+        assert!(wiring.contains(line), "{wiring}");
+    }
+    assert!(!wiring.contains("/r1/place/from/cart/r2"), "{wiring}");
+
+    fleet.sesamec(&["known", "carts.sesame", "slips", "stands", "hears_nothing"]).expect(0);
+    let listed = fleet.sesamec(&["list", "carts.sesame", "--results", "known", "--format", "json"]).expect(0);
+    let listed: Value = serde_json::from_str(&listed.out).expect("it is JSON");
+    let value = |test: &str, metric: &str| -> f64 {
+        let found = listed["tests"].as_array().expect("it lists tests").iter().find(|row| row["test"] == test);
+        let found = found.unwrap_or_else(|| panic!("no {test} in {listed:#}"));
+        found["measured"][metric].as_f64().unwrap_or_else(|| panic!("no {metric} in {listed:#}"))
+    };
+    // Undisturbed they drive side by side.
+    assert!(value("T0", "apart") < 0.5, "{listed:#}");
+    assert!(value("T1", "ahead") > 8.0 && value("T1", "behind") < 0.5, "only `r2` slips: {listed:#}");
+    assert!(value("T2", "ahead") > 1.5 && value("T2", "behind") < 0.5, "only `r1` stands: {listed:#}");
+    assert!(value("T3", "behind") > 2.0 && value("T3", "ahead") < 0.5, "only `r2` hears nothing: {listed:#}");
+}
+
+#[test]
+fn a_start_says_what_it_waits_for() {
+    let Some(fleet) = Fleet::new("fleet_that_waits", "node ghost \"/ghost\" { subscribes place }") else { return };
+    let run = fleet.sesamec(&["run", "carts.sesame"]);
+    let said = "first: the system is not complete yet: 1 of 2 subscribe to `/r1/place`: `manager`, `ghost`; 1 of 2 \
+                subscribe to `/r2/place`: `manager`, `ghost`";
+    assert!(run.err.contains(said), "{}", run.err);
+}

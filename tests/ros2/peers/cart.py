@@ -1,0 +1,51 @@
+"""Carts in namespaces, by rclpy: `cart` drives at the speed that it hears, and `manager` drives all that it names."""
+
+import sys
+
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from std_msgs.msg import Float64
+
+PERIOD = 0.05
+
+
+def cart(node: Node) -> None:
+    """Publishes where it is, in its own namespace."""
+    state = {"speed": 0.0, "place": 0.0}
+    node.create_subscription(Float64, "speed", lambda heard: state.update(speed=heard.data), 10)
+    places = node.create_publisher(Float64, "place", 10)
+
+    def drive() -> None:
+        state["place"] += state["speed"] * PERIOD
+        places.publish(Float64(data=state["place"]))
+
+    node.create_timer(PERIOD, drive)
+
+
+def manager(node: Node, carts: list[str]) -> None:
+    """Publishes the same speed to all carts, and hears where they are."""
+    for name in carts:
+        node.create_subscription(Float64, f"/{name}/place", lambda _: None, 10)
+    speeds = [node.create_publisher(Float64, f"/{name}/speed", 10) for name in carts]
+    node.create_timer(PERIOD, lambda: [speed.publish(Float64(data=1.0)) for speed in speeds])
+
+
+def main() -> None:
+    """Arguments are the role, the carts of a manager, and those of ROS."""
+    rclpy.init(args=sys.argv)
+    own = rclpy.utilities.remove_ros_args(sys.argv)[1:]
+    node = rclpy.create_node(own[0])
+    if own[0] == "cart":
+        cart(node)
+    else:
+        manager(node, own[1:])
+    print("up", flush=True)
+    try:
+        rclpy.spin(node)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+
+
+if __name__ == "__main__":
+    main()
