@@ -137,7 +137,7 @@ fn publishers(space: &Space, topic: TopicId) -> Vec<Publisher<'_>> {
         let members = used.members.as_ref().map(|members| members.iter().copied().collect());
         match publishers.last_mut().filter(|last| last.declaration.span == node.declaration.span) {
             Some(Publisher { members: Some(known), .. }) if members.is_some() => {
-                known.extend(members.into_iter().flatten())
+                known.extend(members.into_iter().flatten());
             }
             Some(Publisher { members: known, .. }) => *known = None,
             None => {

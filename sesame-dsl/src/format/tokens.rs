@@ -104,7 +104,7 @@ impl<'t> Walk<'t> {
             Rule::quantity | Rule::number => self.token(start, pair.as_str(), Kind::Quantity, glued),
             Rule::text => self.token(start, pair.as_str(), Kind::Text, glued),
             Rule::path | Rule::target | Rule::with_member | Rule::unit => {
-                self.token(start, pair.as_str(), Kind::Word, glued)
+                self.token(start, pair.as_str(), Kind::Word, glued);
             }
             _ if pair.clone().into_inner().all(|inner| inner.as_rule() == Rule::COMMENT) => self.leaf(pair, glued),
             _ => self.inner(pair, glued),

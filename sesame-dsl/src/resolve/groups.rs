@@ -9,7 +9,7 @@ use crate::similar::most_similar;
 use crate::span::Span;
 use crate::syntax::ast::{self, Text};
 
-impl<'a> Resolver<'a> {
+impl Resolver<'_> {
     /// What a path stands for; reports one with a mistake.
     pub(super) fn expanded(&mut self, path: &Text, what: &str) -> Option<Vec<Expanded>> {
         match expand(&path.text) {
@@ -75,16 +75,10 @@ impl<'a> Resolver<'a> {
         topic.map_or(String::new(), |topic| self.example_of_member(TopicId::from_index(topic.index)))
     }
 
-    /// The members of a topic that a path or list names in brackets: `None` for all of them.
-    pub(super) fn named_member(
-        &mut self,
-        topic: TopicId,
-        name: &ast::Name,
-        member: &ast::Member,
-    ) -> Option<Option<u32>> {
+    /// The member of a topic that a path or list names in brackets. `None` was reported.
+    pub(super) fn named_member(&mut self, topic: TopicId, name: &ast::Name, wanted: &str, span: Span) -> Option<u32> {
         let members = self.members_of_topic(topic);
-        let Some(wanted) = &member.name else { return Some(None) };
         let declared = self.system.topics[topic.index()].as_ref()?.declaration.span;
-        self.member_named(&members, wanted, member.span, ("topic", &name.text, declared)).map(Some)
+        self.member_named(&members, wanted, span, ("topic", &name.text, declared))
     }
 }

@@ -78,12 +78,13 @@ impl<'a> Resolver<'a> {
     pub(super) fn member_of_path(&mut self, topic: TopicId, path: &'a Path) -> Option<(Option<u32>, &'a [ast::Step])> {
         let elements = path.elements.as_slice();
         if let Some(member) = &path.member {
-            return Some((self.named_member(topic, &path.topic, member)?, elements));
+            let Some(wanted) = &member.name else { return Some((None, elements)) };
+            return Some((Some(self.named_member(topic, &path.topic, wanted, member.span)?), elements));
         }
         match elements {
             [ast::Step::Element(count, span), rest @ ..] if self.may_name_a_member(topic, path) => {
-                let member = ast::Member { name: Some(self.text(count.span).to_owned()), span: *span };
-                Some((self.named_member(topic, &path.topic, &member)?, rest))
+                let wanted = self.text(count.span);
+                Some((Some(self.named_member(topic, &path.topic, wanted, *span)?), rest))
             }
             _ => Some((None, elements)),
         }

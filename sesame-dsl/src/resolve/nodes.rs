@@ -134,10 +134,10 @@ impl<'a> Resolver<'a> {
             let topic = TopicId::from_index(index);
             let said = match &listed.member {
                 None => Some(Said::Own),
-                Some(member) => self.named_member(topic, &listed.name, member).map(|member| match member {
-                    Some(member) => Said::These(vec![member]),
-                    None => Said::All,
-                }),
+                Some(ast::Member { name: None, .. }) => Some(Said::All),
+                Some(ast::Member { name: Some(wanted), span }) => {
+                    self.named_member(topic, &listed.name, wanted, *span).map(|member| Said::These(vec![member]))
+                }
             };
             let known = found.iter_mut().find(|known| known.topic == topic);
             match (known, said) {

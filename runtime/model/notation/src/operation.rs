@@ -63,10 +63,10 @@ fn targets(topic: &Topic, operation: &Operation) -> Vec<String> {
         candidates.into_iter().map(|member| format!("{name}[{}]", topic.member_in_words(member))).collect()
     };
     let places = || operation.places.iter().map(|place| value_path_in_words(place));
-    match operation.places.is_empty() {
-        true => topics,
-        false => topics.iter().flat_map(|topic| places().map(move |place| format!("{topic}{place}"))).collect(),
+    if operation.places.is_empty() {
+        return topics;
     }
+    topics.iter().flat_map(|topic| places().map(move |place| format!("{topic}{place}"))).collect()
 }
 
 /// How many members of a group a test chooses, as it is written before their names; empty where it chooses none.

@@ -158,7 +158,8 @@ pub(super) fn reads_the_other(plan: &CampaignPlan, one: &str, other: &str) -> Op
         let (topic, behind) = topic_of(plan, pose)?;
         let path = &pose[..pose.len() - behind.len()];
         let member = topic.paths.iter().position(|of_topic| of_topic == path)?;
-        let id = (0u32..).map(TopicId).find(|id| std::ptr::eq(plan.topic(*id), topic))?;
+        let mut topics = (0u32..).map(TopicId).zip(&plan.topics);
+        let (id, _) = topics.find(|(_, of_plan)| std::ptr::eq(*of_plan, topic))?;
         let nodes = plan.nodes.iter().enumerate().filter(|(_, node)| node.publishes_on(id, member));
         let nodes: BTreeSet<usize> = nodes.map(|(at, _)| at).collect();
         (!nodes.is_empty()).then_some(nodes)

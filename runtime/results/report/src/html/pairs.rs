@@ -118,11 +118,13 @@ fn draw(body: &mut Markup, plan: &CampaignPlan, pairs: &PairsSummary, summary: &
 fn causes_by_operations(summary: &Summary) -> Vec<(BTreeSet<&str>, &str)> {
     let causes = summary.causes.iter().flat_map(|found| &found.causes);
     // A pair is of operations, whatever members of a group they act on.
-    causes.map(|cause| (cause.operations.iter().map(without_members).collect(), cause.requirement.as_str())).collect()
+    causes
+        .map(|cause| (cause.operations.iter().map(|name| without_members(name)).collect(), cause.requirement.as_str()))
+        .collect()
 }
 
 /// The name of an operation without the members of a group on which it acts.
-fn without_members(operation: &String) -> &str {
+fn without_members(operation: &str) -> &str {
     operation.split('[').next().unwrap_or(operation)
 }
 

@@ -447,7 +447,9 @@ impl Stream {
             Of::Members(members) => {
                 let size = members.last().map_or(0, |last| last + 1);
                 let mut silent = vec![false; size];
-                members.iter().for_each(|&member| silent[member] = true);
+                for &member in members {
+                    silent[member] = true;
+                }
                 let mut spoke = Vec::with_capacity(self.spoke.len());
                 for &(member, _) in &self.spoke {
                     if silent.get_mut(member).is_some_and(std::mem::take) {

@@ -8,11 +8,13 @@ use std::collections::BTreeMap;
 use sesame_base::time::SimTime;
 use sesame_plan::{CampaignPlan, Input, TopicId};
 
+/// By member of a topic: the number of instants in which it was heard, and the last of them.
+type Members = BTreeMap<usize, (u64, SimTime)>;
+
 /// The instants of one formula.
 pub(super) struct Attendance {
-    /// Per topic of the inputs and per member that they read: the number of instants in which it was heard, and the
-    /// last of them.
-    topics: Vec<(TopicId, BTreeMap<usize, (u64, SimTime)>)>,
+    /// Per topic of the inputs, the members that they read.
+    topics: Vec<(TopicId, Members)>,
     /// The number of instants at which anything was heard, and the last of them.
     instants: (u64, SimTime),
 }
@@ -20,7 +22,7 @@ pub(super) struct Attendance {
 impl Attendance {
     /// Before the first message.
     pub(super) fn new(inputs: &[Input], plan: &CampaignPlan) -> Self {
-        let mut topics: Vec<(TopicId, BTreeMap<usize, (u64, SimTime)>)> = Vec::new();
+        let mut topics: Vec<(TopicId, Members)> = Vec::new();
         for topic in inputs.iter().map(|input| input.field.topic) {
             if topics.iter().all(|(known, _)| *known != topic) {
                 let is_read = |member: &usize| inputs.iter().any(|input| input.reads(topic, *member));
@@ -63,7 +65,7 @@ mod tests {
     use proptest::prelude::*;
 
     use sesame_plan::testing::plan;
-    use sesame_plan::{FieldRef, Members};
+    use sesame_plan::{FieldRef, Members as Read};
 
     use super::*;
 
@@ -75,7 +77,7 @@ mod tests {
             // `arm/command`, and both members of `zones`.
             let input = |topic| Input {
                 field: FieldRef { topic: TopicId(topic), path: Vec::new() },
-                members: Members::Min,
+                members: Read::Min,
                 list: None,
                 text: None,
             };
