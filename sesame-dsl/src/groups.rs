@@ -29,14 +29,6 @@ impl Expanded {
     }
 }
 
-/// A member as it is written between brackets: a name or number as it is, everything else as a text.
-pub fn in_brackets(member: &str) -> String {
-    let plain = |rest: &str| rest.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
-    let is_name = !member.starts_with(|first: char| first.is_ascii_digit()) && plain(member) && !member.is_empty();
-    let is_number = !member.is_empty() && member.bytes().all(|byte| byte.is_ascii_digit());
-    if is_name || is_number { member.to_owned() } else { format!("\"{member}\"") }
-}
-
 /// Which members of a group belong to the node of this name: those whose paths begin like the name, up to the part with
 /// the braces. `/r1/vehicle` has `/r1/odom` of `/{r1,r2}/odom`. Braces of which no member begins like it say nothing.
 /// `None` if none of them does.
@@ -123,7 +115,7 @@ mod tests {
     use std::cell::Cell;
     use std::hash::{Hash, Hasher};
 
-    use super::{expand, first_twice, in_brackets, own_members};
+    use super::{expand, first_twice, own_members};
 
     /// A member that counts how often it is compared.
     struct Counted<'a>(usize, &'a Cell<usize>);
@@ -198,11 +190,5 @@ mod tests {
         assert_eq!(own("{acme,bolt}/{1,2}/state", "bolt/2/agv"), Some(vec![3]));
         assert_eq!(own("{acme,bolt}/{1,2}/state", "acme/manager"), Some(vec![0, 1]));
         assert_eq!(own("/odom", "/odom"), None);
-    }
-
-    #[test]
-    fn a_member_is_written_as_it_can_be_read() {
-        let written = ["r1", "12", "acme/1", "1a", "two words"].map(in_brackets);
-        assert_eq!(written, ["r1", "12", "\"acme/1\"", "\"1a\"", "\"two words\""]);
     }
 }

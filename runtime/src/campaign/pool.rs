@@ -203,12 +203,14 @@ impl WorkerSlot {
         let mut killed = None;
         let mut added = Vec::new();
         let listener = Arc::clone(&self.waits);
-        let mut waits = |missing| {
+        let waits = |missing| {
             if let Ok(mut of_pool) = listener.lock() {
                 *of_pool = missing;
             }
         };
-        let (observation, notes, trace_failure) = match worker.ask(job, timeout, &self.stop, &mut waits) {
+        let answer = worker.ask(job, timeout, &self.stop, &mut |missing| waits(Some(missing)));
+        waits(None);
+        let (observation, notes, trace_failure) = match answer {
             Ok(reply) => {
                 self.worker = Some(worker);
                 added = reply.added;
@@ -313,17 +315,14 @@ impl Worker {
         job: &Job,
         timeout: Duration,
         stop: &AtomicBool,
-        waits: &mut dyn FnMut(Option<String>),
+        waits: &mut dyn FnMut(String),
     ) -> io::Result<Reply> {
         protocol::send(&mut self.stream, job)?;
         let asked = Instant::now();
         loop {
             match self.hear(asked, timeout, stop)? {
-                Said::Waits(missing) => waits(Some(missing)),
-                Said::Reply(reply) => {
-                    waits(None);
-                    return Ok(*reply);
-                }
+                Said::Waits(missing) => waits(missing),
+                Said::Reply(reply) => return Ok(*reply),
             }
         }
     }

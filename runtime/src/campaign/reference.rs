@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fmt;
 
 use sesame_base::observation::Observation;
-use sesame_base::silence::wires;
+use sesame_base::silence::{PlannedWire, wires};
 use sesame_plan::{CampaignPlan, OperationId, Requirement, Span, Task, Test};
 use sesame_record::{Difference, Verdict, differences, verdict};
 use sesame_relay::wire::WireTable;
@@ -191,7 +191,7 @@ fn of_traffic(plan: &CampaignPlan, first: &Observation, last: &Observation) -> O
     let heard = |run: &Observation, wire: u32| {
         run.traffic.iter().find(|traffic| traffic.wire == wire).map_or(0, |traffic| traffic.messages)
     };
-    (0..).zip(wires(plan)).find_map(|(wire, (_, path))| {
+    (0..).zip(wires(plan)).find_map(|(wire, PlannedWire { path, .. })| {
         let (before, after) = (heard(first, wire), heard(last, wire));
         // With few messages, half as many are chance.
         let (less, more) = (before.min(after), before.max(after));

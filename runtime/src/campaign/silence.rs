@@ -18,7 +18,7 @@ pub(crate) fn judge(plan: &CampaignPlan, reference: &Observation, run: &mut Obse
 fn note(plan: &CampaignPlan, reference: &Observation, silences: &[Silence]) -> Option<String> {
     let wires = wires(plan);
     let one = |silence: &Silence| {
-        let path = wires.get(silence.wire).map_or("", |(_, path)| path);
+        let path = wires.get(silence.wire).map_or("", |wire| wire.path);
         let to = silence.to.map_or_else(|| "the end of the run".to_owned(), |to| format!("{to:.3} s"));
         let usual = reference.traffic.iter().find(|usual| usual.wire as usize == silence.wire);
         let longest = usual.map_or(0.0, |usual| usual.gap.length());

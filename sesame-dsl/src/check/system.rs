@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use sesame_plan::without_member;
+
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{Declaration, MetricSource, Space, TopicId};
 use crate::resolve::list;
@@ -142,7 +144,7 @@ fn publishers(space: &Space, topic: TopicId) -> Vec<Publisher<'_>> {
             Some(Publisher { members: known, .. }) => *known = None,
             None => {
                 let declaration = &node.declaration;
-                let name = declaration.name.split('[').next().unwrap_or_default();
+                let name = without_member(&declaration.name);
                 publishers.push(Publisher { kind: "node", declaration, name, members });
             }
         }

@@ -17,7 +17,7 @@ pub struct Operation {
     /// end, or one on a node or its parameters, which [`OperationKind::node`] names by its position in the space.
     pub target: Option<Target>,
     /// The members of a group of topics or nodes on which it acts, by their positions; `None` for all topics of a
-    /// group, or for what is no group.
+    /// group, or for an operation that acts on no group.
     pub members: Option<MembersOf>,
     /// Only messages that these nodes publish, in written order; none for all messages.
     pub from: Vec<NodeId>,

@@ -2,7 +2,7 @@
 
 use super::Resolver;
 use crate::diagnostic::{Code, Diagnostic};
-use crate::groups::{expand, in_brackets};
+use crate::groups::expand;
 use crate::model::{self, Domain, Id as _, MembersOf, Parameter, TopicId};
 use crate::span::Span;
 use crate::syntax::ast::{self, Chosen, OperationBody};
@@ -42,7 +42,7 @@ impl<'a> Resolver<'a> {
             return None;
         };
         let Some(chosen) = chosen else {
-            // What acts on a whole group of topics is not told apart from what acts on one topic.
+            // An operation on a whole group of topics needs no list of members, like one on a single topic.
             return Some(((!all || of_nodes).then_some(MembersOf::These(positions)), None));
         };
         let (least, most) = self.how_many(&chosen, positions.len())?;
@@ -111,11 +111,7 @@ impl<'a> Resolver<'a> {
     /// The number of wires that an operation may act on.
     pub(super) fn wires_acted_on(&self, topic: TopicId, operation: &model::Operation) -> Option<usize> {
         let count = self.system.topics.get(topic.index())?.as_ref()?.paths.len();
-        let permitted = |member: &u32| match &operation.members {
-            None => true,
-            Some(MembersOf::These(these)) => these.contains(member),
-            Some(MembersOf::Chosen(choices)) => choices.iter().any(|these| these.contains(member)),
-        };
+        let permitted = |member: &u32| operation.members.as_ref().is_none_or(|members| members.may_have(*member));
         let links = |member: u32| {
             let nodes = operation.to.iter().filter_map(|node| self.system.nodes[node.index()].as_ref());
             let hears =
@@ -130,9 +126,8 @@ impl<'a> Resolver<'a> {
     pub(super) fn of_all_members(&mut self, target: &model::Target, span: Span) -> Option<()> {
         let Some(&first) = target.named.first() else { return Some(()) };
         let topic = self.system.topics.get(target.topic.index())?.as_ref()?;
-        let member = topic.members.get(first as usize).map_or(String::new(), |member| in_brackets(member));
-        let title =
-            format!("`{}[{member}]` is one member of a group, which cannot be used here", topic.declaration.name);
+        let member = sesame_plan::with_member(&topic.declaration.name, topic.members.get(first as usize)?);
+        let title = format!("`{member}` is one member of a group, which cannot be used here");
         self.report(Diagnostic::new(Code::UNPAIRED, span, title).label("expected the whole group"));
         None
     }

@@ -3,7 +3,7 @@
 use super::words::list;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::groups::{Expanded, expand, in_brackets};
+use crate::groups::{Expanded, expand};
 use crate::model::{Id as _, TopicId};
 use crate::similar::most_similar;
 use crate::span::Span;
@@ -22,7 +22,7 @@ impl Resolver<'_> {
         }
     }
 
-    /// The members of a topic; a single one without a name if it is no group.
+    /// The members of a topic; a single one without a name if it is not a group.
     pub(super) fn members_of_topic(&self, topic: TopicId) -> Vec<Expanded> {
         self.path_of_topic(topic).and_then(|path| expand(&path.text).ok()).unwrap_or_default()
     }
@@ -51,7 +51,7 @@ impl Resolver<'_> {
                     .label("unknown member")
                     .secondary(declared, format!("the {what} is declared here"));
             match most_similar(wanted, known.iter().copied()).filter(|_| self.compared.more(known.len())) {
-                Some(similar) => diagnostic.did_you_mean(span, format!("[{}]", in_brackets(similar))),
+                Some(similar) => diagnostic.did_you_mean(span, format!("[{}]", sesame_plan::in_brackets(similar))),
                 None if known.len() <= 8 => diagnostic.note(format!("its members are {}", list(&known))),
                 None => diagnostic,
             }
@@ -63,10 +63,8 @@ impl Resolver<'_> {
     /// How to write a member of a topic, for example.
     pub(super) fn example_of_member(&self, topic: TopicId) -> String {
         let topic = self.system.topics.get(topic.index()).and_then(Option::as_ref);
-        topic.map_or(String::new(), |topic| {
-            let member = topic.members.first().map_or(String::new(), |member| in_brackets(member));
-            format!("`{}[{member}]`", topic.declaration.name)
-        })
+        let member = topic.and_then(|topic| Some((&topic.declaration.name, topic.members.first()?)));
+        member.map_or(String::new(), |(topic, member)| format!("`{}`", sesame_plan::with_member(topic, member)))
     }
 
     /// As [`Resolver::example_of_member`], for the topic of a path.

@@ -74,7 +74,7 @@ impl<'a> Resolver<'a> {
     }
 
     /// The member of a group that a path names, and what is left of its choices of elements. A number is a member
-    /// directly behind the name of a group whose topics are no lists.
+    /// directly behind the name of a group whose topics are not lists.
     pub(super) fn member_of_path(&mut self, topic: TopicId, path: &'a Path) -> Option<(Option<u32>, &'a [ast::Step])> {
         let elements = path.elements.as_slice();
         if let Some(member) = &path.member {

@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::groups::{Expanded, expand, in_brackets, own_members};
+use crate::groups::{Expanded, expand, own_members};
 use crate::model::{self, Channel, Id as _, NodeId, TopicId, TopicMembers};
 use crate::span::Span;
 use crate::syntax::ast::{self, OperationBody, Target, WithMember};
@@ -92,7 +92,7 @@ impl<'a> Resolver<'a> {
     ) -> Option<model::Node> {
         let mut declaration = self.declaration(&node.head);
         if members.len() > 1 {
-            declaration.name = format!("{}[{}]", declaration.name, in_brackets(&member.name));
+            declaration.name = sesame_plan::with_member(&declaration.name, &member.name);
         }
         let used = |listed: &[Listed]| listed.iter().map(|listed| listed.used_by(member, members)).collect();
         let named = match &node.named {
@@ -208,8 +208,8 @@ impl<'a> Resolver<'a> {
         None
     }
 
-    /// Nodes must publish or subscribe to the topic, and the transport must tell them apart. Of a group of nodes, those
-    /// are meant that do.
+    /// Nodes must publish or subscribe to the topic, and the transport must tell them apart. The name of a group of nodes
+    /// stands for its members that do.
     pub(super) fn between_nodes(&mut self, body: &'a OperationBody) -> Option<[Vec<NodeId>; 2]> {
         let Some(target) = &body.target else {
             let Some((span, _)) = body.from.as_ref().or(body.to.as_ref()) else {

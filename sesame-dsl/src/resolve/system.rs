@@ -6,7 +6,6 @@ use super::elements::Reading;
 use super::words::type_in_words;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::groups::in_brackets;
 use crate::model::{self, Channel, Id as _, Simulator, TopicId, Type};
 use crate::similar::most_similar;
 use crate::span::Span;
@@ -186,7 +185,8 @@ impl<'a> Resolver<'a> {
                 topic.paths.len()
             ));
             let named = topic.paths.iter().position(|path| path == member).and_then(|at| topic.members.get(at));
-            last.notes.extend(named.map(|named| format!("`{group}[{}]` is this one alone", in_brackets(named))));
+            let named = named.map(|named| sesame_plan::with_member(group, named));
+            last.notes.extend(named.map(|named| format!("`{named}` is this one alone")));
         }
     }
 

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use sesame_dsl::groups::{expand, in_brackets, own_members};
+use sesame_dsl::groups::{expand, own_members};
+use sesame_plan::with_member;
 use sesame_scan::{FoundNode, FoundService, FoundTopic, System};
 
 use super::groups::{Line, fold_by};
@@ -68,7 +69,7 @@ fn words(name: &str, path: &str, used: &[u32], node: &str) -> Vec<String> {
         Some(own) if own == used => vec![name.to_owned()],
         None if all => vec![name.to_owned()],
         Some(_) if all => vec![format!("{name}[*]")],
-        _ => used.iter().map(|&at| format!("{name}[{}]", in_brackets(&members[at as usize].name))).collect(),
+        _ => used.iter().map(|&at| with_member(name, &members[at as usize].name)).collect(),
     }
 }
 

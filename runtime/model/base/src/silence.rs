@@ -5,7 +5,7 @@
 //! whose topic was silent to the end is judged by what was known until then.
 
 use sesame_plan::stl::Formula;
-use sesame_plan::{CampaignPlan, Metric, MetricId, MetricSource, TopicId};
+use sesame_plan::{CampaignPlan, Metric, MetricId, MetricSource, Source, TopicId};
 
 use crate::observation::{MetricObservation, Observation, Reach, Traffic};
 use crate::robustness::{Quantifier, quantifier};
@@ -72,17 +72,13 @@ pub fn distrust(plan: &CampaignPlan, silences: &[Silence], metrics: &mut [Metric
     if silences.iter().all(|silence| silence.to.is_some()) {
         return;
     }
-    let members = (0..).map(TopicId).zip(&plan.topics);
-    let members = members.flat_map(|(id, topic)| (0u32..).zip(&topic.paths).map(move |(member, _)| (id, member)));
-    let members: Vec<(TopicId, u32)> = members.collect();
+    let wires = wires(plan);
     for (at, observed) in (0..).zip(metrics) {
         let sources = sources_of(plan, MetricId(at));
         let silent = silences.iter().filter(|silence| silence.to.is_none());
         let reads = |silence: &&Silence| {
-            let of = members.get(silence.wire);
-            of.is_some_and(|of| {
-                sources.iter().any(|(topic, only)| *topic == of.0 && only.is_none_or(|only| only == of.1))
-            })
+            let wire = wires.get(silence.wire);
+            wire.is_some_and(|wire| sources.iter().any(|source| source.reads(wire.topic, wire.member)))
         };
         let since = silent.filter(reads).map(|silence| silence.from).min_by(f64::total_cmp);
         if let Some(since) = since {
@@ -92,14 +88,28 @@ pub fn distrust(plan: &CampaignPlan, silences: &[Silence], metrics: &mut [Metric
     }
 }
 
-/// The wires of a plan: the topic and the path of each.
-pub fn wires(plan: &CampaignPlan) -> Vec<(TopicId, &str)> {
+/// A wire of a plan: one path of a topic.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PlannedWire<'a> {
+    /// The topic.
+    pub topic: TopicId,
+    /// The position of the path among those of the topic.
+    pub member: usize,
+    /// The path.
+    pub path: &'a str,
+}
+
+/// The wires of a plan, in their order.
+pub fn wires(plan: &CampaignPlan) -> Vec<PlannedWire<'_>> {
     let topics = (0..).map(TopicId).zip(&plan.topics);
-    topics.flat_map(|(id, topic)| topic.paths.iter().map(move |path| (id, path.as_str()))).collect()
+    let paths = topics.flat_map(|(topic, declared)| {
+        declared.paths.iter().enumerate().map(move |(member, path)| PlannedWire { topic, member, path })
+    });
+    paths.collect()
 }
 
 /// What a metric reads, itself or by the metric whose hazards it counts.
-fn sources_of(plan: &CampaignPlan, metric: MetricId) -> Vec<(TopicId, Option<u32>)> {
+fn sources_of(plan: &CampaignPlan, metric: MetricId) -> Vec<Source> {
     match &plan.metric(metric).source {
         // What a monitor makes of silence is its own affair; what is a hazard is not.
         MetricSource::Monitor { score, .. } => score.requirement().map_or_else(Vec::new, |requirement| {

@@ -208,7 +208,7 @@ impl<'a> Names<'a> {
         if let Members::Only(member) = members {
             let topic = self.plan.topic(field.topic);
             let behind = name.strip_prefix(topic.name.as_str()).unwrap_or_default();
-            name = format!("{}[{}]{behind}", topic.name, topic.member_in_words(*member));
+            name = format!("{}{behind}", topic.member_in_words(*member));
         }
         if let Some(InList { steps, reduction }) = list {
             name.push_str(&value_path_in_words(steps));

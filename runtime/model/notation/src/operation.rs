@@ -3,7 +3,7 @@
 use sesame_plan::condition::{Constraint, Integers};
 use sesame_plan::{
     CampaignPlan, Distribution, Domain, Drain, Lengths, MembersOf, Metric, Operation, OperationKind, Parameter, Span,
-    Topic, value_path_in_words,
+    Topic, value_path_in_words, without_member,
 };
 
 use crate::text::{list, one_of, quoted};
@@ -53,14 +53,12 @@ fn scene(operation: &Operation, known_as: &str, usual: Option<f64>) -> String {
 
 /// The places in the messages of a topic that an operation changes, with the members of a group on which it acts.
 fn targets(topic: &Topic, operation: &Operation) -> Vec<String> {
-    let name = &topic.name;
-    let candidates: Vec<u32> = (0u32..).zip(&topic.paths).map(|(member, _)| member).collect();
-    let candidates = candidates.into_iter().filter(|&member| operation.may_act_on(member as usize));
-    let candidates: Vec<u32> = candidates.collect();
+    let members = (0u32..).zip(&topic.paths).map(|(member, _)| member);
+    let candidates: Vec<u32> = members.filter(|&member| operation.may_act_on(member as usize)).collect();
     let topics: Vec<String> = if candidates.len() == topic.paths.len() {
-        vec![name.clone()]
+        vec![topic.name.clone()]
     } else {
-        candidates.into_iter().map(|member| format!("{name}[{}]", topic.member_in_words(member))).collect()
+        candidates.into_iter().map(|member| topic.member_in_words(member)).collect()
     };
     let places = || operation.places.iter().map(|place| value_path_in_words(place));
     if operation.places.is_empty() {
@@ -87,7 +85,7 @@ pub fn resource(plan: &CampaignPlan, operation: &Operation) -> Option<String> {
     let node = match &operation.members {
         None => node.to_owned(),
         // A group is written by its name alone.
-        Some(_) => format!("{}{}", chosen(operation), node.split('[').next().unwrap_or(node)),
+        Some(_) => format!("{}{}", chosen(operation), without_member(node)),
     };
     Some(match &operation.kind {
         OperationKind::Set { parameter, .. } => format!("parameter {} of {node}", quoted(parameter)),

@@ -49,15 +49,40 @@ pub struct Input {
 }
 
 impl Input {
+    /// Where its messages come from.
+    pub fn source(&self) -> Source {
+        Source { topic: self.field.topic, only: self.only() }
+    }
+
     /// Whether it reads the messages of a path of a topic, by its position.
     pub fn reads(&self, topic: TopicId, member: usize) -> bool {
-        let of_member = |only: u32| only as usize == member;
-        self.field.topic == topic && self.only().is_none_or(of_member)
+        self.source().reads(topic, member)
     }
 
     /// The only member that it reads.
     pub fn only(&self) -> Option<u32> {
         if let Members::Only(member) = self.members { Some(member) } else { None }
+    }
+}
+
+/// A topic that is read: all of it or one member of a group.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Source {
+    /// The topic.
+    pub topic: TopicId,
+    /// The only member that is read, by its position; `None` for all of them.
+    pub only: Option<u32>,
+}
+
+impl Source {
+    /// The whole topic.
+    pub fn whole(topic: TopicId) -> Source {
+        Source { topic, only: None }
+    }
+
+    /// Whether it has the messages of a path of a topic, by its position.
+    pub fn reads(self, topic: TopicId, member: usize) -> bool {
+        self.topic == topic && self.only.is_none_or(|only| only as usize == member)
     }
 }
 

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::stl::Robustness;
-use crate::{FieldRef, Formula, MetricId, MonitorId, Score, TopicId};
+use crate::{FieldRef, Formula, Input, MetricId, MonitorId, Score, Source, TopicId};
 
 /// Which end of a metric is of interest to a tester.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -90,17 +90,14 @@ pub enum MetricSource {
 }
 
 impl MetricSource {
-    /// The topics that it reads itself, each with the only member that it reads, if that is not the whole group. A
-    /// topic may be there several times.
-    pub fn sources(&self) -> Vec<(TopicId, Option<u32>)> {
+    /// What it reads itself. A topic may be there several times.
+    pub fn sources(&self) -> Vec<Source> {
         match self {
-            MetricSource::Hook { topics } => topics.iter().map(|&topic| (topic, None)).collect(),
+            MetricSource::Hook { topics } => topics.iter().copied().map(Source::whole).collect(),
             MetricSource::FuzzingTime | MetricSource::Monitor { .. } => Vec::new(),
-            MetricSource::Last { input } => vec![(input.topic, None)],
+            MetricSource::Last { input } => vec![Source::whole(input.topic)],
             MetricSource::Robustness { robustness: Robustness { inputs, .. } }
-            | MetricSource::Formula { formula: Formula { inputs, .. } } => {
-                inputs.iter().map(|input| (input.field.topic, input.only())).collect()
-            }
+            | MetricSource::Formula { formula: Formula { inputs, .. } } => inputs.iter().map(Input::source).collect(),
         }
     }
 }

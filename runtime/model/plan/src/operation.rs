@@ -15,8 +15,8 @@ pub struct Operation {
     /// The topic whose messages it disturbs; `None` exactly for one that acts on no messages: a custom operation before
     /// the start or after the end, or one on a node.
     pub topic: Option<TopicId>,
-    /// The members of a group of topics or nodes on which it acts; `None` for all topics of a group, or for what is no
-    /// group. The nodes of a group follow each other, and that of the kind is the first of them.
+    /// The members of a group of topics or nodes on which it acts; `None` for all topics of a group, or for an operation
+    /// that acts on no group. The nodes of a group follow each other, and that of the kind is the first of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub members: Option<MembersOf>,
     /// Only messages that these nodes publish; none for all messages.
@@ -54,20 +54,18 @@ pub struct Operation {
 impl Operation {
     /// Whether some test makes it act on a member of its group, by its position.
     pub fn may_act_on(&self, member: usize) -> bool {
-        match &self.members {
-            None => true,
-            Some(MembersOf::These(these)) => is_among(member, these),
-            Some(MembersOf::Chosen(choices)) => choices.iter().any(|these| is_among(member, these)),
-        }
+        let has = |members: &MembersOf| u32::try_from(member).is_ok_and(|member| members.may_have(member));
+        self.members.as_ref().is_none_or(has)
     }
 
     /// Whether it acts on a member of its group, by its position, with these choices of a test.
     pub fn acts_on(&self, member: usize, choices: &[Choice]) -> bool {
-        self.members_of_test(choices).is_none_or(|these| is_among(member, these))
+        let among = |these: &[u32]| these.iter().any(|&one| one as usize == member);
+        self.members_of_test(choices).is_none_or(among)
     }
 
-    /// The members of its group on which it acts with these choices of a test; `None` for all topics of a group, or for
-    /// what is no group. A choice that its parameter does not permit is of none.
+    /// The members of its group on which it acts with these choices of a test; `None` for all topics of a group, or if it
+    /// acts on no group. A choice that its parameter does not permit has no members.
     pub fn members_of_test(&self, choices: &[Choice]) -> Option<&[u32]> {
         let permitted = match self.members.as_ref()? {
             MembersOf::These(these) => return Some(these),
@@ -79,10 +77,16 @@ impl Operation {
 
     /// Which of the permitted choices of members a test makes; `None` for an operation whose tests choose none.
     pub fn choice_of_members(&self, choices: &[Choice]) -> Option<u32> {
-        let Some(MembersOf::Chosen(_)) = &self.members else { return None };
-        let texts = self.parameters.last()?.domain.items()?;
+        let texts = self.choices_of_members()?;
         let Some(Choice::Text { text }) = choices.get(self.parameters.len() - 1) else { return None };
         u32::try_from(texts.iter().position(|item| item == text)?).ok()
+    }
+
+    /// The texts by which a test chooses members, in the order of the choices of [`MembersOf::Chosen`]: what the last
+    /// parameter permits; `None` for an operation whose tests choose none.
+    pub fn choices_of_members(&self) -> Option<&[String]> {
+        let Some(MembersOf::Chosen(_)) = &self.members else { return None };
+        self.parameters.last()?.domain.items()
     }
 
     /// The nodes on which it acts with these choices of a test, if it acts on nodes.
@@ -91,10 +95,6 @@ impl Operation {
         let members = self.members_of_test(choices).unwrap_or(&[0]);
         members.iter().map(|member| NodeId(first.saturating_add(*member))).collect()
     }
-}
-
-fn is_among(member: usize, these: &[u32]) -> bool {
-    these.iter().any(|&one| one as usize == member)
 }
 
 /// Members of a group, by their positions.
@@ -106,6 +106,16 @@ pub enum MembersOf {
     /// Those that a test chooses by the last parameter, a text: for each of its texts the members, as with
     /// [`MembersOf::These`].
     Chosen(Vec<Vec<u32>>),
+}
+
+impl MembersOf {
+    /// Whether some test has this member.
+    pub fn may_have(&self, member: u32) -> bool {
+        match self {
+            MembersOf::These(these) => these.contains(&member),
+            MembersOf::Chosen(choices) => choices.iter().any(|these| these.contains(&member)),
+        }
+    }
 }
 
 fn timed() -> bool {

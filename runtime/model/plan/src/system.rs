@@ -87,15 +87,33 @@ pub struct Topic {
 }
 
 impl Topic {
-    /// A member of a group as a `.sesame` file has it between brackets: its name, as a text where that is no word and
-    /// no number; its position in a plan without names.
+    /// A member of a group with its topic, as a `.sesame` file has it: `odom[r1]`. In a plan without names of members
+    /// it is the position.
     pub fn member_in_words(&self, member: u32) -> String {
-        let Some(name) = self.members.get(member as usize) else { return member.to_string() };
-        let plain = name.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
-        let is_name = plain && !name.starts_with(|first: char| first.is_ascii_digit());
-        let is_number = name.bytes().all(|byte| byte.is_ascii_digit());
-        if is_name || is_number { name.clone() } else { format!("{name:?}") }
+        match self.members.get(member as usize) {
+            Some(name) => with_member(&self.name, name),
+            None => format!("{}[{member}]", self.name),
+        }
     }
+}
+
+/// A name with the member of a group behind it, as a `.sesame` file has it: `odom[r1]`, `odom["acme/1"]`.
+pub fn with_member(name: &str, member: &str) -> String {
+    format!("{name}[{}]", in_brackets(member))
+}
+
+/// A member of a group as a `.sesame` file has it between brackets: a name or number as it is, everything else as a
+/// text.
+pub fn in_brackets(member: &str) -> String {
+    let plain = |rest: &str| rest.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
+    let is_name = !member.starts_with(|first: char| first.is_ascii_digit()) && plain(member) && !member.is_empty();
+    let is_number = !member.is_empty() && member.bytes().all(|byte| byte.is_ascii_digit());
+    if is_name || is_number { member.to_owned() } else { format!("\"{member}\"") }
+}
+
+/// The name before a member in brackets: `odom` of `odom[r1]`, and every other name as it is.
+pub fn without_member(name: &str) -> &str {
+    name.split_once('[').map_or(name, |(group, _)| group)
 }
 
 /// What carries the messages of a topic.
@@ -230,4 +248,17 @@ pub struct FieldRef {
     pub topic: TopicId,
     /// Field names from the message inwards; empty for a topic that carries the value itself.
     pub path: Vec<String>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{in_brackets, with_member, without_member};
+
+    #[test]
+    fn a_member_is_written_as_it_can_be_read() {
+        let written = ["r1", "12", "acme/1", "1a", "two words"].map(in_brackets);
+        assert_eq!(written, ["r1", "12", "\"acme/1\"", "\"1a\"", "\"two words\""]);
+        assert_eq!(without_member(&with_member("odom", "acme/1")), "odom");
+        assert_eq!(without_member("odom"), "odom");
+    }
 }

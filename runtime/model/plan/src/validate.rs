@@ -224,7 +224,7 @@ impl CampaignPlan {
         match members {
             MembersOf::These(members) => these(members),
             MembersOf::Chosen(choices) => {
-                let texts = operation.parameters.last().and_then(|parameter| parameter.domain.items());
+                let texts = operation.choices_of_members();
                 let fits = texts.is_some_and(|texts| texts.len() == choices.len());
                 require(fits, || "are not chosen by the last parameter".to_owned())?;
                 choices.iter().try_for_each(these)

@@ -16,7 +16,7 @@ use sesame_search::test_key::TestKey;
 
 use crate::{Datum, Selection, Table};
 
-/// An operation as tests use it: of one whose tests choose members of a group, each choice is another one.
+/// An operation as tests use it. Where tests choose members of a group, each choice counts as an operation of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Act {
     /// The operation.
@@ -26,7 +26,7 @@ pub struct Act {
 }
 
 impl Act {
-    /// What an operation of a test is.
+    /// The one that a test uses.
     pub fn of(plan: &CampaignPlan, used: &TestOperation) -> Act {
         let members = plan.operation(used.operation).choice_of_members(&used.parameters);
         Act { operation: used.operation, members }
@@ -35,8 +35,7 @@ impl Act {
     /// Its name, with the members in brackets: `late[r2]`.
     pub fn name(self, plan: &CampaignPlan) -> String {
         let operation = plan.operation(self.operation);
-        let items = operation.parameters.last().and_then(|parameter| parameter.domain.items());
-        let members = self.members.and_then(|members| items?.get(members as usize));
+        let members = self.members.and_then(|members| operation.choices_of_members()?.get(members as usize));
         members.map_or_else(|| operation.name.clone(), |members| format!("{}[{members}]", operation.name))
     }
 }

@@ -6,7 +6,7 @@
 use rusqlite::{Transaction, params};
 
 use sesame_base::observation::{Course, Entered, Heard, Signal, SignalEvent, States};
-use sesame_base::silence::wires;
+use sesame_base::silence::{PlannedWire, wires};
 use sesame_plan::{CampaignPlan, Span};
 
 use crate::columns::index;
@@ -80,8 +80,8 @@ pub(super) fn write(
     )?;
     let events = course.signals.iter().flat_map(|signal| signal.events.iter().map(move |event| (signal, event)));
     for (position, (Signal { wire, field, .. }, SignalEvent { at, what })) in events.enumerate() {
-        let Some((topic, path)) = wires.get(*wire as usize) else { continue };
-        let topic = &plan.topic(*topic).name;
+        let Some(&PlannedWire { topic, path, .. }) = wires.get(*wire as usize) else { continue };
+        let topic = &plan.topic(topic).name;
         happened.execute(params![test, index(position), wire, topic, path, field, what.word(), at])?;
     }
     if course.states.is_empty() {
@@ -96,8 +96,8 @@ pub(super) fn write(
     )?;
     let entered = course.states.iter().flat_map(|states| states.entered.iter().map(move |entered| (states, entered)));
     for (position, (States { wire, field, .. }, Entered { at, value })) in entered.enumerate() {
-        let Some((topic, path)) = wires.get(*wire as usize) else { continue };
-        let topic = &plan.topic(*topic).name;
+        let Some(&PlannedWire { topic, path, .. }) = wires.get(*wire as usize) else { continue };
+        let topic = &plan.topic(topic).name;
         entering.execute(params![test, index(position), wire, topic, path, field, at, value])?;
     }
     Ok(())

@@ -6,7 +6,7 @@ use std::ops::RangeInclusive;
 use rusqlite::{Transaction, params};
 
 use sesame_base::observation::{Observation, Traffic, Unreached};
-use sesame_base::silence::wires;
+use sesame_base::silence::{PlannedWire, wires};
 use sesame_plan::{CampaignPlan, OperationId, Span};
 
 use crate::columns::{finite, perhaps_finite, unsigned};
@@ -22,7 +22,7 @@ pub(super) fn write(
 ) -> rusqlite::Result<()> {
     let wires = wires(plan);
     for traffic in &observation.traffic {
-        let Some((topic, path)) = wires.get(traffic.wire as usize) else { continue };
+        let Some(&PlannedWire { topic, path, .. }) = wires.get(traffic.wire as usize) else { continue };
         transaction
             .prepare_cached(
                 "INSERT INTO traffic (test, wire, topic, path, messages, first_s, last_s, gap_start_s, gap_end_s, \
@@ -31,7 +31,7 @@ pub(super) fn write(
             .execute(params![
                 test,
                 traffic.wire,
-                plan.topic(*topic).name,
+                plan.topic(topic).name,
                 path,
                 i64::try_from(traffic.messages).unwrap_or(i64::MAX),
                 traffic.first,

@@ -202,8 +202,8 @@ impl Launched {
         self.waiting.tell(tell);
     }
 
-    /// Notes what the system lacks before a run can begin, each in a phrase. Call it again and again, the last time
-    /// with nothing.
+    /// Notes what the system lacks before a run can begin, each in a phrase. Call it again and again until the system
+    /// lacks nothing, or ends.
     pub fn lacks(&mut self, missing: &[String]) {
         self.waiting.lacks(missing, Instant::now());
     }
@@ -386,6 +386,7 @@ impl Launched {
         }
         self.begun = 0;
         self.ready = false;
+        self.lacks(&[]);
     }
 
     /// Starts the programs whose turn it is: what starts the system, or all nodes.

@@ -130,7 +130,7 @@ impl WireTable {
     }
 
     /// The wires on whose messages an operation may act: the links to the subscribers that it names, or else the wires
-    /// of its topic; of a group, those of the members that it may act on.
+    /// of its topic. If that is a group, only those of the members that the operation may disturb.
     pub fn acted_on(&self, operation: &Operation) -> impl Iterator<Item = Wire> {
         let links = self.links.iter().filter(|link| operation.to.contains(&link.to)).map(|link| link.wire);
         let own = self.iter().filter(|_| operation.to.is_empty());

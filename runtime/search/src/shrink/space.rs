@@ -68,7 +68,7 @@ impl ShrinkSpace {
                 let end = operation.within.end.min(campaign.end_after).max(operation.within.start);
                 Range::window(operation.within.start, end)
             };
-            let texts = operation.parameters.last().and_then(|parameter| parameter.domain.items()).unwrap_or_default();
+            let texts = operation.choices_of_members().unwrap_or_default();
             let members = match &operation.members {
                 Some(MembersOf::Chosen(choices)) => {
                     let texts = texts.iter().map(|text| Choice::Text { text: text.clone() });

@@ -21,11 +21,13 @@ pub struct Heard {
 }
 
 impl Heard {
-    /// What is known of the topic of an operation before the reference run.
+    /// What is known of the messages on which an operation may act before the reference run.
     pub(crate) fn of(plan: &CampaignPlan, operation: OperationId) -> Heard {
-        let topic = plan.operation(operation).topic;
-        let of_topic = (0..).zip(wires(plan)).filter(|(_, (of, _))| Some(*of) == topic);
-        Heard { wires: of_topic.map(|(wire, _)| wire).collect(), ..Heard::default() }
+        let operation = plan.operation(operation);
+        let acted_on = (0..)
+            .zip(wires(plan))
+            .filter(|(_, wire)| Some(wire.topic) == operation.topic && operation.may_act_on(wire.member));
+        Heard { wires: acted_on.map(|(wire, _)| wire).collect(), ..Heard::default() }
     }
 
     /// Learns from the reference run.

@@ -8,7 +8,6 @@ use sesame_monitor::truth::Truth;
 use sesame_plan as plan;
 use sesame_plan::{Gate, MonitorId};
 
-use crate::groups::in_brackets;
 use crate::model::eddi::{Eddi, Evidence};
 use crate::model::{Id as _, Topic, Type};
 use crate::resolve::SystemPart;
@@ -124,7 +123,7 @@ impl<'a> Group<'a> {
     pub(super) fn input_text(&self, input: &plan::Input) -> (String, Option<Unit>) {
         let name = self.topic(&input.field).map_or("", |topic| topic.declaration.name.as_str());
         let only = input.only().and_then(|only| self.topic(&input.field)?.members.get(only as usize));
-        let name = only.map_or_else(|| name.to_owned(), |member| format!("{name}[{}]", in_brackets(member)));
+        let name = only.map_or_else(|| name.to_owned(), |member| plan::with_member(name, member));
         let fields = input.field.path.iter().map(String::as_str);
         let path: Vec<&str> = std::iter::once(name.as_str()).chain(fields).collect();
         let steps = input.list.as_ref().map_or(&[][..], |list| &list.steps);

@@ -110,7 +110,7 @@ impl Reader<'_> {
                     let name = self.member_name(&expect_child(&step, Rule::member_name));
                     let member = Member { name: Some(name), span: self.span(&step) };
                     if let Some(first) = path.member.replace(member) {
-                        let title = "a path is of one member of a group";
+                        let title = "a path names one member of a group";
                         let diagnostic = Diagnostic::new(Code::LISTED_TWICE, self.span(&step), title)
                             .label("another member")
                             .secondary(first.span, "the first one");

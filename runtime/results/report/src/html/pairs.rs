@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use sesame_analysis::pairs::{Acted, PARTS};
-use sesame_plan::CampaignPlan;
+use sesame_plan::{CampaignPlan, without_member};
 use sesame_present::markup::{Markup, coordinate};
 use sesame_present::number::{join_words, plural};
 
@@ -119,13 +119,8 @@ fn causes_by_operations(summary: &Summary) -> Vec<(BTreeSet<&str>, &str)> {
     let causes = summary.causes.iter().flat_map(|found| &found.causes);
     // A pair is of operations, whatever members of a group they act on.
     causes
-        .map(|cause| (cause.operations.iter().map(|name| without_members(name)).collect(), cause.requirement.as_str()))
+        .map(|cause| (cause.operations.iter().map(|name| without_member(name)).collect(), cause.requirement.as_str()))
         .collect()
-}
-
-/// The name of an operation without the members of a group on which it acts.
-fn without_members(operation: &str) -> &str {
-    operation.split('[').next().unwrap_or(operation)
 }
 
 /// A name that is not too long.

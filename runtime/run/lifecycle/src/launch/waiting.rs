@@ -56,7 +56,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_missing_is_told_after_ten_seconds_and_when_it_changes() {
+    fn what_is_missing_is_reported_after_ten_seconds_and_when_it_changes() {
         let told = Arc::new(Mutex::new(Vec::new()));
         let mut waiting = Waiting::default();
         let listener = Arc::clone(&told);
@@ -71,7 +71,7 @@ mod tests {
         assert_eq!(at(0, &["nobody publishes on `/odom`"]), nothing);
         assert_eq!(at(9, &["nobody publishes on `/odom`"]), nothing);
         assert_eq!(at(10, &["nobody publishes on `/odom`"]), ["nobody publishes on `/odom`"]);
-        assert_eq!(at(25, &["nobody publishes on `/odom`"]), nothing, "it is told once");
+        assert_eq!(at(25, &["nobody publishes on `/odom`"]), nothing, "it is reported once");
         assert_eq!(at(26, &["nobody subscribes to `/cmd`"]), ["nobody subscribes to `/cmd`"]);
         assert_eq!(at(27, &["nobody publishes on `/odom`"]), nothing, "not so soon after the last time");
         assert_eq!(at(28, &[]), nothing);

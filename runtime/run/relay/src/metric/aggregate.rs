@@ -55,7 +55,7 @@ pub(super) struct FormulaState<'p> {
 enum Of {
     /// The values of its inputs.
     Inputs,
-    /// Each of these members of its groups.
+    /// Each of these members of its groups, in ascending order.
     Members(Vec<usize>),
     /// Each pair of different members of its group, or of each member of one group with each of another.
     Pairs(Pairs),
@@ -107,7 +107,7 @@ impl<'p> FormulaState<'p> {
             None => Of::Inputs,
         };
         let timed = changes_with_time(formula);
-        let sources = || formula.inputs.iter().map(|input| (input.field.topic, input.only()));
+        let sources = || formula.inputs.iter().map(Input::source);
         let combined = |input: &Input| {
             let one = matches!(input.members, Members::Each | Members::Only(_));
             !one && plan.topic(input.field.topic).paths.len() > 1
@@ -375,7 +375,7 @@ fn groups_of_pairs(inputs: &[Input]) -> Option<(TopicId, TopicId)> {
     Some((one.or(other)?, other.or(one)?))
 }
 
-/// The members of a group that a formula over each of them is of: all without those that it reads by their names.
+/// The members for which a formula with `each of` is evaluated, in ascending order: all except those that it names.
 pub(super) fn each_of(inputs: &[Input], group: TopicId, plan: &CampaignPlan) -> Vec<usize> {
     let each = |input: &&Input| input.members == Members::Each;
     let paired: Vec<TopicId> = inputs.iter().filter(each).map(|input| input.field.topic).collect();
@@ -445,24 +445,21 @@ impl Stream {
         match of {
             Of::Inputs => self.step(formula, 0, context),
             Of::Members(members) => {
-                let size = members.last().map_or(0, |last| last + 1);
-                let mut silent = vec![false; size];
-                for &member in members {
-                    silent[member] = true;
-                }
-                let mut spoke = Vec::with_capacity(self.spoke.len());
-                for &(member, _) in &self.spoke {
-                    if silent.get_mut(member).is_some_and(std::mem::take) {
-                        spoke.push(member);
-                    }
-                }
                 if self.others {
-                    for member in (0..size).filter(|&member| silent[member]) {
+                    let mut silent = vec![true; of.states()];
+                    // Those that the formula names may lie behind the last of the others.
+                    for &(member, _) in self.spoke.iter().filter(|(member, _)| *member < of.states()) {
+                        silent[member] = false;
+                    }
+                    for &member in members.iter().filter(|&&member| silent[member]) {
                         self.step_of_member(formula, member, context);
                     }
                 }
-                for member in spoke {
-                    self.step_of_member(formula, member, context);
+                for at in 0..self.spoke.len() {
+                    let (member, _) = self.spoke[at];
+                    if members.binary_search(&member).is_ok() {
+                        self.step_of_member(formula, member, context);
+                    }
                 }
             }
             Of::Pairs(Pairs { pairs, other }) => {

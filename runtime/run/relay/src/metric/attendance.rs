@@ -9,12 +9,12 @@ use sesame_base::time::SimTime;
 use sesame_plan::{CampaignPlan, Input, TopicId};
 
 /// By member of a topic: the number of instants in which it was heard, and the last of them.
-type Members = BTreeMap<usize, (u64, SimTime)>;
+type Heard = BTreeMap<usize, (u64, SimTime)>;
 
 /// The instants of one formula.
 pub(super) struct Attendance {
     /// Per topic of the inputs, the members that they read.
-    topics: Vec<(TopicId, Members)>,
+    topics: Vec<(TopicId, Heard)>,
     /// The number of instants at which anything was heard, and the last of them.
     instants: (u64, SimTime),
 }
@@ -22,7 +22,7 @@ pub(super) struct Attendance {
 impl Attendance {
     /// Before the first message.
     pub(super) fn new(inputs: &[Input], plan: &CampaignPlan) -> Self {
-        let mut topics: Vec<(TopicId, Members)> = Vec::new();
+        let mut topics: Vec<(TopicId, Heard)> = Vec::new();
         for topic in inputs.iter().map(|input| input.field.topic) {
             if topics.iter().all(|(known, _)| *known != topic) {
                 let is_read = |member: &usize| inputs.iter().any(|input| input.reads(topic, *member));
@@ -65,7 +65,7 @@ mod tests {
     use proptest::prelude::*;
 
     use sesame_plan::testing::plan;
-    use sesame_plan::{FieldRef, Members as Read};
+    use sesame_plan::{FieldRef, Members};
 
     use super::*;
 
@@ -77,7 +77,7 @@ mod tests {
             // `arm/command`, and both members of `zones`.
             let input = |topic| Input {
                 field: FieldRef { topic: TopicId(topic), path: Vec::new() },
-                members: Read::Min,
+                members: Members::Min,
                 list: None,
                 text: None,
             };

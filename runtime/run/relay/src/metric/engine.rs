@@ -84,10 +84,8 @@ impl<'p> MetricTable<'p> {
                 RobustnessState::new(robustness, plan, false).map_err(refused)?;
             }
             for wire in wires.iter() {
-                let is_it = |only: u32| only as usize == wires.member(wire);
-                let reads =
-                    |&(topic, only): &(TopicId, Option<u32>)| topic == wires.topic(wire) && only.is_none_or(is_it);
-                let input = sources.iter().position(reads);
+                let (topic, member) = (wires.topic(wire), wires.member(wire));
+                let input = sources.iter().position(|source| source.reads(topic, member));
                 if outbound {
                     delivered[wire.index()].extend(input.map(|_| at));
                     continue;

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use sesame_base::observation::MetricObservation;
 use sesame_base::time::SimTime;
 use sesame_plan::stl::{self, Interval, Robustness};
-use sesame_plan::testing::plan;
+use sesame_plan::testing::{plan, topic};
 use sesame_plan::{
     Aggregate, CampaignPlan, Comparison, Condition, Distance, Expression, FieldRef, Formula, Input, Members,
     MetricSource, Point, Region, Side, SignedDistance, TextTest, TopicId, Transport, Type, UnaryFunction,
@@ -25,18 +25,11 @@ const TOWER: TopicId = TopicId(2);
 
 fn system() -> CampaignPlan {
     let mut plan = plan(Vec::new());
-    let mut topic = plan.topics[0].clone();
-    let mut named = |name: &str, paths: &[&str]| {
-        topic.name = name.to_owned();
-        topic.paths = paths.iter().map(|&path| path.to_owned()).collect();
-        topic.ty = Type::Text;
-        topic.clone()
-    };
     plan.topics = vec![
-        named("poses", &["poses/a", "poses/b", "poses/c"]),
-        named("goals", &["goals/a", "goals/b", "goals/c"]),
-        named("tower", &["tower"]),
-        named("two", &["two/a", "two/b"]),
+        topic("poses", &["poses/a", "poses/b", "poses/c"], Type::Text),
+        topic("goals", &["goals/a", "goals/b", "goals/c"], Type::Text),
+        topic("tower", &["tower"], Type::Text),
+        topic("two", &["two/a", "two/b"], Type::Text),
     ];
     plan
 }

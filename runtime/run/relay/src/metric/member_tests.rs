@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use sesame_base::time::SimTime;
 use sesame_plan::stl::{self, Interval, Robustness};
-use sesame_plan::testing::plan;
+use sesame_plan::testing::{plan, topic};
 use sesame_plan::{
     Aggregate, CampaignPlan, Comparison, Condition, Distance, Expression, FieldRef, Formula, Input, Members,
     MetricSource, Point, Side, TopicId, Type,
@@ -28,14 +28,8 @@ type Sent = (i64, usize, f64);
 
 fn system() -> CampaignPlan {
     let mut plan = plan(Vec::new());
-    let mut topic = plan.topics[0].clone();
-    let mut named = |name: &str, paths: &[&str]| {
-        topic.name = name.to_owned();
-        topic.paths = paths.iter().map(|&path| path.to_owned()).collect();
-        topic.ty = Type::Point { unit: None };
-        topic.clone()
-    };
-    plan.topics = vec![named("robots", &PATHS[..3]), named("people", &PATHS[3..5]), named("alone", &PATHS[5..])];
+    let groups = [("robots", &PATHS[..3]), ("people", &PATHS[3..5]), ("alone", &PATHS[5..])];
+    plan.topics = groups.map(|(name, paths)| topic(name, paths, Type::Point { unit: None })).to_vec();
     plan
 }
 

@@ -111,7 +111,7 @@ fn line(plan: &CampaignPlan, wires: &WireTable, wire: Wire) -> Line {
     let of_runner = plan.is_published_by_monitor(topic) && !plan.nodes.iter().any(|node| node.publishes(topic));
     let mut others =
         (0u32..).map(NodeId).take(plan.nodes.len()).filter(|node| publishes_here(node) && !publishers.contains(node));
-    // Whoever is not named, if only because no node is declared to publish it.
+    // All publishers that are not named, if only because no node is declared to publish it.
     if !of_runner && (sources.is_empty() || others.next().is_some()) {
         sources.push(source(format!("{path}/undisturbed"), None));
     }

@@ -6,7 +6,7 @@ use sesame_analysis::trigger::{
     Agreement, Decides, Edge, Event, Holds, Moment, State, TriedWindow, Trigger, Which, Within, describe,
 };
 use sesame_base::observation::{Course, Happening};
-use sesame_base::silence::wires;
+use sesame_base::silence::{PlannedWire, wires};
 use sesame_plan::{Activation, CampaignPlan, Span};
 use sesame_present::number::fixed;
 use sesame_search::shrink::{Shrink, Varied};
@@ -50,12 +50,10 @@ pub(super) fn triggers(plan: &CampaignPlan, course: &Course, search: &Shrink) ->
             let tried = varied.into_iter().map(|&Varied { window, fails, .. }| TriedWindow { window, fails });
             tried.collect::<Vec<_>>()
         });
-        let is_acted_on = |topic, path: &str| {
-            let member = plan.topic(topic).paths.iter().position(|of_topic| of_topic == path);
-            Some(topic) == operation.topic && member.is_some_and(|at| operation.acts_on(at, &used.parameters))
+        let is_acted_on = |wire: &PlannedWire<'_>| {
+            Some(wire.topic) == operation.topic && operation.acts_on(wire.member, &used.parameters)
         };
-        let own = (0..).zip(&wires).filter(|&(_, &(topic, path))| is_acted_on(topic, path)).map(|(at, _)| at);
-        let own: Vec<u32> = own.collect();
+        let own: Vec<u32> = (0..).zip(&wires).filter(|(_, wire)| is_acted_on(wire)).map(|(at, _)| at).collect();
         let holds = |of: Agreement| of.right * HOLDS.1 >= of.of * HOLDS.0;
         let described = describe(course, plan.campaign.end_after, &own, window, &made_of, &fresh);
         let (made_of, fresh) = described.as_ref().map(|found| (found.made_of, found.fresh)).unwrap_or_default();
@@ -162,9 +160,9 @@ fn while_words(plan: &CampaignPlan, State { wire, field, holds }: &State) -> Str
 /// A field as the language names it, or the topic for messages as such; of a topic of several paths, the path.
 fn signal(plan: &CampaignPlan, wire: u32, field: &str) -> String {
     let wires = wires(plan);
-    let Some((topic, path)) = wires.get(wire as usize) else { return "?".to_owned() };
-    let topic = plan.topic(*topic);
-    let name = if topic.paths.len() == 1 { topic.name.as_str() } else { path };
+    let Some(wire) = wires.get(wire as usize) else { return "?".to_owned() };
+    let topic = plan.topic(wire.topic);
+    let name = if topic.paths.len() == 1 { topic.name.as_str() } else { wire.path };
     let dot = if field.is_empty() || field.starts_with('[') { "" } else { "." };
     format!("`{name}{dot}{field}`")
 }
