@@ -1,13 +1,13 @@
 //! Plans in which one thing is wrong that later code relies on: each is refused with the place of it.
 
 use sesame_plan::condition::{ConditionEnd, ConditionSpace};
-use sesame_plan::testing::{self, field, lab, message, minimal, node, ros2, simlog_mut, topic};
+use sesame_plan::testing::{self, field, lab, message, minimal, node, ros2, simlog_mut, topic, topics};
 use sesame_plan::{
     Activation, ActivationMode, Adjustment, Answer, Bound, CampaignPlan, Channel, Clock, Command, Dimension, Domain,
-    Endpoint, Fitted, Interface, InterfaceField, KnownTestId, LabBudget, Launch, Lifecycle, MessageId, MessageType,
-    MetricId, MetricSource, Node, NodeId, OperationId, Proxy, RankOrder, Ready, ReadyWhen, RelayBudget, Ros, Search,
-    ShapeForm, ShapePlace, Simlog, SimlogVersion, Simulator, StepBy, Stepping, Strategy, Topic, TopicId, Type,
-    WireNames, WireType, Wiring,
+    Endpoint, Fitted, Interface, InterfaceField, KnownTestId, LabBudget, Launch, Lifecycle, MembersOf, MessageId,
+    MessageType, MetricId, MetricSource, Node, NodeId, OperationId, Proxy, RankOrder, Ready, ReadyWhen, RelayBudget,
+    Ros, Search, ShapeForm, ShapePlace, Simlog, SimlogVersion, Simulator, StepBy, Stepping, Strategy, Topic, TopicId,
+    TopicMembers, Type, WireNames, WireType, Wiring,
 };
 use sesame_record::sample;
 
@@ -80,6 +80,18 @@ fn each_thing_that_later_code_relies_on_is_asked_for() {
             "messages[0].fields[0].type.of.id: message 0 contains message 0",
         ),
         (|plan| plan.operations[0].topic = None, "operations[0].topic: it acts on one"),
+        (
+            |plan| plan.operations[0].members = Some(MembersOf::These(vec![70])),
+            "operations[0].members: there is no member 70",
+        ),
+        (
+            |plan| plan.operations[0].members = Some(MembersOf::These(Vec::new())),
+            "operations[0].members: there is none",
+        ),
+        (
+            |plan| plan.operations[0].members = Some(MembersOf::Chosen(vec![vec![0]])),
+            "operations[0].members: are not chosen by the last parameter",
+        ),
         (|plan| plan.operations[2].within.end = -1.0, "operations[2].within: runs from 0 to -1"),
         (|plan| plan.operations[2].inclusion = 1.5, "operations[2].inclusion: 1.5 is not in 0..=1"),
         (
@@ -183,6 +195,25 @@ fn each_thing_that_later_code_relies_on_is_asked_for() {
         ),
         (|plan| plan.nodes[0].answers[0].to = TopicId(1), "nodes[0].answers[0].to: there is no topic 1"),
         (|plan| plan.nodes[0].answers[0].with = TopicId(2), "nodes[0].answers[0].with: there is no topic 2"),
+        (|plan| plan.nodes[0].subscribes.clear(), "nodes[0].answers[0].to: is not a topic that the node subscribes to"),
+        (|plan| plan.nodes[0].publishes.clear(), "nodes[0].answers[0].with: is not a topic that the node publishes"),
+        (
+            |plan| {
+                let node = &mut plan.nodes[0];
+                node.every_step = vec![TopicId(0)];
+                node.answers.clear();
+                node.publishes.clear();
+            },
+            "nodes[0].every_step[0]: is not a topic that the node publishes",
+        ),
+        (
+            |plan| plan.nodes[0].publishes = vec![TopicMembers::Only { topic: TopicId(0), members: vec![1] }],
+            "nodes[0].publishes[0].members[0]: there is no member 1",
+        ),
+        (
+            |plan| plan.nodes[0].publishes = vec![TopicMembers::Only { topic: TopicId(0), members: vec![0] }],
+            "nodes[0].publishes[0].members: are not some of a group",
+        ),
         (|plan| ready(plan).within = 0.0, "nodes[0].launch.ready.within: 0 is not above 0"),
         (|plan| ready(plan).within = f64::INFINITY, "nodes[0].launch.ready.within: inf is not above 0"),
         (|plan| ready(plan).when = ReadyWhen::Topic { topic: TopicId(9) }, "launch.ready.when: there is no topic 9"),
@@ -268,7 +299,13 @@ fn arm() -> CampaignPlan {
     CampaignPlan {
         simulator: Simulator { ros: Some(ros), lifecycle, ..ros2(232, wiring) },
         topics: vec![topic],
-        nodes: vec![Node { launch: Some(launch(ready_at)), answers, ..node("arm") }],
+        nodes: vec![Node {
+            publishes: topics(&[0]),
+            subscribes: topics(&[0]),
+            launch: Some(launch(ready_at)),
+            answers,
+            ..node("arm")
+        }],
         ..minimal()
     }
 }

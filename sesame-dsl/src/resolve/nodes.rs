@@ -208,8 +208,8 @@ impl<'a> Resolver<'a> {
         None
     }
 
-    /// Nodes must publish or subscribe to the topic, and the transport must tell them apart. The name of a group of nodes
-    /// stands for its members that do.
+    /// Nodes must publish or subscribe to the topic, and the transport must tell them apart. The name of a group of
+    /// nodes stands for its members that do.
     pub(super) fn between_nodes(&mut self, body: &'a OperationBody) -> Option<[Vec<NodeId>; 2]> {
         let Some(target) = &body.target else {
             let Some((span, _)) = body.from.as_ref().or(body.to.as_ref()) else {

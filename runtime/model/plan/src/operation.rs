@@ -15,8 +15,9 @@ pub struct Operation {
     /// The topic whose messages it disturbs; `None` exactly for one that acts on no messages: a custom operation before
     /// the start or after the end, or one on a node.
     pub topic: Option<TopicId>,
-    /// The members of a group of topics or nodes on which it acts; `None` for all topics of a group, or for an operation
-    /// that acts on no group. The nodes of a group follow each other, and that of the kind is the first of them.
+    /// The members of a group of topics or nodes on which it acts; `None` for all topics of a group, or for an
+    /// operation that acts on no group. The nodes of a group follow each other, and that of the kind is the first of
+    /// them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub members: Option<MembersOf>,
     /// Only messages that these nodes publish; none for all messages.
@@ -64,8 +65,8 @@ impl Operation {
         self.members_of_test(choices).is_none_or(among)
     }
 
-    /// The members of its group on which it acts with these choices of a test; `None` for all topics of a group, or if it
-    /// acts on no group. A choice that its parameter does not permit has no members.
+    /// The members of its group on which it acts with these choices of a test; `None` for all topics of a group, or if
+    /// it acts on no group. A choice that its parameter does not permit has no members.
     pub fn members_of_test(&self, choices: &[Choice]) -> Option<&[u32]> {
         let permitted = match self.members.as_ref()? {
             MembersOf::These(these) => return Some(these),

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use sesame_base::time::SimTime;
 use sesame_lifecycle::launch::LaunchError;
-use sesame_plan::testing::{self, minimal, node, topic};
+use sesame_plan::testing::{self, minimal, node, topic, topics};
 use sesame_plan::{Command, Launch, Ready, ReadyWhen, TopicId, Type, WireNames};
 use sesame_relay::metric::MetricTable;
 use sesame_relay::relay::Relay;
@@ -25,7 +25,7 @@ fn launching(arguments: &[&str]) -> Option<CampaignPlan> {
     let arguments = own.iter().chain(arguments).map(|&argument| argument.to_owned()).collect();
     let mut plan = minimal();
     plan.topics = vec![topic("point", &["point"], Type::Point { unit: None })];
-    plan.nodes = vec![sesame_plan::Node { every_step: vec![TopicId(0)], ..node("simulator") }];
+    plan.nodes = vec![sesame_plan::Node { every_step: vec![TopicId(0)], publishes: topics(&[0]), ..node("simulator") }];
     let ready = Ready { when: ReadyWhen::Port { port: "{port}".to_owned() }, within: 20.0 };
     let launch = Launch { command: Command { program, arguments }, ready: Some(ready) };
     plan.simulator = testing::simlog("http://127.0.0.1:{port}");
@@ -83,11 +83,7 @@ mod real {
 fn what_a_step_waits_for_is_named_by_its_path() {
     let mut plan = minimal();
     plan.topics = vec![topic("states", &["left/states", "right/states"], Type::Bool)];
-    plan.nodes = vec![sesame_plan::Node {
-        every_step: vec![TopicId(0)],
-        publishes: sesame_plan::testing::topics(&[0]),
-        ..node("arms")
-    }];
+    plan.nodes = vec![sesame_plan::Node { every_step: vec![TopicId(0)], publishes: topics(&[0]), ..node("arms") }];
     let wires = WireTable::new(&plan);
     let mut round = Round::new(&Promises::new(&plan, &wires), None, None);
     assert_eq!(round.awaited(&wires), "the end of a step");

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use sesame_base::time::SimTime;
 use sesame_plan::testing::{self, minimal, node, simlog_mut, topic};
-use sesame_plan::{CampaignPlan, NodeId, SimlogVersion, TopicId, Type, WireNames};
+use sesame_plan::{CampaignPlan, NodeId, SimlogVersion, TopicId, TopicMembers, Type, WireNames};
 use sesame_relay::fuzz::Order;
 use sesame_relay::relay::{Delivery, Exchange};
 use sesame_relay::simulator::Progress;
@@ -100,6 +100,7 @@ pub(crate) fn plan(url: &str, protocol: SimlogVersion, topics: &[(&str, Type)]) 
     plan.topics = topics.iter().map(|(path, ty)| topic(path, &[path], ty.clone())).collect();
     let mut all = node("simulator");
     all.every_step = (0..).take(topics.len()).map(TopicId).collect();
+    all.publishes = all.every_step.iter().copied().map(TopicMembers::All).collect();
     plan.nodes = vec![all];
     let cut = (0..).map(TopicId).zip(topics).filter(|(_, (path, _))| *path == "joint").map(|(id, _)| id).collect();
     plan.simulator = testing::simlog(url);

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::check::{Checked, at, each, id, name, positive, require};
 use crate::{
     CampaignPlan, Channel, Interface, Launch, Lifecycle, Node, NodeId, ReadyWhen, Ros, Ros2, Simlog, SimlogVersion,
-    Simulator, TopicMembers, Transport, WireType, Wiring,
+    Simulator, TopicId, TopicMembers, Transport, WireType, Wiring,
 };
 
 /// The highest domain of ROS whose ports exist on every system.
@@ -100,10 +100,19 @@ impl CampaignPlan {
         each("subscribes", &node.subscribes, |subscribed| self.has_members(subscribed))?;
         at("named", node.named.as_ref().map_or(Ok(()), |named| name(named)))?;
         at("launch", node.launch.as_ref().map_or(Ok(()), |launch| self.sound_launch(launch)))?;
-        each("every_step", &node.every_step, |&id| self.has_topic(id))?;
+        // A promise about anything else would be kept by nobody, and a step would end without its messages.
+        let published = |&id: &TopicId| {
+            self.has_topic(id)?;
+            require(node.publishes(id), || "is not a topic that the node publishes".to_owned())
+        };
+        let subscribed = |&id: &TopicId| {
+            self.has_topic(id)?;
+            require(node.subscribes(id), || "is not a topic that the node subscribes to".to_owned())
+        };
+        each("every_step", &node.every_step, published)?;
         each("answers", &node.answers, |answer| {
-            at("to", self.has_topic(answer.to))?;
-            at("with", self.has_topic(answer.with))
+            at("to", subscribed(&answer.to))?;
+            at("with", published(&answer.with))
         })
     }
 
