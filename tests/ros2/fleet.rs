@@ -1,5 +1,6 @@
 //! A fleet in namespaces, of nodes that know nothing of it: each has its own member of a group, one of them is
-//! disturbed by its name or by the choice of a test, and a start that waits for one says so.
+//! disturbed by its name or by the choice of a test, a scene sets a parameter of a node, and a start that waits for one
+//! says so.
 
 use std::fs;
 use std::path::PathBuf;
@@ -44,16 +45,21 @@ impl Fleet {
              metric ahead  maximise default 0m = max(place[r2].data - place[r1].data) outbound\n\
              metric behind maximise default 0m = max(place[r1].data - place[r2].data) outbound\n\
              metric apart  maximise default 0m = max(max of place.data - place.data) outbound\n\
+             metric far    maximise default 0m = max(max of place.data) outbound\n\
+             parameter pace \"manager/pace\": real[m/s] in [0m/s, 4m/s] default 1m/s\n\
              operation slip on place[r2].data from cart = bias [0m, 9m]\n\
              operation deaf on one of speed.data to cart = stuck at [0m/s, 1m/s]\n\
              operation stop on node one of cart = pause\n\
+             operation skid on parameter \"grip\" of one of cart = set [0, 1]\n\
              test slips {{ slip bias 9m from 1s to 2s }}\n\
              test stands {{ stop member \"r1\" from 1s to 3s }}\n\
              test hears_nothing {{ deaf value 0m/s member \"r2\" from 1s to 4s }}\n\
+             test skids {{ skid value 0 member \"r2\" from 1s to 4s }}\n\
+             test races {{ pace value 4m/s before start }}\n\
              campaign first {{\n\
                objectives apart\n\
-               observes   ahead, behind\n\
-               operations slip, deaf, stop 1 per test\n\
+               observes   ahead, behind, far\n\
+               operations slip, deaf, stop, skid, pace 1 per test\n\
                search     random {{ evaluations 2 }}\n\
                end        after 4s\n\
              }}\n",
@@ -69,7 +75,7 @@ impl Fleet {
 }
 
 #[test]
-fn each_cart_has_its_own_topics_and_one_of_them_is_disturbed() {
+fn each_cart_has_its_own_topics_one_of_them_is_disturbed_and_a_scene_drives_them_faster() {
     let Some(fleet) = Fleet::new("fleet_in_namespaces", "") else { return };
     let checked = fleet.sesamec(&["check", "carts.sesame"]).expect(0);
     assert!(!checked.err.contains("W0013"), "each publishes for itself: {}", checked.err);
@@ -79,7 +85,7 @@ fn each_cart_has_its_own_topics_and_one_of_them_is_disturbed() {
     }
     assert!(!wiring.contains("/r1/place/from/cart/r2"), "{wiring}");
 
-    fleet.sesamec(&["known", "carts.sesame", "slips", "stands", "hears_nothing"]).expect(0);
+    fleet.sesamec(&["known", "carts.sesame", "slips", "stands", "hears_nothing", "skids", "races"]).expect(0);
     let listed = fleet.sesamec(&["list", "carts.sesame", "--results", "known", "--format", "json"]).expect(0);
     let listed: Value = serde_json::from_str(&listed.out).expect("it is JSON");
     let value = |test: &str, metric: &str| -> f64 {
@@ -92,6 +98,8 @@ fn each_cart_has_its_own_topics_and_one_of_them_is_disturbed() {
     assert!(value("T1", "ahead") > 8.0 && value("T1", "behind") < 0.5, "only `r2` slips: {listed:#}");
     assert!(value("T2", "ahead") > 1.5 && value("T2", "behind") < 0.5, "only `r1` stands: {listed:#}");
     assert!(value("T3", "behind") > 2.0 && value("T3", "ahead") < 0.5, "only `r2` hears nothing: {listed:#}");
+    assert!(value("T4", "behind") > 2.0 && value("T4", "ahead") < 0.5, "only `r2` has no grip: {listed:#}");
+    assert!(value("T5", "far") > 2.0 * value("T0", "far"), "the manager has another pace: {listed:#}");
 }
 
 #[test]

@@ -11,24 +11,32 @@ PERIOD = 0.05
 
 
 def cart(node: Node) -> None:
-    """Publishes where it is, in its own namespace."""
+    """Publishes where it is, in its own namespace; without `grip`, its parameter, it does not move."""
     state = {"speed": 0.0, "place": 0.0}
+    node.declare_parameter("grip", 1.0)
     node.create_subscription(Float64, "speed", lambda heard: state.update(speed=heard.data), 10)
     places = node.create_publisher(Float64, "place", 10)
 
     def drive() -> None:
-        state["place"] += state["speed"] * PERIOD
+        state["place"] += state["speed"] * PERIOD * node.get_parameter("grip").value
         places.publish(Float64(data=state["place"]))
 
     node.create_timer(PERIOD, drive)
 
 
 def manager(node: Node, carts: list[str]) -> None:
-    """Publishes the same speed to all carts, and hears where they are."""
+    """Publishes the same speed, its parameter `pace`, to all carts, and hears where they are."""
+    node.declare_parameter("pace", 1.0)
     for name in carts:
         node.create_subscription(Float64, f"/{name}/place", lambda _: None, 10)
     speeds = [node.create_publisher(Float64, f"/{name}/speed", 10) for name in carts]
-    node.create_timer(PERIOD, lambda: [speed.publish(Float64(data=1.0)) for speed in speeds])
+
+    def drive() -> None:
+        pace = node.get_parameter("pace").value
+        for speed in speeds:
+            speed.publish(Float64(data=pace))
+
+    node.create_timer(PERIOD, drive)
 
 
 def main() -> None:

@@ -1,5 +1,7 @@
 //! Fuzzing operations with the ranges that they permit.
 
+use std::collections::BTreeSet;
+
 use serde::{Deserialize, Serialize};
 
 use crate::condition::Constraint;
@@ -92,8 +94,24 @@ impl Operation {
 
     /// The nodes on which it acts with these choices of a test, if it acts on nodes.
     pub fn nodes_of_test(&self, choices: &[Choice]) -> Vec<NodeId> {
+        self.nodes_at(self.members_of_test(choices).unwrap_or(&[0]))
+    }
+
+    /// The nodes on which some test makes it act, each once, if it acts on nodes.
+    pub fn nodes(&self) -> Vec<NodeId> {
+        match &self.members {
+            None => self.nodes_at(&[0]),
+            Some(MembersOf::These(these)) => self.nodes_at(these),
+            Some(MembersOf::Chosen(choices)) => {
+                let members: BTreeSet<u32> = choices.iter().flatten().copied().collect();
+                self.nodes_at(&Vec::from_iter(members))
+            }
+        }
+    }
+
+    /// The nodes of these members.
+    fn nodes_at(&self, members: &[u32]) -> Vec<NodeId> {
         let Some(NodeId(first)) = self.kind.node() else { return Vec::new() };
-        let members = self.members_of_test(choices).unwrap_or(&[0]);
         members.iter().map(|member| NodeId(first.saturating_add(*member))).collect()
     }
 }

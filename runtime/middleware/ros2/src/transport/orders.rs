@@ -8,7 +8,7 @@ use sesame_relay::relay::Exchange;
 use sesame_relay::transport::TransportError;
 
 use super::change::{Change, Changed, Slowed};
-use super::session::Session;
+use super::session::{Session, parameter_of_node};
 use super::wall_clock::now;
 use super::{COMPLETE_WITHIN, System};
 use crate::parameters::ParameterValue;
@@ -64,24 +64,19 @@ impl System {
         done
     }
 
-    /// Sets the parameters that compensate for a reality gap, for this run. A name is `NODE/PARAMETER`, with the node
-    /// as the space calls it.
+    /// Sets the parameters of a scene, and those that compensate for a reality gap, for this run. A name is
+    /// `NODE/PARAMETER`, with the node as the space calls it.
     pub(super) fn set_parameters(&mut self, parameters: &[(String, f64)]) -> Result<(), TransportError> {
         for (name, value) in parameters {
-            let nodes = || (0u32..).map(NodeId).zip(&self.plan.nodes);
-            let found = name.split_once('/').and_then(|(node, parameter)| {
-                let (id, _) = nodes().find(|(_, declared)| declared.name == node)?;
-                Some((id, parameter.to_owned()))
-            });
-            let Some((node, parameter)) = found else {
-                let known: Vec<String> = nodes().map(|(_, node)| format!("`{}/…`", node.name)).collect();
+            let Some((node, parameter)) = parameter_of_node(&self.plan, name) else {
+                let known: Vec<String> = self.plan.nodes.iter().map(|node| format!("`{}/…`", node.name)).collect();
                 return Err(TransportError::Wiring(format!(
                     "`{name}` is not a parameter of a node; a node and its parameter are {}",
                     known.join(", ")
                 )));
             };
             let notes = self.incidents.notes.len();
-            let what = self.set_parameter(node, parameter, *value)?;
+            let what = self.set_parameter(node, parameter.to_owned(), *value)?;
             // A run without it would be that of another simulation.
             if let Some(note) = self.incidents.notes.drain(notes..).next() {
                 return Err(TransportError::Wiring(note));

@@ -8,7 +8,7 @@ use rustdds::QosPolicies;
 use rustdds::policy::{Durability, History, Reliability};
 use rustdds::rpc::SampleIdentity;
 use sesame_codec::cdr::Codec;
-use sesame_plan::{CampaignPlan, Clock, Fitted, NodeId, OperationKind, Ros, StepBy, TopicId};
+use sesame_plan::{CampaignPlan, Clock, Fitted, NodeId, Operation, OperationKind, Ros, StepBy, TopicId};
 use sesame_relay::transport::relay_latency::Added;
 use sesame_relay::wire::{Line, Wire, WireTable, wanted};
 
@@ -247,20 +247,31 @@ fn prefix(gid: Gid) -> [u8; PREFIX] {
     std::array::from_fn(|at| gid[at])
 }
 
-/// What sets the parameters of the nodes that operations act on, or that may be fitted to a lab.
+/// The node and its parameter that a name `NODE/PARAMETER` means, with the node as the space calls it.
+pub(super) fn parameter_of_node<'n>(plan: &CampaignPlan, name: &'n str) -> Option<(NodeId, &'n str)> {
+    (0u32..).map(NodeId).zip(&plan.nodes).find_map(|(id, declared)| {
+        // The name of a member of a group may have a `/` too.
+        let parameter = name.strip_prefix(declared.name.as_str())?.strip_prefix('/')?;
+        Some((id, parameter))
+    })
+}
+
+/// What sets the parameters of the nodes that operations and scenes act on, or that may be fitted to a lab.
 fn parameters(plan: &CampaignPlan, dds: &mut Participant) -> Result<BTreeMap<NodeId, Parameters>, DdsError> {
-    let operations = plan.operations.iter().filter_map(|operation| match operation.kind {
-        OperationKind::Set { node, .. } => Some(node),
+    let set = plan.operations.iter().filter(|operation| matches!(operation.kind, OperationKind::Set { .. }));
+    let operations = set.flat_map(Operation::nodes);
+    let scenes = plan.operations.iter().filter_map(|operation| match &operation.kind {
+        OperationKind::Scene { parameter, .. } => Some(parameter),
         _ => None,
     });
     let fitted = plan.labs.iter().flat_map(|lab| &lab.fits).map(|fit| &fit.what);
     let adjusted =
         plan.compensation.iter().flat_map(|compensation| &compensation.adjustments).map(|adjustment| &adjustment.what);
-    let named = fitted.chain(adjusted).filter_map(|what| {
-        let Fitted::Parameter { name } = what else { return None };
-        let (node, _) = name.split_once('/')?;
-        (0u32..).map(NodeId).zip(&plan.nodes).find(|(_, declared)| declared.name == node).map(|(id, _)| id)
+    let of_lab = fitted.chain(adjusted).filter_map(|what| match what {
+        Fitted::Parameter { name } => Some(name),
+        _ => None,
     });
+    let named = scenes.chain(of_lab).filter_map(|name| parameter_of_node(plan, name)).map(|(node, _)| node);
     let mut found = BTreeMap::new();
     for node in operations.chain(named) {
         if let Entry::Vacant(place) = found.entry(node) {
