@@ -6,6 +6,7 @@ mod bugs;
 mod building;
 mod choice;
 mod commands;
+mod common_cause;
 mod compensation;
 mod conditions;
 mod confirm;

@@ -17,19 +17,19 @@ pub enum Ineffective {
     NoReceiver {
         /// The operation.
         operation: String,
-        /// Its topic.
-        topic: String,
+        /// Its topics.
+        topics: Vec<String>,
         /// The wires without a receiver.
         paths: Vec<String>,
-        /// How many wires the topic has.
+        /// How many wires the topics have.
         of: usize,
     },
-    /// Its topic has no message at the times at which it may be active.
+    /// Its topics have no message at the times at which it may be active.
     NoMessage {
         /// The operation.
         operation: String,
-        /// Its topic.
-        topic: String,
+        /// Its topics.
+        topics: Vec<String>,
         /// When it may be active.
         within: Span,
         /// The time of the nearest message; `None` without any.
@@ -62,35 +62,43 @@ impl Ineffective {
 impl fmt::Display for Ineffective {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Ineffective::NoReceiver { operation, topic, paths, .. } => {
-                let named = paths.iter().map(|path| format!("`{path}`")).collect::<Vec<_>>().join(", ");
+            Ineffective::NoReceiver { operation, topics, paths, .. } => {
+                let named = quoted(paths);
+                let (word, topics) = (if topics.len() == 1 { "topic" } else { "topics" }, quoted(topics));
                 if self.wholly() {
                     write!(
                         f,
                         "nothing receives what operation `{operation}` disturbs: the simulator does not subscribe to its \
-                         topic `{topic}` ({named}), and no outbound metric and no monitor reads it"
+                         {word} {topics} ({named}), and no outbound metric and no monitor reads it"
                     )
                 } else {
                     write!(
                         f,
-                        "nothing receives what operation `{operation}` disturbs on {named}: of topic `{topic}`, the \
-                         simulator subscribes to other members only"
+                        "nothing receives what operation `{operation}` disturbs on {named}: of {word} {topics}, the \
+                         simulator subscribes to other paths only"
                     )
                 }
             }
-            Ineffective::NoMessage { operation, topic, within: Span { start, end }, nearest } => {
+            Ineffective::NoMessage { operation, topics, within: Span { start, end }, nearest } => {
+                let (has, it) = if topics.len() == 1 { ("has", "it has") } else { ("have", "they have") };
                 write!(
                     f,
-                    "operation `{operation}` cannot act: in the reference run, `{topic}` has no message from {start} s to \
-                     {end} s, the only time at which the operation may be active"
+                    "operation `{operation}` cannot act: in the reference run, {} {has} no message from {start} s to \
+                     {end} s, the only time at which the operation may be active",
+                    quoted(topics)
                 )?;
                 match nearest {
                     Some(time) => write!(f, "; the nearest message is at {time} s"),
-                    None => write!(f, "; it has no message at all"),
+                    None => write!(f, "; {it} no message at all"),
                 }
             }
         }
     }
+}
+
+/// Names in a sentence: `` `scan`, `odom` ``.
+fn quoted(names: &[String]) -> String {
+    names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
 }
 
 /// The operations that tests of this campaign may hold and that cannot have an effect, wholly or in part, as far as its
@@ -113,11 +121,11 @@ pub(super) fn ineffective(plan: &CampaignPlan, task: &Task, reference: &Observat
     let wires = WireTable::new(plan);
     let found = operations.into_iter().filter_map(|id| {
         let operation = plan.operation(id);
-        let topic = plan.topic(operation.topic?);
+        let topics: Vec<String> = operation.topics().map(|topic| plan.topic(topic).name.clone()).collect();
         if let Some(unreached) = reference.unreached.iter().find(|unreached| unreached.operation == id) {
             return Some(Ineffective::NoMessage {
                 operation: operation.name.clone(),
-                topic: topic.name.clone(),
+                topics,
                 within: operation.within,
                 nearest: unreached.nearest,
             });
@@ -126,8 +134,8 @@ pub(super) fn ineffective(plan: &CampaignPlan, task: &Task, reference: &Observat
         let of = acted_on.len();
         let paths = acted_on.into_iter().filter(|path| reference.unheard.iter().any(|unheard| unheard == path));
         let paths: Vec<String> = paths.map(str::to_owned).collect();
-        let (operation, topic) = (operation.name.clone(), topic.name.clone());
-        (!paths.is_empty()).then_some(Ineffective::NoReceiver { operation, topic, paths, of })
+        let operation = operation.name.clone();
+        (!paths.is_empty()).then_some(Ineffective::NoReceiver { operation, topics, paths, of })
     });
     found.collect()
 }
@@ -229,11 +237,9 @@ mod tests {
         for part in [&operation.name, &topic.name, &topic.paths[0], "--allow-unheard"] {
             assert!(message.contains(part), "{message}");
         }
-        let Ineffective::NoReceiver { operation, topic: of_topic, paths, of } = found[0].clone() else {
-            unreachable!()
-        };
-        let partly = Ineffective::NoReceiver { operation, topic: of_topic, paths, of: of + 1 };
-        assert!(!partly.wholly() && partly.to_string().contains("other members only"));
+        let Ineffective::NoReceiver { operation, topics, paths, of } = found[0].clone() else { unreachable!() };
+        let partly = Ineffective::NoReceiver { operation, topics, paths, of: of + 1 };
+        assert!(!partly.wholly() && partly.to_string().contains("other paths only"));
         let known = Task::Known { tests: Vec::new(), lab: None };
         let mut reference = sample::observe(&plan, &Test::default(), 1);
         reference.unheard = topic.paths.clone();

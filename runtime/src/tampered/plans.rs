@@ -6,8 +6,8 @@ use sesame_plan::{
     Activation, ActivationMode, Adjustment, Answer, Bound, CampaignPlan, Channel, Clock, Command, Dimension, Domain,
     Endpoint, Fitted, Interface, InterfaceField, KnownTestId, LabBudget, Launch, Lifecycle, MembersOf, MessageId,
     MessageType, MetricId, MetricSource, Node, NodeId, OperationId, Proxy, RankOrder, Ready, ReadyWhen, RelayBudget,
-    Ros, Search, ShapeForm, ShapePlace, Simlog, SimlogVersion, Simulator, StepBy, Stepping, Strategy, Topic, TopicId,
-    TopicMembers, Type, WireNames, WireType, Wiring,
+    Ros, Search, ShapeForm, ShapePlace, Simlog, SimlogVersion, Simulator, StepBy, Stepping, Strategy, Target, Topic,
+    TopicId, TopicMembers, Type, WireNames, WireType, Wiring,
 };
 use sesame_record::sample;
 
@@ -19,6 +19,11 @@ fn budget(plan: &mut CampaignPlan) -> &mut LabBudget {
 
 fn adjustments(plan: &mut CampaignPlan) -> &mut Vec<Adjustment> {
     &mut plan.compensation.as_mut().expect("it has one").adjustments
+}
+
+/// Another topic that an operation disturbs, as a whole.
+fn further(topic: u32) -> Target {
+    Target { topic: TopicId(topic), members: None, places: Vec::new() }
 }
 
 /// A change to a plan, and what is then said of it.
@@ -78,6 +83,18 @@ fn each_thing_that_later_code_relies_on_is_asked_for() {
         (
             |plan| plan.messages.push(containing_itself()),
             "messages[0].fields[0].type.of.id: message 0 contains message 0",
+        ),
+        (|plan| plan.operations[0].further = vec![further(70)], "operations[0].further[0].topic: there is no topic 70"),
+        (
+            |plan| plan.operations[0].further = vec![further(1), further(1)],
+            "operations[0].further: TopicId(1) is there twice",
+        ),
+        (
+            |plan| {
+                let members = Some(MembersOf::Chosen(vec![vec![0]]));
+                plan.operations[0].further = vec![Target { members, ..further(1) }];
+            },
+            "operations[0].further[0].members: are not chosen by the last parameter",
         ),
         (|plan| plan.operations[0].topic = None, "operations[0].topic: it acts on one"),
         (

@@ -12,14 +12,21 @@ pub(super) fn operation(
     end_after: f64,
     constraints: Vec<plan::condition::Constraint>,
 ) -> plan::Operation {
+    let mut targets = operation.targets.iter().map(|target| plan::Target {
+        topic: topic_id(target.topic),
+        members: target.members.clone(),
+        places: target.places.clone(),
+    });
+    let first = targets.next();
     plan::Operation {
         name: operation.declaration.name.clone(),
         doc: operation.declaration.doc.clone(),
-        topic: operation.topic().map(topic_id),
-        members: operation.members.clone(),
+        topic: first.as_ref().map(|first| first.topic),
+        members: first.as_ref().map_or_else(|| operation.nodes.clone(), |first| first.members.clone()),
         from: operation.from.iter().map(|&id| node_id(id)).collect(),
         to: operation.to.iter().map(|&id| node_id(id)).collect(),
-        places: operation.target.iter().flat_map(|target| &target.places).cloned().collect(),
+        places: first.map_or_else(Vec::new, |first| first.places),
+        further: targets.collect(),
         kind: operation.kind.clone(),
         parameters: operation.parameters.iter().map(parameter).collect(),
         within: within(operation, end_after),
@@ -61,7 +68,7 @@ pub(super) fn custom_operations(space: &Space) -> Vec<OperationPlan> {
             doc: operation.declaration.doc.clone(),
             source: space.file_of(&operation.declaration).to_owned(),
             line: operation.declaration.line,
-            called: match (moment, operation.topic()) {
+            called: match (moment, operation.topics().next()) {
                 (plan::Moment::BeforeStart, _) => Called::Offline(Offline::BeforeStart),
                 (plan::Moment::AfterEnd, _) => Called::Offline(Offline::AfterEnd),
                 (plan::Moment::OnMessage, Some(topic)) => Called::OnMessage(topic_id(topic)),

@@ -57,7 +57,7 @@ fn contained(ty: &WireType) -> Option<&str> {
 /// In lock-step, what a node answers to, whatever else it hears, and its answers pass through the relay too: only then
 /// does the relay decide in which order a node hears its messages, and that an answer has arrived before the next step.
 fn wiring(space: &Space, topic: TopicId, stepped: bool) -> plan::Wiring {
-    let on_it = || space.operations.values().filter(|operation| operation.topic() == Some(topic));
+    let on_it = || space.operations.values().filter(|operation| operation.disturbs(topic));
     let distinguished = |nodes: fn(&model::Operation) -> &Vec<NodeId>| {
         let nodes: BTreeSet<NodeId> = on_it().flat_map(nodes).copied().collect();
         nodes.into_iter().map(node_id).collect()

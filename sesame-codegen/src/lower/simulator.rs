@@ -39,7 +39,7 @@ fn brokers_of_nodes(space: &Space, broker: &plan::Broker) -> Vec<(plan::NodeId, 
 
 /// The topics on which any operation of the space acts, or a monitor publishes.
 fn acted_on(space: &Space) -> Vec<plan::TopicId> {
-    let mut acted_on: BTreeSet<TopicId> = space.operations.values().filter_map(model::Operation::topic).collect();
+    let mut acted_on: BTreeSet<TopicId> = space.operations.values().flat_map(model::Operation::topics).collect();
     acted_on.extend(space.topics.iter().map(|(topic, _)| topic).filter(|&topic| by_monitor(space, topic)));
     acted_on.into_iter().map(topic_id).collect()
 }

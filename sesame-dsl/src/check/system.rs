@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use sesame_plan::without_member;
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{Declaration, MetricSource, Space, TopicId};
+use crate::model::{Declaration, MetricSource, Operation, Space, TopicId};
 use crate::resolve::list;
 
 /// Operations whose name ends with the name of a topic that they do not disturb.
@@ -16,17 +16,18 @@ pub(super) fn misnamed_operations(space: &Space, diagnostics: &mut Vec<Diagnosti
         let name = &operation.declaration.name;
         // The endings of a name, the longest first.
         let ends = || name.match_indices('_').map(|(at, _)| &name[at + 1..]);
-        let Some(own) = operation.topic().map(|topic| &space.topics[topic].declaration) else { continue };
+        let own: Vec<&Declaration> = operation.topics().map(|topic| &space.topics[topic].declaration).collect();
         // `command_lost` is named after `command`, even if there is a topic `lost`.
-        let begins = name.strip_prefix(own.name.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with('_'));
-        if begins || ends().any(|end| end == own.name) {
+        let begins = |own: &str| name.strip_prefix(own).is_some_and(|rest| rest.is_empty() || rest.starts_with('_'));
+        if own.is_empty() || own.iter().any(|own| begins(&own.name) || ends().any(|end| end == own.name)) {
             continue;
         }
+        let own = list(&own.iter().map(|own| own.name.as_str()).collect::<Vec<_>>());
         // The longest is meant: `cut_link_speed` is named after `link_speed` even if there is a `speed` too.
         let Some(meant) = ends().find_map(|end| topics.get(end)) else { continue };
-        let title = format!("operation `{name}` is named after `{}` but disturbs `{}`", meant.name, own.name);
+        let title = format!("operation `{name}` is named after `{}` but disturbs {own}", meant.name);
         let diagnostic = Diagnostic::new(Code::MISNAMED_OPERATION, operation.declaration.span, title)
-            .label(format!("this acts on `{}`", own.name))
+            .label(format!("this acts on {own}"))
             .secondary(meant.span, "the operation's name ends with the name of this topic");
         diagnostics.push(diagnostic);
     }
@@ -56,8 +57,13 @@ pub(super) fn unheard_operations(space: &Space, diagnostics: &mut Vec<Diagnostic
         heard.extend(delivered.flat_map(|evidence| &evidence.inputs).map(|input| input.field.topic));
     }
     for operation in space.operations.values() {
-        let Some(topic) = operation.topic().filter(|topic| !heard.contains(topic)) else { continue };
-        let topic = &space.topics[topic].declaration;
+        let unheard = operation.topics().filter(|topic| !heard.contains(topic));
+        let unheard: Vec<&Declaration> = unheard.map(|topic| &space.topics[topic].declaration).collect();
+        let Some(topic) = unheard.first() else { continue };
+        if unheard.len() < operation.targets.len() {
+            diagnostics.extend(unheard.iter().map(|topic| partly_unheard(operation, topic)));
+            continue;
+        }
         let title =
             format!("operation `{}` has no effect: no node subscribes to `{}`", operation.declaration.name, topic.name);
         diagnostics.push(
@@ -67,6 +73,15 @@ pub(super) fn unheard_operations(space: &Space, diagnostics: &mut Vec<Diagnostic
                 .note("if the simulator does not subscribe to the topic either, a campaign ends with an error after the reference run"),
         );
     }
+}
+
+/// An operation on several topics, one of which nobody hears.
+fn partly_unheard(operation: &Operation, topic: &Declaration) -> Diagnostic {
+    let name = &operation.declaration.name;
+    let title = format!("operation `{name}` has no effect on `{}`: no node subscribes to it", topic.name);
+    Diagnostic::new(Code::NOBODY_HEARS, operation.declaration.span, title)
+        .label("no monitor and no outbound metric reads this topic either")
+        .secondary(topic.span, "the topic is declared here")
 }
 
 /// The names of topics that have many publishers by design, without their namespaces.

@@ -92,7 +92,7 @@ fn used_topics(space: &Space) -> BTreeSet<TopicId> {
     for node in space.nodes.values() {
         used.extend(node.publishes.iter().chain(&node.subscribes).map(|used| used.topic));
     }
-    used.extend(space.operations.values().filter_map(Operation::topic));
+    used.extend(space.operations.values().flat_map(Operation::topics));
     for metric in space.metrics.values() {
         match &metric.source {
             MetricSource::FuzzingTime | MetricSource::Monitor(..) => {}

@@ -458,7 +458,8 @@ impl<'a> Indexer<'a> {
 
     fn operation(&mut self, operation: &'a Operation, id: DefinitionId) {
         let OperationBody {
-            target,
+            targets,
+            chosen: _,
             resource,
             from,
             to,
@@ -471,7 +472,7 @@ impl<'a> Indexer<'a> {
             untimed: _,
             contains,
         } = &operation.body;
-        for place in target.iter().flat_map(|target| &target.places) {
+        for place in targets.iter().flat_map(|target| &target.places) {
             self.path(place, id);
         }
         if let Some(Resource { parameter: _, node, chosen: _, span: _ }) = resource {

@@ -13,12 +13,12 @@ use crate::units::Unit;
 pub struct Operation {
     /// Its name and doc comment.
     pub declaration: Declaration,
-    /// What it disturbs; `None` exactly for one that acts on no messages: a custom one before the start or after the
-    /// end, or one on a node or its parameters, which [`OperationKind::node`] names by its position in the space.
-    pub target: Option<Target>,
-    /// The members of a group of topics or nodes on which it acts, by their positions; `None` for all topics of a
-    /// group, or for an operation that acts on no group.
-    pub members: Option<MembersOf>,
+    /// What it disturbs, each topic once, in written order; none exactly for one that acts on no messages: a custom one
+    /// before the start or after the end, or one on a node or its parameters, which [`OperationKind::node`] names by its
+    /// position in the space.
+    pub targets: Vec<Target>,
+    /// The nodes of a group on which it acts, by their positions; `None` for an operation that acts on no nodes.
+    pub nodes: Option<MembersOf>,
     /// Only messages that these nodes publish, in written order; none for all messages.
     pub from: Vec<NodeId>,
     /// Only messages on their way to these nodes, in written order; none for all messages.
@@ -44,9 +44,14 @@ pub struct Operation {
 }
 
 impl Operation {
-    /// The topic whose messages it disturbs.
-    pub fn topic(&self) -> Option<TopicId> {
-        self.target.as_ref().map(|target| target.topic)
+    /// The topics whose messages it disturbs, each once, in written order.
+    pub fn topics(&self) -> impl Iterator<Item = TopicId> {
+        self.targets.iter().map(|target| target.topic)
+    }
+
+    /// Whether it disturbs a topic.
+    pub fn disturbs(&self, topic: TopicId) -> bool {
+        self.topics().any(|own| own == topic)
     }
 
     /// Whether it acts before the start or after the end: a test then chooses no window for it.
@@ -55,13 +60,14 @@ impl Operation {
     }
 }
 
-/// What an operation disturbs.
+/// What an operation disturbs of one topic.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Target {
     /// The topic.
     pub topic: TopicId,
-    /// The members of a group that are named, by their positions in ascending order; none for all.
-    pub named: Vec<u32>,
+    /// The members of a group on which it acts, by their positions; `None` for all topics of a group, or for a topic
+    /// that is no group. A test chooses members of all topics, or of none.
+    pub members: Option<MembersOf>,
     /// The values in each message that it changes, in written order, all of one type; none exactly where it acts on
     /// whole messages.
     pub places: Vec<Vec<Step>>,

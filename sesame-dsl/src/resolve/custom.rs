@@ -14,14 +14,14 @@ impl<'a> Resolver<'a> {
         &mut self,
         custom: &'a ast::Custom,
         body: &'a ast::OperationBody,
-    ) -> Option<(Option<Target>, OperationKind, Vec<Parameter>)> {
+    ) -> Option<(Vec<Target>, OperationKind, Vec<Parameter>)> {
         let parameters = self.custom_parameters(custom);
-        let (target, moment) = match (&body.target, custom.moment) {
+        let (targets, moment) = match (self.at_most_one_topic(&body.targets)?, custom.moment) {
             (Some(topic), None) => {
-                (Some(self.whole_messages(topic, "a custom operation receives")?), Moment::OnMessage)
+                (vec![self.whole_messages(topic, "a custom operation receives")?], Moment::OnMessage)
             }
-            (None, Some((_, ast::Moment::BeforeStart))) => (None, Moment::BeforeStart),
-            (None, Some((_, ast::Moment::AfterEnd))) => (None, Moment::AfterEnd),
+            (None, Some((_, ast::Moment::BeforeStart))) => (Vec::new(), Moment::BeforeStart),
+            (None, Some((_, ast::Moment::AfterEnd))) => (Vec::new(), Moment::AfterEnd),
             (Some(topic), Some((moment, _))) => {
                 let title = format!("an operation `{}` cannot have a topic", self.text(moment));
                 let diagnostic = Diagnostic::new(Code::WRONG_TYPE, topic.span, title)
@@ -39,7 +39,7 @@ impl<'a> Resolver<'a> {
             }
         };
         let mut complete = true;
-        if target.is_none() {
+        if targets.is_empty() {
             let within = body.within.first().map(|(span, _)| (*span, "within"));
             let lengths = body.lengths.first().map(|(span, _)| (*span, "for"));
             let contains = body.contains.first().map(|(span, _)| (*span, "start contains"));
@@ -51,7 +51,7 @@ impl<'a> Resolver<'a> {
             }
         }
         let parameters = parameters?;
-        complete.then_some((target, OperationKind::Custom { moment }, parameters))
+        complete.then_some((targets, OperationKind::Custom { moment }, parameters))
     }
 
     fn custom_parameters(&mut self, custom: &'a ast::Custom) -> Option<Vec<Parameter>> {

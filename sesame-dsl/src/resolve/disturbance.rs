@@ -11,8 +11,8 @@ use super::resource::acts_on_nodes;
 use super::words::type_in_words;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{
-    ChoiceKind, Distribution, Domain, Drain, Id as _, NotFinite, OperationKind, Parameter, Range, Step, Target,
-    TopicId, Type, ValueMode,
+    ChoiceKind, Distribution, Domain, Drain, Id as _, MembersOf, NotFinite, OperationKind, Parameter, Range, Step,
+    Target, TopicId, Type, ValueMode,
 };
 use crate::span::Span;
 use crate::syntax::ast;
@@ -422,17 +422,11 @@ impl<'a> Resolver<'a> {
                 complete = false;
                 continue;
             };
-            let Disturbed { topic, only, steps, ty } = &disturbed;
+            let Disturbed { topic: _, only, steps, ty } = &disturbed;
             let written = self.text(place.span);
-            if let Some(Disturbed { topic: first_topic, ty: first_type, .. }) = found.first() {
+            if let Some(Disturbed { ty: first_type, .. }) = found.first() {
                 let same_place = |before: &Disturbed| before.only == *only && before.steps == *steps;
-                let wrong = if first_topic != topic {
-                    Some((
-                        Code::WRONG_TYPE,
-                        format!("`{written}` and `{first_words}` are on different topics"),
-                        "an operation acts on one topic; declare another operation for this one".to_owned(),
-                    ))
-                } else if first_type != ty {
+                let wrong = if first_type != ty {
                     let label =
                         format!("this is {}, but `{first_words}` is {}", type_in_words(ty), type_in_words(first_type));
                     Some((Code::WRONG_TYPE, format!("`{written}` and `{first_words}` have different types"), label))
@@ -471,7 +465,8 @@ impl<'a> Resolver<'a> {
             self.report(diagnostic);
             return None;
         }
-        Some((Target { topic, named: by_member.into_keys().flatten().collect(), places }, ty))
+        let named: Vec<u32> = by_member.into_keys().flatten().collect();
+        Some((Target { topic, members: (!named.is_empty()).then_some(MembersOf::These(named)), places }, ty))
     }
 
     /// Where a place is that an operation changes, and its type.

@@ -28,9 +28,9 @@ impl<'a> Resolver<'a> {
         let body = &operation.body;
         let what = match &body.kind {
             ast::OperationKind::Scene(scene) => {
-                self.scene(&operation.head.name, scene).map(|(kind, value)| (None, kind, vec![value]))
+                self.scene(&operation.head.name, scene).map(|(kind, value)| (Vec::new(), kind, vec![value]))
             }
-            _ => self.target_and_kind(body),
+            _ => self.targets_and_kind(body),
         };
         let within = match self.single(&body.within, "within") {
             Some(range) => self.within(range).map(Some),
@@ -51,8 +51,11 @@ impl<'a> Resolver<'a> {
         self.at_most_one(&body.untimed, "untimed");
         let between = self.between_nodes(body);
         let constraints = self.constraints(&body.contains);
-        let (target, kind, mut parameters) = what?;
-        let (members, choice) = self.members_acted_on(body, target.as_ref())?;
+        let (mut targets, kind, mut parameters) = what?;
+        let (nodes, choice) = match &body.resource {
+            Some(resource) => self.members_of_node(resource)?,
+            None => (None, self.members_of_targets(body, &mut targets)?),
+        };
         if let Some(choice) = choice {
             if parameters.iter().any(|parameter| parameter.name == choice.name) {
                 let title = format!("this operation has a parameter `{}` of its own", choice.name);
@@ -66,8 +69,8 @@ impl<'a> Resolver<'a> {
         let [from, to] = between?;
         Some(model::Operation {
             declaration: self.declaration(&operation.head),
-            target,
-            members,
+            targets,
+            nodes,
             from,
             to,
             kind,
@@ -81,23 +84,19 @@ impl<'a> Resolver<'a> {
         })
     }
 
-    fn target_and_kind(
+    fn targets_and_kind(
         &mut self,
         body: &'a ast::OperationBody,
-    ) -> Option<(Option<model::Target>, OperationKind, Vec<Parameter>)> {
+    ) -> Option<(Vec<model::Target>, OperationKind, Vec<Parameter>)> {
         if let (ast::OperationKind::Custom(custom), None) = (&body.kind, &body.resource) {
             return self.custom(custom, body);
         }
-        let (target, kind, parameters) = match (&body.resource, &body.target) {
-            (Some(resource), _) => {
+        let (targets, kind, parameters) = match &body.resource {
+            Some(resource) => {
                 let (kind, parameters) = self.on_resource(resource, body)?;
-                (None, kind, parameters)
+                (Vec::new(), kind, parameters)
             }
-            (None, Some(target)) => {
-                let (target, kind, parameters) = self.disturbance(target, body)?;
-                (Some(target), kind, parameters)
-            }
-            (None, None) => unreachable!("only custom operations can act on nothing"),
+            None => self.disturbances(body)?,
         };
         let mut said: Vec<Span> = Vec::new();
         for parameter in parameters.iter().filter(|_| !is_constant(&kind)) {
@@ -112,7 +111,39 @@ impl<'a> Resolver<'a> {
             }
             said.push(span);
         }
-        Some((target, kind, parameters))
+        Some((targets, kind, parameters))
+    }
+
+    /// What an operation does to messages: the same on each of its topics.
+    fn disturbances(
+        &mut self,
+        body: &'a ast::OperationBody,
+    ) -> Option<(Vec<model::Target>, OperationKind, Vec<Parameter>)> {
+        let (first, further) = body.targets.split_first().expect("only custom operations can act on nothing");
+        let (target, kind, parameters) = self.disturbance(first, body)?;
+        let mut targets = vec![target];
+        let mut complete = true;
+        for written in further {
+            match self.disturbance(written, body) {
+                Some((target, same, equal)) if same == kind && equal == parameters => targets.push(target),
+                found => {
+                    complete = false;
+                    if found.is_some() {
+                        self.report_unlike(first, written);
+                    }
+                }
+            }
+        }
+        complete.then_some((targets, kind, parameters))
+    }
+
+    fn report_unlike(&mut self, first: &ast::Target, other: &ast::Target) {
+        let [one, title] = [first.span, other.span].map(|span| self.text(span));
+        let title = format!("`{title}` and `{one}` have different types or units");
+        let diagnostic = Diagnostic::new(Code::WRONG_TYPE, other.span, title)
+            .label("a test makes one choice for all topics; declare another operation for this one")
+            .secondary(first.span, "the first is here");
+        self.report(diagnostic);
     }
 
     /// Warns of a range that leaves nothing to choose.
@@ -303,13 +334,13 @@ impl<'a> Resolver<'a> {
             return Some(Vec::new());
         };
         let name = &test.operation.text;
-        let Some(topic) = operation.topic() else {
+        if operation.targets.is_empty() {
             let title = format!("`{name}` acts on no messages");
             let diagnostic = Diagnostic::new(Code::WRONG_CHOICE, first.span.to(last.span), title);
             self.report(diagnostic.label("remove this list"));
             return None;
-        };
-        let wires = self.wires_acted_on(topic, operation)?;
+        }
+        let wires = self.wires_acted_on(operation)?;
         let mut runs = Vec::new();
         for run in &test.messages {
             let (from, to) = (run.first.value?, run.last.map_or(run.first.value, |last| last.value)?);

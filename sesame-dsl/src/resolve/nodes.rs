@@ -211,7 +211,7 @@ impl<'a> Resolver<'a> {
     /// Nodes must publish or subscribe to the topic, and the transport must tell them apart. The name of a group of
     /// nodes stands for its members that do.
     pub(super) fn between_nodes(&mut self, body: &'a OperationBody) -> Option<[Vec<NodeId>; 2]> {
-        let Some(target) = &body.target else {
+        if body.targets.is_empty() {
             let Some((span, _)) = body.from.as_ref().or(body.to.as_ref()) else {
                 return Some([Vec::new(), Vec::new()]);
             };
@@ -219,27 +219,34 @@ impl<'a> Resolver<'a> {
             let label = "remove the nodes; after `on` stands the node on which it acts";
             self.report(Diagnostic::new(Code::WHICH_NODES, *span, title).label(label));
             return None;
-        };
-        let topic = self.names.get(target.topic.text.as_str()).copied().filter(|topic| topic.kind == Kind::Topic)?;
-        let of_service = self.system.topics.get(topic.index).and_then(Option::as_ref);
-        let of_service = of_service.is_some_and(|topic| topic.channel != Channel::Topic);
-        if let (true, Some((span, _))) = (of_service, body.from.as_ref().or(body.to.as_ref())) {
-            let title = format!("`{}` is of a service, whose clients are not distinguished", target.topic.text);
-            let diagnostic = Diagnostic::new(Code::WHICH_NODES, *span, title)
-                .label("remove the nodes; the operation then applies to all calls of the service");
-            self.report(diagnostic);
-            return None;
+        }
+        let mut topics = Vec::new();
+        for target in &body.targets {
+            let topic = self.names.get(target.topic.text.as_str()).copied();
+            let topic = topic.filter(|topic| topic.kind == Kind::Topic)?;
+            let of_service = self.system.topics.get(topic.index).and_then(Option::as_ref);
+            let of_service = of_service.is_some_and(|topic| topic.channel != Channel::Topic);
+            if let (true, Some((span, _))) = (of_service, body.from.as_ref().or(body.to.as_ref())) {
+                let title = format!("`{}` is of a service, whose clients are not distinguished", target.topic.text);
+                let diagnostic = Diagnostic::new(Code::WHICH_NODES, *span, title)
+                    .label("remove the nodes; the operation then applies to all calls of the service");
+                self.report(diagnostic);
+                return None;
+            }
+            topics.push((target, TopicId::from_index(topic.index)));
         }
         let mut lists = |nodes: &'a Option<(Span, Vec<WithMember>)>, from: bool| {
             let Some((span, listed)) = nodes else { return Some(Vec::new()) };
             let found = self.nodes_listed(listed);
             let mut fits = true;
             for one in listed.iter().filter(|_| found.is_some()) {
-                fits &= self.on_its_way(target, TopicId::from_index(topic.index), one, from);
+                for (target, topic) in &topics {
+                    fits &= self.on_its_way(target, *topic, one, from);
+                }
             }
             fits &= self.tells_nodes_apart(*span, from);
             let on_it =
-                |node: &NodeId| self.is_on_its_way(*node, TopicId::from_index(topic.index), from) != Some(false);
+                |node: &NodeId| topics.iter().any(|(_, topic)| self.is_on_its_way(*node, *topic, from) != Some(false));
             found.filter(|_| fits).map(|found| found.into_iter().filter(on_it).collect())
         };
         let from = lists(&body.from, true);

@@ -258,18 +258,20 @@ impl<'a> Resolver<'a> {
 
     fn fit(&mut self, fit: &'a written::Fit) -> Option<Fit> {
         match fit {
-            written::Fit::Delay(target, range) => {
-                let topic = match target {
-                    Some(target) => self.whole_messages(target, "a relay delays").and_then(|found| {
+            written::Fit::Delay(targets, range) => {
+                let topic = match self.at_most_one_topic(targets) {
+                    Some(Some(target)) => self.whole_messages(target, "a relay delays").and_then(|found| {
                         self.of_all_members(&found, target.span)?;
                         Some(Some(found.topic))
                     }),
-                    None => Some(None),
+                    Some(None) => Some(None),
+                    None => None,
                 };
                 let delay = self.times(range, "the delay of a relay");
                 Some(Fit::RelayDelay(topic?, delay?))
             }
-            written::Fit::Relay { rule, target, amounts } => {
+            written::Fit::Relay { rule, targets, amounts } => {
+                let target = self.at_most_one_topic(targets)??;
                 let span = target.span;
                 let (target, kind, parameters) = self.plain(target, *rule, Some(amounts))?;
                 self.of_all_members(&target, span)?;
@@ -286,6 +288,17 @@ impl<'a> Resolver<'a> {
                 Some(Fit::Parameter(plain?, permitted))
             }
         }
+    }
+}
+
+impl<'a> Resolver<'a> {
+    /// What is written of the one topic that is meant, if one is written. `None` was reported.
+    #[expect(clippy::option_option, reason = "the outer one is for what was reported")]
+    pub(super) fn at_most_one_topic(&mut self, targets: &'a [ast::Target]) -> Option<Option<&'a ast::Target>> {
+        let [first, second, ..] = targets else { return Some(targets.first()) };
+        let title = format!("`{}` and `{}` are on different topics", self.text(second.span), self.text(first.span));
+        self.report(Diagnostic::new(Code::WRONG_TYPE, second.span, title).label("expected one topic"));
+        None
     }
 }
 

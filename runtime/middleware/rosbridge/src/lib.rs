@@ -8,6 +8,7 @@
 //! With the feature `client`, `client` is a connection to a bridge, `payload` turns messages into values, `rosbridge`
 //! is the transport to the nodes behind it, and `proxy` is where other clients connect that are to be disturbed.
 
+mod bare;
 pub mod cbor;
 #[cfg(feature = "client")]
 pub mod client;

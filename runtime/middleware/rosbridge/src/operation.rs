@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::bare;
+
 /// One thing that a peer says. Fields that a peer may leave out are `Option`s, and are left out when there is nothing
 /// to say. What a peer says besides is ignored, as the protocol asks for.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -202,7 +204,7 @@ pub enum Compression {
 impl Operation {
     /// The operation as a frame of text.
     pub fn text(&self) -> String {
-        serde_json::to_string(self).expect("an operation is plain data with text keys")
+        bare::unmarked(serde_json::to_string(self).expect("an operation is plain data with text keys"))
     }
 
     /// Its name on the wire.

@@ -14,6 +14,8 @@ use sesame_plan::{CampaignPlan, Dialect, Interface, Primitive, TopicId, Type, Wi
 use sesame_relay::message::Mismatch;
 use sesame_relay::value::{Fields, Record, Value};
 
+use crate::bare;
+
 /// The largest whole number up to which JSON's reals are exact.
 const EXACT: f64 = 9_007_199_254_740_992.0;
 
@@ -134,8 +136,11 @@ impl Payloads {
             Value::Int(number) => *there = Json::from(*number),
             Value::Real(number) => match time_names(there) {
                 Some(names) => *there = time(*number, names),
-                // What JSON has no number for becomes `null`.
-                None => *there = Json::from(*number),
+                // What JSON has no number for becomes `null`, or a bare word where the bridge wrote one.
+                None => {
+                    let word = bare::number(there).and_then(|_| bare::word(*number));
+                    *there = word.unwrap_or_else(|| Json::from(*number));
+                }
             },
             Value::Text(text) => *there = Json::from(text.as_str()),
             Value::Point([x, y, z]) => *there = json!({ "x": x, "y": y, "z": z }),
@@ -230,12 +235,12 @@ fn time(seconds: f64, [whole, nanos]: [&str; 2]) -> Json {
     json!({ whole: total.div_euclid(1_000_000_000), nanos: total.rem_euclid(1_000_000_000) })
 }
 
-/// A real number; `null` stands for what JSON has no number for. A time is a number of seconds.
+/// A real number; `null`, or a bare word, stands for what JSON has no number for. A time is a number of seconds.
 fn real(json: &Json) -> Option<f64> {
     match time_names(json) {
         Some([whole, nanos]) => Some(json[whole].as_i64()? as f64 + json[nanos].as_i64()? as f64 * 1e-9),
         None if json.is_null() => Some(f64::NAN),
-        None => json.as_f64(),
+        None => json.as_f64().or_else(|| bare::number(json)),
     }
 }
 
@@ -260,6 +265,7 @@ fn mismatch(expected: &'static str, json: &Json) -> Mismatch {
         Json::Bool(_) => "bool",
         Json::Number(_) if expected == "int" => "a number that is not whole, or too large",
         Json::Number(_) => "a number",
+        Json::String(_) if bare::number(json).is_some() => "a number that is not finite",
         Json::String(_) => "text",
         Json::Array(_) => "a list",
         Json::Object(_) => "an object",
@@ -325,6 +331,33 @@ mod tests {
             "at": { "x": 1.0, "y": 2.0, "z": -0.5 }, "data": "AAH/", "extra": [null, "x"], "level": level,
             "seen": stamp, "stamp": stamp
         })
+    }
+
+    #[test]
+    fn numbers_that_json_does_not_have_are_read_and_stay_where_they_are() {
+        let payloads = payloads(Dialect::Ros2);
+        let stamp = json!({ "sec": 1, "nanosec": 5 });
+        let read = |level: &str| {
+            let text = reading(&stamp, &json!("LEVEL")).to_string().replace("\"LEVEL\"", level);
+            let json = parsed(&bare::marked(&text).unwrap_or(text));
+            payloads.read(TopicId(0), &json).unwrap()
+        };
+        let level = |value: &Value| value.number_at(&["level"]).unwrap();
+        assert!(level(&read("NaN")).is_nan() && level(&read("null")).is_nan());
+        assert_eq!(level(&read("-Infinity")), f64::NEG_INFINITY);
+        let written = |value: &Value| bare::unmarked(payloads.write(TopicId(0), value));
+        assert!(written(&read("Infinity")).contains(r#""level":Infinity,"#));
+        let mut changed = read("Infinity");
+        let Value::Record(record) = &mut changed else { unreachable!() };
+        *record.get_mut("seen").unwrap() = Value::Real(2.5);
+        assert!(written(&changed).contains(r#""level":Infinity,"#), "what is beside a change");
+        let Value::Record(record) = &mut changed else { unreachable!() };
+        *record.get_mut("level").unwrap() = Value::Real(f64::NAN);
+        assert!(written(&changed).contains(r#""level":NaN,"#), "as the bridge writes it");
+        let mut null = read("null");
+        let Value::Record(record) = &mut null else { unreachable!() };
+        *record.get_mut("level").unwrap() = Value::Real(f64::INFINITY);
+        assert!(written(&null).contains(r#""level":null,"#), "JSON has no word for it");
     }
 
     fn parsed(text: &str) -> Json {

@@ -2,6 +2,7 @@
 
 use serde_json::Value;
 
+use crate::bare;
 use crate::cbor::{self, CborError};
 use crate::fragment::{PieceError, Pieces};
 use crate::operation::Operation;
@@ -144,7 +145,11 @@ impl Reader {
 }
 
 fn parsed(text: &str) -> Result<Operation, FrameError> {
-    typed(serde_json::from_str(text).map_err(FrameError::Syntax)?)
+    let read = serde_json::from_str(text).or_else(|error| {
+        let marked = bare::marked(text).and_then(|text| serde_json::from_str(&text).ok());
+        marked.ok_or(error)
+    });
+    typed(read.map_err(FrameError::Syntax)?)
 }
 
 /// A value as an operation, or what is wrong with it.

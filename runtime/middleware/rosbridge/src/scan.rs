@@ -17,6 +17,7 @@ use sesame_relay::transport::bus::secret::{Token, trusted};
 use sesame_scan::{Arrivals, Facts, FoundTopic, Payloads, System};
 
 use self::assemble::Graph;
+use crate::bare;
 use crate::client::{Address, Client, ConnectError, Incoming};
 use crate::operation::{Level, Operation};
 use crate::payload::type_name;
@@ -297,7 +298,8 @@ impl Scanner {
     fn take(&mut self, incoming: Incoming) -> Result<(), ScanError> {
         match incoming {
             Incoming::Operation(operation, arrived) => match *operation {
-                Operation::Publish { topic, msg, .. } if self.listens_to(&topic) => {
+                Operation::Publish { topic, mut msg, .. } if self.listens_to(&topic) => {
+                    bare::as_reals(&mut msg);
                     let at = arrived.saturating_duration_since(self.begin);
                     self.payloads.add(&topic, &msg);
                     self.arrivals.entry(topic).or_default().add(at);

@@ -16,6 +16,7 @@ use sesame_relay::transport::{Connect, Transport, TransportError};
 use sesame_relay::value::Value;
 use sesame_relay::wire::Line;
 
+use crate::bare;
 use crate::client::{Address, Client, ConnectError, Incoming};
 use crate::echo::content;
 use crate::operation::{Compression, Level, Operation};
@@ -331,6 +332,7 @@ impl Bridge {
         let (channel, path) = (self.lines[line].channel, &self.lines[line].sinks[sink].path);
         let quoted = |text: &str| serde_json::Value::from(text).to_string();
         let path = quoted(path);
+        let text = bare::unmarked(text.to_owned());
         match (channel, call) {
             (Channel::Topic, _) => self.say(format!(r#"{{"op":"publish","topic":{path},"msg":{text}}}"#)),
             (Channel::Request, Some(call)) => {

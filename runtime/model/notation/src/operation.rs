@@ -3,7 +3,7 @@
 use sesame_plan::condition::{Constraint, Integers};
 use sesame_plan::{
     CampaignPlan, Distribution, Domain, Drain, Lengths, MembersOf, Metric, Operation, OperationKind, Parameter, Span,
-    Topic, value_path_in_words, without_member,
+    TargetRef, Topic, value_path_in_words, without_member,
 };
 
 use crate::text::{list, one_of, quoted};
@@ -15,8 +15,10 @@ pub fn operation(plan: &CampaignPlan, operation: &Operation) -> String {
         return scene(operation, parameter, *usual);
     }
     let mut line = format!("operation {}", operation.name);
-    if let Some(topic) = operation.topic {
-        line = format!("{line} on {}{}", chosen(operation), targets(plan.topic(topic), operation).join(", "));
+    let targets: Vec<String> =
+        operation.targets().flat_map(|target| written(plan.topic(target.topic), operation, target)).collect();
+    if !targets.is_empty() {
+        line = format!("{line} on {}{}", chosen(operation), targets.join(", "));
     }
     if let Some(resource) = resource(plan, operation) {
         line = format!("{line} on {resource}");
@@ -52,16 +54,16 @@ fn scene(operation: &Operation, known_as: &str, usual: Option<f64>) -> String {
 }
 
 /// The places in the messages of a topic that an operation changes, with the members of a group on which it acts.
-fn targets(topic: &Topic, operation: &Operation) -> Vec<String> {
+fn written(topic: &Topic, operation: &Operation, target: TargetRef<'_>) -> Vec<String> {
     let members = (0u32..).zip(&topic.paths).map(|(member, _)| member);
-    let candidates: Vec<u32> = members.filter(|&member| operation.may_act_on(member as usize)).collect();
+    let candidates: Vec<u32> = members.filter(|&member| operation.may_act_on(target.topic, member as usize)).collect();
     let topics: Vec<String> = if candidates.len() == topic.paths.len() {
         vec![topic.name.clone()]
     } else {
         candidates.into_iter().map(|member| topic.member_in_words(member)).collect()
     };
-    let places = || operation.places.iter().map(|place| value_path_in_words(place));
-    if operation.places.is_empty() {
+    let places = || target.places.iter().map(|place| value_path_in_words(place));
+    if target.places.is_empty() {
         return topics;
     }
     topics.iter().flat_map(|topic| places().map(move |place| format!("{topic}{place}"))).collect()

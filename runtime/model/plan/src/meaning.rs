@@ -129,6 +129,7 @@ fn forget_what_is_for_people(plan: &mut CampaignPlan) {
             name: _,
             doc,
             topic: _,
+            further: _,
             members: _,
             from: _,
             to: _,

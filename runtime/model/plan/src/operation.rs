@@ -14,12 +14,12 @@ pub struct Operation {
     pub name: String,
     /// Its doc comment.
     pub doc: String,
-    /// The topic whose messages it disturbs; `None` exactly for one that acts on no messages: a custom operation before
-    /// the start or after the end, or one on a node.
+    /// The topic whose messages it disturbs, the first if they are several; `None` exactly for one that acts on no
+    /// messages: a custom operation before the start or after the end, or one on a node.
     pub topic: Option<TopicId>,
-    /// The members of a group of topics or nodes on which it acts; `None` for all topics of a group, or for an
-    /// operation that acts on no group. The nodes of a group follow each other, and that of the kind is the first of
-    /// them.
+    /// The members of a group, of the first topic or of nodes, on which it acts; `None` for all topics of a group, or
+    /// for an operation that acts on no group. The nodes of a group follow each other, and that of the kind is the
+    /// first of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub members: Option<MembersOf>,
     /// Only messages that these nodes publish; none for all messages.
@@ -29,9 +29,14 @@ pub struct Operation {
     /// fanned out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub to: Vec<NodeId>,
-    /// The values in each message that it changes, in written order; none exactly where it acts on whole messages.
+    /// The values in each message of the first topic that it changes, in written order; none exactly where it acts on
+    /// whole messages.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub places: Vec<ValuePath>,
+    /// The other topics that it disturbs at the same times and with the same choices, as a common cause does; no topic
+    /// twice. Tests choose members of all of them, or of none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub further: Vec<Target>,
     /// What it does to them.
     pub kind: OperationKind,
     /// The parameters a test chooses, in the order that [`OperationKind`] documents.
@@ -54,28 +59,85 @@ pub struct Operation {
     pub constraints: Vec<Constraint>,
 }
 
+/// A topic that an operation disturbs in addition to its first.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Target {
+    /// The topic.
+    pub topic: TopicId,
+    /// The members of a group, as [`Operation::members`] has them of the first topic.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub members: Option<MembersOf>,
+    /// The values that it changes, as [`Operation::places`] has them of the first topic.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub places: Vec<ValuePath>,
+}
+
+impl Target {
+    fn as_ref(&self) -> TargetRef<'_> {
+        TargetRef { topic: self.topic, members: self.members.as_ref(), places: &self.places }
+    }
+}
+
+/// A topic that an operation disturbs, and what of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TargetRef<'a> {
+    /// The topic.
+    pub topic: TopicId,
+    /// The members of a group; `None` for all of them, or for a topic that is no group.
+    pub members: Option<&'a MembersOf>,
+    /// The values in each message; none where it acts on whole messages.
+    pub places: &'a [ValuePath],
+}
+
 impl Operation {
-    /// Whether some test makes it act on a member of its group, by its position.
-    pub fn may_act_on(&self, member: usize) -> bool {
+    /// What it disturbs: each topic once, in written order.
+    pub fn targets(&self) -> impl Iterator<Item = TargetRef<'_>> {
+        let first = self.topic.map(|topic| TargetRef { topic, members: self.members.as_ref(), places: &self.places });
+        first.into_iter().chain(self.further.iter().map(Target::as_ref))
+    }
+
+    /// The topics that it disturbs, each once, in written order.
+    pub fn topics(&self) -> impl Iterator<Item = TopicId> {
+        self.topic.into_iter().chain(self.further.iter().map(|target| target.topic))
+    }
+
+    /// Whether it disturbs a topic.
+    pub fn disturbs(&self, topic: TopicId) -> bool {
+        self.topics().any(|own| own == topic)
+    }
+
+    /// What it disturbs of a topic, with its position among the [targets](Operation::targets).
+    pub fn target_on(&self, topic: TopicId) -> Option<(usize, TargetRef<'_>)> {
+        self.targets().enumerate().find(|(_, target)| target.topic == topic)
+    }
+
+    /// Whether some test makes it act on a path of a topic, by its position among the members.
+    pub fn may_act_on(&self, topic: TopicId, member: usize) -> bool {
         let has = |members: &MembersOf| u32::try_from(member).is_ok_and(|member| members.may_have(member));
-        self.members.as_ref().is_none_or(has)
+        self.target_on(topic).is_some_and(|(_, target)| target.members.is_none_or(has))
     }
 
-    /// Whether it acts on a member of its group, by its position, with these choices of a test.
-    pub fn acts_on(&self, member: usize, choices: &[Choice]) -> bool {
-        let among = |these: &[u32]| these.iter().any(|&one| one as usize == member);
-        self.members_of_test(choices).is_none_or(among)
+    /// Whether it acts on a path of a topic, by its position among the members, with these choices of a test.
+    pub fn acts_on(&self, topic: TopicId, member: usize, choices: &[Choice]) -> bool {
+        self.target_on(topic).is_some_and(|(_, target)| self.acts_on_member(target, member, choices))
     }
 
-    /// The members of its group on which it acts with these choices of a test; `None` for all topics of a group, or if
-    /// it acts on no group. A choice that its parameter does not permit has no members.
-    pub fn members_of_test(&self, choices: &[Choice]) -> Option<&[u32]> {
-        let permitted = match self.members.as_ref()? {
-            MembersOf::These(these) => return Some(these),
-            MembersOf::Chosen(permitted) => permitted,
-        };
-        let chosen = self.choice_of_members(choices).and_then(|choice| permitted.get(choice as usize));
-        Some(chosen.map_or(&[], Vec::as_slice))
+    /// Whether it acts on a path of one of its targets, by its position among the members, with these choices of a
+    /// test.
+    pub fn acts_on_member(&self, target: TargetRef<'_>, member: usize, choices: &[Choice]) -> bool {
+        let among = |members| self.members_of_test(members, choices).iter().any(|&one| one as usize == member);
+        target.members.is_none_or(among)
+    }
+
+    /// Which members are meant with these choices of a test. A choice that its parameter does not permit has none.
+    fn members_of_test<'a>(&self, members: &'a MembersOf, choices: &[Choice]) -> &'a [u32] {
+        match members {
+            MembersOf::These(these) => these,
+            MembersOf::Chosen(permitted) => {
+                let chosen = self.choice_of_members(choices).and_then(|choice| permitted.get(choice as usize));
+                chosen.map_or(&[], Vec::as_slice)
+            }
+        }
     }
 
     /// Which of the permitted choices of members a test makes; `None` for an operation whose tests choose none.
@@ -94,7 +156,7 @@ impl Operation {
 
     /// The nodes on which it acts with these choices of a test, if it acts on nodes.
     pub fn nodes_of_test(&self, choices: &[Choice]) -> Vec<NodeId> {
-        self.nodes_at(self.members_of_test(choices).unwrap_or(&[0]))
+        self.nodes_at(self.members.as_ref().map_or(&[0], |members| self.members_of_test(members, choices)))
     }
 
     /// The nodes on which some test makes it act, each once, if it acts on nodes.

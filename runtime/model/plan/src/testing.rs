@@ -259,6 +259,7 @@ pub fn operation_with(name: &str, topic: u32, kind: OperationKind, parameters: V
         from: Vec::new(),
         to: Vec::new(),
         places: Vec::new(),
+        further: Vec::new(),
         kind,
         parameters,
         within: Span { start: 0.0, end: 10.0 },

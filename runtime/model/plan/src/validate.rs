@@ -21,7 +21,7 @@ use crate::condition::{Condition, Constraint, Operand};
 use crate::{
     Activation, Bound, CampaignPlan, Choice, Domain, Failing, FieldRef, KnownTest, KnownTestId, LabTask, MembersOf,
     MessageId, Messages, Metric, MetricId, MetricSource, Operation, OperationId, OperationKind, RequirementId, SCHEMA,
-    Shrinking, Span, Task, Test, TopicId, Type, Undisturbed, Variations,
+    Shrinking, Span, Target, Task, Test, TopicId, Type, Undisturbed, Variations,
 };
 
 use check::{
@@ -178,8 +178,10 @@ impl CampaignPlan {
         at("name", name(&operation.name))?;
         let beside = !operation.kind.acts_on_messages();
         at("kind.node", operation.kind.node().map_or(Ok(()), |id| self.has_node(id)))?;
-        at("members", operation.members.as_ref().map_or(Ok(()), |members| self.sound_members(operation, members)))?;
         at("topic", operation.topic.map_or(Ok(()), |id| self.has_topic(id)))?;
+        at("members", self.sound_members(operation, operation.topic, operation.members.as_ref()))?;
+        each("further", &operation.further, |target| self.sound_target(operation, target))?;
+        at("further", distinct(operation.topics()))?;
         at(
             "topic",
             require(operation.topic.is_some() != beside, || {
@@ -206,13 +208,24 @@ impl CampaignPlan {
         })
     }
 
+    /// That an operation can disturb another topic as it does its first.
+    fn sound_target(&self, operation: &Operation, target: &Target) -> Checked {
+        at("topic", self.has_topic(target.topic))?;
+        at("members", self.sound_members(operation, Some(target.topic), target.members.as_ref()))?;
+        let of_topics = operation.topic.is_some() && !matches!(operation.kind, OperationKind::Custom { .. });
+        require(of_topics, || "it acts on one topic at most".to_owned())?;
+        let chosen = |members: Option<&MembersOf>| matches!(members, Some(MembersOf::Chosen(_)));
+        let same = chosen(operation.members.as_ref()) == chosen(target.members.as_ref());
+        at("members", require(same, || "a test chooses those of all topics, or of none".to_owned()))?;
+        let same = operation.places.is_empty() == target.places.is_empty();
+        at("places", require(same, || "it acts on whole messages, or on values".to_owned()))
+    }
+
     /// That the members on which an operation acts are there, with a text for each choice of them.
-    fn sound_members(&self, operation: &Operation, members: &MembersOf) -> Checked {
-        let count = match (operation.topic, operation.kind.node()) {
-            (Some(topic), _) => {
-                self.has_topic(topic)?;
-                self.topic(topic).paths.len()
-            }
+    fn sound_members(&self, operation: &Operation, topic: Option<TopicId>, members: Option<&MembersOf>) -> Checked {
+        let Some(members) = members else { return Ok(()) };
+        let count = match (topic, operation.kind.node()) {
+            (Some(topic), _) => self.topic(topic).paths.len(),
             (None, Some(first)) => self.nodes.len() - first.index(),
             (None, None) => 0,
         };

@@ -57,17 +57,19 @@ impl CampaignPlan {
         remappings
     }
 
-    /// The names of the wires that an operation may act on, in their order: those of its topic, or of the ways to the
-    /// subscribers that it names.
-    pub fn wires_of(&self, operation: &Operation) -> Vec<String> {
-        let Some(id) = operation.topic else { return Vec::new() };
-        let paths = self.topic(id).paths.iter().enumerate().filter(|(member, _)| operation.may_act_on(*member));
+    /// The names of the wires that an operation may act on, in the order of the plan's topics: those of its topics, or
+    /// of the ways to the subscribers that it names. Each with its topic.
+    pub fn wires_of(&self, operation: &Operation) -> Vec<(TopicId, String)> {
+        let topics = (0..).map(TopicId).zip(&self.topics);
+        let paths = topics.flat_map(|(id, topic)| topic.paths.iter().enumerate().map(move |path| (id, path)));
+        let paths = paths.filter(|(id, (member, _))| operation.may_act_on(*id, *member));
         if operation.to.is_empty() {
-            return paths.map(|(_, path)| path.clone()).collect();
+            return paths.map(|(id, (_, path))| (id, path.clone())).collect();
         }
-        let to_members = |(member, path): (usize, &String)| {
+        let to_members = |(id, (member, path)): (TopicId, (usize, &String))| {
             let named = self.told_apart(id, member).filter(|subscriber| operation.to.contains(subscriber));
-            named.map(|to| format!("{path}/to/{}", self.node(to).name_in_paths())).collect::<Vec<String>>()
+            let named = named.map(|to| (id, format!("{path}/to/{}", self.node(to).name_in_paths())));
+            named.collect::<Vec<_>>()
         };
         paths.flat_map(to_members).collect()
     }
@@ -188,7 +190,7 @@ impl CampaignPlan {
     /// [needed in each step](CampaignPlan::needed_in_step).
     pub fn relayable(&self) -> Vec<Vec<TopicId>> {
         let acted_on = |id: TopicId| match self.simulator.wiring.as_slice() {
-            [] => self.operations.iter().any(|operation| operation.topic == Some(id)),
+            [] => self.operations.iter().any(|operation| operation.disturbs(id)),
             wiring => wiring.get(id.index()).is_some_and(|wiring| wiring.cut) && !self.needed_in_step(id),
         };
         let mut found: Vec<Vec<TopicId>> = Vec::new();

@@ -506,6 +506,7 @@ mod tests {
             operation: operation.to_owned(),
             kind: "blackhole".to_owned(),
             topic: Some("order".to_owned()),
+            further_topics: Vec::new(),
             resource: None,
             planned: Some(Span { start, end: start + 1.0 }),
             conditions: None,

@@ -280,7 +280,7 @@ pub(super) fn operations(operations: &[OperationReport]) -> Table {
         table.row([
             Datum::text(&operation.operation),
             Datum::text(&operation.kind),
-            Datum::text(operation.topic.as_ref().or(operation.resource.as_ref()).cloned().unwrap_or_default()),
+            Datum::Text(operation.target_in_words()),
             Datum::Text(planned_text(operation)),
             Datum::Text(operation.observed.as_deref().map_or("unknown".to_owned(), spans_text)),
             Datum::Text(choices_text(operation)),

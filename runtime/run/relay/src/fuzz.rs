@@ -35,7 +35,7 @@ use sesame_plan::{
 
 use crate::value::{Text, Value};
 
-pub use action::{Action, HELD_LIMIT, MessageContext};
+pub use action::{Action, HELD_LIMIT, MessageContext, OnWire};
 pub use bias::Bias;
 pub use burst_loss::BurstLoss;
 pub use change::Amount;
@@ -147,7 +147,7 @@ impl Disturbance {
             _ => Err(lacks(name)),
         };
         let amount = |name: &str| chosen(name).and_then(Amount::from_choice).ok_or_else(|| lacks(name));
-        let places = Places::new(&operation.places);
+        let places = Places::new(operation.targets().map(|target| target.places));
         Ok(match &operation.kind {
             OperationKind::RandomValue { mode, integer } => {
                 let ranges = if chosen("x").is_some() {
@@ -232,10 +232,10 @@ impl Disturbance {
     }
 
     /// A message passes while the operation is inactive.
-    pub fn observe(&mut self, now: SimTime, member: u64, message: &Value) {
+    pub fn observe(&mut self, now: SimTime, on: OnWire, message: &Value) {
         match self {
-            Disturbance::Freeze(operation) => operation.observe(member, message),
-            Disturbance::Stale(operation) => operation.observe(now, member, message),
+            Disturbance::Freeze(operation) => operation.observe(on, message),
+            Disturbance::Stale(operation) => operation.observe(now, on, message),
             _ => {}
         }
     }
@@ -258,20 +258,20 @@ impl Disturbance {
     /// more than that, so the relay calls it itself.
     pub fn apply(&mut self, at: MessageContext, message: &mut Value) -> Action {
         match self {
-            Disturbance::RandomValue(operation) => operation.apply(at.draws, message),
-            Disturbance::RandomText(operation) => operation.apply(at.draws, message),
-            Disturbance::StuckAt(operation) => operation.apply(message),
-            Disturbance::Bias(operation) => operation.apply(message),
-            Disturbance::Drift(operation) => operation.apply(at.active, message),
-            Disturbance::Noise(operation) => operation.apply(at.draws, message),
+            Disturbance::RandomValue(operation) => operation.apply(at, message),
+            Disturbance::RandomText(operation) => operation.apply(at, message),
+            Disturbance::StuckAt(operation) => operation.apply(at, message),
+            Disturbance::Bias(operation) => operation.apply(at, message),
+            Disturbance::Drift(operation) => operation.apply(at, message),
+            Disturbance::Noise(operation) => operation.apply(at, message),
             Disturbance::RandomWalk(operation) => operation.apply(at, message),
-            Disturbance::Scale(operation) => operation.apply(message),
-            Disturbance::NotFinite(operation) => operation.apply(message),
-            Disturbance::Freeze(operation) => operation.apply(at.member, message),
-            Disturbance::Stale(operation) => operation.apply(at.now, at.member, message),
+            Disturbance::Scale(operation) => operation.apply(at, message),
+            Disturbance::NotFinite(operation) => operation.apply(at, message),
+            Disturbance::Freeze(operation) => operation.apply(at.on, message),
+            Disturbance::Stale(operation) => operation.apply(at.now, at.on, message),
             Disturbance::PacketLoss(operation) => operation.apply(at.draws),
-            Disturbance::BurstLoss(operation) => operation.apply(at.draws, at.member),
-            Disturbance::RateLimit(operation) => operation.apply(at.now, at.member),
+            Disturbance::BurstLoss(operation) => operation.apply(at.draws, at.on.member),
+            Disturbance::RateLimit(operation) => operation.apply(at.now, at.on.member),
             Disturbance::Latency(operation) => operation.apply(at.draws),
             Disturbance::Reorder(operation) => operation.apply(at.draws),
             Disturbance::Duplicate(copies) => Action::Duplicated(*copies),

@@ -46,7 +46,7 @@ use sesame_plan::{
 };
 
 use crate::files::SpaceFiles;
-use crate::fuzz::{ChoiceError, Disturbance, KeyedRng, OperationEntry, Order, Resource, RunContext};
+use crate::fuzz::{ChoiceError, Disturbance, KeyedRng, OnWire, OperationEntry, Order, Resource, RunContext};
 use crate::metric::Metrics;
 use crate::monitor::Monitors;
 use crate::value::Value;
@@ -73,7 +73,7 @@ pub struct Relay<'a> {
     order: Vec<usize>,
     /// Per wire: the stages a message passes, in order, with the wire's position in the operation's topic. The test's
     /// operations come first.
-    pipelines: Vec<Vec<(usize, u64)>>,
+    pipelines: Vec<Vec<(usize, OnWire)>>,
     /// Per wire: how many stages of its pipeline are operations of the test. Behind them the message is delivered, as
     /// far as metrics and listeners are concerned: what compensates stands for the robots.
     disturbed_by: Vec<usize>,
@@ -181,9 +181,10 @@ impl<'a> Relay<'a> {
         for &at in &order {
             let used = &test.operations[at];
             let operation = plan.operation(used.operation);
-            for (place, wire) in (0u64..).zip(wires.acted_on(operation)) {
-                if operation.acts_on(wires.member(wire), &used.parameters) {
-                    pipelines[wire.index()].push((at, place));
+            for (member, wire) in (0u64..).zip(wires.acted_on(operation)) {
+                let Some((target, on)) = operation.target_on(wires.topic(wire)) else { continue };
+                if operation.acts_on_member(on, wires.member(wire), &used.parameters) {
+                    pipelines[wire.index()].push((at, OnWire { member, target }));
                 }
             }
         }

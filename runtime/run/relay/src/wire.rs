@@ -130,11 +130,11 @@ impl WireTable {
     }
 
     /// The wires on whose messages an operation may act: the links to the subscribers that it names, or else the wires
-    /// of its topic. If that is a group, only those of the members that the operation may disturb.
+    /// of its topics. If one is a group, only those of the members that the operation may disturb.
     pub fn acted_on(&self, operation: &Operation) -> impl Iterator<Item = Wire> {
         let links = self.links.iter().filter(|link| operation.to.contains(&link.to)).map(|link| link.wire);
         let own = self.iter().filter(|_| operation.to.is_empty());
-        let acts = |wire| operation.topic == Some(self.topic(wire)) && operation.may_act_on(self.member(wire));
+        let acts = |wire| operation.may_act_on(self.topic(wire), self.member(wire));
         own.chain(links).filter(move |&wire| acts(wire))
     }
 

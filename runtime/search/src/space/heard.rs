@@ -24,9 +24,7 @@ impl Heard {
     /// What is known of the messages on which an operation may act before the reference run.
     pub(crate) fn of(plan: &CampaignPlan, operation: OperationId) -> Heard {
         let operation = plan.operation(operation);
-        let acted_on = (0..)
-            .zip(wires(plan))
-            .filter(|(_, wire)| Some(wire.topic) == operation.topic && operation.may_act_on(wire.member));
+        let acted_on = (0..).zip(wires(plan)).filter(|(_, wire)| operation.may_act_on(wire.topic, wire.member));
         Heard { wires: acted_on.map(|(wire, _)| wire).collect(), ..Heard::default() }
     }
 

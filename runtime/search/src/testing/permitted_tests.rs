@@ -182,7 +182,7 @@ fn no_strategy_but_a_grid_spends_tests_on_windows_without_a_message() {
         });
         for mut plan in plans {
             plan.campaign.count.max = 2;
-            let count = plan.operations.iter().filter_map(|operation| operation.topic).map(|topic| topic.0 + 1).max();
+            let count = plan.operations.iter().flat_map(sesame_plan::Operation::topics).map(|topic| topic.0 + 1).max();
             let topic = |at: u32| {
                 sesame_plan::testing::topic(&format!("t{at}"), &[&format!("t{at}")], Type::Real { unit: None })
             };

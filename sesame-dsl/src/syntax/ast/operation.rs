@@ -13,9 +13,11 @@ pub(crate) struct Operation {
 
 #[derive(Debug)]
 pub(crate) struct OperationBody {
-    /// `None` for an operation on no topic.
-    pub(crate) target: Option<Target>,
-    /// What it acts on instead of messages; not together with a target.
+    /// One for each topic, in the order of their first places; none for an operation on no topic.
+    pub(crate) targets: Vec<Target>,
+    /// How many members of its groups a test chooses.
+    pub(crate) chosen: Option<Chosen>,
+    /// What it acts on instead of messages; not together with targets.
     pub(crate) resource: Option<Resource>,
     pub(crate) from: Option<(Span, Vec<WithMember>)>,
     pub(crate) to: Option<(Span, Vec<WithMember>)>,
@@ -35,7 +37,8 @@ impl OperationBody {
     /// What has nothing but a kind.
     pub(crate) fn of_kind(kind: OperationKind, kind_word: Span) -> Self {
         OperationBody {
-            target: None,
+            targets: Vec::new(),
+            chosen: None,
             resource: None,
             from: None,
             to: None,
@@ -51,15 +54,13 @@ impl OperationBody {
     }
 }
 
-/// What an operation disturbs.
+/// What an operation disturbs of one topic.
 #[derive(Debug)]
 pub(crate) struct Target {
-    /// The topic of the first place.
     pub(crate) topic: Name,
-    /// At least one.
+    /// At least one, all of this topic.
     pub(crate) places: Vec<Path>,
-    /// How many members of the group a test chooses.
-    pub(crate) chosen: Option<Chosen>,
+    /// From its first place to its last.
     pub(crate) span: Span,
 }
 

@@ -63,11 +63,11 @@ pub(crate) enum ShapePlace {
 
 #[derive(Debug)]
 pub(crate) enum Fit {
-    Delay(Option<Target>, Range),
+    Delay(Vec<Target>, Range),
     /// As an operation of this rule.
     Relay {
         rule: Rule,
-        target: Target,
+        targets: Vec<Target>,
         amounts: Amounts,
     },
     Parameter(Text, Range),

@@ -7,7 +7,7 @@ use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::span::Span;
 use crate::syntax::ast::{
     Amounts, Chosen, Contained, Count, Custom, CustomParameter, Distribution, Domain, Drain, Moment, NotFinite,
-    Operation, OperationBody, OperationKind, Path, Point, Range, Resource, Scene, Stuck, Target, Text, UnitName,
+    Operation, OperationBody, OperationKind, Point, Range, Resource, Scene, Stuck, Target, Text, UnitName,
 };
 
 impl Reader<'_> {
@@ -40,10 +40,11 @@ impl Reader<'_> {
         let from = nodes(Rule::from_nodes);
         let to = nodes(Rule::to_nodes);
         let chosen = child(pair, Rule::chosen).map(|chosen| self.chosen(&chosen));
-        let target = child(pair, Rule::targets).map(|targets| Target { chosen, ..self.target(&targets) });
+        let targets = child(pair, Rule::targets).map_or_else(Vec::new, |targets| self.targets(&targets));
         let resource = first_of(pair, &[Rule::on_node, Rule::on_parameter]).map(|resource| self.resource(&resource));
         let body = OperationBody {
-            target,
+            targets,
+            chosen,
             resource,
             from,
             to,
@@ -92,10 +93,20 @@ impl Reader<'_> {
         Chosen { least, most, span }
     }
 
-    pub(super) fn target(&mut self, pair: &Pair<'_>) -> Target {
-        let places: Vec<Path> = children(pair, Rule::target).map(|place| self.path(&place)).collect();
-        let topic = places.first().expect("an operation has a target").topic.clone();
-        Target { topic, places, chosen: None, span: self.span(pair) }
+    /// The places of each topic together.
+    pub(super) fn targets(&mut self, pair: &Pair<'_>) -> Vec<Target> {
+        let mut targets: Vec<Target> = Vec::new();
+        for place in children(pair, Rule::target) {
+            let place = self.path(&place);
+            match targets.iter_mut().find(|target| target.topic.text == place.topic.text) {
+                Some(target) => {
+                    target.span = target.span.to(place.span);
+                    target.places.push(place);
+                }
+                None => targets.push(Target { topic: place.topic.clone(), span: place.span, places: vec![place] }),
+            }
+        }
+        targets
     }
 
     fn operation_kind(&mut self, kind: &Pair<'_>) -> OperationKind {

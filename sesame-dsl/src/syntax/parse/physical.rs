@@ -75,9 +75,9 @@ impl Reader<'_> {
     /// One thing that may be fitted; `None` for the words around them.
     fn fit(&mut self, one: &Pair<'_>) -> Option<Fit> {
         let range = self.range(&child(one, Rule::range)?);
-        let target = child(one, Rule::targets).map(|targets| self.target(&targets));
+        let targets = child(one, Rule::targets).map_or_else(Vec::new, |targets| self.targets(&targets));
         Some(match one.as_rule() {
-            Rule::fit_delay => Fit::Delay(target, range),
+            Rule::fit_delay => Fit::Delay(targets, range),
             Rule::fit_parameter => Fit::Parameter(self.text_of(&expect_child(one, Rule::text)), range),
             _ => {
                 let rule = match () {
@@ -85,7 +85,7 @@ impl Reader<'_> {
                     () if child(one, Rule::k_bias).is_some() => Rule::bias,
                     () => Rule::noise,
                 };
-                Fit::Relay { rule, target: target?, amounts: Amounts::Range(range) }
+                Fit::Relay { rule, targets, amounts: Amounts::Range(range) }
             }
         })
     }

@@ -113,10 +113,11 @@ fn disturbances(operation: &OperationReport) -> Vec<(f64, Disturbance)> {
     let choices: Vec<&str> = operation.choices.iter().map(|choice| choice.text.as_str()).collect();
     let choices = if choices.is_empty() { String::new() } else { format!(", {}", choices.join(", ")) };
     let what = format!("{} ({}{choices})", operation.kind, operation.operation);
-    let target = match (&operation.topic, &operation.resource) {
-        (Some(topic), _) => format!("topic {topic}"),
-        (None, Some(resource)) => resource.clone(),
-        (None, None) => "the run as a whole".to_owned(),
+    let target = match (operation.topics().count(), &operation.resource) {
+        (0, None) => "the run as a whole".to_owned(),
+        (0, Some(resource)) => resource.clone(),
+        (1, _) => format!("topic {}", operation.target_in_words()),
+        (_, _) => format!("topics {}", operation.target_in_words()),
     };
     let disturbance = |active| Disturbance { operation: what.clone(), target: target.clone(), active };
     if let Some(planned) = operation.planned {
@@ -195,7 +196,7 @@ fn interlocks(facts: &Facts<'_>) -> Vec<String> {
             ),
         });
     }
-    let mut topics: Vec<&str> = report.operations.iter().filter_map(|operation| operation.topic.as_deref()).collect();
+    let mut topics: Vec<&str> = report.operations.iter().flat_map(OperationReport::topics).collect();
     topics.sort_unstable();
     topics.dedup();
     if !topics.is_empty() {

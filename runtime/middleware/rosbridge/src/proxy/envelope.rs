@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use serde_json::value::RawValue;
 
+use crate::bare;
+
 /// An operation of which only what is asked for is read.
 pub(super) struct Envelope<'a> {
     fields: BTreeMap<String, &'a RawValue>,
@@ -16,6 +18,14 @@ impl<'a> Envelope<'a> {
         Ok(Envelope { fields })
     }
 
+    /// Reads the envelope of a frame in which there may be numbers that JSON does not have: they are marked in a copy.
+    pub(super) fn read_marked(frame: &'a str, copy: &'a mut Option<String>) -> Result<Self, String> {
+        Envelope::read(frame).or_else(|problem| {
+            *copy = bare::marked(frame);
+            copy.as_deref().map_or(Err(problem), Envelope::read)
+        })
+    }
+
     /// A field that is a text.
     pub(super) fn text(&self, field: &str) -> Option<String> {
         serde_json::from_str(self.fields.get(field)?.get()).ok()
@@ -26,7 +36,7 @@ impl<'a> Envelope<'a> {
         serde_json::from_str(self.fields.get(field)?.get()).ok()
     }
 
-    /// The operation with another text in a field and without some fields.
+    /// The operation with another text in a field and without some fields. Marked numbers are written as they came.
     pub(super) fn with(&self, field: &str, text: &str, without: &[&str]) -> String {
         let text = serde_json::Value::from(text).to_string();
         let mut frame = String::from("{");
@@ -42,13 +52,22 @@ impl<'a> Envelope<'a> {
             frame.push_str(if name == field { &text } else { value.get() });
         }
         frame.push('}');
-        frame
+        bare::unmarked(frame)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_that_json_does_not_have_stay_as_they_came() {
+        let frame = r#"{"op":"publish","topic":"/a","msg":{"ranges":[1.5,NaN,Infinity]}}"#;
+        let mut copy = None;
+        let envelope = Envelope::read_marked(frame, &mut copy).unwrap();
+        assert_eq!(envelope.with("topic", "/b", &["op"]), r#"{"msg":{"ranges":[1.5,NaN,Infinity]},"topic":"/b"}"#);
+        assert!(Envelope::read_marked("{\"op\":NaNs}", &mut None).is_err());
+    }
 
     #[test]
     fn what_is_not_asked_for_stays_as_it_came() {

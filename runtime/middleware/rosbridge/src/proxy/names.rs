@@ -95,7 +95,8 @@ impl Names {
     }
 
     fn operation(&mut self, frame: &str, layer: usize) -> FromClient {
-        let envelope = match Envelope::read(frame) {
+        let mut copy = None;
+        let envelope = match Envelope::read_marked(frame, &mut copy) {
             Ok(envelope) => envelope,
             Err(problem) => return refused(None, &problem),
         };
@@ -207,7 +208,8 @@ impl Names {
             return FromBridge::Unchanged;
         }
         // What is wrong with it is for the client to say.
-        let Ok(envelope) = Envelope::read(frame) else { return FromBridge::Unchanged };
+        let mut copy = None;
+        let Ok(envelope) = Envelope::read_marked(frame, &mut copy) else { return FromBridge::Unchanged };
         match envelope.text("op").as_deref() {
             Some("publish") => {
                 let heard = envelope.text("topic").and_then(|topic| self.heard.get(&topic));

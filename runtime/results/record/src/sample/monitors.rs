@@ -120,7 +120,7 @@ fn run(plan: &CampaignPlan, test: &Test, network: &Arc<Network>, end: f64) -> Ve
         test.operations.iter().any(|used| {
             let (start, end) = window(used);
             let operation = plan.operation(used.operation);
-            let of_topic = operation.topic.is_some_and(|own| own.index() == topic);
+            let of_topic = operation.topics().any(|own| own.index() == topic);
             of_topic && kind(&operation.kind) && start + lag <= time && time < end + lag
         })
     };

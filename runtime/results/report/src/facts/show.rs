@@ -134,8 +134,11 @@ pub struct OperationReport {
     pub operation: String,
     /// Its kind in words.
     pub kind: String,
-    /// The topic it disturbs; `None` for one that acts on no messages.
+    /// The topic it disturbs, the first if they are several; `None` for one that acts on no messages.
     pub topic: Option<String>,
+    /// The other topics that it disturbs at the same time.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub further_topics: Vec<String>,
     /// The node or the parameter it acts on, in the words of the language; `None` for one that acts on messages, before
     /// the start or after the end.
     pub resource: Option<String>,
@@ -161,6 +164,21 @@ pub struct OperationReport {
     pub first_touch: Option<f64>,
     /// Simulation time of its last effect, in seconds.
     pub last_touch: Option<f64>,
+}
+
+impl OperationReport {
+    /// The topics that it disturbs, each once.
+    pub fn topics(&self) -> impl Iterator<Item = &str> {
+        self.topic.iter().chain(&self.further_topics).map(String::as_str)
+    }
+
+    /// What it acts on: topics, or a node or parameter; empty for one that acts before the start or after the end.
+    pub fn target_in_words(&self) -> String {
+        match &self.resource {
+            Some(resource) => resource.clone(),
+            None => self.topics().collect::<Vec<_>>().join(", "),
+        }
+    }
 }
 
 /// What a test chose for a parameter.
@@ -362,6 +380,7 @@ pub(crate) fn operations(plan: &CampaignPlan, record: &TestRecord) -> Vec<Operat
     let reports = record.test.operations.iter().enumerate().map(|(position, used)| {
         let operation = plan.operation(used.operation);
         let effect = record.observation.operations.get(position);
+        let mut topics = operation.topics().map(|topic| plan.topic(topic).name.clone());
         let (planned, conditions) = match used.activation {
             Activation::Time { start, end } => (Some(Span { start, end }), None),
             Activation::Condition { .. } | Activation::ConditionFor { .. } => {
@@ -372,7 +391,8 @@ pub(crate) fn operations(plan: &CampaignPlan, record: &TestRecord) -> Vec<Operat
         OperationReport {
             operation: operation.name.clone(),
             kind: operation.kind.words().to_owned(),
-            topic: operation.topic.map(|topic| plan.topic(topic).name.clone()),
+            topic: topics.next(),
+            further_topics: topics.collect(),
             resource: notation::resource(plan, operation),
             planned,
             conditions,

@@ -98,7 +98,7 @@ pub struct LeftMessage {
     pub operation: String,
     /// The position of the operation in the test, from 0.
     pub position: usize,
-    /// The topic that it disturbs.
+    /// The topic of the message.
     pub topic: String,
     /// The name of the message on the wire.
     pub path: String,
@@ -280,7 +280,8 @@ const ALL_TIMES: usize = 6;
 /// Altered messages with their times, as in ``three `odom` messages, at 12.40, 12.45 and 12.50 s``. Where several
 /// operations alter messages, each of them has a part of its own.
 fn altered_words(messages: &[LeftMessage]) -> String {
-    let of_each: Vec<&[LeftMessage]> = messages.chunk_by(|a, b| a.position == b.position).collect();
+    let of_each: Vec<&[LeftMessage]> =
+        messages.chunk_by(|a, b| (a.position, &a.topic) == (b.position, &b.topic)).collect();
     let words = of_each.iter().map(|messages| {
         let of = if of_each.len() > 1 { format!("`{}` alters ", messages[0].operation) } else { String::new() };
         format!("{of}{}", altered_by_one(messages))
@@ -288,7 +289,7 @@ fn altered_words(messages: &[LeftMessage]) -> String {
     words.collect::<Vec<_>>().join("; ")
 }
 
-/// The messages that one operation alters, of which there is one at least.
+/// The messages of one topic that one operation alters, of which there is one at least.
 fn altered_by_one(messages: &[LeftMessage]) -> String {
     let count = match messages.len() {
         count @ 1..=10 => {
@@ -364,18 +365,19 @@ fn left(plan: &CampaignPlan, test: &Test, altered: Option<&AlteredMessages>) -> 
     let mut left = Vec::new();
     for (position, used) in test.operations.iter().enumerate() {
         let operation = plan.operation(used.operation);
-        let (Some(messages), Some(topic)) = (&used.messages, operation.topic) else { continue };
-        let paths = plan.wires_of(operation);
+        let Some(messages) = &used.messages else { continue };
+        let wires = plan.wires_of(operation);
         for run in messages.runs() {
             left.extend((run.first..=run.last).map(|number| {
                 let is_it = |message: &&AlteredMessage| {
                     (message.operation as usize, message.wire, message.number) == (position, run.wire, number)
                 };
+                let wire = wires.get(run.wire as usize);
                 LeftMessage {
                     operation: operation.name.clone(),
                     position,
-                    topic: plan.topic(topic).name.clone(),
-                    path: paths.get(run.wire as usize).cloned().unwrap_or_default(),
+                    topic: wire.map(|(topic, _)| plan.topic(*topic).name.clone()).unwrap_or_default(),
+                    path: wire.map(|(_, path)| path.clone()).unwrap_or_default(),
                     number,
                     time: altered.iter().find(is_it).map(|message| message.time),
                 }

@@ -7,15 +7,24 @@ use crate::fuzz::draws::KeyedRng;
 /// The most messages that operations may hold back at once; beyond it, the oldest is released early, with a warning.
 pub const HELD_LIMIT: usize = 100_000;
 
-/// The circumstances of a message: when, and on which wire of its topic, an operation acts on it.
+/// A wire, as an operation that acts on it counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct OnWire {
+    /// Its position among the wires on which the operation may act.
+    pub member: u64,
+    /// The position of its topic among those on which the operation acts.
+    pub target: usize,
+}
+
+/// The circumstances of a message: when, and on which wire, an operation acts on it.
 #[derive(Debug, Clone, Copy)]
 pub struct MessageContext {
     /// Simulation time.
     pub now: SimTime,
     /// How long the operation has been active.
     pub active: SimTime,
-    /// The wire's position in the topic.
-    pub member: u64,
+    /// The wire.
+    pub on: OnWire,
     /// The operation's random numbers for the message.
     pub draws: KeyedRng,
 }

@@ -1,6 +1,6 @@
 //! Bias: adds a constant. On time stamps this is the skew of a clock.
 
-use crate::fuzz::action::Action;
+use crate::fuzz::action::{Action, MessageContext};
 use crate::fuzz::change::{Amount, add};
 use crate::fuzz::places::Places;
 use crate::value::Value;
@@ -16,7 +16,7 @@ pub struct Bias {
 
 impl Bias {
     /// Adds the bias to the values.
-    pub fn apply(&self, message: &mut Value) -> Action {
-        self.places.change(message, |value, _| add(value, |axis| self.bias.on(axis)))
+    pub fn apply(&self, at: MessageContext, message: &mut Value) -> Action {
+        self.places.change(at.on, message, |value, _| add(value, |axis| self.bias.on(axis)))
     }
 }

@@ -10,7 +10,7 @@ pub struct KeyedRng {
 }
 
 impl KeyedRng {
-    /// The random numbers for the `index`th message on the `member`th wire of the operation's topic.
+    /// The random numbers for the `index`th message on the `member`th wire of the operation.
     pub fn new(operation_seed: u64, member: u64, index: u64) -> Self {
         let seed = if member == 0 { operation_seed } else { rng::derive_seed(operation_seed, "member", &[member]) };
         KeyedRng { seed, message: index }

@@ -1,8 +1,6 @@
 //! Drift: adds an offset that grows with the time since the operation became active.
 
-use sesame_base::time::SimTime;
-
-use crate::fuzz::action::Action;
+use crate::fuzz::action::{Action, MessageContext};
 use crate::fuzz::change::{Amount, add};
 use crate::fuzz::places::Places;
 use crate::value::Value;
@@ -18,8 +16,8 @@ pub struct Drift {
 
 impl Drift {
     /// Adds the offset that has accumulated while the operation is active.
-    pub fn apply(&self, active: SimTime, message: &mut Value) -> Action {
-        let seconds = active.seconds();
-        self.places.change(message, |value, _| add(value, |axis| self.rate.on(axis) * seconds))
+    pub fn apply(&self, at: MessageContext, message: &mut Value) -> Action {
+        let seconds = at.active.seconds();
+        self.places.change(at.on, message, |value, _| add(value, |axis| self.rate.on(axis) * seconds))
     }
 }

@@ -1,6 +1,6 @@
 //! Freeze: repeats the last values from before the operation became active.
 
-use crate::fuzz::action::Action;
+use crate::fuzz::action::{Action, OnWire};
 use crate::fuzz::per_wire::PerWire;
 use crate::fuzz::places::{Memory, Places};
 use crate::value::Value;
@@ -19,16 +19,16 @@ impl Freeze {
     }
 
     /// A message passes while the operation is inactive.
-    pub fn observe(&mut self, member: u64, message: &Value) {
-        self.places.remember(message, self.last.entry(member).get_or_insert_default());
+    pub fn observe(&mut self, on: OnWire, message: &Value) {
+        self.places.remember(on, message, self.last.entry(on.member).get_or_insert_default());
     }
 
     /// Replaces the values by the frozen ones. If no message passed before, the values of this one are frozen.
-    pub fn apply(&mut self, member: u64, message: &mut Value) -> Action {
-        if let Some(memory) = self.last.entry(member) {
-            return self.places.recall(message, memory);
+    pub fn apply(&mut self, on: OnWire, message: &mut Value) -> Action {
+        if let Some(memory) = self.last.entry(on.member) {
+            return self.places.recall(on, message, memory);
         }
-        self.observe(member, message);
+        self.observe(on, message);
         Action::Unchanged
     }
 }

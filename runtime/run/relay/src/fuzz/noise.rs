@@ -1,8 +1,7 @@
 //! Noise: adds a new normally distributed number with mean zero per message and number.
 
-use crate::fuzz::action::Action;
+use crate::fuzz::action::{Action, MessageContext};
 use crate::fuzz::change::add;
-use crate::fuzz::draws::KeyedRng;
 use crate::fuzz::places::Places;
 use crate::value::Value;
 
@@ -17,8 +16,9 @@ pub struct Noise {
 
 impl Noise {
     /// Adds noise to the values, independently for each coordinate of a point.
-    pub fn apply(&self, draws: KeyedRng, message: &mut Value) -> Action {
-        self.places
-            .change(message, |value, first| add(value, |axis| self.sigma * draws.normal(first + 2 * axis as u64)))
+    pub fn apply(&self, at: MessageContext, message: &mut Value) -> Action {
+        self.places.change(at.on, message, |value, first| {
+            add(value, |axis| self.sigma * at.draws.normal(first + 2 * axis as u64))
+        })
     }
 }

@@ -2,7 +2,7 @@
 
 use sesame_plan::NotFinite;
 
-use crate::fuzz::action::Action;
+use crate::fuzz::action::{Action, MessageContext};
 use crate::fuzz::change::map;
 use crate::fuzz::places::Places;
 use crate::value::Value;
@@ -18,13 +18,13 @@ pub struct MakeNotFinite {
 
 impl MakeNotFinite {
     /// Replaces reals and all coordinates of points; whole numbers have no such values and are left unchanged.
-    pub fn apply(&self, message: &mut Value) -> Action {
+    pub fn apply(&self, at: MessageContext, message: &mut Value) -> Action {
         let new = match self.number {
             NotFinite::Nan => f64::NAN,
             NotFinite::Infinity => f64::INFINITY,
             NotFinite::MinusInfinity => f64::NEG_INFINITY,
         };
-        self.places.change(message, |value, _| match value {
+        self.places.change(at.on, message, |value, _| match value {
             Value::Int(_) => false,
             value => map(value, |_, _| new),
         })

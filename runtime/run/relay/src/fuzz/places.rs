@@ -3,20 +3,25 @@
 use sesame_plan::{Step, ValuePath};
 
 use crate::elements::{self, Found, chosen, positions};
-use crate::fuzz::action::Action;
+use crate::fuzz::action::{Action, OnWire};
 use crate::value::Value;
 
 /// How many random numbers each value of a message may use.
 const DRAWS_PER_VALUE: u64 = 8;
 
-/// The places of an operation in messages of its topic.
+/// The places of an operation in messages of each of its topics.
 #[derive(Debug, Clone)]
-pub struct Places(Vec<ValuePath>);
+pub struct Places(Vec<Vec<ValuePath>>);
 
 impl Places {
-    /// These places, or the whole message if the list is empty.
-    pub fn new(places: &[ValuePath]) -> Self {
-        Places(if places.is_empty() { vec![Vec::new()] } else { places.to_vec() })
+    /// The places in messages of each topic, or whole messages where the list is empty.
+    pub fn new<'a>(of_each: impl IntoIterator<Item = &'a [ValuePath]>) -> Self {
+        let places = |places: &[ValuePath]| if places.is_empty() { vec![Vec::new()] } else { places.to_vec() };
+        Places(of_each.into_iter().map(places).collect())
+    }
+
+    fn of(&self, on: OnWire) -> &[ValuePath] {
+        self.0.get(on.target).map_or(&[], Vec::as_slice)
     }
 
     /// Visits the values at these places in order, and returns what was done with the message. `change` returns whether
@@ -25,9 +30,9 @@ impl Places {
     ///
     /// Parts that a message does not have are skipped: elements beyond the end of a list, and values that are not of
     /// their declared type.
-    pub fn change(&self, message: &mut Value, mut change: impl FnMut(&mut Value, u64) -> bool) -> Action {
+    pub fn change(&self, on: OnWire, message: &mut Value, mut change: impl FnMut(&mut Value, u64) -> bool) -> Action {
         let mut changed = false;
-        for (at, place) in (0u64..).zip(&self.0) {
+        for (at, place) in (0u64..).zip(self.of(on)) {
             let mut next = (at << 32) * DRAWS_PER_VALUE;
             changed |= visit(message, place, &mut next, &mut change);
         }
@@ -35,18 +40,18 @@ impl Places {
     }
 
     /// Stores the values at these places and discards those stored before.
-    pub fn remember(&self, message: &Value, memory: &mut Memory) {
+    pub fn remember(&self, on: OnWire, message: &Value, memory: &mut Memory) {
         memory.0.clear();
-        for (at, place) in (0u64..).zip(&self.0) {
+        for (at, place) in (0u64..).zip(self.of(on)) {
             let mut next = (at << 32) * DRAWS_PER_VALUE;
             collect(message, place, &mut next, memory);
         }
     }
 
     /// Restores stored values to their places; elements that the list did not have before are left unchanged.
-    pub fn recall(&self, message: &mut Value, memory: &Memory) -> Action {
+    pub fn recall(&self, on: OnWire, message: &mut Value, memory: &Memory) -> Action {
         let mut remembered = memory.0.iter().peekable();
-        self.change(message, |value, at| {
+        self.change(on, message, |value, at| {
             while remembered.next_if(|(before, _)| *before < at).is_some() {}
             match remembered.next_if(|(same, _)| *same == at) {
                 Some((_, old)) if !value.is_same(old) => {

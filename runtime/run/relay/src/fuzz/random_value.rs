@@ -3,9 +3,8 @@
 
 use sesame_plan::ValueMode;
 
-use crate::fuzz::action::Action;
+use crate::fuzz::action::{Action, MessageContext};
 use crate::fuzz::change::{add, map, put};
-use crate::fuzz::draws::KeyedRng;
 use crate::fuzz::places::Places;
 use crate::value::{Text, Value};
 
@@ -26,9 +25,9 @@ pub struct RandomValue {
 impl RandomValue {
     /// Changes the numbers that the message has as declared; whole numbers stay whole. A message with the same value as
     /// before counts as unchanged.
-    pub fn apply(&self, draws: KeyedRng, message: &mut Value) -> Action {
-        self.places.change(message, |value, first| {
-            let draw = |axis: usize| self.draw(axis, draws.unit(first + axis as u64));
+    pub fn apply(&self, at: MessageContext, message: &mut Value) -> Action {
+        self.places.change(at.on, message, |value, first| {
+            let draw = |axis: usize| self.draw(axis, at.draws.unit(first + axis as u64));
             match self.mode {
                 ValueMode::Offset => add(value, draw),
                 ValueMode::Absolute => map(value, |axis, _| draw(axis)),
@@ -53,11 +52,11 @@ pub struct RandomText {
 
 impl RandomText {
     /// Replaces the texts.
-    pub fn apply(&self, draws: KeyedRng, message: &mut Value) -> Action {
-        self.places.change(message, |value, first| {
+    pub fn apply(&self, at: MessageContext, message: &mut Value) -> Action {
+        self.places.change(at.on, message, |value, first| {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it is below their number")]
-            let at = (draws.unit(first) * self.texts.len() as f64) as usize;
-            match (value, self.texts.get(at)) {
+            let drawn = (at.draws.unit(first) * self.texts.len() as f64) as usize;
+            match (value, self.texts.get(drawn)) {
                 (Value::Text(text), Some(drawn)) => put(text, drawn.clone()),
                 _ => false,
             }

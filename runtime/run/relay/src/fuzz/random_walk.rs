@@ -49,9 +49,9 @@ impl RandomWalk {
 
     /// Takes one step per value and coordinate, independent of each other, and adds where the walk is to the values.
     pub fn apply(&mut self, at: MessageContext, message: &mut Value) -> Action {
-        let walks = self.walks.entry(at.member);
+        let walks = self.walks.entry(at.on.member);
         let sigma = self.sigma;
-        self.places.change(message, |value, first| {
+        self.places.change(at.on, message, |value, first| {
             let walk = walks.entry(first).or_default();
             let deviation = sigma * libm::sqrt((at.active - walk.at).seconds());
             add(value, |axis| {

@@ -1,6 +1,6 @@
 //! Scale: multiplies by a constant.
 
-use crate::fuzz::action::Action;
+use crate::fuzz::action::{Action, MessageContext};
 use crate::fuzz::change::map;
 use crate::fuzz::places::Places;
 use crate::value::Value;
@@ -17,10 +17,10 @@ pub struct Scale {
 impl Scale {
     /// Multiplies the values; of points, each coordinate.
     #[expect(clippy::float_cmp, reason = "exactly one changes nothing, not even whole numbers beyond 2^53")]
-    pub fn apply(&self, message: &mut Value) -> Action {
+    pub fn apply(&self, at: MessageContext, message: &mut Value) -> Action {
         if self.factor == 1.0 {
             return Action::Unchanged;
         }
-        self.places.change(message, |value, _| map(value, |_, x| x * self.factor))
+        self.places.change(at.on, message, |value, _| map(value, |_, x| x * self.factor))
     }
 }

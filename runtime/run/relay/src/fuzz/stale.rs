@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use sesame_base::time::SimTime;
 
-use crate::fuzz::action::{Action, HELD_LIMIT};
+use crate::fuzz::action::{Action, HELD_LIMIT, OnWire};
 use crate::fuzz::per_wire::PerWire;
 use crate::fuzz::places::{Memory, Places};
 use crate::value::Value;
@@ -26,14 +26,14 @@ impl Stale {
     /// A message passes, whether the operation is active or not.
     ///
     /// Stores the latest values that are old enough, and all newer ones.
-    pub fn observe(&mut self, now: SimTime, member: u64, message: &Value) {
-        let past = self.past.entry(member);
+    pub fn observe(&mut self, now: SimTime, on: OnWire, message: &Value) {
+        let past = self.past.entry(on.member);
         let mut spare = None;
         while past.get(1).is_some_and(|(time, _)| *time + self.age <= now) || past.len() >= HELD_LIMIT {
             spare = past.pop_front();
         }
         let mut memory = spare.map_or_else(Memory::default, |(_, memory)| memory);
-        self.places.remember(message, &mut memory);
+        self.places.remember(on, message, &mut memory);
         past.push_back((now, memory));
         // If the age is zero, the new message is old enough itself.
         while past.get(1).is_some_and(|(time, _)| *time + self.age <= now) {
@@ -43,10 +43,10 @@ impl Stale {
 
     /// Replaces the values by those of the latest earlier message that is old enough; before there is one, by those of
     /// the first message.
-    pub fn apply(&mut self, now: SimTime, member: u64, message: &mut Value) -> Action {
-        self.observe(now, member, message);
-        match self.past.entry(member).front() {
-            Some((_, memory)) => self.places.recall(message, memory),
+    pub fn apply(&mut self, now: SimTime, on: OnWire, message: &mut Value) -> Action {
+        self.observe(now, on, message);
+        match self.past.entry(on.member).front() {
+            Some((_, memory)) => self.places.recall(on, message, memory),
             None => Action::Unchanged,
         }
     }

@@ -1,6 +1,6 @@
 //! Stuck-at: replaces a value by a constant.
 
-use crate::fuzz::action::Action;
+use crate::fuzz::action::{Action, MessageContext};
 use crate::fuzz::change::{Amount, map, put};
 use crate::fuzz::places::Places;
 use crate::value::{Text, Value};
@@ -27,11 +27,11 @@ pub enum Stuck {
 
 impl StuckAt {
     /// Replaces the values that the message has as declared.
-    pub fn apply(&self, message: &mut Value) -> Action {
-        self.places.change(message, |value, _| match (&self.at, value) {
+    pub fn apply(&self, at: MessageContext, message: &mut Value) -> Action {
+        self.places.change(at.on, message, |value, _| match (&self.at, value) {
             (Stuck::Amount(amount), value) => map(value, |axis, _| amount.on(axis)),
-            (Stuck::Text(at), Value::Text(text)) => put(text, at.clone()),
-            (Stuck::Truth(at), Value::Bool(truth)) => put(truth, *at),
+            (Stuck::Text(constant), Value::Text(text)) => put(text, constant.clone()),
+            (Stuck::Truth(constant), Value::Bool(truth)) => put(truth, *constant),
             _ => false,
         })
     }

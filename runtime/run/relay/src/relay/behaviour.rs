@@ -6,9 +6,11 @@ use proptest::prelude::*;
 use sesame_base::time::SimTime;
 use sesame_plan::condition::{Comparison, Condition, Operand};
 use sesame_plan::testing::{at, latency, operation, plan, test_of, use_of};
-use sesame_plan::{Activation, Choice, Distribution, Drain, MetricId, Operation, OperationKind, Step, TestOperation};
+use sesame_plan::{
+    Activation, Choice, Distribution, Drain, MetricId, Operation, OperationKind, Step, Target, TestOperation, TopicId,
+};
 
-use crate::fuzz::{Action, Disturbance, KeyedRng, MessageContext};
+use crate::fuzz::{Action, Disturbance, KeyedRng, MessageContext, OnWire};
 use crate::metric::MetricTable;
 use crate::relay::{COPIES_LIMIT, Exchange as _, Finished, Relay};
 use crate::value::{Fields, Record, Value};
@@ -62,7 +64,7 @@ fn run(operation: &Operation, choices: Vec<Choice>, seed: u64, messages: u64) ->
     let one = |n: u64| {
         let now = SimTime::from_nanos(i64::try_from(n).unwrap() * 100_000_000);
         let mut message = Value::Real(0.0);
-        let context = MessageContext { now, active: now, member: 0, draws: KeyedRng::new(seed, 0, n) };
+        let context = MessageContext { now, active: now, on: OnWire::default(), draws: KeyedRng::new(seed, 0, n) };
         let action = disturbance.apply(context, &mut message);
         (action, message.number_at::<&str>(&[]).unwrap())
     };
@@ -157,7 +159,7 @@ proptest! {
             let disturbance = Disturbance::new(&noise, &use_of(0, 0.0, 1.0, choices(&[1.0]), seed), &[]);
             let mut message = Value::List(vec![Value::Real(0.0); length]);
             let draws = KeyedRng::new(seed, 0, 0);
-            let at = MessageContext { now: SimTime::ZERO, active: SimTime::ZERO, member: 0, draws };
+            let at = MessageContext { now: SimTime::ZERO, active: SimTime::ZERO, on: OnWire::default(), draws };
             disturbance.unwrap().apply(at, &mut message);
             let Value::List(items) = message else { panic!("a list stays one") };
             items
@@ -210,6 +212,47 @@ fn each_member_of_a_group_is_disturbed_as_if_it_were_alone() {
     assert_eq!((levels(&frozen, "zones/Z1")[30], levels(&frozen, "zones/Z2")[30]), (19.0, 981.0));
     let count = |value: &Value| value.number_at(&["count"]);
     assert_eq!(count(&frozen[60].2), Some(30.0), "what is beside the frozen field goes on");
+}
+
+#[test]
+fn one_operation_acts_on_several_topics_at_once_on_each_as_if_it_were_alone() {
+    let with = |kind: OperationKind, whole: bool| {
+        let places = if whole { Vec::new() } else { vec![vec![Step::Field("level".to_owned())]] };
+        let further = vec![Target { topic: TopicId(1), members: None, places }];
+        Operation { further, ..operation(0, kind) }
+    };
+    let on_zones = |kind: OperationKind, whole: bool| {
+        if whole { operation(1, kind) } else { at(&["level"], operation(1, kind)) }
+    };
+    let messages: Vec<_> =
+        commands(80).into_iter().zip((0..80).map(zones)).flat_map(|(one, two)| [one].into_iter().chain(two)).collect();
+    let fixed = || OperationKind::Latency { distribution: Distribution::Fixed, drain: Drain::Finish };
+    let delay = vec![Choice::Range { low: 0.35, high: 0.35 }];
+    let cases = [
+        (OperationKind::Bias, choices(&[3.0]), false),
+        (OperationKind::Drift, choices(&[3.0]), false),
+        (OperationKind::Freeze, vec![], false),
+        (OperationKind::Stale, choices(&[0.7]), false),
+        (OperationKind::Blackhole, vec![], true),
+        (OperationKind::RateLimit, choices(&[3.0]), true),
+        (fixed(), delay, true),
+    ];
+    for (kind, choices, whole) in cases {
+        let test = || vec![use_of(0, 2.0, 6.0, choices.clone(), 8)];
+        let (all, finished) = relayed(vec![with(kind.clone(), whole)], test(), &messages);
+        let mut seen = 0;
+        for (path, alone) in [("command", operation(0, kind.clone())), ("zones/Z1", on_zones(kind.clone(), whole))] {
+            let (expected, of_one) = relayed(vec![alone], test(), &messages);
+            let on = |delivered: &[(u32, String, Value)]| {
+                let of_path = delivered.iter().filter(|(_, on, _)| on == path);
+                of_path.map(|(at, _, value)| (*at, format!("{value:?}"))).collect::<Vec<_>>()
+            };
+            assert_eq!(on(&all), on(&expected), "{kind:?} on {path}");
+            seen += of_one.operations[0].counters.seen;
+        }
+        assert_eq!(finished.operations[0].counters.seen, seen, "{kind:?}");
+        assert_eq!(finished.operations[0].intervals.len(), 1, "{kind:?}");
+    }
 }
 
 /// Active from 2 s to 3 s and from 6 s to 7 s, by the command itself.

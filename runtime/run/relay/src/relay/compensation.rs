@@ -11,7 +11,7 @@ use sesame_plan::{
 };
 use sesame_rng::{derive_seed, keyed_unit};
 
-use crate::fuzz::{Amount, Bias, Disturbance, Latency, Noise, Places, Scale};
+use crate::fuzz::{Amount, Bias, Disturbance, Latency, Noise, OnWire, Places, Scale};
 use crate::relay::Relay;
 use crate::relay::stage::Stage;
 
@@ -38,7 +38,7 @@ impl Relay<'_> {
     }
 
     fn adjust(&mut self, plan: &CampaignPlan, what: &Fitted, value: f64, seed: u64) {
-        let places = |values: &Values| Places::new(&values.places);
+        let places = |values: &Values| Places::new([values.places.as_slice()]);
         let disturbance = match what {
             Fitted::Delay { .. } => Disturbance::Latency(Latency {
                 delay: (value, value),
@@ -88,7 +88,7 @@ impl Relay<'_> {
             let links = wires.links().iter().filter(|link| link.of == wire).map(|link| link.wire);
             for wire in std::iter::once(wire).chain(links) {
                 // The stage's random numbers differ from wire to wire.
-                self.pipelines[wire.index()].push((at, *member));
+                self.pipelines[wire.index()].push((at, OnWire { member: *member, target: 0 }));
             }
             *member += 1;
         }

@@ -55,7 +55,7 @@ impl Relay<'_> {
             if message.next_stage == self.disturbed_by[wire] {
                 self.disturbed(now, &message, deliveries);
             }
-            let Some(&(at, member)) = self.pipelines[wire].get(message.next_stage) else { break };
+            let Some(&(at, on)) = self.pipelines[wire].get(message.next_stage) else { break };
             message.next_stage += 1;
             let heard = self.heard[message.wire.index()];
             let stage = &mut self.operations[at];
@@ -67,18 +67,18 @@ impl Relay<'_> {
             if active {
                 stage.counters.seen += 1;
             } else if stage.observes_inactive {
-                stage.disturbance.observe(now, member, &message.value);
+                stage.disturbance.observe(now, on, &message.value);
             }
             let context = |stage: &Stage| {
-                let draws = KeyedRng::new(stage.operation_seed, member, message.index);
-                MessageContext { now, active: now - stage.since, member, draws }
+                let draws = KeyedRng::new(stage.operation_seed, on.member, message.index);
+                MessageContext { now, active: now - stage.since, on, draws }
             };
-            if active && !stage.alters(member, message.published) {
+            if active && !stage.alters(on.member, message.published) {
                 stage.decide_on(self.wires.path(message.wire), context(stage), &message.value);
                 active = false;
             }
             if active && matches!(stage.disturbance, Disturbance::Custom(_)) {
-                return self.pass_custom(now, at, member, message, deliveries);
+                return self.pass_custom(now, at, on.member, message, deliveries);
             }
             let action =
                 if active { stage.disturbance.apply(context(stage), &mut message.value) } else { Action::Unchanged };

@@ -52,7 +52,7 @@ impl Recorder {
         let unreached = operations.filter_map(|(id, operation)| {
             let Span { start, end } = operation.within;
             let mut reached = vec![false; wires.len()];
-            let member = |wire| operation.topic == Some(wires.topic(wire)) && operation.may_act_on(wires.member(wire));
+            let member = |wire| operation.may_act_on(wires.topic(wire), wires.member(wire));
             wires.iter().for_each(|wire| reached[wire.index()] = member(wire));
             operation.topic.map(|_| Reached {
                 operation: id,

@@ -13,7 +13,7 @@ use mcap::{McapError, McapResult, WriteOptions, Writer};
 
 use sesame_base::observation::Observation;
 use sesame_base::time::SimTime;
-use sesame_plan::{CampaignPlan, Test, TopicId, Type};
+use sesame_plan::{CampaignPlan, Operation, Test, TopicId, Type};
 
 use crate::json::{encode, number, quoted};
 use crate::relay::{Listener, MessageRef, OperationEvent};
@@ -211,7 +211,7 @@ fn write_out(shared: &Shared) {
 
 impl Channels {
     fn declare(writer: &mut Writer<BufWriter<File>>, plan: &CampaignPlan, wires: &WireTable) -> McapResult<Self> {
-        let disturbed: BTreeSet<TopicId> = plan.operations.iter().filter_map(|operation| operation.topic).collect();
+        let disturbed: BTreeSet<TopicId> = plan.operations.iter().flat_map(Operation::topics).collect();
         let mut channels = Channels {
             published: Vec::with_capacity(wires.len()),
             delivered: Vec::with_capacity(wires.len()),

@@ -40,7 +40,7 @@ pub fn wanted(plan: &CampaignPlan, topic: TopicId) -> Wanted {
         || plan
             .operations
             .iter()
-            .any(|operation| operation.topic == Some(topic) && matches!(operation.kind, OperationKind::Custom { .. }))
+            .any(|operation| operation.disturbs(topic) && matches!(operation.kind, OperationKind::Custom { .. }))
         || plan.is_published_by_monitor(topic);
     if seen_whole {
         return Wanted::All;
@@ -72,10 +72,9 @@ pub fn wanted(plan: &CampaignPlan, topic: TopicId) -> Wanted {
             _ => {}
         }
     }
-    for operation in plan.operations.iter().filter(|operation| operation.topic == Some(topic)) {
-        for place in &operation.places {
-            add(&mut wanted, &[], place);
-        }
+    let targets = plan.operations.iter().filter_map(|operation| operation.target_on(topic));
+    for place in targets.flat_map(|(_, target)| target.places) {
+        add(&mut wanted, &[], place);
     }
     wanted
 }

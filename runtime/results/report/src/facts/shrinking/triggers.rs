@@ -50,9 +50,7 @@ pub(super) fn triggers(plan: &CampaignPlan, course: &Course, search: &Shrink) ->
             let tried = varied.into_iter().map(|&Varied { window, fails, .. }| TriedWindow { window, fails });
             tried.collect::<Vec<_>>()
         });
-        let is_acted_on = |wire: &PlannedWire<'_>| {
-            Some(wire.topic) == operation.topic && operation.acts_on(wire.member, &used.parameters)
-        };
+        let is_acted_on = |wire: &PlannedWire<'_>| operation.acts_on(wire.topic, wire.member, &used.parameters);
         let own: Vec<u32> = (0..).zip(&wires).filter(|(_, wire)| is_acted_on(wire)).map(|(at, _)| at).collect();
         let holds = |of: Agreement| of.right * HOLDS.1 >= of.of * HOLDS.0;
         let described = describe(course, plan.campaign.end_after, &own, window, &made_of, &fresh);

@@ -8,7 +8,7 @@ use sesame_base::time::SimTime;
 use sesame_plan::testing::{operation, use_of};
 use sesame_plan::{Choice, OperationKind, Step};
 
-use crate::fuzz::{Action, Disturbance, KeyedRng, MessageContext};
+use crate::fuzz::{Action, Disturbance, KeyedRng, MessageContext, OnWire};
 use crate::value::Value;
 
 /// A walk of all elements of a list, or of the whole message.
@@ -33,7 +33,7 @@ fn apply(walk: &mut Disturbance, seed: u64, at: At, message: &mut Value) -> Acti
     let active = SimTime::from_nanos(at.millis * 1_000_000);
     let draws = KeyedRng::new(seed, at.member, at.index);
     let now = SimTime::from_seconds(3.0) + active;
-    walk.apply(MessageContext { now, active, member: at.member, draws }, message)
+    walk.apply(MessageContext { now, active, on: OnWire { member: at.member, target: 0 }, draws }, message)
 }
 
 /// Where the walk of a zero is at each of these milliseconds, as numbers; points are three, lists as many as they have.
