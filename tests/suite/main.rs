@@ -39,6 +39,7 @@ mod messages;
 mod monitor_alone;
 mod monitors;
 mod optimisers;
+mod optional;
 mod physical;
 mod preparation;
 mod random_models;

@@ -113,12 +113,15 @@ impl<'a> Messages<'a> {
             let docs = rust::docs(message.doc.lines());
             let fields = self.fields(id).map(|(field, rust_name)| {
                 let docs = field_docs(field);
-                let (name, ty) = (names::ident(rust_name), tokens(&self.owned(&field.ty, TypePaths::IMPORTED)));
+                let ty = self.owned(&field.ty, TypePaths::IMPORTED);
+                let ty = if field.optional { format!("Option<{ty}>") } else { ty };
+                let (name, ty) = (names::ident(rust_name), tokens(&ty));
                 quote! { #docs pub #name: #ty }
             });
             let reads = self.fields(id).map(|(field, rust_name)| {
                 let (name, wire) = (names::ident(rust_name), &field.name);
-                quote! { #name: ::sesame_runtime::message::field(value, #wire)? }
+                let read = names::ident(if field.optional { "optional_field" } else { "field" });
+                quote! { #name: ::sesame_runtime::message::#read(value, #wire)? }
             });
             // A message without fields still has to be a message.
             let value = if message.fields.is_empty() { quote!(_value) } else { quote!(value) };

@@ -8,6 +8,7 @@ use super::id::{raw, topic_id};
 
 pub(super) fn message(message: &model::Message) -> plan::MessageType {
     let fields = message.fields.iter().map(|field| plan::Field {
+        optional: field.optional,
         name: field.declaration.name.clone(),
         doc: field.declaration.doc.clone(),
         ty: ty(&field.ty),

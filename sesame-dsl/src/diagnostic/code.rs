@@ -80,6 +80,7 @@ codes! {
     NOTHING_TO_LAUNCH = "E0219": "A command is launched for a simulator that is part of the runner.",
     NODE_OUT_OF_REACH = "E0220": "An operation on a node needs a launched node of a ROS 2 simulator, and `slow` a free-running one.",
     BAD_ADDRESS = "E0221": "The address of a simulator or broker is malformed, or a secret would go there in plain text.",
+    NOT_OPTIONAL = "E0222": "A field is optional where messages have all of their fields.",
     UNKNOWN_UNIT = "E0301": "There is no such unit.",
     WRONG_UNIT = "E0302": "A quantity has the wrong dimension or no unit.",
     WRONG_TYPE = "E0303": "A value of this type cannot be used here.",

@@ -14,8 +14,8 @@ pub struct Operation {
     /// Its name and doc comment.
     pub declaration: Declaration,
     /// What it disturbs, each topic once, in written order; none exactly for one that acts on no messages: a custom one
-    /// before the start or after the end, or one on a node or its parameters, which [`OperationKind::node`] names by its
-    /// position in the space.
+    /// before the start or after the end, or one on a node or its parameters, which [`OperationKind::node`] names by
+    /// its position in the space.
     pub targets: Vec<Target>,
     /// The nodes of a group on which it acts, by their positions; `None` for an operation that acts on no nodes.
     pub nodes: Option<MembersOf>,

@@ -110,6 +110,8 @@ pub struct Field {
     pub declaration: Declaration,
     /// Its type.
     pub ty: Type,
+    /// Whether messages may lack it.
+    pub optional: bool,
 }
 
 /// The type of a field or topic.

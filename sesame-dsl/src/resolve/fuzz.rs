@@ -124,11 +124,16 @@ impl<'a> Resolver<'a> {
         let mut targets = vec![target];
         let mut complete = true;
         for written in further {
+            let before = self.diagnostics.len();
             match self.disturbance(written, body) {
                 Some((target, same, equal)) if same == kind && equal == parameters => targets.push(target),
                 found => {
                     complete = false;
-                    if found.is_some() {
+                    // What fits the first topic and not this one is no mistake of the amounts.
+                    let of_target =
+                        |found: &Diagnostic| written.span.lo <= found.span.lo && found.span.hi <= written.span.hi;
+                    if found.is_some() || !self.diagnostics[before..].iter().any(of_target) {
+                        self.diagnostics.truncate(before);
                         self.report_unlike(first, written);
                     }
                 }

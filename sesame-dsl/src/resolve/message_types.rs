@@ -143,6 +143,9 @@ impl<'a> Resolver<'a> {
                 complete = false;
             }
             first.entry(&name.text).or_insert(name.span);
+            if let Some(word) = field.optional {
+                complete &= self.may_be_optional(word, name);
+            }
             match self.type_of(&field.ty) {
                 Some(ty) => fields.push((field, ty)),
                 None => complete = false,
@@ -172,9 +175,25 @@ impl<'a> Resolver<'a> {
             complete = false;
         }
         let declared = fields.into_iter();
-        let fields = declared.map(|(field, ty)| model::Field { declaration: self.declaration(&field.head), ty });
+        let fields = declared.map(|(field, ty)| model::Field {
+            declaration: self.declaration(&field.head),
+            ty,
+            optional: field.optional.is_some(),
+        });
         let fields = fields.collect();
         complete.then(|| model::Message { declaration: self.declaration(&message.head), fields, interface })
+    }
+
+    /// Whether messages of the simulator may lack a field; reports the word `optional` if not.
+    fn may_be_optional(&mut self, word: Span, field: &'a Name) -> bool {
+        let Some((kind, simulator)) = self.without(|kind| kind.optional_fields) else { return true };
+        let title = format!("`{}` is optional, but messages of simulator kind `{kind}` have all fields", field.text);
+        let diagnostic = Diagnostic::new(Code::NOT_OPTIONAL, word, title)
+            .label("only messages in JSON may lack fields")
+            .suggest("remove the word", Span { hi: field.span.lo, ..word }, "")
+            .secondary(simulator, "the simulator is declared here");
+        self.report(diagnostic);
+        false
     }
 
     pub(super) fn type_of(&mut self, ty: &'a ast::Type) -> Option<Type> {

@@ -216,7 +216,7 @@ impl<'a> Resolver<'a> {
                 complete = false;
                 continue;
             }
-            let field = model::Field { declaration: self.declaration(&field.head), ty };
+            let field = model::Field { declaration: self.declaration(&field.head), ty, optional: false };
             fields[position] = field;
         }
         let interface = Some(last.name.clone());
@@ -343,7 +343,7 @@ impl<'a> Resolver<'a> {
         let line = self.sources.position(at).line;
         let mut field = |field: &InterfaceField| {
             let declaration = Declaration { name: field.name.clone(), span: at, line, doc: String::new() };
-            model::Field { declaration, ty: self.language_type(&field.ty, all, at) }
+            model::Field { declaration, ty: self.language_type(&field.ty, all, at), optional: false }
         };
         let fields = layout.fields.iter().filter(|field| field.name != interfaces::NO_FIELDS);
         fields.map(&mut field).collect()

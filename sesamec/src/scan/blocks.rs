@@ -64,7 +64,9 @@ pub(super) fn messages(system: &System, types: &Types, names: &BTreeMap<&str, St
         for field in types.fields(ty) {
             let said = in_language(is_ros, types, names, field);
             let detail = types.detail(ty, &field.name);
-            _ = writeln!(text, "{}: {}", field.name, detail.map_or(said.clone(), |detail| with_detail(&said, detail)));
+            let optional = if detail.is_some_and(|detail| detail.optional) { "optional " } else { "" };
+            let said = detail.map_or(said.clone(), |detail| with_detail(&said, detail));
+            _ = writeln!(text, "{optional}{}: {said}", field.name);
         }
         let left_out = types.left_out(ty);
         for out in left_out.iter().take(MOST_LEFT_OUT) {

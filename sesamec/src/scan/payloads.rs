@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use heck::ToUpperCamelCase as _;
 use sesame_plan::{InterfaceField, Primitive, WireType};
-use sesame_scan::{Conventions, Facts, Guess, LeftOut, Payloads, Samples};
+use sesame_scan::{Conventions, Facts, Guess, GuessedField, LeftOut, Payloads, Samples};
 
 use super::types::{POINT, Types};
 
@@ -103,16 +103,20 @@ fn real() -> WireType {
 }
 
 /// Adds a message of this name, or of a similar one; gives the name.
-fn message(types: &mut Types, wanted: &str, fields: Vec<(String, Guess)>, left_out: Vec<LeftOut>) -> String {
+fn message(types: &mut Types, wanted: &str, fields: Vec<GuessedField>, left_out: Vec<LeftOut>) -> String {
     let name = free(types, if wanted.is_empty() { "Message" } else { wanted });
     // The name is taken before those of messages in it.
     types.add_payload(&name, Vec::new(), Vec::new());
-    let mut of = Vec::new();
-    for (field, guess) in fields {
+    let (mut of, mut lacking) = (Vec::new(), Vec::new());
+    for GuessedField { name: field, guess, optional } in fields {
         let ty = wire(types, &format!("{name}{}", field.to_upper_camel_case()), guess);
+        if optional {
+            lacking.push(field.clone());
+        }
         of.push(InterfaceField { name: field, ty });
     }
     types.set_payload(&name, of, left_out);
+    types.set_optional(&name, lacking);
     name
 }
 
@@ -137,9 +141,9 @@ fn wire(types: &mut Types, name: &str, guess: Guess) -> WireType {
 }
 
 /// Adds a message with this type of ROS. Messages in it have types that are made up, since JSON does not name them.
-fn message_of_ros(types: &mut Types, name: &str, fields: Vec<(String, Guess)>, left_out: Vec<LeftOut>) {
+fn message_of_ros(types: &mut Types, name: &str, fields: Vec<GuessedField>, left_out: Vec<LeftOut>) {
     let mut of = Vec::new();
-    for (field, guess) in fields {
+    for GuessedField { name: field, guess, .. } in fields {
         let ty = wire_of_ros(types, &format!("{name}{}", field.to_upper_camel_case()), guess);
         of.push(InterfaceField { name: field, ty });
     }
@@ -169,7 +173,7 @@ fn wire_of_ros(types: &mut Types, name: &str, guess: Guess) -> WireType {
 }
 
 /// Whether these are the fields of a `std_msgs/msg/Header`, in ROS 1 with `seq`.
-fn is_header(fields: &[(String, Guess)]) -> bool {
-    let fields = fields.iter().filter(|(name, _)| name != "seq");
-    fields.map(|(name, of)| (name.as_str(), of)).eq([("frame_id", &Guess::Text), ("stamp", &Guess::Time)])
+fn is_header(fields: &[GuessedField]) -> bool {
+    let fields = fields.iter().filter(|field| field.name != "seq");
+    fields.map(|field| (field.name.as_str(), &field.guess)).eq([("frame_id", &Guess::Text), ("stamp", &Guess::Time)])
 }

@@ -314,6 +314,7 @@ fn vehicles_have_proxies_and_the_messages_of_their_dialect() {
         definitions: vec!["../runtime/middleware/interfaces/tests/small.xml".to_owned()],
     };
     let field = |name: &str, ty: &str, unit: Option<&str>, sample: &str| FoundField {
+        optional: false,
         name: name.to_owned(),
         ty: ty.to_owned(),
         unit: unit.map(str::to_owned),

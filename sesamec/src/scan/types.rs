@@ -31,7 +31,7 @@ struct Type {
     fields: Vec<InterfaceField>,
     left_out: Vec<LeftOut>,
     problem: Option<String>,
-    /// The unit of each field, and a value that came, as far as they are known.
+    /// What else is known of fields: their units, values that came, whether messages may lack them.
     details: BTreeMap<String, FoundField>,
 }
 
@@ -74,7 +74,14 @@ impl Types {
         types
     }
 
-    /// The unit of a field and a value that came, if they are known.
+    /// Notes which fields of a type some messages lacked.
+    pub(super) fn set_optional(&mut self, name: &str, fields: Vec<String>) {
+        let Some(ty) = self.by_name.get_mut(name) else { return };
+        let optional = |field: String| (field, FoundField { optional: true, ..FoundField::default() });
+        ty.details.extend(fields.into_iter().map(optional));
+    }
+
+    /// What else is known of a field: its unit, a value that came, whether messages may lack it.
     pub(super) fn detail(&self, name: &str, field: &str) -> Option<&FoundField> {
         self.by_name.get(name)?.details.get(field)
     }

@@ -168,6 +168,7 @@ impl Heard {
                 continue;
             }
             let field = |(field, value): (&sesame_interfaces::mavlink::Field, &Option<Value>)| FoundField {
+                optional: false,
                 name: field.name.clone(),
                 ty: in_words(&field.wire_type()),
                 unit: field.unit.clone(),

@@ -4,6 +4,7 @@ use std::collections::hash_map::DefaultHasher;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::hash::{Hash as _, Hasher as _};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::{Duration, Instant};
 
@@ -56,6 +57,7 @@ fn connect(plan: &CampaignPlan, folder: &Path) -> Box<dyn Transport> {
         unready: BTreeMap::new(),
         latest: BTreeMap::new(),
         misfits: BTreeSet::new(),
+        notes: VecDeque::new(),
     };
     on_bus(plan, Box::new(bus), Settings::of(plan), context)
 }
@@ -80,6 +82,8 @@ struct Brokers {
     latest: BTreeMap<usize, Manner>,
     /// Topics of which a message did not fit.
     misfits: BTreeSet<String>,
+    /// What is to be noted.
+    notes: VecDeque<String>,
     /// What is awaited back from a broker, if the plan has a relay budget.
     echoes: Option<Echoes>,
 }
@@ -109,6 +113,7 @@ impl Brokers {
         self.lines = lines.to_vec();
         self.routes = Routes::new(&self.plan, &self.mqtt, lines, self.echoes.is_some());
         self.misfits.clear();
+        self.notes.clear();
         self.latest.clear();
         self.early.clear();
         if let Some(echoes) = &mut self.echoes {
@@ -179,7 +184,7 @@ impl Brokers {
         }
     }
 
-    /// A message for the relay. One that does not fit is noted once per topic and goes on as it came.
+    /// A message for the relay. One that does not fit is noted once per topic, and nothing reads it.
     fn message(
         &mut self,
         broker: BrokerAt,
@@ -211,14 +216,13 @@ impl Brokers {
                 Ok(Some(Event::Message { line, source, value, call: None, arrived }))
             }
             Err(mismatch) => {
-                let said = if self.lines[line].cut { self.routes.said[line].clone() } else { Vec::new() };
-                for topics in said {
-                    topics.iter().try_for_each(|topic| self.send(topic, &publish.payload, &manner))?;
+                if self.misfits.insert(topic.to_owned()) {
+                    let said = "is not of its declared type, so nothing reads it";
+                    self.notes.push_back(format!("a message on `{topic}` {said}: {mismatch}"));
                 }
-                let topic = topic.to_owned();
-                let note =
-                    format!("a message on `{topic}` is not of its declared type and goes on as it came: {mismatch}");
-                Ok(self.misfits.insert(topic).then_some(Event::Note(note)))
+                self.latest.insert(line, manner);
+                let value = Value::Opaque(Arc::from(&publish.payload[..]));
+                Ok(Some(Event::Message { line, source, value, call: None, arrived }))
             }
         }
     }
@@ -287,6 +291,9 @@ impl Bus for Brokers {
     fn receive(&mut self, timeout: Duration) -> Result<Option<Event>, TransportError> {
         let limit = Instant::now() + timeout;
         loop {
+            if let Some(note) = self.notes.pop_front() {
+                return Ok(Some(Event::Note(note)));
+            }
             let Some((broker, passed)) = self.next(limit.saturating_duration_since(Instant::now()))? else {
                 return Ok(None);
             };
@@ -297,7 +304,10 @@ impl Bus for Brokers {
     }
 
     fn publish(&mut self, line: usize, sink: usize, value: &Value, _: Option<u64>) -> Result<(), TransportError> {
-        let payload = Bytes::from(self.codec.write(value));
+        let payload = match value {
+            Value::Opaque(bytes) => Bytes::copy_from_slice(bytes),
+            value => Bytes::from(self.codec.write(value)),
+        };
         if let Some(echoes) = &mut self.echoes {
             echoes.published(line, sink, hash(&payload));
         }

@@ -69,6 +69,8 @@ impl Payloads {
                 }
                 None => self.blank_of(topic),
             },
+            // It came as JSON.
+            Value::Opaque(bytes) => return String::from_utf8_lossy(bytes).into_owned(),
             _ => Json::Null,
         };
         self.patch(&mut message, value);
@@ -170,6 +172,7 @@ impl Payloads {
                 }
             }
             Value::Undeclared(text) => *there = serde_json::from_str(text).unwrap_or(Json::Null),
+            Value::Opaque(bytes) => *there = serde_json::from_slice(bytes).unwrap_or(Json::Null),
         }
     }
 }

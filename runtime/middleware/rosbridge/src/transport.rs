@@ -5,6 +5,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use sesame_lifecycle::launch::LaunchContext;
@@ -248,7 +249,7 @@ impl Bridge {
     fn operation(&mut self, operation: Operation, arrived: Instant) -> Result<Option<Event>, TransportError> {
         match operation {
             Operation::Publish { topic, msg, .. } => match self.topics.get(&topic) {
-                Some(&Heard::Source { line, source }) => self.message(line, source, None, &msg, arrived),
+                Some(&Heard::Source { line, source }) => Ok(Some(self.message(line, source, None, &msg, arrived))),
                 Some(&Heard::Sink { line, sink }) => {
                     let back = self.echoes.as_mut().and_then(|echoes| echoes.heard(line, sink, content(&msg), arrived));
                     Ok(back.map(|added| Event::Returned { line, added }))
@@ -267,7 +268,7 @@ impl Bridge {
                     self.calls.pop_first();
                 }
                 let args = args.unwrap_or_else(|| serde_json::json!({}));
-                self.message(line, 0, Some(self.count), &args, arrived)
+                Ok(Some(self.message(line, 0, Some(self.count), &args, arrived)))
             }
             Operation::ServiceResponse { id, values, result, .. } => {
                 let Some(call) = id.as_deref().and_then(|id| id.strip_prefix(CALL)?.parse().ok()) else {
@@ -296,14 +297,14 @@ impl Bridge {
         let Some(line) = self.line_of(&service, Channel::Reply) else { return Ok(None) };
         let values = values.unwrap_or_else(|| serde_json::json!({}));
         if result {
-            return self.message(line, 0, Some(call), &values, arrived);
+            return Ok(Some(self.message(line, 0, Some(call), &values, arrived)));
         }
         // There is no reply that operations could act on: the client gets the bridge's error.
         self.say(Operation::ServiceResponse { id, service, values: Some(values), result: false }.text())?;
         Ok(None)
     }
 
-    /// A message for the relay. One that does not fit is noted once per topic and goes on as it came.
+    /// A message for the relay. One that does not fit is noted once per topic, and nothing reads it.
     fn message(
         &mut self,
         line: usize,
@@ -311,21 +312,16 @@ impl Bridge {
         call: Option<u64>,
         message: &serde_json::Value,
         arrived: Instant,
-    ) -> Result<Option<Event>, TransportError> {
-        match self.payloads.read(self.lines[line].topic, message) {
-            Ok(value) => Ok(Some(Event::Message { line, source, value, call, arrived })),
-            Err(mismatch) => {
-                let text = message.to_string();
-                let sinks = if self.lines[line].cut { self.lines[line].sinks.len() } else { 0 };
-                for sink in 0..sinks {
-                    self.publish_text(line, sink, &text, call)?;
-                }
-                let path = &self.lines[line].sources[source].path;
-                let note =
-                    format!("a message on `{path}` is not of its declared type and goes on as it came: {mismatch}");
-                Ok(self.misfits.insert(path.clone()).then_some(Event::Note(note)))
+    ) -> Event {
+        let value = self.payloads.read(self.lines[line].topic, message).unwrap_or_else(|mismatch| {
+            let path = &self.lines[line].sources[source].path;
+            if self.misfits.insert(path.clone()) {
+                let said = "is not of its declared type, so nothing reads it";
+                self.reported.push_back(format!("a message on `{path}` {said}: {mismatch}"));
             }
-        }
+            Value::Opaque(Arc::from(message.to_string().into_bytes()))
+        });
+        Event::Message { line, source, value, call, arrived }
     }
 
     fn publish_text(&self, line: usize, sink: usize, text: &str, call: Option<u64>) -> Result<(), TransportError> {

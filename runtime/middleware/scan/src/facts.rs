@@ -252,6 +252,9 @@ pub struct FoundField {
     /// A value that came, in words, in `MAVLink`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sample: Option<String>,
+    /// Whether some messages in JSON lacked it.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub optional: bool,
 }
 
 /// A field that a space cannot declare.

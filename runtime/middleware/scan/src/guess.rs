@@ -1,8 +1,8 @@
 //! The type of which all payloads of a topic are, as the language has types.
 //!
-//! A space may declare only what each message has: a message with a field less, or with one of another kind, would not
-//! be of its declared type. So fields that came in some messages only, or as values of several kinds, are left out, and
-//! the reason is given.
+//! A message with a field less than declared, or with one of another kind, is not of its declared type. So fields that
+//! came as values of several kinds are left out, and the reason is given. Fields that came in some messages only are
+//! optional, or left out too where messages have all of their fields.
 
 use sesame_notation::is_name;
 
@@ -28,11 +28,22 @@ pub enum Guess {
     List(Box<Guess>),
     /// Named values.
     Message {
-        /// The fields that each message has, by name.
-        fields: Vec<(String, Guess)>,
+        /// The fields, by name.
+        fields: Vec<GuessedField>,
         /// The others.
         left_out: Vec<LeftOut>,
     },
+}
+
+/// A field of a guessed message.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct GuessedField {
+    /// Its name.
+    pub name: String,
+    /// Its type.
+    pub guess: Guess,
+    /// Whether some messages lacked it, or had `null` in its place.
+    pub optional: bool,
 }
 
 /// How a middleware writes in JSON what JSON does not have, and what the relay reads there.
@@ -62,6 +73,11 @@ impl Conventions {
     /// Whether `null` in the place of a number is NaN.
     fn null_is_nan(self) -> bool {
         self == Conventions::Rosbridge
+    }
+
+    /// Whether messages may lack fields, or have `null` in their places.
+    fn optional_fields(self) -> bool {
+        self == Conventions::Json
     }
 
     /// Whether a payload may be any text, so that one of several kinds is a text.
@@ -128,15 +144,18 @@ impl Seen {
         let (mut fields, mut left_out) = (Vec::new(), Vec::new());
         for (name, field) in &self.fields {
             // The language wants a letter or a digit in it.
+            let optional = conventions.optional_fields() && (field.values() < self.objects || field.nulls > 0);
             let guess = if !is_name(name) || !name.contains(|c: char| c.is_ascii_alphanumeric()) {
                 Err("its name cannot be that of a field in a space".to_owned())
+            } else if optional {
+                Seen { nulls: 0, ..field.clone() }.guess(conventions)
             } else if field.values() < self.objects {
                 Err(format!("only {} of {} objects have it", field.values(), self.objects))
             } else {
                 field.guess(conventions)
             };
             match guess {
-                Ok(guess) => fields.push((name.clone(), guess)),
+                Ok(guess) => fields.push(GuessedField { name: name.clone(), guess, optional }),
                 Err(why) => left_out.push(LeftOut { name: name.clone(), why }),
             }
         }

@@ -14,7 +14,7 @@ pub use arrivals::Arrivals;
 pub use facts::{
     Facts, FoundAction, FoundField, FoundNode, FoundService, FoundTopic, FoundType, LeftOut, System, TypeSource,
 };
-pub use guess::{Conventions, Guess};
+pub use guess::{Conventions, Guess, GuessedField};
 pub use payloads::Payloads;
 pub use samples::Samples;
 

@@ -40,7 +40,7 @@ pub(crate) fn message(value: &Value, now: u64) -> Result<SimlogMessage, Mismatch
     let kind = match value {
         Value::Bool(_) => ValueType::Bool,
         Value::Int(_) | Value::Real(_) => ValueType::Number,
-        Value::Text(_) | Value::Undeclared(_) => ValueType::String,
+        Value::Text(_) | Value::Undeclared(_) | Value::Opaque(_) => ValueType::String,
         Value::Point(_) | Value::List(_) | Value::Record(_) => ValueType::Undefined,
     };
     Ok(SimlogMessage { header: Some(header), r#type: kind.into(), value: Some(dynamic(&Tree::of(value))?) })

@@ -59,7 +59,7 @@ impl ExpectedType {
             Value::Bool(_) => ExpectedType::Bool,
             Value::Int(_) => ExpectedType::Int,
             Value::Real(_) => ExpectedType::Real,
-            Value::Text(_) | Value::Undeclared(_) => ExpectedType::Text,
+            Value::Text(_) | Value::Undeclared(_) | Value::Opaque(_) => ExpectedType::Text,
             Value::Point(_) => ExpectedType::Point,
             Value::List(items) => {
                 ExpectedType::List(Box::new(items.first().map_or(ExpectedType::Real, ExpectedType::of_value)))

@@ -144,6 +144,7 @@ pub(crate) fn text(expected: &ExpectedType, text: &str) -> Result<Value, Mismatc
 pub(crate) fn written(value: &Value, like: &str) -> String {
     match value {
         Value::Text(text) | Value::Undeclared(text) => text.to_string(),
+        Value::Opaque(bytes) => String::from_utf8_lossy(bytes).into_owned(),
         Value::Bool(truth) => truth.to_string(),
         Value::Int(whole) => whole.to_string(),
         Value::Real(x) if x.is_finite() => format!("{x:?}"),

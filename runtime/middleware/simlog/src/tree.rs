@@ -123,6 +123,7 @@ impl Tree {
             Value::Int(n) => Tree::Int(i128::from(*n)),
             Value::Real(x) => Tree::Real(*x),
             Value::Text(text) | Value::Undeclared(text) => Tree::Text(text.to_string()),
+            Value::Opaque(bytes) => Tree::Text(String::from_utf8_lossy(bytes).into_owned()),
             Value::Point(axes) => Tree::List(axes.map(Tree::Real).to_vec()),
             Value::List(items) => Tree::List(items.iter().map(Tree::of).collect()),
             Value::Record(record) => {

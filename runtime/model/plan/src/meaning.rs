@@ -94,7 +94,7 @@ fn forget_what_is_for_people(plan: &mut CampaignPlan) {
     labs.clear();
     for MessageType { name: _, doc, fields } in messages {
         doc.clear();
-        for Field { name: _, doc, ty: _ } in fields {
+        for Field { name: _, doc, ty: _, optional: _ } in fields {
             doc.clear();
         }
     }

@@ -325,6 +325,8 @@ pub struct SimulatorProperties {
     pub reaches_nodes: bool,
     /// Whether a run can begin with other values of the simulator's parameters.
     pub takes_parameters: bool,
+    /// Whether its messages may lack fields, as those in JSON may.
+    pub optional_fields: bool,
 }
 
 impl SimulatorKind {
@@ -348,10 +350,15 @@ impl SimulatorKind {
     /// What is fixed for it.
     pub const fn properties(self) -> SimulatorProperties {
         match self {
-            SimulatorKind::InProcess => {
-                SimulatorProperties { in_runner: true, takes_parameters: true, ..properties("in_process") }
+            SimulatorKind::InProcess => SimulatorProperties {
+                in_runner: true,
+                takes_parameters: true,
+                optional_fields: true,
+                ..properties("in_process")
+            },
+            SimulatorKind::Process => {
+                SimulatorProperties { takes_parameters: true, optional_fields: true, ..properties("process") }
             }
-            SimulatorKind::Process => SimulatorProperties { takes_parameters: true, ..properties("process") },
             SimulatorKind::Ros2 => SimulatorProperties {
                 feature: Some("ros2"),
                 bus: Some("as a node of ROS 2"),
@@ -388,6 +395,7 @@ impl SimulatorKind {
                 bus: Some("as a client of the MQTT broker"),
                 brokers: true,
                 renames: true,
+                optional_fields: true,
                 ..properties("mqtt")
             },
             SimulatorKind::Simlog => SimulatorProperties {
@@ -431,6 +439,7 @@ const fn properties(keyword: &'static str) -> SimulatorProperties {
         named_messages: false,
         reaches_nodes: false,
         takes_parameters: false,
+        optional_fields: false,
     }
 }
 

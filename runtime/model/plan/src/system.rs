@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Launch, MessageId, TopicId};
+use crate::{CampaignPlan, Launch, MessageId, TopicId};
 
 /// A named message type.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -25,6 +25,14 @@ pub struct Field {
     /// Its type.
     #[serde(rename = "type")]
     pub ty: Type,
+    /// Whether messages may lack it, or have `null` in its place. Only JSON has such fields.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub optional: bool,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference")]
+fn is_false(truth: &bool) -> bool {
+    !truth
 }
 
 /// The type of a field or topic.
@@ -248,6 +256,22 @@ pub struct FieldRef {
     pub topic: TopicId,
     /// Field names from the message inwards; empty for a topic that carries the value itself.
     pub path: Vec<String>,
+}
+
+impl CampaignPlan {
+    /// Whether a message of its type may lack a value: a field on the way to it is optional.
+    pub fn may_lack(&self, value: &FieldRef) -> bool {
+        let mut ty = self.topics.get(value.topic.index()).map(|topic| &topic.ty);
+        value.path.iter().any(|name| {
+            let Some(Type::Message { id }) = ty else { return false };
+            let field = self
+                .messages
+                .get(id.index())
+                .and_then(|message| message.fields.iter().find(|field| field.name == *name));
+            ty = field.map(|field| &field.ty);
+            field.is_some_and(|field| field.optional)
+        })
+    }
 }
 
 #[cfg(test)]

@@ -115,7 +115,7 @@ pub fn message(name: &str, fields: Vec<Field>) -> MessageType {
 
 /// A field of a message type.
 pub fn field(name: &str, ty: Type) -> Field {
-    Field { name: name.to_owned(), doc: String::new(), ty }
+    Field { name: name.to_owned(), doc: String::new(), ty, optional: false }
 }
 
 /// A topic, or a group of topics.

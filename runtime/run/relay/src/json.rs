@@ -80,6 +80,11 @@ pub(crate) fn encode(value: &Value, out: &mut Vec<u8>) {
             out.push(b'}');
         }
         Value::Undeclared(text) => out.extend_from_slice(text.as_bytes()),
+        // What is not JSON is written as a text: a trace has JSON only.
+        Value::Opaque(bytes) => match serde_json::from_slice::<serde::de::IgnoredAny>(bytes) {
+            Ok(_) => out.extend_from_slice(bytes),
+            Err(_) => quoted(&String::from_utf8_lossy(bytes), out),
+        },
     }
 }
 

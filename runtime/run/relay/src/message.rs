@@ -44,7 +44,7 @@ impl Mismatch {
     }
 }
 
-/// Whether a payload is of a declared type. A message may have more fields than declared, never fewer.
+/// Whether a payload is of a declared type. A message may have more fields than declared, and lack optional ones.
 pub fn fits(plan: &CampaignPlan, ty: &Type, value: &Value) -> Result<(), Mismatch> {
     match ty {
         Type::Bool => bool::from_value(value).map(drop),
@@ -62,7 +62,11 @@ pub fn fits(plan: &CampaignPlan, ty: &Type, value: &Value) -> Result<(), Mismatc
         Type::Message { id } => {
             let Value::Record(record) = value else { return Err(Mismatch::new("message", value)) };
             plan.message(*id).fields.iter().try_for_each(|field| {
-                let value = record.get(&field.name).ok_or_else(|| Mismatch::missing(&field.name))?;
+                let value = match record.get(&field.name) {
+                    None | Some(Value::Undeclared(_)) if field.optional => return Ok(()),
+                    None => return Err(Mismatch::missing(&field.name)),
+                    Some(value) => value,
+                };
                 fits(plan, &field.ty, value).map_err(|mismatch| mismatch.inside(&field.name))
             })
         }
@@ -76,6 +80,42 @@ pub fn field<T: FromValue>(message: &Value, name: &str) -> Result<T, Mismatch> {
         Some(value) => T::from_value(value).map_err(|mismatch| mismatch.inside(name)),
         None => Err(Mismatch::missing(name)),
     }
+}
+
+/// An optional field of a message: `None` if the message lacks it, or has `null` in its place.
+pub fn optional_field<T: FromValue>(message: &Value, name: &str) -> Result<Option<T>, Mismatch> {
+    match message {
+        Value::Record(record) if record.get(name).is_none() => Ok(None),
+        _ => field(message, name),
+    }
+}
+
+impl<T: FromValue> FromValue for Option<T> {
+    /// `null` is `None`.
+    fn from_value(value: &Value) -> Result<Self, Mismatch> {
+        match value {
+            Value::Undeclared(_) => Ok(None),
+            value => T::from_value(value).map(Some),
+        }
+    }
+}
+
+impl<T: ToValue> ToValue for Option<T> {
+    fn to_value(&self) -> Value {
+        self.as_ref().map_or_else(null, ToValue::to_value)
+    }
+    fn write_to(&self, value: &mut Value) -> bool {
+        match (self, &value) {
+            (None, Value::Undeclared(_)) => false,
+            (Some(new), old) if !matches!(old, Value::Undeclared(_)) => new.write_to(value),
+            (new, _) => replace(value, false, || new.to_value()),
+        }
+    }
+}
+
+/// What stands in JSON in the place of an optional value that is not there.
+fn null() -> Value {
+    Value::Undeclared(Text::from("null"))
 }
 
 impl FromValue for f64 {

@@ -187,6 +187,9 @@ pub enum Value {
     /// A part of a message that the space does not declare, in the format of the wire (JSON, for simulators that are
     /// programs). It is neither read nor changed, and passed on as it came.
     Undeclared(Text),
+    /// A whole message that is not of its declared type, as it came. Nothing reads it and no value in it is changed,
+    /// but it can be lost, late, repeated or replaced like any other message.
+    Opaque(Arc<[u8]>),
 }
 
 impl Value {
@@ -243,7 +246,7 @@ impl Value {
             Value::Point(point) => point.iter().all(|x| x.is_finite()),
             Value::List(items) => items.iter().all(Value::is_finite),
             Value::Record(record) => record.values.iter().all(Value::is_finite),
-            Value::Bool(_) | Value::Int(_) | Value::Text(_) | Value::Undeclared(_) => true,
+            Value::Bool(_) | Value::Int(_) | Value::Text(_) | Value::Undeclared(_) | Value::Opaque(_) => true,
         }
     }
 
@@ -276,6 +279,7 @@ impl Value {
             Value::List(_) => "list",
             Value::Record(_) => "message",
             Value::Undeclared(_) => "something undeclared",
+            Value::Opaque(_) => "something else",
         }
     }
 }

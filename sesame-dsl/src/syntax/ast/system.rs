@@ -142,6 +142,8 @@ pub(crate) struct Message {
 #[derive(Debug)]
 pub(crate) struct Field {
     pub(crate) head: Head,
+    /// The word `optional`.
+    pub(crate) optional: Option<Span>,
     pub(crate) ty: Type,
     /// Its type on the wire, as in a `.msg` file.
     pub(crate) wire: Option<Text>,

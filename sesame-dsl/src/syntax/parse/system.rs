@@ -196,6 +196,7 @@ impl Reader<'_> {
                     doc: Self::doc(&field),
                     full_span: reader.full_span(&field),
                 },
+                optional: child(&field, Rule::k_optional).map(|word| reader.span(&word)),
                 ty: reader.type_of(&expect_child(&field, Rule::type_of)),
                 wire: child(&field, Rule::wire_type).map(|wire| reader.text_of(&expect_child(&wire, Rule::text))),
             });

@@ -61,11 +61,13 @@ fn record(plan: &CampaignPlan, shapes: &mut Shapes, id: MessageId, text: &str) -
             return Err(twice.inside(name));
         }
         values.push(match declared.iter().find(|field| field.name == *name) {
+            Some(field) if field.optional && value.get() == "null" => Value::Undeclared(Text::from("null")),
             Some(field) => decode(plan, shapes, &field.ty, value).map_err(|mismatch| mismatch.inside(name))?,
             None => Value::Undeclared(Text::from(value.get())),
         });
     }
-    if let Some(missing) = declared.iter().find(|field| entries.iter().all(|(name, _)| *name != field.name)) {
+    let required = || declared.iter().filter(|field| !field.optional);
+    if let Some(missing) = required().find(|field| entries.iter().all(|(name, _)| *name != field.name)) {
         return Err(Mismatch::missing(&missing.name));
     }
     let same = |fields: &Arc<Fields>| {

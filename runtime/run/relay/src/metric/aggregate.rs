@@ -49,6 +49,8 @@ pub(super) struct FormulaState<'p> {
     evaluated: Option<SimTime>,
     /// The values of the current message, per input.
     heard: HeardValues,
+    /// Whether a message may lack the key of `per`.
+    key_is_optional: bool,
 }
 
 /// What a formula is evaluated for.
@@ -129,17 +131,19 @@ impl<'p> FormulaState<'p> {
             keys: BTreeMap::new(),
             attendance: several.then(|| Attendance::new(&formula.inputs, plan)),
             evaluated: None,
-            heard: HeardValues::default(),
+            heard: HeardValues::new(plan, &formula.inputs),
+            key_is_optional: formula.per.as_ref().is_some_and(|per| plan.may_lack(per)),
         }
     }
 
     /// A message on the `member`th path of a topic, at the context's time. Returns whether the formula waits for the
     /// end of the instant, for which [`FormulaState::settle`] is called.
     pub(super) fn message(&mut self, topic: TopicId, member: usize, value: &Value, context: &mut Context) -> bool {
-        if let Some(attendance) = &mut self.attendance {
+        let heard = hear(&self.formula.inputs, (topic, member), value, &mut self.heard);
+        if let Some(attendance) = self.attendance.as_mut().filter(|_| !self.heard.lacks()) {
             attendance.heard(context.now, topic, member);
         }
-        match hear(&self.formula.inputs, (topic, member), value, &mut self.heard) {
+        match heard {
             Ok(true) => {}
             Ok(false) => context.read_not_finite(),
             Err(lacking) => {
@@ -167,6 +171,7 @@ impl<'p> FormulaState<'p> {
                 let key = match value.at(&per.path) {
                     Some(Value::Int(n)) => Key::Int(*n),
                     Some(Value::Text(text)) => Key::Text(text.clone()),
+                    _ if self.key_is_optional => return false,
                     _ => {
                         context.note(format!("a message on `{}` has no key `{}`", context.topic, per.path.join(".")));
                         return false;

@@ -421,6 +421,7 @@ impl Metrics<'_> {
                 (MetricSource::Last { input }, ..) => match value.number_at(&input.path) {
                     Some(number) if number.is_finite() => context.set(number),
                     Some(_) => context.read_not_finite(),
+                    None if self.table.plan.may_lack(input) => {}
                     None => context.note(format!(
                         "a message on `{}` has no number `{}`",
                         context.topic,

@@ -18,9 +18,24 @@ pub(crate) struct HeardValues {
     lists: Vec<(usize, Vec<Held>)>,
     /// The first input for which several elements of a list were there, although it is one value.
     several: Option<usize>,
+    /// Of each input, whether a message may lack its value.
+    optional: Vec<bool>,
+    /// Whether the last message lacked an optional value: it is as if it had not come.
+    lacks: bool,
 }
 
 impl HeardValues {
+    /// Nothing yet of these inputs.
+    pub(crate) fn new(plan: &CampaignPlan, inputs: &[Input]) -> Self {
+        let optional = inputs.iter().map(|input| plan.may_lack(&input.field)).collect();
+        HeardValues { optional, ..HeardValues::default() }
+    }
+
+    /// Whether the last message lacked an optional value, so that it is as if it had not come.
+    pub(crate) fn lacks(&self) -> bool {
+        self.lacks
+    }
+
     /// Whether there was none, as if the message had not come.
     pub(crate) fn is_nothing(&self) -> bool {
         self.values.is_empty() && self.lists.is_empty()
@@ -41,7 +56,7 @@ impl HeardValues {
 }
 
 /// Reads the values of the inputs that a message on the `member`th path of a topic has, and returns whether all of them
-/// are finite. The error is a missing field.
+/// are finite. The error is a missing field that is not optional.
 pub(crate) fn hear(
     inputs: &[Input],
     (topic, member): (TopicId, usize),
@@ -51,6 +66,7 @@ pub(crate) fn hear(
     heard.values.clear();
     heard.lists.clear();
     heard.several = None;
+    heard.lacks = false;
     let mut all_finite = true;
     for (at, input) in inputs.iter().enumerate().filter(|(_, input)| input.reads(topic, member)) {
         let path = &input.field.path;
@@ -63,7 +79,15 @@ pub(crate) fn hear(
             (None, None) => value.coordinate_at(path).map(number),
             (Some(_), None) => None,
         };
-        let Some(held) = held else { return Err(path.join(".")) };
+        let Some(held) = held else {
+            if !heard.optional.get(at).is_some_and(|optional| *optional) {
+                return Err(path.join("."));
+            }
+            heard.values.clear();
+            heard.lists.clear();
+            heard.lacks = true;
+            return Ok(true);
+        };
         let finite = is_finite(held);
         all_finite &= finite;
         heard.values.push((at, if finite { held } else { NOT_FINITE }));

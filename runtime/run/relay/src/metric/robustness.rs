@@ -156,7 +156,7 @@ impl<'p> RobustnessState<'p> {
             previous: SimTime::ZERO,
             end: SimTime::ZERO,
             attendance,
-            heard: HeardValues::default(),
+            heard: HeardValues::new(plan, &robustness.inputs),
             fresh: required.then_some(fresh),
         })
     }
@@ -164,8 +164,12 @@ impl<'p> RobustnessState<'p> {
     /// A message on the `member`th path of a topic, at the context's time.
     pub(super) fn message(&mut self, topic: TopicId, member: usize, value: &Value, context: &mut Context) {
         let Robustness { inputs, signals, .. } = self.robustness;
+        let heard = hear(inputs, (topic, member), value, &mut self.heard);
+        if self.heard.lacks() {
+            return;
+        }
         self.attendance.heard(context.now, topic, member);
-        match hear(inputs, (topic, member), value, &mut self.heard) {
+        match heard {
             Ok(true) => {}
             Ok(false) => context.read_not_finite(),
             Err(lacking) => {

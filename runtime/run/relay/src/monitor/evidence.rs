@@ -23,7 +23,7 @@ impl<'p> EvidenceState<'p> {
         EvidenceState {
             evidence,
             held: HeldInputs::new(&evidence.inputs, plan),
-            heard: HeardValues::default(),
+            heard: HeardValues::new(plan, &evidence.inputs),
             sources: Sources::new(sources),
         }
     }

@@ -95,8 +95,9 @@ impl<'p> RecordedMonitors<'p> {
         let mut content: Vec<Content> = Vec::new();
         let of = (self.wires.topic(wire), self.wires.member(wire));
         for id in self.streams[stream as usize].evidence.clone() {
-            let mut heard = HeardValues::default();
-            match hear(&evidence_of(self.plan, &self.network, id).inputs, of, value, &mut heard) {
+            let inputs = &evidence_of(self.plan, &self.network, id).inputs;
+            let mut heard = HeardValues::new(self.plan, inputs);
+            match hear(inputs, of, value, &mut heard) {
                 Ok(_) if heard.is_nothing() => {}
                 Ok(_) => content.push((id, heard)),
                 Err(lacking) => self.note(id, wire, &lacking),

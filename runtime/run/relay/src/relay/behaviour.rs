@@ -1,6 +1,8 @@
 //! What single operations do beyond the table of `matrix`: on groups, in lists, in several activations, together, and
 //! in the long run.
 
+use std::sync::Arc;
+
 use proptest::prelude::*;
 
 use sesame_base::time::SimTime;
@@ -212,6 +214,33 @@ fn each_member_of_a_group_is_disturbed_as_if_it_were_alone() {
     assert_eq!((levels(&frozen, "zones/Z1")[30], levels(&frozen, "zones/Z2")[30]), (19.0, 981.0));
     let count = |value: &Value| value.number_at(&["count"]);
     assert_eq!(count(&frozen[60].2), Some(30.0), "what is beside the frozen field goes on");
+}
+
+/// Commands, every other of which is not of its declared type.
+fn every_other_is_opaque(count: u32) -> Vec<(u32, &'static str, Value)> {
+    let opaque = |n: u32| Value::Opaque(Arc::from(format!("{{\"speed\": {n}").into_bytes()));
+    (0..count).map(|n| (n, COMMAND, if n % 2 == 0 { Value::Real(f64::from(n)) } else { opaque(n) })).collect()
+}
+
+#[test]
+fn a_message_of_any_content_is_lost_late_or_repeated_and_no_value_in_it_is_changed() {
+    let counted = |kind: OperationKind, choices: Vec<Choice>| {
+        let test = vec![use_of(0, 2.0, 4.0, choices, 3)];
+        let (delivered, finished) = relayed(vec![operation(0, kind)], test, &every_other_is_opaque(80));
+        let opaque = delivered.iter().filter(|(_, _, value)| matches!(value, Value::Opaque(_))).count();
+        (opaque, finished.operations[0].counters)
+    };
+    let (left, counters) = counted(OperationKind::Blackhole, vec![]);
+    assert_eq!((left, counters.dropped), (30, 20));
+    let fixed = OperationKind::Latency { distribution: Distribution::Fixed, drain: Drain::Finish };
+    let (left, counters) = counted(fixed, vec![Choice::Range { low: 0.3, high: 0.3 }]);
+    assert_eq!((left, counters.delayed), (40, 20));
+    let (left, counters) = counted(OperationKind::Duplicate, choices(&[2.0]));
+    assert_eq!((left, counters.seen), (40 + 2 * 10, 20));
+    let (left, counters) = counted(OperationKind::Bias, choices(&[5.0]));
+    assert_eq!((left, counters.changed), (40, 10), "only numbers have one");
+    let (left, counters) = counted(OperationKind::Freeze, vec![]);
+    assert!(left > 40 && counters.changed > 0, "the last one before the window is repeated, whatever it is");
 }
 
 #[test]

@@ -142,7 +142,7 @@ impl Layout {
                 };
                 Layout::Record(record.iter().map(of_field).collect())
             }
-            Value::Undeclared(_) => Layout::Nothing,
+            Value::Undeclared(_) | Value::Opaque(_) => Layout::Nothing,
         }
     }
 

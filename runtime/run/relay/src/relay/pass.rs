@@ -38,9 +38,12 @@ impl Relay<'_> {
         for tap in &mut self.taps {
             tap.published(now, wire, index, &value);
         }
-        self.metrics.published(now, wire, index, &value);
-        self.monitors_hear(Side::Inbound, wire, index, &value);
-        if self.conditions.read[wire.index()] {
+        let is_read = !matches!(value, Value::Opaque(_));
+        if is_read {
+            self.metrics.published(now, wire, index, &value);
+            self.monitors_hear(Side::Inbound, wire, index, &value);
+        }
+        if is_read && self.conditions.read[wire.index()] {
             self.evaluate_conditions();
             self.release_due(deliveries);
         }
@@ -130,11 +133,16 @@ impl Relay<'_> {
             return;
         }
         if self.phase != Phase::Over {
-            self.metrics.delivered(now, message.wire, message.published, &message.value);
+            let is_read = !matches!(message.value, Value::Opaque(_));
+            if is_read {
+                self.metrics.delivered(now, message.wire, message.published, &message.value);
+            }
             for tap in &mut self.taps {
                 tap.delivered(now, message.wire, message.published, &message.value);
             }
-            self.monitors_hear(Side::Outbound, message.wire, message.published, &message.value);
+            if is_read {
+                self.monitors_hear(Side::Outbound, message.wire, message.published, &message.value);
+            }
         }
         self.fan_out(now, message, deliveries);
     }

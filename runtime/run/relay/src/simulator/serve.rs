@@ -337,7 +337,7 @@ fn read(like: Option<&Value>, text: &str) -> Option<Value> {
             let fields = record.iter().map(|(name, like)| (name.as_str(), like)).map(of);
             Value::Record(Record::new(record.fields(), fields.collect::<Option<_>>()?))
         }
-        Some(Value::Undeclared(_)) | None => untyped(serde_json::from_str(text).ok()?)?,
+        Some(Value::Undeclared(_) | Value::Opaque(_)) | None => untyped(serde_json::from_str(text).ok()?)?,
     })
 }
 

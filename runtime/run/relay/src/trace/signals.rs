@@ -105,7 +105,7 @@ impl Collector<'_> {
     fn collect(&mut self, name: &mut String, time: f64, value: &Value) {
         let length = name.len();
         match value {
-            Value::Bool(_) | Value::Text(_) | Value::Undeclared(_) => {}
+            Value::Bool(_) | Value::Text(_) | Value::Undeclared(_) | Value::Opaque(_) => {}
             #[expect(clippy::cast_precision_loss, reason = "signals are compared, not computed with")]
             Value::Int(number) => self.sample(name, time, *number as f64),
             Value::Real(number) => self.sample(name, time, *number),
