@@ -15,7 +15,7 @@ use sesame_gap::fit::minimise;
 use sesame_gap::series::{Between, Series};
 use sesame_plan::{Adjustment, CampaignPlan, Compensation, Fit, Fitted, LabTask, Recorded, Test};
 use sesame_record::{RecordError, Repository, trace_file};
-use sesame_relay::trace::{self, RecordingError, Signal};
+use sesame_recording::{self as trace, RecordingError, Signal};
 use sesame_relay::wire::WireTable;
 use sesame_rng::derive_seed;
 

@@ -17,9 +17,9 @@ use clap::{CommandFactory as _, FromArgMatches as _, Parser};
 use sesame_base::gathered::gathered;
 use sesame_base::visible::{visible, visible_lines};
 use sesame_plan::{CampaignPlan, Endpoint, Monitor, is_shared};
+use sesame_recording::feed_telling;
 use sesame_relay::metric::MetricTable;
 use sesame_relay::monitor::Decided;
-use sesame_relay::trace::feed_telling;
 use sesame_relay::transport::Connect;
 use sesame_relay::wire::WireTable;
 

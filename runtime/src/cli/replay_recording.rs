@@ -38,9 +38,10 @@ pub(super) fn replay_recording(session: &Session, args: &ReplayRecordingArgs) ->
     use std::panic::{self, AssertUnwindSafe};
 
     use sesame_base::gathered::gathered;
+    use sesame_recording as trace;
     use sesame_relay::metric::MetricTable;
+    use sesame_relay::panic_capture;
     use sesame_relay::wire::WireTable;
-    use sesame_relay::{panic_capture, trace};
     use sesame_report::recording_text;
 
     use super::execution::refuse_unfilled;
@@ -71,7 +72,7 @@ pub(super) fn replay_recording(session: &Session, args: &ReplayRecordingArgs) ->
 fn compared(
     plan: &CampaignPlan,
     args: &ReplayRecordingArgs,
-    fed: sesame_relay::trace::Fed,
+    fed: sesame_recording::Fed,
 ) -> sesame_report::RecordingReplay {
     use sesame_base::visible::visible;
     use sesame_record::MetricValue;

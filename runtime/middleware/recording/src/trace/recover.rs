@@ -10,7 +10,7 @@ use mcap::{McapError, McapResult, Writer};
 
 use sesame_base::observation::Outcome;
 
-use crate::trace::records::records;
+use crate::container::mcap::records;
 use crate::trace::writer::{finish, options};
 use crate::trace::{RUN, TraceError, how_it_ended, publish};
 
@@ -43,10 +43,18 @@ fn copy(unfinished: &Path, outcome: &Outcome, saved: &Path) -> McapResult<()> {
                 reader.notify_read(read);
             }
             // The first error is where the process died.
-            Ok(LinearReadEvent::Record { opcode, data }) => match records(opcode, data) {
-                Ok(records) => records.iter().try_for_each(|record| copy_record(&mut writer, record))?,
-                Err(_) => break,
-            },
+            Ok(LinearReadEvent::Record { opcode, data }) => {
+                let mut found = Vec::new();
+                // A chunk counts as a whole or not at all.
+                let whole = records(opcode, data, &mut |record| {
+                    found.push(record.into_owned());
+                    true
+                });
+                if whole.is_err() {
+                    break;
+                }
+                found.iter().try_for_each(|record| copy_record(&mut writer, record))?;
+            }
             Err(McapError::Io(error)) => return Err(error.into()),
             Err(_) => break,
         }

@@ -8,20 +8,22 @@ use std::path::Path;
 use mcap::records::MessageHeader;
 use mcap::{WriteOptions, Writer};
 
+use sesame_base::observation::{Observation, Outcome};
 use sesame_base::time::SimTime;
 use sesame_plan::testing::{latency, offset, operation, plan, test_of, use_of};
-use sesame_plan::{Choice, Distribution, Drain, OperationKind, Test, ValueMode};
+use sesame_plan::{CampaignPlan, Choice, Distribution, Drain, OperationKind, Test, ValueMode};
 use sesame_rng::Stream;
 
 use super::*;
-use crate::evaluate::{Custom, Run, evaluate_tapped};
-use crate::files::NoFiles;
-use crate::metric::MetricTable;
-use crate::relay::Exchange;
-use crate::simulator::Progress;
-use crate::transport::{Capabilities, Transport, TransportError};
-use crate::value::{Fields, Record, Value};
-use crate::wire::WireTable;
+use crate::trace::{RUN, SUBJECT};
+use sesame_relay::evaluate::{Custom, Run, evaluate_tapped};
+use sesame_relay::files::NoFiles;
+use sesame_relay::metric::MetricTable;
+use sesame_relay::relay::Exchange;
+use sesame_relay::simulator::Progress;
+use sesame_relay::transport::{Capabilities, Transport, TransportError};
+use sesame_relay::value::{Fields, Record, Value};
+use sesame_relay::wire::WireTable;
 
 /// Publishes awkward numbers on all wires, ten times a second.
 struct Awkward(SimTime);
@@ -239,6 +241,44 @@ fn a_recording_of_another_program_is_fed_where_topic_and_payload_match() {
 }
 
 #[test]
+fn messages_that_are_nearly_in_order_are_put_in_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("foreign.mcap");
+    foreign(
+        &file,
+        &[
+            ("arm/command", "json", 2_000_000_000, "3"),
+            ("arm/command", "json", 1_000_000_000, "2"),
+            ("arm/command", "json", 2_000_000_000, "4"),
+        ],
+    );
+    let fed = fed(&file, &awkward_plan().0).unwrap();
+    assert_eq!(fed.metrics[1].series, [(0.0, 2.0), (1.0, 4.0)], "of one time, the last one in the file counts");
+}
+
+#[test]
+fn a_recording_of_another_program_that_is_cut_off_is_read_up_to_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("foreign.mcap");
+    let mut writer = WriteOptions::new().chunk_size(Some(1)).create(File::create(&file).unwrap()).unwrap();
+    let channel_id = writer.add_channel(0, "arm/command", "json", &BTreeMap::new()).unwrap();
+    for time in [1, 2, 3] {
+        let header = MessageHeader { channel_id, sequence: 0, log_time: time * 1_000_000_000, publish_time: 0 };
+        writer.write_to_known_channel(&header, b"1").unwrap();
+    }
+    writer.finish().unwrap();
+    let whole = fs::read(&file).unwrap();
+    let third = whole.windows(8).rposition(|window| window == 3_000_000_000u64.to_le_bytes()).unwrap();
+    let first = whole.windows(8).position(|window| window == 3_000_000_000u64.to_le_bytes()).unwrap();
+    assert!(first < third);
+    fs::write(&file, &whole[..first]).unwrap();
+    let fed = fed(&file, &awkward_plan().0).unwrap();
+    assert_eq!(fed.messages, 2);
+    let said = fed.warnings.last().unwrap();
+    assert_eq!(said, "the recording is cut off; what comes before, up to 1.000 s, is used");
+}
+
+#[test]
 fn what_cannot_be_fed_is_said_in_words() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("foreign.mcap");
@@ -256,7 +296,7 @@ fn what_cannot_be_fed_is_said_in_words() {
             said(&[("zones/Z1", "json", 1, "{\"level\": 1}")]),
             said(&[("arm/command", "json", 1, "not json")]),
             said(&[("arm/command", "json", 2, "1"), ("zones/Z1", "cdr", 1, "1")]),
-            said(&[("arm/command", "json", 2, "1"), ("arm/command", "json", 1, "1")]),
+            said(&[("arm/command", "protobuf", 1, "1")]),
         ]
         .join("\n")
     );
@@ -279,7 +319,7 @@ fn what_cannot_be_fed_is_said_in_words() {
 }
 
 #[test]
-fn a_compressed_recording_is_refused_with_a_remedy() {
+fn a_recording_that_is_compressed_by_an_unknown_method_is_refused_with_a_remedy() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("compressed.mcap");
     let mut bytes = Cursor::new(Vec::new());
@@ -289,7 +329,7 @@ fn a_compressed_recording_is_refused_with_a_remedy() {
     writer.write_to_known_channel(&header, b"1").unwrap();
     writer.finish().unwrap();
     drop(writer);
-    // The chunk's header says how it is compressed, as a text after times, size and checksum: `lz4` instead of nothing.
+    // The chunk's header says how it is compressed, as a text after times, size and checksum: `lzo` instead of nothing.
     let bytes = bytes.into_inner();
     let chunk =
         bytes.iter().enumerate().skip(8).find(|(at, byte)| **byte == 6 && bytes[at + 9 + 28..].starts_with(&[0; 4]));
@@ -299,11 +339,11 @@ fn a_compressed_recording_is_refused_with_a_remedy() {
     made.extend(length.to_le_bytes());
     made.extend(&bytes[at + 9..at + 37]);
     made.extend([3, 0, 0, 0]);
-    made.extend(b"lz4");
+    made.extend(b"lzo");
     made.extend(&bytes[at + 41..]);
     fs::write(&file, made).unwrap();
     let said = fed(&file, &awkward_plan().0).unwrap_err().to_string();
-    assert!(said.contains("compressed (`lz4`)") && said.contains("mcap compress --compression none"), "{said}");
+    assert!(said.contains("compressed by `lzo`") && said.contains("mcap compress --compression zstd"), "{said}");
 }
 
 /// The same recording without its checksums, which are then not looked at: what is changed in it is not refused for

@@ -14,15 +14,15 @@ use mcap::{McapError, McapResult, WriteOptions, Writer};
 use sesame_base::observation::Observation;
 use sesame_base::time::SimTime;
 use sesame_plan::{CampaignPlan, Operation, Test, TopicId, Type};
+use sesame_relay::json::{encode, number, quoted};
+use sesame_relay::relay::{Listener, MessageRef, OperationEvent};
+use sesame_relay::value::Value;
+use sesame_relay::wire::{Wire, WireTable};
 
-use crate::json::{encode, number, quoted};
-use crate::relay::{Listener, MessageRef, OperationEvent};
 use crate::trace::{
     ROLE, ROLE_DELIVERED, ROLE_METRIC, ROLE_OPERATIONS, ROLE_PUBLISHED, Subject, TOPIC, TraceError, ending, owned,
     publish, schema,
 };
-use crate::value::Value;
-use crate::wire::{Wire, WireTable};
 
 /// How long written data may stay in memory: the trace of a test that hangs must contain its last messages.
 const LATEST: Duration = Duration::from_millis(250);

@@ -1,0 +1,178 @@
+//! Files with recordings: whatever their format, a sequence of entries.
+
+mod bag;
+mod compressed;
+#[cfg(feature = "db3")]
+mod db3;
+mod folder;
+pub(crate) mod mcap;
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, BufReader, Chain, Cursor, Read, Seek as _, SeekFrom};
+use std::path::Path;
+
+use crate::error::RecordingError;
+
+/// The largest record, chunk and message that is read, in bytes.
+pub(crate) const LARGEST: usize = 1 << 27;
+
+/// How much is read at once, in bytes.
+const BLOCK: usize = 1 << 16;
+
+/// What stands at the beginning of a file that tells its format.
+const HEAD: usize = 16;
+
+/// What a file says, in its order.
+pub(crate) enum Entry<'a> {
+    /// A file of the recording begins: its channels are its own.
+    File,
+    /// A named set of texts.
+    Metadata(String, BTreeMap<String, String>),
+    /// A channel, before its first message.
+    Channel(Channel),
+    /// A message.
+    Message(Message<'a>),
+}
+
+/// A line of messages of one type.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Channel {
+    /// Its number in the file.
+    pub(crate) id: u32,
+    pub(crate) topic: String,
+    /// How messages are encoded: `json`, `cdr`, `ros1`, or something else.
+    pub(crate) encoding: String,
+    /// What the messages are, if the file says it.
+    pub(crate) schema: Option<Schema>,
+    /// What its writer said of it.
+    pub(crate) metadata: BTreeMap<String, String>,
+}
+
+/// The type of the messages on a channel.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Schema {
+    /// Its name.
+    pub(crate) name: String,
+    /// How the text is written: `ros2msg`, `ros2idl`, `ros1msg`, `jsonschema`, or something else; empty without a text.
+    pub(crate) encoding: String,
+    /// Its definition with everything that it contains.
+    pub(crate) text: String,
+}
+
+/// A message as bytes.
+pub(crate) struct Message<'a> {
+    /// The number of its channel.
+    pub(crate) channel: u32,
+    /// Its number on its channel, if the file has one.
+    pub(crate) sequence: u32,
+    /// When it was recorded, in nanoseconds.
+    pub(crate) time: u64,
+    pub(crate) data: &'a [u8],
+}
+
+/// Who is told the entries of a file.
+pub(crate) type Each<'e> = &'e mut dyn FnMut(Entry<'_>) -> Result<(), RecordingError>;
+
+/// Reads a recording from start to end: a file of any format, or a folder of rosbag2.
+///
+/// If a file is cut off or damaged, everything before is told, and then it is an error.
+pub(crate) fn read(path: &Path, each: Each<'_>) -> Result<(), RecordingError> {
+    if let Some(folder) = folder::of(path) {
+        return folder::files(folder)?.iter().try_for_each(|file| one(file, each));
+    }
+    one(path, each)
+}
+
+/// The formats of files, by how they begin.
+#[derive(Clone, Copy)]
+enum Format {
+    Mcap,
+    Sqlite,
+    Bag,
+    OldBag,
+    Zstd,
+}
+
+const FORMATS: [(&[u8], Format); 5] = [
+    (b"\x89MCAP", Format::Mcap),
+    (b"SQLite format 3\0", Format::Sqlite),
+    (b"#ROSBAG V2.0\n", Format::Bag),
+    (b"#ROSBAG", Format::OldBag),
+    (&compressed::ZSTD, Format::Zstd),
+];
+
+fn one(path: &Path, each: Each<'_>) -> Result<(), RecordingError> {
+    let unreadable = |error: io::Error| RecordingError::unreadable(path, &error);
+    let mut file = File::open(path).map_err(unreadable)?;
+    let head = head(&mut file).map_err(unreadable)?;
+    each(Entry::File)?;
+    match format(&head, path)? {
+        Format::Zstd => {
+            file.seek(SeekFrom::Start(0)).map_err(unreadable)?;
+            let mut content = compressed::file(BufReader::with_capacity(BLOCK, file));
+            let head = self::head(&mut content).map_err(unreadable)?;
+            let format = format(&head, path)?;
+            content_of(format, &head, content, path, each)
+        }
+        Format::Sqlite => sqlite(path, path, each),
+        other => content_of(other, &head, file, path, each),
+    }
+}
+
+/// Reads what begins with these bytes and goes on with those.
+fn content_of(format: Format, head: &[u8], rest: impl Read, path: &Path, each: Each<'_>) -> Result<(), RecordingError> {
+    let mut whole: Chain<Cursor<&[u8]>, _> = Cursor::new(head).chain(rest);
+    match format {
+        Format::Mcap => mcap::read(BufReader::with_capacity(BLOCK, whole), path, each),
+        Format::Bag => bag::read(BufReader::with_capacity(BLOCK, whole), path, each),
+        Format::Sqlite => unpacked(&mut whole, path, each),
+        Format::OldBag => {
+            let problem = "a bag of ROS 1 before version 2.0; `rosbag fix` converts it".to_owned();
+            Err(RecordingError::Unsupported { problem, path: path.to_owned() })
+        }
+        Format::Zstd => Err(RecordingError::Foreign { path: path.to_owned() }),
+    }
+}
+
+#[cfg(feature = "db3")]
+fn sqlite(file: &Path, path: &Path, each: Each<'_>) -> Result<(), RecordingError> {
+    db3::read(file, path, each)
+}
+
+/// SQLite needs a file.
+#[cfg(feature = "db3")]
+fn unpacked(content: &mut dyn Read, path: &Path, each: Each<'_>) -> Result<(), RecordingError> {
+    let unreadable = |error: io::Error| RecordingError::unreadable(path, &error);
+    let mut file = tempfile::NamedTempFile::new().map_err(unreadable)?;
+    io::copy(content, &mut file).map_err(unreadable)?;
+    sqlite(file.path(), path, each)
+}
+
+#[cfg(not(feature = "db3"))]
+fn sqlite(_: &Path, path: &Path, _: Each<'_>) -> Result<(), RecordingError> {
+    let problem = "a recording in SQLite, which this program does not read; `sesamec replay-recording` does, and \
+                   `ros2 bag convert` makes it MCAP"
+        .to_owned();
+    Err(RecordingError::Unsupported { problem, path: path.to_owned() })
+}
+
+#[cfg(not(feature = "db3"))]
+fn unpacked(_: &mut dyn Read, path: &Path, each: Each<'_>) -> Result<(), RecordingError> {
+    sqlite(path, path, each)
+}
+
+/// The first bytes of a file.
+fn head(file: &mut impl Read) -> io::Result<Vec<u8>> {
+    let mut head = Vec::with_capacity(HEAD);
+    file.take(HEAD as u64).read_to_end(&mut head)?;
+    Ok(head)
+}
+
+fn format(head: &[u8], path: &Path) -> Result<Format, RecordingError> {
+    if head.is_empty() {
+        return Err(RecordingError::CutOff { path: path.to_owned() });
+    }
+    let found = FORMATS.iter().find(|(start, _)| head.starts_with(start)).map(|(_, format)| *format);
+    found.ok_or_else(|| RecordingError::Foreign { path: path.to_owned() })
+}
