@@ -117,8 +117,8 @@ fn parts(name: &str, text: &str) -> Vec<Part> {
     parts
 }
 
-/// A name with package and kind; a name without a kind is that of a message.
-fn full(name: &str) -> Option<String> {
+/// A name with package and kind; a name without a kind, as older recordings have it, is that of a message.
+pub fn full(name: &str) -> Option<String> {
     match *name.split('/').collect::<Vec<_>>() {
         [package, name] if !package.is_empty() && !name.is_empty() => Some(format!("{package}/msg/{name}")),
         [package, kind @ ("msg" | "srv" | "action"), last] if !package.is_empty() && !last.is_empty() => {

@@ -176,3 +176,6 @@ fn format(head: &[u8], path: &Path) -> Result<Format, RecordingError> {
     let found = FORMATS.iter().find(|(start, _)| head.starts_with(start)).map(|(_, format)| *format);
     found.ok_or_else(|| RecordingError::Foreign { path: path.to_owned() })
 }
+
+#[cfg(test)]
+mod tests;

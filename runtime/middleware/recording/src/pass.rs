@@ -15,8 +15,9 @@ use sesame_relay::wire::{Wire, WireTable};
 
 use crate::container::{Channel, Entry, Message, read};
 use crate::error::RecordingError;
+use crate::layout::Unreadable;
 use crate::order::Order;
-use crate::payload::{Reader as Payloads, Unreadable};
+use crate::payload::Payloads;
 use crate::trace::{ROLE, ROLE_DELIVERED, ROLE_PUBLISHED, RUN, SUBJECT, TOPIC};
 
 /// The run that a trace is of.

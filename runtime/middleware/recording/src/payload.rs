@@ -1,54 +1,33 @@
-//! Messages of recordings as values: bytes are read by the layout that the file says, else by that of the space.
-
-use std::sync::Arc;
+//! Messages of recordings as values of the types that a plan declares.
 
 use serde::Deserialize;
 use serde_json::value::RawValue;
 
-use sesame_codec::{cdr, ros1};
-use sesame_interfaces::bundle::{self, Notation};
-use sesame_plan::{CampaignPlan, Interface, TopicId, Type};
+use sesame_plan::{CampaignPlan, TopicId, Type};
 use sesame_relay::json::{Shapes, decode};
 use sesame_relay::message::fits;
 use sesame_relay::value::{Fields, Record, Value};
 use sesame_relay::wire::Wanted;
 
-use crate::container::{Channel, Schema};
+use crate::container::Channel;
+use crate::layout::{Bytes, Unreadable};
 
-/// Reads the messages of a channel.
-pub(crate) enum Reader {
+/// Reads the messages of a channel as those of a topic of a plan.
+pub(crate) enum Payloads {
     Json,
-    Cdr(Box<cdr::Codec>),
-    Ros1(Box<ros1::Codec>),
+    Bytes(Bytes),
 }
 
-/// Why the messages of a channel cannot be read.
-pub(crate) enum Unreadable {
-    /// Nobody knows the encoding.
-    Encoding,
-    /// The layout is not known, in words for the user.
-    Layout(String),
-}
-
-impl Reader {
-    /// For the messages of a channel, which are those of a topic of the plan.
+impl Payloads {
+    /// For the messages of a channel, which are those of this topic.
     pub(crate) fn new(plan: &CampaignPlan, topic: TopicId, channel: &Channel) -> Result<Self, Unreadable> {
-        let declared = &plan.topic(topic).ty;
-        let wrong = |reason: String| Unreadable::Layout(reason);
-        match channel.encoding.as_str() {
-            "json" => Ok(Reader::Json),
-            "cdr" => {
-                let (interfaces, name) = layout(plan, topic, channel.schema.as_ref()).map_err(wrong)?;
-                let codec = cdr::Codec::new(&interfaces, &name, &declared_fields(plan, declared));
-                codec.map(|codec| Reader::Cdr(Box::new(codec))).map_err(|error| wrong(error.to_string()))
-            }
-            "ros1" => {
-                let (interfaces, name) = layout(plan, topic, channel.schema.as_ref()).map_err(wrong)?;
-                let codec = ros1::Codec::new(&interfaces, &name, &declared_fields(plan, declared));
-                codec.map(|codec| Reader::Ros1(Box::new(codec))).map_err(|error| wrong(error.to_string()))
-            }
-            _ => Err(Unreadable::Encoding),
+        if channel.encoding == "json" {
+            return Ok(Payloads::Json);
         }
+        let topic = plan.topic(topic);
+        let known = plan.simulator.ros.as_ref().map_or(&[][..], |ros| &ros.interfaces);
+        let wanted = declared_fields(plan, &topic.ty);
+        Bytes::new(channel, known, topic.interface.as_deref(), &wanted).map(Payloads::Bytes)
     }
 
     /// Reads a message of the declared type.
@@ -59,48 +38,14 @@ impl Reader {
         ty: &Type,
         data: &[u8],
     ) -> Result<Value, String> {
-        let bytes = || Arc::<[u8]>::from(data);
         let mut value = match self {
-            Reader::Json => return json(plan, shapes, ty, data),
-            Reader::Cdr(codec) => codec.read(bytes()),
-            Reader::Ros1(codec) => codec.read(bytes()),
-        }
-        .map_err(|error| error.to_string())?;
+            Payloads::Json => return json(plan, shapes, ty, data),
+            Payloads::Bytes(bytes) => bytes.read(data)?,
+        };
         shape(plan, ty, &mut value);
         fits(plan, ty, &value).map_err(|mismatch| mismatch.to_string())?;
         Ok(value)
     }
-}
-
-/// The layout of the messages on a channel: what the file says, else what the space knows.
-fn layout(plan: &CampaignPlan, topic: TopicId, schema: Option<&Schema>) -> Result<(Vec<Interface>, String), String> {
-    if let Some(schema) = schema.filter(|schema| !schema.text.trim().is_empty() || !schema.encoding.is_empty()) {
-        let known: Vec<&str> = Notation::ALL.iter().map(|(_, name)| *name).collect();
-        let notation = Notation::named(&schema.encoding).ok_or_else(|| {
-            let encoding = schema.encoding.escape_debug();
-            format!("its schema is written as `{encoding}`; only {} can be read", known.join(", "))
-        })?;
-        let wrong =
-            |problem: String| format!("the definition of `{}` in the file: {problem}", schema.name.escape_debug());
-        let (catalogue, name) =
-            bundle::read(notation, &schema.name, &schema.text).map_err(|error| wrong(error.to_string()))?;
-        let interfaces = catalogue.layout(&name).map_err(|error| wrong(error.to_string()))?;
-        return Ok((interfaces, name));
-    }
-    let of_space = plan.simulator.ros.as_ref().map_or(&[][..], |ros| &ros.interfaces);
-    let named = schema.map(|schema| schema.name.as_str());
-    let candidates = named.into_iter().chain(plan.topic(topic).interface.as_deref());
-    let known = candidates.filter_map(|name| {
-        let at = of_space.iter().position(|interface| interface.name == name)?;
-        Some((of_space[..=at].to_vec(), name.to_owned()))
-    });
-    known.into_iter().next().ok_or_else(|| {
-        let ty = named.map_or_else(|| "its type".to_owned(), |name| format!("`{}`", name.escape_debug()));
-        format!(
-            "neither the file nor the space defines {ty}: declare the topic with that type in a system of `ros2` or \
-             `ros1`, whose `types` name the folders with its definitions"
-        )
-    })
 }
 
 /// The fields that a plan declares of a message.

@@ -1,5 +1,5 @@
 //! Bags of ROS 1, version 2.0, read from start to end without their index: so a bag whose recorder was killed is read
-//! as well.
+//! as well. Whether it is all there follows from the place of the index, which is written last.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Read};
@@ -16,6 +16,7 @@ const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
 
 /// The kinds of records that are read, by their number.
 const MESSAGE: u8 = 0x02;
+const HEAD: u8 = 0x03;
 const CHUNK: u8 = 0x05;
 const CONNECTION: u8 = 0x07;
 
@@ -26,12 +27,14 @@ const MOST_DECLARED: usize = 1 << 26;
 pub(super) fn read(mut file: impl Read, path: &Path, each: Each<'_>) -> Result<(), RecordingError> {
     let mut magic = [0; MAGIC.len()];
     file.read_exact(&mut magic).map_err(|error| cut(path, &error))?;
-    let mut reader = Reader { path, each, told: BTreeSet::new(), size: 0 };
+    let mut reader = Reader { path, each, index: 0, told: BTreeSet::new(), size: 0 };
+    let mut at = MAGIC.len() as u64;
     while let Some(header) = block(&mut file, path, true)? {
         let Some(data) = block(&mut file, path, false)? else { return Err(cut_off(path)) };
         reader.record(&header, &data, true)?;
+        at += (header.len() + data.len() + 2 * size_of::<u32>()) as u64;
     }
-    Ok(())
+    if reader.index == 0 || at < reader.index { Err(cut_off(path)) } else { Ok(()) }
 }
 
 fn cut_off(path: &Path) -> RecordingError {
@@ -64,6 +67,8 @@ fn block(file: &mut impl Read, path: &Path, may_end: bool) -> Result<Option<Vec<
 struct Reader<'a, 'e> {
     path: &'a Path,
     each: Each<'e>,
+    /// Where the file has its index; zero before it has one.
+    index: u64,
     /// The connections that were told.
     told: BTreeSet<u32>,
     /// How much they say.
@@ -97,6 +102,12 @@ impl Reader<'_, '_> {
                 let size = number("size").ok_or_else(|| lacks("size"))? as usize;
                 let method = text(b"compression");
                 self.chunk(&method, size, data)
+            }
+            Some([HEAD]) => {
+                let index =
+                    || Some(u64::from_le_bytes(header.get(b"index_pos".as_slice())?.get(..8)?.try_into().ok()?));
+                self.index = index().ok_or_else(|| lacks("index_pos"))?;
+                Ok(())
             }
             Some([_]) => Ok(()),
             _ => Err(lacks("op")),
