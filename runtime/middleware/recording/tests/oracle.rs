@@ -10,12 +10,21 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use serde_json::Value as Json;
+use sesame_base::observation::{MetricObservation, Observation};
+use sesame_base::time::SimTime;
+use sesame_codec::cdr::Codec;
+use sesame_interfaces::{Catalogue, msg};
 use sesame_peers::named;
-use sesame_peers::oracle::{each_line, is};
-use sesame_recording::messages;
+use sesame_peers::oracle::{bytes, each_line, is};
+use sesame_plan::testing::{message, metric, minimal, ros2, test_of, topic};
+use sesame_plan::{MessageId, MetricSource, Recorded, Type};
+use sesame_recording::{Subject, TraceWriter, messages};
+use sesame_relay::relay::Listener as _;
 use sesame_relay::value::Value;
+use sesame_relay::wire::{Wanted, WireTable};
 
 const ORACLE: &str = "ros2/recordings_oracle.py";
+const MESSAGES: &str = "ros2/cdr_oracle.py";
 
 /// A line of it.
 #[derive(Deserialize)]
@@ -83,6 +92,74 @@ fn recordings_of_all_kinds_are_read_as_rosbags_reads_them() {
     let folder = tempfile::tempdir().unwrap();
     let compared = compare(&python, &["write", folder.path().to_str().unwrap(), "30", "7"]);
     assert_eq!(compared, 6 * (30 + 10) + 3 * 10);
+}
+
+/// A random message as rosbags writes it.
+#[derive(Deserialize)]
+struct Sample {
+    files: BTreeMap<String, String>,
+    #[serde(rename = "type")]
+    interface: String,
+    cdr: String,
+    fields: Json,
+}
+
+#[test]
+fn rosbags_reads_in_the_trace_of_a_system_of_ros_2_what_its_nodes_published() {
+    let Some(python) = named("SESAME_ROS2_CYCLONE") else { return };
+    let mut plan = minimal();
+    plan.simulator = ros2(0, Vec::new());
+    plan.campaign.record = Some(Recorded::All);
+    plan.messages.push(message("Any", Vec::new()));
+    plan.metrics.push(metric("fuzzed", MetricSource::FuzzingTime));
+    let ros = plan.simulator.ros.as_mut().unwrap();
+    let mut published: Vec<(Value, Json)> = Vec::new();
+    each_line(&python, MESSAGES, &["rosbags", "60", "11"], |sample: &Sample| {
+        // Types of one name differ from sample to sample, so each has a package of its own.
+        let package = format!("p{}", published.len());
+        let own = |text: &str| text.replace("oracle/", &format!("{package}/"));
+        let mut catalogue = Catalogue::default();
+        sample.files.iter().for_each(|(name, text)| catalogue.add(msg(&package, name, &own(text)).unwrap()));
+        let interface = own(&sample.interface);
+        let layout = catalogue.layout(&interface).unwrap();
+        let codec = Codec::new(&layout, &interface, &Wanted::All).unwrap();
+        published.push((codec.read(bytes(&sample.cdr)).unwrap(), sample.fields.clone()));
+        ros.interfaces.extend(layout);
+        let mut declared = topic(&package, &[&format!("/{package}")], Type::Message { id: MessageId(0) });
+        declared.interface = Some(interface);
+        plan.topics.push(declared);
+    });
+
+    let folder = tempfile::tempdir().unwrap();
+    let (unfinished, file) = (folder.path().join("unfinished"), folder.path().join("T1.mcap"));
+    let (wires, test) = (WireTable::new(&plan), test_of(Vec::new()));
+    let subject = Subject { plan: &plan, number: 1, test: &test, simulator_seed: 1 };
+    let mut writer = TraceWriter::create(&unfinished, subject, &wires).unwrap();
+    let time = |index: u64| SimTime::from_nanos(i64::try_from(index).unwrap() * 1_000_000_007);
+    for index in 0..3 {
+        for (wire, (value, _)) in wires.iter().zip(&published) {
+            writer.published(time(index), wire, index, value);
+        }
+    }
+    let mut observation = Observation::crashed("no run".to_owned());
+    observation.metrics.push(MetricObservation { series: vec![(0.5, 0.1)], ..MetricObservation::default() });
+    writer.keep(&observation, &file).unwrap();
+
+    // Ours and theirs, and both as it was published.
+    let compared = compare(&python, &["read", file.to_str().unwrap()]);
+    assert_eq!(compared, 3 * published.len() + 1);
+    let mut topics = ours(&file);
+    let of_metric = topics.remove("/sesame/metrics/fuzzed").unwrap();
+    let (at, Ok(value)) = &of_metric[0] else { panic!("{of_metric:?}") };
+    assert_eq!((*at, value.number_at(&["data"])), (500_000_000, Some(0.1)));
+    assert_eq!(topics.len(), published.len());
+    for ((value, fields), wire) in published.iter().zip(wires.iter()) {
+        assert!(is(value, fields));
+        for (index, (at, read)) in (0..).zip(&topics[wires.path(wire)]) {
+            assert_eq!(i64::try_from(*at).unwrap(), time(index).nanos());
+            assert!(read.as_ref().unwrap().is_same(value), "{}: bit for bit", wires.path(wire));
+        }
+    }
 }
 
 /// All recordings below a folder: files, and folders with `metadata.yaml`.
