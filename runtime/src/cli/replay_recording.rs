@@ -15,7 +15,8 @@ use crate::cli::terminal::Format;
 /// Which recording is fed.
 #[derive(Debug, Args)]
 pub struct ReplayRecordingArgs {
-    /// The recording, for example `results/42/traces/T17.mcap`
+    /// The recording, for example `results/42/traces/T17.mcap`: MCAP, `.db3` or a folder of rosbag2, or a `.bag` of
+    /// ROS 1
     #[arg(value_name = "FILE")]
     recording: PathBuf,
     /// The format of the results

@@ -54,7 +54,7 @@ pub fn feed_telling(
         feeder.message(message);
         Ok(())
     })?;
-    let Ending { run, end, busy, warnings: about_topics, messages } = ending;
+    let Ending { run, end, busy, warnings: about_topics, damage: _, messages } = ending;
     let Found { metrics, monitors, mut warnings } = feeder.finish(end, busy.as_deref());
     warnings.extend(about_topics);
     Ok(Fed { run, metrics, monitors, warnings, messages })

@@ -54,6 +54,8 @@ pub(crate) struct Ending {
     pub(crate) busy: Option<Vec<Span>>,
     /// Warnings for the user.
     pub(crate) warnings: Vec<String>,
+    /// Why there is no more of it, if it is cut off or damaged. The warnings say it too.
+    pub(crate) damage: Option<RecordingError>,
     /// Messages, as published.
     pub(crate) messages: u64,
 }
@@ -95,7 +97,10 @@ pub(crate) fn pass(
         Ok(()) => None,
         // What a runner wrote is known to be whole, or is recovered.
         Err(error) if failed || reader.subject.is_some() || reader.heard.is_empty() => return Err(error),
-        Err(error) => Some(error.damage().ok_or(error)?),
+        Err(error) => match error.damage() {
+            Some(what) => Some((what, error)),
+            None => return Err(error),
+        },
     };
     while let Some(next) = reader.order.next() {
         reader.pass(next.channel, None, next.time, &next.data, each)?;
@@ -278,7 +283,7 @@ impl Reader<'_> {
         })
     }
 
-    fn finish(self, damage: Option<String>) -> Result<Ending, RecordingError> {
+    fn finish(self, damage: Option<(String, RecordingError)>) -> Result<Ending, RecordingError> {
         if self.heard.is_empty() {
             return Err(RecordingError::NoTopics {
                 found: self.other_topics.into_iter().collect(),
@@ -289,8 +294,10 @@ impl Reader<'_> {
             |problem: &str| RecordingError::Damaged { problem: problem.to_owned(), path: self.path.to_owned() };
         let missing = self.wires.iter().filter(|wire| !self.heard.contains(wire)).map(|wire| self.wires.path(wire));
         let mut warnings: Vec<String> = missing.map(|path| format!("topic `{path}` is not in the recording")).collect();
-        warnings.extend(damage.map(|what| format!("{what}; what comes before, up to {}, is used", self.now)));
-        let mut found = Ending { run: None, end: End::Whole(self.now), busy: None, warnings, messages: self.messages };
+        let (what, damage) = damage.unzip();
+        warnings.extend(what.map(|what| format!("{what}; what comes before, up to {}, is used", self.now)));
+        let end = End::Whole(self.now);
+        let mut found = Ending { run: None, end, busy: None, warnings, damage, messages: self.messages };
         let (subject, ending) = match (&self.subject, &self.ending) {
             (Some(subject), Some(ending)) => (subject, ending),
             (Some(_), None) => return Err(damaged("it does not say how its run ended")),

@@ -28,14 +28,15 @@ pub struct Signal {
 /// The signals of a recording by name, such as `zones/Z1.level`: every number in the messages that were published on
 /// topics of the plan. Values that are not finite are left out.
 ///
-/// In a recording that no runner made, times are those since its first message on a topic of the plan.
+/// In a recording that no runner made, times are those since its first message on a topic of the plan. One that is cut
+/// off or damaged is refused: what is missing may be what matters in a lab.
 pub fn signals(
     path: &Path,
     plan: &CampaignPlan,
     wires: &WireTable,
 ) -> Result<BTreeMap<String, Signal>, RecordingError> {
     let mut collector = Collector { samples: 0, signals: BTreeMap::new() };
-    pass(path, plan, wires, &mut |message| {
+    let ending = pass(path, plan, wires, &mut |message| {
         if !message.published {
             return Ok(());
         }
@@ -48,7 +49,7 @@ pub fn signals(
         }
         Ok(())
     })?;
-    Ok(collector.signals)
+    ending.damage.map_or(Ok(collector.signals), Err)
 }
 
 struct Collector {

@@ -276,6 +276,9 @@ fn a_recording_of_another_program_that_is_cut_off_is_read_up_to_there() {
     assert_eq!(fed.messages, 2);
     let said = fed.warnings.last().unwrap();
     assert_eq!(said, "the recording is cut off; what comes before, up to 1.000 s, is used");
+    let plan = awkward_plan().0;
+    let refused = signals(&file, &plan, &WireTable::new(&plan)).unwrap_err();
+    assert!(matches!(refused, RecordingError::CutOff { .. }), "{refused}");
 }
 
 #[test]
