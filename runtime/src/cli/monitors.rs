@@ -159,11 +159,11 @@ fn recording(session: &Session, args: &MonitorsArgs, named: &std::path::Path) ->
     use crate::cli::execution::shown;
     use crate::cli::results_folder::open;
 
+    const ENDINGS: [&str; 4] = ["mcap", "db3", "bag", "zstd"];
     // The folder of a run is none of a recording.
     if named.is_file() || named.is_dir() && !named.join(sesame_record::DATABASE).is_file() {
         return Ok(named.to_owned());
     }
-    const ENDINGS: [&str; 4] = ["mcap", "db3", "bag", "zstd"];
     if named.extension().is_some_and(|extension| ENDINGS.iter().any(|ending| extension == *ending)) {
         return Err(Failure(format!("there is no recording {}", shown(named))));
     }

@@ -193,7 +193,8 @@ fn everywhere() -> [Definition; 3] {
 /// The text of a `.msg` file of ROS 2 that declares these fields.
 fn of_ros2(interface: &Interface) -> String {
     let fields = interface.fields.iter().filter(|field| field.name != ros1::NOTHING);
-    fields.map(|field| format!("{} {}\n", type_in_ros2(&field.ty), field.name)).collect()
+    let lines: Vec<String> = fields.map(|field| format!("{} {}\n", type_in_ros2(&field.ty), field.name)).collect();
+    lines.concat()
 }
 
 fn type_in_ros2(ty: &WireType) -> String {

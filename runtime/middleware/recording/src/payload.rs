@@ -75,7 +75,9 @@ fn shape(plan: &CampaignPlan, ty: &Type, value: &mut Value) {
             }
         }
         (Type::List { of }, Value::List(items)) if has_shape(of) => {
-            items.iter_mut().for_each(|item| shape(plan, of, item));
+            for item in items {
+                shape(plan, of, item);
+            }
         }
         (Type::Point { .. }, Value::Record(record)) => {
             let coordinates = AXES.map(|axis| record.get(axis).and_then(|value| value.number_at::<&str>(&[])));

@@ -134,3 +134,6 @@ impl TraceError {
 fn publish(unfinished: &Path, file: &Path) -> Result<(), TraceError> {
     fs::rename(unfinished, file).map_err(|error| TraceError::new(file, error.into()))
 }
+
+#[cfg(test)]
+mod tests;

@@ -39,7 +39,9 @@ struct Line {
 type Topics<T> = BTreeMap<String, Vec<(u64, T)>>;
 
 fn in_order<T>(mut topics: Topics<T>) -> Topics<T> {
-    topics.values_mut().for_each(|messages| messages.sort_by_key(|(time, _)| *time));
+    for messages in topics.values_mut() {
+        messages.sort_by_key(|(time, _)| *time);
+    }
     topics
 }
 

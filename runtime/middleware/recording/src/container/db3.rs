@@ -130,9 +130,8 @@ fn messages(database: &Connection, path: &Path, each: Each<'_>) -> Result<(), Re
         else {
             return Err(damaged("a message has no topic or no time"));
         };
-        let data = match row.get_ref(2).map_err(failed)? {
-            ValueRef::Blob(data) | ValueRef::Text(data) => data,
-            _ => return Err(damaged("a message is too large or has no content")),
+        let (ValueRef::Blob(data) | ValueRef::Text(data)) = row.get_ref(2).map_err(failed)? else {
+            return Err(damaged("a message is too large or has no content"));
         };
         let channel = u32::try_from(topic).map_err(|_| damaged("a message has no topic"))?;
         let time = u64::try_from(time).map_err(|_| damaged("a message is from before 1970"))?;

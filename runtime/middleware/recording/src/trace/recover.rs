@@ -45,10 +45,12 @@ fn copy(unfinished: &Path, outcome: &Outcome, saved: &Path) -> McapResult<()> {
                 reader.notify_read(read);
             }
             // The first error is where the process died.
-            Ok(LinearReadEvent::Record { opcode: op::HEADER, data }) => match (parse_record(op::HEADER, data), &started) {
-                (Ok(Record::Header(header)), None) => started = Some(start(&header.profile)?),
-                _ => break,
-            },
+            Ok(LinearReadEvent::Record { opcode: op::HEADER, data }) => {
+                match (parse_record(op::HEADER, data), &started) {
+                    (Ok(Record::Header(header)), None) => started = Some(start(&header.profile)?),
+                    _ => break,
+                }
+            }
             Ok(LinearReadEvent::Record { opcode, data }) => {
                 let Some(writer) = &mut started else { break };
                 let mut found = Vec::new();

@@ -13,8 +13,8 @@ use mcap::{McapError, McapResult, WriteOptions, Writer};
 
 use sesame_base::observation::Observation;
 use sesame_base::time::SimTime;
-use sesame_plan::{CampaignPlan, Channel, Operation, Test, TopicId};
 use sesame_codec::error::CodecError;
+use sesame_plan::{CampaignPlan, Channel, Operation, Test, TopicId};
 use sesame_relay::json::{number, quoted};
 use sesame_relay::relay::{Listener, MessageRef, OperationEvent};
 use sesame_relay::value::Value;
@@ -114,7 +114,8 @@ impl Sink {
         match written {
             Ok(()) => self.message(channel, sequence, time, payload),
             Err(error) if self.error.is_none() => {
-                self.error = Some(std::io::Error::other(format!("a message of {of} cannot be written: {error}")).into());
+                self.error =
+                    Some(std::io::Error::other(format!("a message of {of} cannot be written: {error}")).into());
             }
             Err(_) => {}
         }
