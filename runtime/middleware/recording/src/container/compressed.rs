@@ -49,6 +49,7 @@ pub(crate) fn chunk(method: &str, data: &[u8], size: usize) -> Result<Vec<u8>, W
 }
 
 /// The content of a message that is compressed by itself, of at most so many bytes.
+#[cfg(feature = "db3")]
 pub(crate) fn message(data: &[u8], most: usize) -> io::Result<Vec<u8>> {
     let mut content = Vec::new();
     let frames = Frames { rest: Some(data), now: None };
