@@ -18,7 +18,8 @@ pub(super) use compared::compared;
 /// Which recordings are compared.
 #[derive(Debug, Args)]
 pub struct MonitorsArgs {
-    /// The first recording: a file, a folder of rosbag2, a test of the run such as `T17`, or a test of another run such as `42-hall/T3`
+    /// The first recording: a file, a folder of rosbag2, a test of the run such as `T17`, or a test of another run such
+    /// as `42-hall/T3`
     first: PathBuf,
     /// The second recording, in the same notation
     second: PathBuf,

@@ -19,8 +19,8 @@ mod tests;
 /// The most messages that monitors may hear in a recording; with more, memory could run out.
 const MOST_HEARD: usize = 20_000_000;
 
-/// Reads what the monitors of a plan hear in a recording, which [may be](crate::feed()) one that no runner made. With it
-/// come the recorded run, if a runner recorded it, and warnings for the user. The network is that of the plan's
+/// Reads what the monitors of a plan hear in a recording, which [may be](crate::feed()) one that no runner made. With
+/// it come the recorded run, if a runner recorded it, and warnings for the user. The network is that of the plan's
 /// monitors.
 ///
 /// What monitors publish has no effect here: it is in the recording.

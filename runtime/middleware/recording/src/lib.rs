@@ -1,10 +1,10 @@
 //! Recordings: traces of tests are written as MCAP files, and these and the recordings of others are read.
 //!
-//! A [`TraceWriter`] writes a [`trace`] while its test runs. Whatever a recording is, it is read as messages with topics
-//! and times: MCAP, rosbag2 in SQLite, folders of either, and bags of ROS 1, compressed or not, with messages in JSON,
-//! CDR and as ROS 1 serialises them. Layouts are those that the file itself says, else those of the space. From there
-//! on all are the same: [`feed()`] gives their messages to metrics and monitors, [`monitors`] keeps what monitors hear,
-//! [`signals`] collects numbers over time.
+//! A [`TraceWriter`] writes a [`trace`] while its test runs. Whatever a recording is, it is read as messages with
+//! topics and times: MCAP, rosbag2 in SQLite, folders of either, and bags of ROS 1, compressed or not, with messages in
+//! JSON, CDR and as ROS 1 serialises them. Layouts are those that the file itself says, else those of the space. From
+//! there on all are the same: [`feed()`] gives their messages to metrics and monitors, [`monitors`] keeps what monitors
+//! hear, [`signals`] collects numbers over time.
 //!
 //! Files are not trusted: memory is bounded, whatever lengths a file claims, and what is damaged is read up to the
 //! damage, which is said.

@@ -3,9 +3,9 @@
 //! A trace contains every message as it was published, on a channel with the name of its topic; if an operation of the
 //! campaign may act on a topic, also every message as it was delivered, on a channel `TOPIC/delivered`. The actions of
 //! operations are on `sesame/operations`, the change points of each metric on `sesame/metrics/NAME`. Everything is JSON
-//! with a JSON Schema; in traces of systems of ROS, everything is as ROS records it, with messages byte for byte as they
-//! came where nobody changed them. Numbers are exact, and times are simulation time in nanoseconds. A metadata record
-//! `sesame` identifies the run, a metadata record `sesame.run` says how it ended.
+//! with a JSON Schema; in traces of systems of ROS, everything is as ROS records it, with messages byte for byte as
+//! they came where nobody changed them. Numbers are exact, and times are simulation time in nanoseconds. A metadata
+//! record `sesame` identifies the run, a metadata record `sesame.run` says how it ended.
 //!
 //! A trace is written while the test runs, under a temporary name, and gets its own name when it is complete. If the
 //! process dies during a run, the part that was written until then is recovered.

@@ -99,8 +99,8 @@ impl Repository {
         made.map_err(|e| RecordError::io("make the folder for traces", &traces, e))
     }
 
-    /// The recording of a test, or of the test whose result stands for it, if there is one: its trace, or what people put
-    /// in its place.
+    /// The recording of a test, or of the test whose result stands for it, if there is one: its trace, or what people
+    /// put in its place.
     pub fn trace(&self, test: u32, duplicate_of: Option<u32>) -> Option<PathBuf> {
         recording(self.folder(), duplicate_of.unwrap_or(test))
     }

@@ -8,7 +8,7 @@ use std::path::Path;
 use sesame_base::visible::visible;
 
 use super::compressed::{self, Wrong};
-use super::{BLOCK, Channel, Each, Entry, LARGEST, Message, Schema};
+use super::entry::{BLOCK, Channel, Each, Entry, LARGEST, Message, Schema};
 use crate::error::RecordingError;
 
 /// What stands before the first record.

@@ -9,7 +9,7 @@ use rusqlite::{Connection, OpenFlags, Row, ffi};
 use sesame_base::visible::visible;
 
 use super::compressed::{self, ZSTD};
-use super::{Channel, Each, Entry, LARGEST, Message, Schema};
+use super::entry::{Channel, Each, Entry, LARGEST, Message, Schema};
 use crate::error::RecordingError;
 
 /// The most topics of a file.

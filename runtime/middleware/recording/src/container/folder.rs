@@ -23,8 +23,8 @@ pub(super) fn of(path: &Path) -> Option<&Path> {
     Some(if folder.as_os_str().is_empty() { Path::new(".") } else { folder })
 }
 
-/// The files of a folder, in their order in time: those that `metadata.yaml` names. Without it, because the recorder was
-/// killed, all that there are.
+/// The files of a folder, in their order in time: those that `metadata.yaml` names. Without it, because the recorder
+/// was killed, all that there are.
 pub(super) fn files(folder: &Path) -> Result<Vec<PathBuf>, RecordingError> {
     let unreadable = |error| RecordingError::unreadable(folder, &error);
     let metadata = folder.join(METADATA);

@@ -14,7 +14,7 @@ use mcap::{McapError, McapResult, parse_record};
 use sesame_base::visible::visible;
 
 use super::compressed::{self, Wrong};
-use super::{BLOCK, Channel, Each, Entry, LARGEST, Message, Schema};
+use super::entry::{BLOCK, Channel, Each, Entry, LARGEST, Message, Schema};
 use crate::error::RecordingError;
 
 /// The most bytes of all schemas and channels of a file together.
