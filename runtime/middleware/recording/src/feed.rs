@@ -10,6 +10,7 @@ use sesame_relay::wire::WireTable;
 
 use crate::error::RecordingError;
 use crate::pass::{self, Ending, RecordedRun};
+use crate::payload::Reads;
 
 /// The result of feeding a recording to a campaign's metrics.
 #[derive(Debug)]
@@ -50,7 +51,7 @@ pub fn feed_telling(
     // The fuzzing time at each moment follows from what is said at the end of a trace.
     let busy = if asks_for_busy(plan) { pass::busy(path)? } else { None };
     let mut feeder = Feeder::new(plan, wires, table, busy.as_deref().unwrap_or_default(), decided);
-    let ending = pass::pass(path, plan, wires, &mut |message| {
+    let ending = pass::pass(path, plan, wires, Reads::Used, &mut |message| {
         feeder.message(message);
         Ok(())
     })?;

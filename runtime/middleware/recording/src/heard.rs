@@ -12,6 +12,7 @@ use sesame_relay::wire::WireTable;
 
 use crate::error::RecordingError;
 use crate::pass::{Ending, RecordedRun, pass};
+use crate::payload::Reads;
 
 #[cfg(test)]
 mod tests;
@@ -32,7 +33,7 @@ pub fn monitors<'p>(
 ) -> Result<(RecordedMonitors<'p>, Option<RecordedRun>, Vec<String>), RecordingError> {
     let mut heard = RecordedMonitors::new(plan, wires, Arc::clone(network));
     let mut last = SimTime::ZERO;
-    let Ending { run, end, mut warnings, .. } = pass(path, plan, wires, &mut |message| {
+    let Ending { run, end, mut warnings, .. } = pass(path, plan, wires, Reads::Used, &mut |message| {
         last = message.time;
         for (side, is_so) in [(Side::Inbound, message.published), (Side::Outbound, message.delivered)] {
             if is_so {

@@ -17,7 +17,7 @@ use crate::container::{Channel, Entry, Message, read};
 use crate::error::RecordingError;
 use crate::layout::Unreadable;
 use crate::order::Order;
-use crate::payload::Payloads;
+use crate::payload::{Payloads, Reads};
 use crate::trace::{ROLE, ROLE_DELIVERED, ROLE_PUBLISHED, RUN, SUBJECT, TOPIC};
 
 /// The run that a trace is of.
@@ -65,15 +65,20 @@ pub(crate) struct Ending {
 /// The messages of a runner's trace come in the same order as in its run. In any other recording, the messages on
 /// topics of the space count, with times since the first of them, both as published and as delivered; if it is cut off
 /// or damaged, what comes before is passed on, with a warning. The file is read once from start to end, in bounded
-/// memory.
+/// memory. Messages in bytes have only those fields that are read.
 pub(crate) fn pass(
     path: &Path,
     plan: &CampaignPlan,
     wires: &WireTable,
+    reads: Reads,
     each: &mut dyn FnMut(&Passing<'_>) -> Result<(), RecordingError>,
 ) -> Result<Ending, RecordingError> {
+    // Where traces are recorded, all is wanted.
+    let mut unrecorded = plan.clone();
+    unrecorded.campaign.record = None;
     let mut reader = Reader {
-        plan,
+        plan: &unrecorded,
+        reads,
         wires,
         path,
         file: 0,
@@ -145,6 +150,7 @@ struct Line {
 
 struct Reader<'a> {
     plan: &'a CampaignPlan,
+    reads: Reads,
     wires: &'a WireTable,
     path: &'a Path,
     /// How many files of the recording have begun.
@@ -221,16 +227,18 @@ impl Reader<'_> {
         let path = || self.path.to_owned();
         let topic = || visible(&channel.topic);
         let payloads =
-            Payloads::new(self.plan, self.wires.topic(wire), channel).map_err(|unreadable| match unreadable {
-                Unreadable::Encoding => RecordingError::Encoding {
-                    topic: topic(),
-                    encoding: channel.encoding.escape_debug().to_string(),
-                    path: path(),
+            Payloads::new(self.plan, self.wires.topic(wire), channel, self.reads).map_err(
+                |unreadable| match unreadable {
+                    Unreadable::Encoding => RecordingError::Encoding {
+                        topic: topic(),
+                        encoding: channel.encoding.escape_debug().to_string(),
+                        path: path(),
+                    },
+                    Unreadable::Layout(reason) => {
+                        RecordingError::Layout { topic: topic(), reason: visible(&reason), path: path() }
+                    }
                 },
-                Unreadable::Layout(reason) => {
-                    RecordingError::Layout { topic: topic(), reason: visible(&reason), path: path() }
-                }
-            })?;
+            )?;
         let delivered = role == Some(ROLE_DELIVERED);
         self.delivered_apart[wire.index()] |= delivered;
         self.heard.insert(wire);

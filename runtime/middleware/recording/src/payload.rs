@@ -5,29 +5,44 @@ use serde_json::value::RawValue;
 
 use sesame_plan::{CampaignPlan, TopicId, Type};
 use sesame_relay::json::{Shapes, decode};
-use sesame_relay::message::fits;
+use sesame_relay::message::{Mismatch, fits};
 use sesame_relay::value::{Fields, Record, Value};
-use sesame_relay::wire::Wanted;
+use sesame_relay::wire::{Wanted, wanted};
 
 use crate::container::Channel;
 use crate::layout::{Bytes, Unreadable};
 
+/// What of each message somebody reads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Reads {
+    /// All that the space declares.
+    Declared,
+    /// What metrics and monitors read: of a cloud of points that nobody reads, no point becomes a value.
+    Used,
+}
+
 /// Reads the messages of a channel as those of a topic of a plan.
 pub(crate) enum Payloads {
     Json,
-    Bytes(Bytes),
+    /// Of these fields.
+    Bytes(Bytes, Wanted),
 }
 
 impl Payloads {
     /// For the messages of a channel, which are those of this topic.
-    pub(crate) fn new(plan: &CampaignPlan, topic: TopicId, channel: &Channel) -> Result<Self, Unreadable> {
+    pub(crate) fn new(plan: &CampaignPlan, id: TopicId, channel: &Channel, reads: Reads) -> Result<Self, Unreadable> {
         if channel.encoding == "json" {
             return Ok(Payloads::Json);
         }
-        let topic = plan.topic(topic);
+        let topic = plan.topic(id);
         let known = plan.simulator.ros.as_ref().map_or(&[][..], |ros| &ros.interfaces);
-        let wanted = declared_fields(plan, &topic.ty);
-        Bytes::new(channel, known, topic.interface.as_deref(), &wanted).map(Payloads::Bytes)
+        let wanted = match reads {
+            Reads::Declared => Wanted::All,
+            Reads::Used => wanted(plan, id),
+        };
+        let wanted = declared_fields(plan, &topic.ty, &wanted);
+        let bytes = Bytes::new(channel, known, topic.interface.as_deref(), &wanted)?;
+        Ok(Payloads::Bytes(bytes, wanted))
     }
 
     /// Reads a message of the declared type.
@@ -38,21 +53,36 @@ impl Payloads {
         ty: &Type,
         data: &[u8],
     ) -> Result<Value, String> {
-        let mut value = match self {
-            Payloads::Json => return json(plan, shapes, ty, data),
-            Payloads::Bytes(bytes) => bytes.read(data)?,
-        };
+        let Payloads::Bytes(bytes, wanted) = self else { return json(plan, shapes, ty, data) };
+        let mut value = bytes.read(data)?;
         shape(plan, ty, &mut value);
-        fits(plan, ty, &value).map_err(|mismatch| mismatch.to_string())?;
+        has(plan, ty, wanted, &value).map_err(|mismatch| mismatch.to_string())?;
         Ok(value)
     }
 }
 
-/// The fields that a plan declares of a message.
-fn declared_fields(plan: &CampaignPlan, ty: &Type) -> Wanted {
+/// The fields that a plan declares of a message, as far as they are wanted.
+fn declared_fields(plan: &CampaignPlan, ty: &Type, wanted: &Wanted) -> Wanted {
     let Type::Message { id } = ty else { return Wanted::All };
-    let fields = plan.message(*id).fields.iter();
-    Wanted::Fields(fields.map(|field| (field.name.clone(), declared_fields(plan, &field.ty))).collect())
+    let fields = plan.message(*id).fields.iter().filter_map(|field| {
+        let wanted = match wanted {
+            Wanted::All => &Wanted::All,
+            Wanted::Fields(fields) => fields.get(&field.name)?,
+        };
+        Some((field.name.clone(), declared_fields(plan, &field.ty, wanted)))
+    });
+    Wanted::Fields(fields.collect())
+}
+
+/// Whether a value has what is wanted, of its declared types.
+fn has(plan: &CampaignPlan, ty: &Type, wanted: &Wanted, value: &Value) -> Result<(), Mismatch> {
+    let (Type::Message { id }, Wanted::Fields(wanted)) = (ty, wanted) else { return fits(plan, ty, value) };
+    let Value::Record(record) = value else { return Err(Mismatch::new("message", value)) };
+    let declared = plan.message(*id).fields.iter();
+    declared.filter_map(|field| Some((field, wanted.get(&field.name)?))).try_for_each(|(field, wanted)| {
+        let value = record.get(&field.name).ok_or_else(|| Mismatch::missing(&field.name))?;
+        has(plan, &field.ty, wanted, value).map_err(|mismatch| mismatch.inside(&field.name))
+    })
 }
 
 /// Gives a value the shape that the plan declares, where another one means the same: points and messages of their

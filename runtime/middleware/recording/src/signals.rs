@@ -9,6 +9,7 @@ use sesame_relay::wire::WireTable;
 
 use crate::error::RecordingError;
 use crate::pass::pass;
+use crate::payload::Reads;
 
 /// The most samples that are read of a recording; with more, memory could run out.
 const MOST_SAMPLES: usize = 50_000_000;
@@ -36,7 +37,7 @@ pub fn signals(
     wires: &WireTable,
 ) -> Result<BTreeMap<String, Signal>, RecordingError> {
     let mut collector = Collector { samples: 0, signals: BTreeMap::new() };
-    let ending = pass(path, plan, wires, &mut |message| {
+    let ending = pass(path, plan, wires, Reads::Declared, &mut |message| {
         if !message.published {
             return Ok(());
         }

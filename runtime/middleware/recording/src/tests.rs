@@ -281,6 +281,38 @@ fn a_recording_of_another_program_that_is_cut_off_is_read_up_to_there() {
     assert!(matches!(refused, RecordingError::CutOff { .. }), "{refused}");
 }
 
+/// A recording of one message in CDR, with its definition.
+fn in_cdr(file: &Path, topic: &str, name: &str, definition: &str, fields: &[u8]) {
+    let mut writer = WriteOptions::new().create(File::create(file).unwrap()).unwrap();
+    let schema = writer.add_schema(name, "ros2msg", definition.as_bytes()).unwrap();
+    let channel_id = writer.add_channel(schema, topic, "cdr", &BTreeMap::new()).unwrap();
+    let header = MessageHeader { channel_id, sequence: 0, log_time: 1, publish_time: 1 };
+    writer.write_to_known_channel(&header, &[&[0, 1, 0, 0], fields].concat()).unwrap();
+    writer.finish().unwrap();
+}
+
+#[test]
+fn a_message_has_to_have_what_is_read_of_it_and_may_be_of_another_shape() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("cdr.mcap");
+    // The space declares `level` and `count`, and no metric reads them.
+    let plan = awkward_plan().0;
+    let wires = WireTable::new(&plan);
+    in_cdr(&file, "zones/Z1", "p/msg/Zone", "float64 level", &1.5f64.to_le_bytes());
+    assert_eq!(fed(&file, &plan).unwrap().messages, 1, "nobody reads what is missing");
+    let said = signals(&file, &plan, &wires).unwrap_err().to_string();
+    assert!(said.contains("field `count`: expected a value, found nothing"), "{said}");
+    // A real that is a message of its own, as in `std_msgs`.
+    in_cdr(&file, "arm/command", "std_msgs/msg/Float64", "float64 data", &2.5f64.to_le_bytes());
+    assert_eq!(fed(&file, &plan).unwrap().metrics[1].value, Some(2.5));
+    in_cdr(&file, "arm/command", "std_msgs/msg/String", "string data", &[2, 0, 0, 0, b'a', 0]);
+    let said = fed(&file, &plan).unwrap_err().to_string();
+    assert!(said.contains("not of its declared type: expected real, found text"), "{said}");
+    in_cdr(&file, "arm/command", "std_msgs/msg/Float64", "nonsense", &[]);
+    let said = fed(&file, &plan).unwrap_err().to_string();
+    assert!(said.contains("the definition of `std_msgs/msg/Float64` in the file: line 1"), "{said}");
+}
+
 #[test]
 fn what_cannot_be_fed_is_said_in_words() {
     let folder = tempfile::tempdir().unwrap();
