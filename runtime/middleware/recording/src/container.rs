@@ -15,7 +15,13 @@ use std::path::Path;
 use crate::error::RecordingError;
 
 use entry::BLOCK;
+#[cfg(feature = "db3")]
+use entry::LARGEST;
 pub(crate) use entry::{Channel, Each, Entry, Message, Schema};
+
+/// How many times larger than the file what is compressed in it may be.
+#[cfg(feature = "db3")]
+const MOST_GROWTH: u64 = 1000;
 
 /// What stands at the beginning of a file that tells its format.
 const HEAD: usize = 16;
@@ -90,8 +96,14 @@ fn sqlite(file: &Path, path: &Path, each: Each<'_>) -> Result<(), RecordingError
 #[cfg(feature = "db3")]
 fn unpacked(content: &mut dyn Read, path: &Path, each: Each<'_>) -> Result<(), RecordingError> {
     let unreadable = |error: io::Error| RecordingError::unreadable(path, &error);
+    let packed = std::fs::metadata(path).map_err(unreadable)?.len();
+    // A few bytes cannot fill the disk.
+    let most = packed.saturating_mul(MOST_GROWTH).saturating_add(LARGEST as u64);
     let mut file = tempfile::NamedTempFile::new().map_err(unreadable)?;
-    io::copy(content, &mut file).map_err(unreadable)?;
+    if io::copy(&mut content.take(most), &mut file).map_err(unreadable)? == most {
+        let problem = format!("it grows to more than {MOST_GROWTH} times its size");
+        return Err(RecordingError::Damaged { problem, path: path.to_owned() });
+    }
     sqlite(file.path(), path, each)
 }
 

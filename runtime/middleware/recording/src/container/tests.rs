@@ -163,6 +163,22 @@ fn a_database_that_is_no_recording_is_refused_and_one_with_less_than_all_is_read
     assert!(matches!(read, Err(RecordingError::Damaged { .. })), "a message without content");
 }
 
+#[cfg(feature = "db3")]
+#[test]
+fn a_compressed_database_that_grows_without_end_is_refused() {
+    // A frame of Zstandard: the beginning of a database as it is, then blocks that are one byte 131,072 times.
+    let block = |last: bool, kind: u32, size: u32| (size << 3 | kind << 1 | u32::from(last)).to_le_bytes();
+    let mut packed = [&compressed::ZSTD[..], &[0, 0x50]].concat();
+    packed.extend(&block(false, 0, 16)[..3]);
+    packed.extend(b"SQLite format 3\0");
+    for at in 0..1500 {
+        packed.extend(&block(at == 1499, 1, 1 << 17)[..3]);
+        packed.push(0);
+    }
+    let (_, read) = told(&packed);
+    assert!(read.unwrap_err().to_string().contains("grows to more than 1000 times its size"));
+}
+
 proptest! {
     #[test]
     fn no_bytes_are_too_much(start in 0usize..5, bytes in proptest::collection::vec(any::<u8>(), 0..300)) {
