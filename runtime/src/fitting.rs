@@ -14,8 +14,8 @@ use sesame_gap::discrepancy::discrepancy;
 use sesame_gap::fit::minimise;
 use sesame_gap::series::{Between, Series};
 use sesame_plan::{Adjustment, CampaignPlan, Compensation, Fit, Fitted, LabTask, Recorded, Test};
-use sesame_record::{RecordError, Repository, trace_file};
-use sesame_relay::trace::{self, RecordingError, Signal};
+use sesame_record::{RecordError, Repository, recording};
+use sesame_recording::{self as trace, RecordingError, Signal};
 use sesame_relay::wire::WireTable;
 use sesame_rng::derive_seed;
 
@@ -79,8 +79,7 @@ pub(crate) fn lab_traces(lab: &Repository, task: &LabTask) -> Result<Vec<LabTrac
     for selected in &task.tests {
         let mut runs = Vec::new();
         for row in rows.iter().filter(|row| row.test == selected.test) {
-            let file = trace_file(lab.folder(), row.number);
-            if file.is_file() {
+            if let Some(file) = recording(lab.folder(), row.number) {
                 runs.push(trace::signals(&file, plan, &wires)?);
             }
         }

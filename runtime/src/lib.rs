@@ -54,7 +54,7 @@ pub use sesame_plan as plan;
 #[cfg(feature = "campaign")]
 pub use sesame_record as record;
 #[cfg(feature = "mcap")]
-pub use sesame_relay::trace;
+pub use sesame_recording as trace;
 pub use sesame_relay::{evaluate, fuzz, message, metric, relay, simulator, value, wire};
 #[cfg(feature = "campaign")]
 pub use sesame_report as report;

@@ -17,9 +17,9 @@ use clap::{CommandFactory as _, FromArgMatches as _, Parser};
 use sesame_base::gathered::gathered;
 use sesame_base::visible::{visible, visible_lines};
 use sesame_plan::{CampaignPlan, Endpoint, Monitor, is_shared};
+use sesame_recording::feed_telling;
 use sesame_relay::metric::MetricTable;
 use sesame_relay::monitor::Decided;
-use sesame_relay::trace::feed_telling;
 use sesame_relay::transport::Connect;
 use sesame_relay::wire::WireTable;
 
@@ -41,7 +41,8 @@ const ABOUT: &str = "Exit codes: 0 done: the recording or the input has ended, o
 #[derive(Debug, Parser)]
 #[command(version, after_help = ABOUT)]
 struct StandaloneArgs {
-    /// Run on a recording instead of a system: an MCAP file, as campaigns record with `record mcap`
+    /// Run on a recording instead of a system: MCAP, as campaigns record with `record mcap`, a folder of rosbag2 with
+    /// MCAP, or a `.bag` of ROS 1
     #[arg(long, value_name = "FILE", conflicts_with_all = ["program", "domain", "url"])]
     recording: Option<PathBuf>,
     /// The format of decisions on standard output; JSON has one object per line

@@ -5,9 +5,9 @@ use std::fs;
 use std::path::PathBuf;
 
 use sesame_record::Repository;
+use sesame_recording::feed_telling;
 use sesame_relay::metric::MetricTable;
 use sesame_relay::monitor::Decided;
-use sesame_relay::trace::feed_telling;
 use sesame_relay::wire::WireTable;
 use sesame_tests::{Project, fresh_folder, workspace};
 

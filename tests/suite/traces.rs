@@ -91,7 +91,7 @@ fn failing_tests_have_traces_for_every_cause_of_failure_and_others_have_none() {
         }
     }
     let missing = runner.run(&["replay-recording", "r/3/results.sqlite"]).expect(1);
-    assert!(missing.err.contains("this is not an MCAP file"), "{}", missing.err);
+    assert!(missing.err.contains("this is no recording that can be read"), "{}", missing.err);
 }
 
 #[test]

@@ -39,7 +39,7 @@ pub(super) fn run(
     };
     #[cfg(feature = "mcap")]
     {
-        use sesame_relay::trace::{Subject, TraceWriter};
+        use sesame_recording::{Subject, TraceWriter};
 
         let subject = Subject { plan, number: job.number, test, simulator_seed: *simulator_seed };
         let mut writer = match TraceWriter::create(&directory.join(UNFINISHED), subject, wires) {
@@ -69,7 +69,7 @@ pub(super) fn run(
 pub(super) fn save(request: &TraceRequest, directory: &Path, outcome: &Outcome) -> Result<(), String> {
     #[cfg(feature = "mcap")]
     {
-        sesame_relay::trace::recover(&directory.join(UNFINISHED), outcome, &request.file)
+        sesame_recording::recover(&directory.join(UNFINISHED), outcome, &request.file)
             .map_err(|error| error.to_string())
     }
     #[cfg(not(feature = "mcap"))]

@@ -141,6 +141,11 @@ pub enum Internal {
 }
 
 impl Running {
+    /// Whether it only reads recordings, so that it reaches no simulator.
+    pub fn only_reads(&self) -> bool {
+        matches!(self, Running::ReplayRecording(_) | Running::Monitors(_))
+    }
+
     pub(super) fn carry_out(&self, session: &Session) -> Result<ExitCode, Failure> {
         match self {
             Running::Resume(args) => run::resume(session, args),

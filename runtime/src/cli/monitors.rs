@@ -18,7 +18,8 @@ pub(super) use compared::compared;
 /// Which recordings are compared.
 #[derive(Debug, Args)]
 pub struct MonitorsArgs {
-    /// The first recording: a file, a test of the run such as `T17`, or a test of another run such as `42-hall/T3`
+    /// The first recording: a file, a folder of rosbag2, a test of the run such as `T17`, or a test of another run such
+    /// as `42-hall/T3`
     first: PathBuf,
     /// The second recording, in the same notation
     second: PathBuf,
@@ -159,10 +160,12 @@ fn recording(session: &Session, args: &MonitorsArgs, named: &std::path::Path) ->
     use crate::cli::execution::shown;
     use crate::cli::results_folder::open;
 
-    if named.is_file() {
+    const ENDINGS: [&str; 4] = ["mcap", "db3", "bag", "zstd"];
+    // The folder of a run is none of a recording.
+    if named.is_file() || named.is_dir() && !named.join(sesame_record::DATABASE).is_file() {
         return Ok(named.to_owned());
     }
-    if named.extension().is_some_and(|extension| extension == "mcap") {
+    if named.extension().is_some_and(|extension| ENDINGS.iter().any(|ending| extension == *ending)) {
         return Err(Failure(format!("there is no recording {}", shown(named))));
     }
     let folder = named.parent().filter(|folder| !folder.as_os_str().is_empty());

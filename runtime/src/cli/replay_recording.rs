@@ -15,7 +15,8 @@ use crate::cli::terminal::Format;
 /// Which recording is fed.
 #[derive(Debug, Args)]
 pub struct ReplayRecordingArgs {
-    /// The recording, for example `results/42/traces/T17.mcap`
+    /// The recording, for example `results/42/traces/T17.mcap`: MCAP, `.db3` or a folder of rosbag2, or a `.bag` of
+    /// ROS 1
     #[arg(value_name = "FILE")]
     recording: PathBuf,
     /// The format of the results
@@ -38,9 +39,10 @@ pub(super) fn replay_recording(session: &Session, args: &ReplayRecordingArgs) ->
     use std::panic::{self, AssertUnwindSafe};
 
     use sesame_base::gathered::gathered;
+    use sesame_recording as trace;
     use sesame_relay::metric::MetricTable;
+    use sesame_relay::panic_capture;
     use sesame_relay::wire::WireTable;
-    use sesame_relay::{panic_capture, trace};
     use sesame_report::recording_text;
 
     use super::execution::refuse_unfilled;
@@ -71,7 +73,7 @@ pub(super) fn replay_recording(session: &Session, args: &ReplayRecordingArgs) ->
 fn compared(
     plan: &CampaignPlan,
     args: &ReplayRecordingArgs,
-    fed: sesame_relay::trace::Fed,
+    fed: sesame_recording::Fed,
 ) -> sesame_report::RecordingReplay {
     use sesame_base::visible::visible;
     use sesame_record::MetricValue;

@@ -96,10 +96,10 @@ impl<'a> Found<'a> {
         &self.checked.plans[self.chosen]
     }
 
-    /// The runner as data, if the campaign needs no Rust.
-    fn interpreted(&self) -> anyhow::Result<Option<Interpreted>> {
+    /// The runner as data, if the campaign needs no Rust beyond these features.
+    fn interpreted(&self, is_there: fn(feature: &str) -> bool) -> anyhow::Result<Option<Interpreted>> {
         let file = &self.generation.file;
-        if self.plan().needs_rust(is_built_in) || environment::runtime_is_chosen(file, &self.generation.options())? {
+        if self.plan().needs_rust(is_there) || environment::runtime_is_chosen(file, &self.generation.options())? {
             return Ok(None);
         }
         let (space, simulator) = environment::program_folders(file, self.plan())?;
@@ -126,7 +126,7 @@ pub(super) fn run(
     let found = Found::find(shell, language, generation)?;
     // These concern the crate.
     let build = build || generation.force || generation.templates.is_some();
-    if !build && let Some(interpreted) = found.interpreted()? {
+    if !build && let Some(interpreted) = found.interpreted(is_built_in)? {
         return Ok(sesame_runtime::cli::interpret(&interpreted, found.caller, arguments));
     }
     let allowed = arguments.iter().any(|argument| argument == "--allow-unimplemented");
@@ -142,7 +142,9 @@ pub(super) fn running(
 ) -> anyhow::Result<ExitCode> {
     let generation = named(matches);
     let found = Found::find(shell, language, &generation)?;
-    if let Some(interpreted) = found.interpreted()? {
+    // No middleware is needed to read a file.
+    let is_there = if command.only_reads() { |_: &str| true } else { is_built_in };
+    if let Some(interpreted) = found.interpreted(is_there)? {
         return Ok(sesame_runtime::cli::carry_out(command, &interpreted, found.caller));
     }
     let mut arguments = vec![OsString::from(name)];

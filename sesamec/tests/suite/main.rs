@@ -13,5 +13,6 @@ mod originals;
 #[path = "../../../sesame-codegen/tests/suite/plans.rs"]
 mod plans;
 mod random_originals;
+mod recordings;
 mod said_of_originals;
 mod scan;

@@ -6,9 +6,9 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 
 use sesame_base::time::SimTime;
 use sesame_plan::Test;
+use sesame_recording::{Subject, TraceWriter};
 use sesame_relay::metric::MetricTable;
 use sesame_relay::relay::{Exchange as _, Relay};
-use sesame_relay::trace::{Subject, TraceWriter};
 use sesame_relay::value::{Fields, Record};
 use sesame_relay::wire::WireTable;
 

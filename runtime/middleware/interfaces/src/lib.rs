@@ -6,6 +6,7 @@
 //! Files of ROS 1 are read by [`ros1`].
 
 pub mod action;
+pub mod bundle;
 mod catalogue;
 mod idl;
 pub mod mavlink;

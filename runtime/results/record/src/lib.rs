@@ -69,7 +69,7 @@ pub use difference::{Difference, differences};
 pub use each_test::{NoPoint, ScannedOperation, ScannedTest};
 pub use entered::{ENTERED_OUTCOMES, Entered, EnteredRun, Provenance, entered_outcome};
 pub use error::RecordError;
-pub use files::{DATABASE, LOCK, TRACES, trace_file};
+pub use files::{DATABASE, LOCK, TRACES, recording, trace_file};
 pub use folder::{Claim, claim_folder, latest_folder, latest_unfinished};
 pub use left_out_operations::{LeftOutOperations, NOT_IMPORTED, not_imported};
 pub use original_extents::OriginalExtent;

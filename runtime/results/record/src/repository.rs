@@ -9,7 +9,7 @@ use sesame_plan::{CampaignPlan, Task};
 use sesame_search::indicators::GenerationIndicators;
 
 use crate::columns::{finite, perhaps_finite, position};
-use crate::files::{DATABASE, TRACES, trace_file};
+use crate::files::{DATABASE, TRACES, recording};
 use crate::{Event, EventKind, GenerationCoverage, RecordError, ResultSet, Session, Status, plan, recognise, schema};
 
 /// The results of one campaign run, to be read.
@@ -99,9 +99,10 @@ impl Repository {
         made.map_err(|e| RecordError::io("make the folder for traces", &traces, e))
     }
 
-    /// The trace of a test, or of the test whose result stands for it, if there is one.
+    /// The recording of a test, or of the test whose result stands for it, if there is one: its trace, or what people
+    /// put in its place.
     pub fn trace(&self, test: u32, duplicate_of: Option<u32>) -> Option<PathBuf> {
-        Some(trace_file(self.folder(), duplicate_of.unwrap_or(test))).filter(|file| file.exists())
+        recording(self.folder(), duplicate_of.unwrap_or(test))
     }
 
     /// What is fixed for the run.

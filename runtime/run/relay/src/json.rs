@@ -6,7 +6,7 @@
 
 #[cfg(feature = "process")]
 mod codec;
-#[cfg(any(feature = "process", feature = "mcap"))]
+#[cfg(any(feature = "process", feature = "recordings"))]
 mod declared;
 
 use std::io::Write as _;
@@ -16,8 +16,8 @@ use crate::value::Value;
 
 #[cfg(feature = "process")]
 pub use codec::Codec;
-#[cfg(any(feature = "process", feature = "mcap"))]
-pub(crate) use declared::{Shapes, decode};
+#[cfg(any(feature = "process", feature = "recordings"))]
+pub use declared::{Shapes, decode};
 
 /// The largest whole number up to which JSON's reals are exact.
 const EXACT: f64 = 9_007_199_254_740_992.0;
@@ -59,7 +59,7 @@ fn mismatch(expected: &'static str, text: &str) -> Mismatch {
 }
 
 /// Writes a payload.
-pub(crate) fn encode(value: &Value, out: &mut Vec<u8>) {
+pub fn encode(value: &Value, out: &mut Vec<u8>) {
     match value {
         Value::Bool(b) => out.extend_from_slice(if *b { b"true" } else { b"false" }),
         Value::Int(n) => write!(out, "{n}").expect("memory takes all that is written"),
@@ -100,7 +100,7 @@ fn row<T>(items: &[T], out: &mut Vec<u8>, each: fn(&T, &mut Vec<u8>)) {
 }
 
 /// Writes a real number, or the string that represents it.
-pub(crate) fn number(x: f64, out: &mut Vec<u8>) {
+pub fn number(x: f64, out: &mut Vec<u8>) {
     if x.is_finite() {
         serde_json::to_writer(out, &x).expect("memory takes all that is written");
     } else {
@@ -116,6 +116,6 @@ pub(crate) fn number(x: f64, out: &mut Vec<u8>) {
 }
 
 /// Writes a string in quotes.
-pub(crate) fn quoted(text: &str, out: &mut Vec<u8>) {
+pub fn quoted(text: &str, out: &mut Vec<u8>) {
     serde_json::to_writer(out, text).expect("memory takes all that is written");
 }

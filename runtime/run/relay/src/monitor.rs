@@ -11,8 +11,8 @@ mod decided;
 mod evidence;
 mod outlet;
 mod record;
-#[cfg(feature = "mcap")]
-pub(crate) mod recorded;
+#[cfg(feature = "recordings")]
+pub mod recorded;
 mod scores;
 
 use std::collections::VecDeque;

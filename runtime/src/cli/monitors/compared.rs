@@ -11,7 +11,7 @@ use sesame_monitor::difference::{Deviation, Disagreement, Leads, Value, disagree
 use sesame_monitor::tolerance::{Limit, Tolerance};
 use sesame_monitor::{EvidenceId, Network, State};
 use sesame_plan::{CampaignPlan, MonitorId, MonitorState};
-use sesame_relay::trace::{self, Heard, RecordedMonitors, RecordedRun};
+use sesame_recording::{self as trace, Heard, RecordedMonitors, RecordedRun};
 use sesame_relay::wire::WireTable;
 use sesame_report::{
     BrokenDecision, ComparedMonitor, ComparedRecording, DecisionDifference, DelayTolerance, EvidenceCause,

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use sesame_analysis::gap::{LabRun, dimensions, points};
 use sesame_analysis::traces::{Signal, Signals, TracedTest};
 use sesame_plan::{CampaignPlan, Lab};
-use sesame_record::{Repository, trace_file};
+use sesame_record::{Repository, recording};
 use sesame_runtime::trace;
 use sesame_runtime::wire::WireTable;
 
@@ -32,13 +32,12 @@ pub(super) fn read(
     for test in tests {
         let simulated = match again {
             Some(runs) => simulated_again(runs, test),
-            None => Some(trace_file(campaign.folder(), test)).filter(|file| file.is_file()),
+            None => recording(campaign.folder(), test),
         };
         let Some(simulated) = simulated else { continue };
         let runs = labs.iter().flat_map(|(folder, runs)| runs.iter().map(move |run| (folder, run)));
         let of_test = runs.filter(|(_, run)| run.of == test);
-        let files: Vec<PathBuf> =
-            of_test.map(|(folder, run)| trace_file(folder, run.row.number)).filter(|file| file.is_file()).collect();
+        let files: Vec<PathBuf> = of_test.filter_map(|(folder, run)| recording(folder, run.row.number)).collect();
         if files.is_empty() {
             continue;
         }
@@ -59,7 +58,7 @@ pub(super) fn read_again(plan: &CampaignPlan, again: &Runs) -> anyhow::Result<BT
 /// The trace of the first run in which a test was simulated again.
 fn simulated_again((folder, runs): &Runs, test: u32) -> Option<PathBuf> {
     let run = runs.iter().find(|run| run.of == test)?;
-    Some(trace_file(folder, run.row.number)).filter(|file| file.is_file())
+    recording(folder, run.row.number)
 }
 
 fn signals(plan: &CampaignPlan, file: &Path) -> anyhow::Result<Signals> {

@@ -25,7 +25,7 @@ use crate::frontend::Language;
 pub(in crate::cli) struct Asked {
     /// The `.sesame` file with the lab.
     file: PathBuf,
-    /// A recording (MCAP): of a run without the object, or with the other robot parked.
+    /// A recording (MCAP, rosbag2, or a bag of ROS 1): of a run without the object, or with the other robot parked.
     recording: PathBuf,
     /// A second recording of the same test, in which the other robot moved and the first one was parked.
     #[arg(requires = "second")]

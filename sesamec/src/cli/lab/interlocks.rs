@@ -10,7 +10,7 @@ use anyhow::{bail, ensure};
 use clap::Args;
 
 use sesame_analysis::{Datum, Table, TestNumber};
-use sesame_record::{Repository, trace_file};
+use sesame_record::{Repository, recording};
 use sesame_safety::interlock::{Equivalence, Judgement, Response};
 
 use super::brief::{how_to_record, no_trace};
@@ -62,11 +62,10 @@ pub(super) fn print_interlocks(shell: Shell, asked: &Asked) -> anyhow::Result<()
     let mut untraced = Vec::new();
     for test in tests {
         let name = format!("T{test}");
-        let file = trace_file(repository.folder(), test);
-        if !file.is_file() {
+        let Some(file) = recording(repository.folder(), test) else {
             untraced.push(TestNumber(test));
             continue;
-        }
+        };
         let signals = signals(plan, &file)?;
         let shapes = shapes.iter().map(|shape| recorded(plan, shape, (0, &signals, 0.0)));
         let meetings = meetings(&shapes.collect::<Result<Vec<_>, _>>()?)?.into_iter();

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use sesame_base::gathered::gathered;
 use sesame_present::markup::Markup;
-use sesame_record::{MetricValue, RecordError, Repository, Verdict, trace_file};
+use sesame_record::{MetricValue, RecordError, Repository, TRACES, Verdict};
 
 use crate::export::{Expected, ExportError, export};
 use crate::facts::show::{TestReport, report_on};
@@ -40,8 +40,8 @@ pub(super) fn test(
         Err(ExportError::Record(error)) => return Err(error),
     };
     figures(body, &report, block.as_deref(), &format!("{before}{}{after}", report.test));
-    if repository.trace(number, record.duplicate_of).is_some() {
-        trace_link(body, &trace_file(folder, ran));
+    if let Some(name) = repository.trace(number, record.duplicate_of).as_deref().and_then(Path::file_name) {
+        trace_link(body, &folder.join(TRACES).join(name));
     }
     body.close();
     Ok(())
@@ -133,7 +133,8 @@ fn figures(body: &mut Markup, report: &TestReport, block: Option<&str>, command:
 
 /// A link to a trace, for tools that read MCAP.
 fn trace_link(body: &mut Markup, file: &Path) {
+    let what = if file.extension().is_some_and(|ending| ending == "mcap") { "Trace (MCAP)" } else { "Recording" };
     body.open("p", &[("class", "quiet")]);
-    body.element("a", &[("href", &file.display().to_string())], "Trace (MCAP)");
+    body.element("a", &[("href", &file.display().to_string())], what);
     body.close();
 }

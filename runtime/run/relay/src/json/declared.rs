@@ -15,11 +15,11 @@ use crate::message::Mismatch;
 use crate::value::{Fields, Record, Text, Value};
 
 /// The latest field names per message type, so that all records of a type share them.
-#[derive(Default)]
-pub(crate) struct Shapes(BTreeMap<MessageId, Arc<Fields>>);
+#[derive(Debug, Default)]
+pub struct Shapes(BTreeMap<MessageId, Arc<Fields>>);
 
 /// Reads a payload of a declared type.
-pub(crate) fn decode(plan: &CampaignPlan, shapes: &mut Shapes, ty: &Type, json: &RawValue) -> Result<Value, Mismatch> {
+pub fn decode(plan: &CampaignPlan, shapes: &mut Shapes, ty: &Type, json: &RawValue) -> Result<Value, Mismatch> {
     let text = json.get();
     match ty {
         Type::Bool => match text {

@@ -56,7 +56,7 @@ pub struct Heard {
 
 impl<'p> RecordedMonitors<'p> {
     /// Before the first message. The network is that of the plan's monitors.
-    pub(crate) fn new(plan: &'p CampaignPlan, wires: &'p WireTable, network: Arc<Network>) -> Self {
+    pub fn new(plan: &'p CampaignPlan, wires: &'p WireTable, network: Arc<Network>) -> Self {
         let members = wires.iter().map(|wire| wires.member(wire)).collect();
         let (mut streams, mut of_wire) = (Vec::<Stream>::new(), vec![[None; 2]; wires.len()]);
         let mut read = vec![Vec::new(); network.evidence_count()];
@@ -90,7 +90,7 @@ impl<'p> RecordedMonitors<'p> {
     }
 
     /// Adds a message, as it was published or as it was delivered.
-    pub(crate) fn add(&mut self, at: SimTime, side: Side, wire: Wire, index: u64, value: &Value) {
+    pub fn add(&mut self, at: SimTime, side: Side, wire: Wire, index: u64, value: &Value) {
         let Some(stream) = self.of_wire[wire.index()][place(side)] else { return };
         let mut content: Vec<Content> = Vec::new();
         let of = (self.wires.topic(wire), self.wires.member(wire));
@@ -130,7 +130,7 @@ impl<'p> RecordedMonitors<'p> {
     }
 
     /// The recording ends then.
-    pub(crate) fn end(&mut self, end: SimTime) {
+    pub fn end(&mut self, end: SimTime) {
         self.recording.end = end;
     }
 

@@ -1,18 +1,15 @@
 //! The signals of a recording: every number in its messages, over time.
 
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::path::Path;
 
-use mcap::records::{Metadata, Record};
-use sesame_base::visible::visible;
 use sesame_plan::CampaignPlan;
+use sesame_relay::value::Value;
+use sesame_relay::wire::WireTable;
 
-use crate::json::Shapes;
-use crate::trace::recording::{RecordingError, payload, read};
-use crate::trace::{ROLE, ROLE_PUBLISHED, SUBJECT, TOPIC};
-use crate::value::Value;
-use crate::wire::{Wire, WireTable};
+use crate::error::RecordingError;
+use crate::pass::pass;
+use crate::payload::Reads;
 
 /// The most samples that are read of a recording; with more, memory could run out.
 const MOST_SAMPLES: usize = 50_000_000;
@@ -32,75 +29,36 @@ pub struct Signal {
 /// The signals of a recording by name, such as `zones/Z1.level`: every number in the messages that were published on
 /// topics of the plan. Values that are not finite are left out.
 ///
-/// In a recording that no runner made, times are those since its first message on a topic of the plan.
+/// In a recording that no runner made, times are those since its first message on a topic of the plan. One that is cut
+/// off or damaged is refused: what is missing may be what matters in a lab.
 pub fn signals(
     path: &Path,
     plan: &CampaignPlan,
     wires: &WireTable,
 ) -> Result<BTreeMap<String, Signal>, RecordingError> {
-    let file = File::open(path)
-        .map_err(|error| RecordingError::Unreadable { reason: error.to_string(), path: path.to_owned() })?;
-    let mut collector = Collector {
-        plan,
-        wires,
-        channels: BTreeMap::new(),
-        shapes: Shapes::default(),
-        start: None,
-        samples: 0,
-        signals: BTreeMap::new(),
-    };
-    read(file, path, &mut |record| collector.record(record, path))?;
-    Ok(collector.signals)
+    let mut collector = Collector { samples: 0, signals: BTreeMap::new() };
+    let ending = pass(path, plan, wires, Reads::Declared, &mut |message| {
+        if !message.published {
+            return Ok(());
+        }
+        #[expect(clippy::cast_precision_loss, reason = "a run of 104 days has times to the nanosecond")]
+        let time = message.time.nanos() as f64 / 1e9;
+        collector.collect(&mut wires.path(message.wire).to_owned(), time, message.value);
+        if collector.samples > MOST_SAMPLES {
+            let problem = format!("it has more than {MOST_SAMPLES} numbers");
+            return Err(RecordingError::TooLong { problem, path: path.to_owned() });
+        }
+        Ok(())
+    })?;
+    ending.damage.map_or(Ok(collector.signals), Err)
 }
 
-struct Collector<'a> {
-    plan: &'a CampaignPlan,
-    wires: &'a WireTable,
-    /// The wires of channels with published messages, by their id.
-    channels: BTreeMap<u16, Wire>,
-    shapes: Shapes,
-    start: Option<u64>,
+struct Collector {
     samples: usize,
     signals: BTreeMap<String, Signal>,
 }
 
-impl Collector<'_> {
-    fn record(&mut self, record: Record<'_>, path: &Path) -> Result<(), RecordingError> {
-        match record {
-            Record::Metadata(Metadata { name, .. }) if name == SUBJECT => self.start = Some(0),
-            Record::Channel(channel) if channel.message_encoding == "json" => {
-                let name = match channel.metadata.get(ROLE).map(String::as_str) {
-                    Some(ROLE_PUBLISHED) => channel.metadata.get("sesame_name"),
-                    Some(_) => None,
-                    None => Some(&channel.topic),
-                };
-                let topic = channel.metadata.get(TOPIC).map(String::as_str);
-                if let Some(wire) = name.and_then(|name| self.wires.find_of(self.plan, name, topic)) {
-                    self.channels.insert(channel.id, wire);
-                }
-            }
-            Record::Message { header, data } => {
-                let Some(&wire) = self.channels.get(&header.channel_id) else { return Ok(()) };
-                let start = *self.start.get_or_insert(header.log_time);
-                #[expect(clippy::cast_precision_loss, reason = "a run of 104 days has times to the nanosecond")]
-                let time = header.log_time.saturating_sub(start) as f64 / 1e9;
-                let ty = &self.plan.topic(self.wires.topic(wire)).ty;
-                let value = payload(self.plan, &mut self.shapes, ty, &data).map_err(|reason| {
-                    let problem = format!("a message on `{}`: {}", self.wires.path(wire), visible(&reason));
-                    RecordingError::Damaged { problem, path: path.to_owned() }
-                })?;
-                let mut name = self.wires.path(wire).to_owned();
-                self.collect(&mut name, time, &value);
-                if self.samples > MOST_SAMPLES {
-                    let problem = format!("it has more than {MOST_SAMPLES} numbers");
-                    return Err(RecordingError::Damaged { problem, path: path.to_owned() });
-                }
-            }
-            _ => {}
-        }
-        Ok(())
-    }
-
+impl Collector {
     /// Adds the numbers of a value, whose name this is.
     fn collect(&mut self, name: &mut String, time: f64, value: &Value) {
         let length = name.len();

@@ -3,22 +3,16 @@
 //! A trace contains every message as it was published, on a channel with the name of its topic; if an operation of the
 //! campaign may act on a topic, also every message as it was delivered, on a channel `TOPIC/delivered`. The actions of
 //! operations are on `sesame/operations`, the change points of each metric on `sesame/metrics/NAME`. Everything is JSON
-//! with a JSON Schema, numbers are exact, and times are simulation time in nanoseconds. A metadata record `sesame`
-//! identifies the run, a metadata record `sesame.run` says how it ended.
+//! with a JSON Schema; in traces of systems of ROS, everything is as ROS records it, with messages byte for byte as
+//! they came where nobody changed them. Numbers are exact, and times are simulation time in nanoseconds. A metadata
+//! record `sesame` identifies the run, a metadata record `sesame.run` says how it ended.
 //!
 //! A trace is written while the test runs, under a temporary name, and gets its own name when it is complete. If the
 //! process dies during a run, the part that was written until then is recovered.
 
-#![expect(clippy::disallowed_methods, clippy::disallowed_types, reason = "an adapter: it writes and reads files")]
-
-mod feed;
-mod fuzzing_time;
-mod heard;
-mod recording;
-mod records;
+mod encoding;
 mod recover;
 mod schema;
-mod signals;
 mod writer;
 
 use std::collections::BTreeMap;
@@ -32,27 +26,24 @@ use sesame_base::observation::{Observation, Outcome};
 use sesame_base::visible::{visible_json, visible_lines};
 use sesame_plan::{CampaignPlan, Test};
 
-pub use crate::monitor::recorded::{Heard, RecordedMonitors};
-pub use feed::{Fed, feed, feed_telling};
-pub use heard::monitors;
-pub use recording::{RecordedMetric, RecordedRun, RecordingError};
+use crate::pass::RecordedMetric;
+
 pub use recover::recover;
-pub use signals::{Signal, signals};
 pub use writer::TraceWriter;
 
 /// Name of the metadata record that identifies the run of a trace.
-const SUBJECT: &str = "sesame";
+pub(crate) const SUBJECT: &str = "sesame";
 
 /// Name of the metadata record that says how the run ended.
-const RUN: &str = "sesame.run";
+pub(crate) const RUN: &str = "sesame.run";
 
 /// Key of a channel's metadata for its contents: one of the `ROLE_…`.
-const ROLE: &str = "sesame_role";
+pub(crate) const ROLE: &str = "sesame_role";
 /// The topic of the plan; recordings of earlier versions do not say it.
-const TOPIC: &str = "sesame_topic";
+pub(crate) const TOPIC: &str = "sesame_topic";
 
-const ROLE_PUBLISHED: &str = "published";
-const ROLE_DELIVERED: &str = "delivered";
+pub(crate) const ROLE_PUBLISHED: &str = "published";
+pub(crate) const ROLE_DELIVERED: &str = "delivered";
 const ROLE_OPERATIONS: &str = "operations";
 const ROLE_METRIC: &str = "metric";
 

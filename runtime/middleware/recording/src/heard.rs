@@ -6,10 +6,13 @@ use std::sync::Arc;
 use sesame_base::time::SimTime;
 use sesame_monitor::Network;
 use sesame_plan::{CampaignPlan, Side};
+use sesame_relay::feed::End;
+use sesame_relay::monitor::recorded::RecordedMonitors;
+use sesame_relay::wire::WireTable;
 
-use crate::monitor::recorded::RecordedMonitors;
-use crate::trace::recording::{End, Ending, RecordedRun, RecordingError, pass};
-use crate::wire::WireTable;
+use crate::error::RecordingError;
+use crate::pass::{Ending, RecordedRun, pass};
+use crate::payload::Reads;
 
 #[cfg(test)]
 mod tests;
@@ -17,8 +20,8 @@ mod tests;
 /// The most messages that monitors may hear in a recording; with more, memory could run out.
 const MOST_HEARD: usize = 20_000_000;
 
-/// Reads what the monitors of a plan hear in a recording, which [may be](super::feed) one that no runner made. With it
-/// come the recorded run, if a runner recorded it, and warnings for the user. The network is that of the plan's
+/// Reads what the monitors of a plan hear in a recording, which [may be](crate::feed()) one that no runner made. With
+/// it come the recorded run, if a runner recorded it, and warnings for the user. The network is that of the plan's
 /// monitors.
 ///
 /// What monitors publish has no effect here: it is in the recording.
@@ -30,7 +33,7 @@ pub fn monitors<'p>(
 ) -> Result<(RecordedMonitors<'p>, Option<RecordedRun>, Vec<String>), RecordingError> {
     let mut heard = RecordedMonitors::new(plan, wires, Arc::clone(network));
     let mut last = SimTime::ZERO;
-    let Ending { run, end, mut warnings, .. } = pass(path, plan, wires, &mut |message| {
+    let Ending { run, end, mut warnings, .. } = pass(path, plan, wires, Reads::Used, &mut |message| {
         last = message.time;
         for (side, is_so) in [(Side::Inbound, message.published), (Side::Outbound, message.delivered)] {
             if is_so {
@@ -39,7 +42,7 @@ pub fn monitors<'p>(
         }
         if heard.messages() > MOST_HEARD {
             let problem = format!("monitors hear more than {MOST_HEARD} messages in it");
-            return Err(RecordingError::Damaged { problem, path: path.to_owned() });
+            return Err(RecordingError::TooLong { problem, path: path.to_owned() });
         }
         Ok(())
     })?;

@@ -22,13 +22,13 @@ use sesame_plan::{
 };
 
 use super::*;
-use crate::evaluate::{Custom, Run, evaluate_tapped};
-use crate::metric::MetricTable;
-use crate::relay::Exchange;
-use crate::simulator::Progress;
-use crate::trace::{Subject, TraceWriter, feed};
-use crate::transport::{Capabilities, Transport, TransportError};
-use crate::value::Value;
+use crate::{Subject, TraceWriter, feed};
+use sesame_relay::evaluate::{Custom, Run, evaluate_tapped};
+use sesame_relay::metric::MetricTable;
+use sesame_relay::relay::Exchange;
+use sesame_relay::simulator::Progress;
+use sesame_relay::transport::{Capabilities, Transport, TransportError};
+use sesame_relay::value::Value;
 
 const MS: i64 = 1_000_000;
 
@@ -111,7 +111,7 @@ fn recorded(
     let mut writer = TraceWriter::create(&folder.join("unfinished"), subject, &wires).unwrap();
     let mut transport = Script { now: SimTime::ZERO, messages: script, next: 0 };
     let run = Run { test, simulator_seed: 1, withheld: &[], lists_altered: false };
-    let tap = Some(&mut writer as &mut dyn crate::relay::Listener);
+    let tap = Some(&mut writer as &mut dyn sesame_relay::relay::Listener);
     let seen = evaluate_tapped(plan, &wires, &table, &mut transport, &run, &mut Custom::none(), tap).unwrap();
     writer.keep(&seen, &folder.join(name)).unwrap();
     // Monitors decide on the recording as they did in the run.

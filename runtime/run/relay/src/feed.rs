@@ -1,92 +1,103 @@
-//! Replays a recording: feeds metrics from it instead of a simulator.
+//! Metrics and monitors are fed with messages that were recorded, instead of with those of a run.
 
-use std::path::Path;
+mod fuzzing_time;
 
 use sesame_base::observation::{MetricObservation, MonitorObservation};
 use sesame_base::time::SimTime;
-use sesame_plan::{CampaignPlan, MetricSource, Side};
+use sesame_plan::{CampaignPlan, MetricSource, Side, Span};
 
 use crate::metric::{MetricTable, Metrics};
 use crate::monitor::{Decided, Monitors};
-use crate::trace::fuzzing_time::{FuzzingTime, scored_bounds};
-use crate::trace::recording::{self, End, Ending, Passing, RecordedRun, RecordingError};
 use crate::value::Value;
 use crate::wire::{Wire, WireTable};
+use fuzzing_time::{FuzzingTime, scored_bounds};
 
-/// The result of feeding a recording to a campaign's metrics.
+/// A message of a recording, as it passes.
+#[derive(Debug, Clone, Copy)]
+pub struct Passing<'v> {
+    /// Simulation time.
+    pub time: SimTime,
+    /// Its wire.
+    pub wire: Wire,
+    /// Whether this is the message as it was published.
+    pub published: bool,
+    /// Whether this is the message as it was delivered.
+    pub delivered: bool,
+    /// Its number among those published on its wire.
+    pub index: u64,
+    /// The payload.
+    pub value: &'v Value,
+}
+
+/// How a recording ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum End {
+    /// The run came to its end then; a recording that no runner made ends with its last message.
+    Whole(SimTime),
+    /// The run broke off, if that is known, then.
+    BrokenOff(Option<SimTime>),
+}
+
+/// What came of the messages.
 #[derive(Debug)]
-pub struct Fed {
-    /// The recorded run, if a runner recorded it.
-    pub run: Option<RecordedRun>,
-    /// Per metric of the plan. Without a run, the actions of operations are unknown, and so is `fuzzing_time()`.
+pub struct Found {
+    /// Per metric of the plan. Where it is not known when operations were active, `fuzzing_time()` has no value.
     pub metrics: Vec<MetricObservation>,
     /// Per monitor of the plan.
     pub monitors: Vec<MonitorObservation>,
     /// Warnings for the user.
     pub warnings: Vec<String>,
-    /// Messages fed, as published.
-    pub messages: u64,
 }
 
-/// Feeds the messages of a recording to the metrics of a plan, in order of time and without a simulator.
-///
-/// The trace of a runner is fed in the same order as in its run. In any other recording, the JSON messages on topics of
-/// the space count, with times since the first of them, both as published and as delivered. Memory holds one record at
-/// a time.
-pub fn feed(
-    path: &Path,
-    plan: &CampaignPlan,
-    wires: &WireTable,
-    table: &MetricTable<'_>,
-) -> Result<Fed, RecordingError> {
-    feed_telling(path, plan, wires, table, None)
+/// Who is told what monitors decide, in order of time.
+pub type Tell<'d> = &'d mut (dyn FnMut(&Decided) + 'd);
+
+/// Whether [`Feeder::new`] has to know when operations were active: hazards are scored that depend on the fuzzing time.
+pub fn asks_for_busy(plan: &CampaignPlan) -> bool {
+    !scored_bounds(plan).is_empty()
 }
 
-/// As [`feed`], and tells what monitors decide, in order of time.
-pub fn feed_telling<'d>(
-    path: &Path,
-    plan: &CampaignPlan,
-    wires: &WireTable,
-    table: &MetricTable<'_>,
-    decided: Option<&'d mut (dyn FnMut(&Decided) + 'd)>,
-) -> Result<Fed, RecordingError> {
-    // The fuzzing time at each moment follows from what is said at the end of a trace.
-    let scored = scored_bounds(plan);
-    let busy = if scored.is_empty() { None } else { recording::busy(path)? };
-    let mut feeder = Feeder {
-        plan,
-        fuzzing_time: FuzzingTime::new(busy.as_deref().unwrap_or_default(), &scored),
-        metrics: table.start(),
-        monitors: None,
-        decided,
-        now: SimTime::ZERO,
-    };
-    feeder.monitors = Monitors::new(&feeder.metrics, wires);
-    if feeder.decided.is_some() {
-        feeder.monitors.iter_mut().for_each(Monitors::tell);
-    }
-    feeder.show_monitors();
-    feeder.metrics.begin();
-    let ending = recording::pass(path, plan, wires, &mut |message| {
-        feeder.message(message);
-        Ok(())
-    })?;
-    Ok(feeder.finish(ending))
-}
-
-struct Feeder<'a, 'd> {
+/// Feeds messages to the metrics and monitors of a plan, in order of time, as a run of the relay does.
+pub struct Feeder<'a, 'd> {
     plan: &'a CampaignPlan,
     fuzzing_time: FuzzingTime,
     metrics: Metrics<'a>,
     /// `None` for a plan without monitors. What they publish is in the recording.
     monitors: Option<Monitors<'a>>,
     /// Who is told what they decide.
-    decided: Option<&'d mut (dyn FnMut(&Decided) + 'd)>,
+    decided: Option<Tell<'d>>,
     now: SimTime,
 }
 
-impl Feeder<'_, '_> {
-    fn message(&mut self, message: &Passing<'_>) {
+impl<'a, 'd> Feeder<'a, 'd> {
+    /// At the start of a run in which operations that count in `fuzzing_time()` were active, or held messages back, in
+    /// these spans.
+    pub fn new(
+        plan: &'a CampaignPlan,
+        wires: &'a WireTable,
+        table: &'a MetricTable<'_>,
+        busy: &[Span],
+        decided: Option<Tell<'d>>,
+    ) -> Self {
+        let mut feeder = Feeder {
+            plan,
+            fuzzing_time: FuzzingTime::new(busy, &scored_bounds(plan)),
+            metrics: table.start(),
+            monitors: None,
+            decided,
+            now: SimTime::ZERO,
+        };
+        feeder.monitors = Monitors::new(&feeder.metrics, wires);
+        if feeder.decided.is_some() {
+            feeder.monitors.iter_mut().for_each(Monitors::tell);
+        }
+        feeder.show_monitors();
+        feeder.metrics.begin();
+        feeder
+    }
+
+    /// The next message, which is not earlier than the one before.
+    pub fn message(&mut self, message: &Passing<'_>) {
         let &Passing { time, wire, published, delivered, index, value } = message;
         self.pass_to(time);
         self.now = time;
@@ -139,8 +150,8 @@ impl Feeder<'_, '_> {
         }
     }
 
-    fn finish(mut self, ending: Ending) -> Fed {
-        let Ending { run, end, busy, warnings: about_topics, messages } = ending;
+    /// The end, and when operations were active, if that is known.
+    pub fn finish(mut self, end: End, busy: Option<&[Span]>) -> Found {
         match end {
             End::Whole(end) => {
                 self.pass_to(end);
@@ -166,7 +177,7 @@ impl Feeder<'_, '_> {
             }
         }
         self.tell_decided();
-        let (mut metrics, mut warnings) = self.metrics.finish(busy.as_deref().unwrap_or_default());
+        let (mut metrics, mut warnings) = self.metrics.finish(busy.unwrap_or_default());
         let mut monitors = Vec::new();
         if let Some(of_run) = self.monitors {
             let (observed, problems) = of_run.finish(self.now, &mut metrics, matches!(end, End::Whole(_)));
@@ -176,8 +187,7 @@ impl Feeder<'_, '_> {
         if busy.is_none() {
             warnings.extend(forget_unknown(self.plan, &mut metrics));
         }
-        warnings.extend(about_topics);
-        Fed { run, metrics, monitors, warnings, messages }
+        Found { metrics, monitors, warnings }
     }
 }
 

@@ -13,16 +13,18 @@ use mcap::{McapError, McapResult, WriteOptions, Writer};
 
 use sesame_base::observation::Observation;
 use sesame_base::time::SimTime;
-use sesame_plan::{CampaignPlan, Operation, Test, TopicId, Type};
+use sesame_codec::error::CodecError;
+use sesame_plan::{CampaignPlan, Channel, Operation, Test, TopicId};
+use sesame_relay::json::{number, quoted};
+use sesame_relay::relay::{Listener, MessageRef, OperationEvent};
+use sesame_relay::value::Value;
+use sesame_relay::wire::{Wire, WireTable};
 
-use crate::json::{encode, number, quoted};
-use crate::relay::{Listener, MessageRef, OperationEvent};
+use crate::trace::encoding::{Encoder, Encoding};
 use crate::trace::{
     ROLE, ROLE_DELIVERED, ROLE_METRIC, ROLE_OPERATIONS, ROLE_PUBLISHED, Subject, TOPIC, TraceError, ending, owned,
-    publish, schema,
+    publish,
 };
-use crate::value::Value;
-use crate::wire::{Wire, WireTable};
 
 /// How long written data may stay in memory: the trace of a test that hangs must contain its last messages.
 const LATEST: Duration = Duration::from_millis(250);
@@ -30,11 +32,12 @@ const LATEST: Duration = Duration::from_millis(250);
 /// The most bytes that are kept in memory before they are written.
 const CHUNK: u64 = 1 << 20;
 
-/// Options of all traces: no compression, which would need C libraries.
-pub(super) fn options() -> WriteOptions {
+/// Options of all traces of this profile: no compression, which would cost time while a test runs.
+pub(super) fn options(profile: &str) -> WriteOptions {
     WriteOptions::new()
         .compression(None)
         .chunk_size(Some(CHUNK))
+        .profile(profile)
         .library(concat!("sesame-runtime ", env!("CARGO_PKG_VERSION")))
 }
 
@@ -47,7 +50,7 @@ pub struct TraceWriter<'a> {
     shared: Arc<Shared>,
     flusher: Option<JoinHandle<()>>,
     channels: Channels,
-    /// The JSON of one message.
+    /// One message.
     payload: Vec<u8>,
     kept: bool,
 }
@@ -60,8 +63,10 @@ struct Channels {
     operations: u16,
     /// Per metric of the plan.
     metrics: Vec<u16>,
-    /// Per wire: whether its messages are objects by themselves.
-    objects: Vec<bool>,
+    /// Per wire, how its messages are written.
+    encoders: Vec<Encoder>,
+    of_operations: Encoder,
+    of_metrics: Encoder,
 }
 
 /// The state shared between the run's thread and the one that flushes.
@@ -96,6 +101,26 @@ impl Sink {
         }
     }
 
+    /// A message, if it could be written as bytes. That of a hook, say, may be none of its type.
+    fn written(
+        &mut self,
+        written: Result<(), CodecError>,
+        of: &str,
+        channel: u16,
+        sequence: u64,
+        time: SimTime,
+        payload: &[u8],
+    ) {
+        match written {
+            Ok(()) => self.message(channel, sequence, time, payload),
+            Err(error) if self.error.is_none() => {
+                self.error =
+                    Some(std::io::Error::other(format!("a message of {of} cannot be written: {error}")).into());
+            }
+            Err(_) => {}
+        }
+    }
+
     fn message(&mut self, channel: u16, sequence: u64, time: SimTime, payload: &[u8]) {
         let time = u64::try_from(time.nanos()).unwrap_or(0);
         let header = MessageHeader {
@@ -113,10 +138,11 @@ impl<'a> TraceWriter<'a> {
     pub fn create(path: &Path, subject: Subject<'a>, wires: &'a WireTable) -> Result<Self, TraceError> {
         let failed = |error: McapError| TraceError::new(path, error);
         let file = File::create(path).map_err(|error| failed(error.into()))?;
-        let mut writer = options().create(BufWriter::new(file)).map_err(failed)?;
+        let encoding = Encoding::of(subject.plan);
+        let mut writer = options(encoding.profile()).create(BufWriter::new(file)).map_err(failed)?;
         let channels = writer
             .write_metadata(&subject.metadata())
-            .and_then(|()| Channels::declare(&mut writer, subject.plan, wires))
+            .and_then(|()| Channels::declare(&mut writer, encoding, subject.plan, wires))
             .map_err(failed)?;
         // So that a process that dies at once leaves a trace that identifies its run.
         writer.flush().map_err(failed)?;
@@ -153,11 +179,8 @@ impl<'a> TraceWriter<'a> {
         let sink = &mut *self.shared.lock();
         for (channel, metric) in self.channels.metrics.iter().zip(&observation.metrics) {
             for (at, &(time, value)) in (0u64..).zip(&metric.series) {
-                self.payload.clear();
-                self.payload.extend_from_slice(b"{\"value\":");
-                number(value, &mut self.payload);
-                self.payload.push(b'}');
-                sink.message(*channel, at, SimTime::from_seconds(time), &self.payload);
+                let written = self.channels.of_metrics.number(value, &mut self.payload);
+                sink.written(written, "a metric", *channel, at, SimTime::from_seconds(time), &self.payload);
             }
         }
         sink.attempt(|writer| writer.write_metadata(&ending(self.plan, observation)));
@@ -210,18 +233,26 @@ fn write_out(shared: &Shared) {
 }
 
 impl Channels {
-    fn declare(writer: &mut Writer<BufWriter<File>>, plan: &CampaignPlan, wires: &WireTable) -> McapResult<Self> {
+    fn declare(
+        writer: &mut Writer<BufWriter<File>>,
+        encoding: Encoding,
+        plan: &CampaignPlan,
+        wires: &WireTable,
+    ) -> McapResult<Self> {
         let disturbed: BTreeSet<TopicId> = plan.operations.iter().flat_map(Operation::topics).collect();
         let mut channels = Channels {
             published: Vec::with_capacity(wires.len()),
             delivered: Vec::with_capacity(wires.len()),
             operations: 0,
             metrics: Vec::with_capacity(plan.metrics.len()),
-            objects: Vec::with_capacity(wires.len()),
+            encoders: Vec::with_capacity(wires.len()),
+            of_operations: encoding.operations(),
+            of_metrics: encoding.metric(None),
         };
-        let mut add = |(name, schema): (String, Vec<u8>), topic: &str, role: &[(&str, String)]| {
-            let schema = writer.add_schema(&name, "jsonschema", &schema)?;
-            writer.add_channel(schema, topic, "json", &owned(role.iter().cloned()))
+        let mut add = |encoder: &Encoder, topic: &str, role: &[(&str, String)]| {
+            let (name, of_schema, text) = encoder.schema();
+            let schema = writer.add_schema(name, of_schema, text)?;
+            writer.add_channel(schema, topic, encoder.encoding(), &owned(role.iter().cloned()))
         };
         let role = |role: &str, name: &str| [(ROLE, role.to_owned()), ("sesame_name", name.to_owned())];
         for wire in wires.iter() {
@@ -231,48 +262,50 @@ impl Channels {
                 let [role, name] = role(kind, path);
                 [role, name, (TOPIC, topic.name.clone())]
             };
-            let (schema, path) = (schema::of_messages(plan, &topic.ty), wires.path(wire));
-            channels.objects.push(matches!(topic.ty, Type::Message { .. }));
-            channels.published.push(add(schema.clone(), path, &of_topic(ROLE_PUBLISHED, path))?);
+            let path = wires.path(wire);
+            let encoder = encoding.topic(plan, wires.topic(wire));
+            let encoder = encoder.map_err(|reason| std::io::Error::other(format!("`{path}`: {reason}")))?;
+            // Players of ROS take a name for that of one topic.
+            let shown = match topic.channel {
+                Channel::Request if encoding.is_of_ros() => format!("{path}/request"),
+                Channel::Reply if encoding.is_of_ros() => format!("{path}/reply"),
+                _ => path.to_owned(),
+            };
+            channels.published.push(add(&encoder, &shown, &of_topic(ROLE_PUBLISHED, path))?);
             channels.delivered.push(if disturbed.contains(&wires.topic(wire)) {
-                Some(add(schema, &format!("{path}/delivered"), &of_topic(ROLE_DELIVERED, path))?)
+                Some(add(&encoder, &format!("{shown}/delivered"), &of_topic(ROLE_DELIVERED, path))?)
             } else {
                 None
             });
+            channels.encoders.push(encoder);
         }
-        channels.operations = add(schema::of_operations(), "sesame/operations", &role(ROLE_OPERATIONS, ""))?;
+        let root = if encoding.is_of_ros() { "/" } else { "" };
+        let name = format!("{root}sesame/operations");
+        channels.operations = add(&channels.of_operations, &name, &role(ROLE_OPERATIONS, ""))?;
         for metric in &plan.metrics {
-            let schema = schema::of_metric(metric.unit.as_deref());
-            let topic = format!("sesame/metrics/{}", metric.name);
-            channels.metrics.push(add(schema, &topic, &role(ROLE_METRIC, &metric.name))?);
+            let encoder = encoding.metric(metric.unit.as_deref());
+            let topic = format!("{root}sesame/metrics/{}", metric.name);
+            channels.metrics.push(add(&encoder, &topic, &role(ROLE_METRIC, &metric.name))?);
         }
         Ok(channels)
     }
 }
 
 impl TraceWriter<'_> {
-    fn payload(&mut self, wire: Wire, value: &Value) {
-        self.payload.clear();
-        if self.channels.objects[wire.index()] {
-            encode(value, &mut self.payload);
-        } else {
-            self.payload.extend_from_slice(b"{\"value\":");
-            encode(value, &mut self.payload);
-            self.payload.push(b'}');
-        }
+    fn message(&mut self, channel: u16, now: SimTime, wire: Wire, index: u64, value: &Value) {
+        let written = self.channels.encoders[wire.index()].message(value, &mut self.payload);
+        self.shared.lock().written(written, self.wires.path(wire), channel, index, now, &self.payload);
     }
 }
 
 impl Listener for TraceWriter<'_> {
     fn published(&mut self, now: SimTime, wire: Wire, index: u64, value: &Value) {
-        self.payload(wire, value);
-        self.shared.lock().message(self.channels.published[wire.index()], index, now, &self.payload);
+        self.message(self.channels.published[wire.index()], now, wire, index, value);
     }
 
     fn delivered(&mut self, now: SimTime, wire: Wire, index: u64, value: &Value) {
         let Some(channel) = self.channels.delivered[wire.index()] else { return };
-        self.payload(wire, value);
-        self.shared.lock().message(channel, index, now, &self.payload);
+        self.message(channel, now, wire, index, value);
     }
 
     fn operated(&mut self, now: SimTime, operation: usize, event: OperationEvent) {
@@ -284,24 +317,24 @@ impl Listener for TraceWriter<'_> {
             OperationEvent::Injected(touched) => ("injected", Some(touched), None),
             OperationEvent::Delayed(touched, until) => ("delayed", Some(touched), Some(until)),
         };
-        let payload = &mut self.payload;
-        payload.clear();
-        payload.extend_from_slice(b"{\"operation\":");
-        quoted(&self.plan.operation(self.test.operations[operation].operation).name, payload);
-        payload.extend_from_slice(format!(",\"position\":{operation},\"did\":\"{did}\"").as_bytes());
+        let mut json = Vec::new();
+        json.extend_from_slice(b"{\"operation\":");
+        quoted(&self.plan.operation(self.test.operations[operation].operation).name, &mut json);
+        json.extend_from_slice(format!(",\"position\":{operation},\"did\":\"{did}\"").as_bytes());
         if let Some(MessageRef { wire, index }) = touched {
-            payload.extend_from_slice(b",\"topic\":");
-            quoted(self.wires.path(wire), payload);
-            payload.extend_from_slice(format!(",\"message\":{index}").as_bytes());
+            json.extend_from_slice(b",\"topic\":");
+            quoted(self.wires.path(wire), &mut json);
+            json.extend_from_slice(format!(",\"message\":{index}").as_bytes());
         }
         if let Some(until) = until {
-            payload.extend_from_slice(b",\"until_s\":");
-            number(until.seconds(), payload);
+            json.extend_from_slice(b",\"until_s\":");
+            number(until.seconds(), &mut json);
         }
-        payload.push(b'}');
+        json.push(b'}');
+        let written = self.channels.of_operations.object(&String::from_utf8_lossy(&json), &mut self.payload);
         let sink = &mut *self.shared.lock();
         let sequence = sink.activities;
         sink.activities += 1;
-        sink.message(self.channels.operations, sequence, now, payload);
+        sink.written(written, "operations", self.channels.operations, sequence, now, &self.payload);
     }
 }

@@ -8,20 +8,22 @@ use std::path::Path;
 use mcap::records::MessageHeader;
 use mcap::{WriteOptions, Writer};
 
+use sesame_base::observation::{Observation, Outcome};
 use sesame_base::time::SimTime;
 use sesame_plan::testing::{latency, offset, operation, plan, test_of, use_of};
-use sesame_plan::{Choice, Distribution, Drain, OperationKind, Test, ValueMode};
+use sesame_plan::{CampaignPlan, Choice, Distribution, Drain, OperationKind, Test, ValueMode};
 use sesame_rng::Stream;
 
 use super::*;
-use crate::evaluate::{Custom, Run, evaluate_tapped};
-use crate::files::NoFiles;
-use crate::metric::MetricTable;
-use crate::relay::Exchange;
-use crate::simulator::Progress;
-use crate::transport::{Capabilities, Transport, TransportError};
-use crate::value::{Fields, Record, Value};
-use crate::wire::WireTable;
+use crate::trace::{RUN, SUBJECT};
+use sesame_relay::evaluate::{Custom, Run, evaluate_tapped};
+use sesame_relay::files::NoFiles;
+use sesame_relay::metric::MetricTable;
+use sesame_relay::relay::Exchange;
+use sesame_relay::simulator::Progress;
+use sesame_relay::transport::{Capabilities, Transport, TransportError};
+use sesame_relay::value::{Fields, Record, Value};
+use sesame_relay::wire::WireTable;
 
 /// Publishes awkward numbers on all wires, ten times a second.
 struct Awkward(SimTime);
@@ -239,6 +241,79 @@ fn a_recording_of_another_program_is_fed_where_topic_and_payload_match() {
 }
 
 #[test]
+fn messages_that_are_nearly_in_order_are_put_in_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("foreign.mcap");
+    foreign(
+        &file,
+        &[
+            ("arm/command", "json", 2_000_000_000, "3"),
+            ("arm/command", "json", 1_000_000_000, "2"),
+            ("arm/command", "json", 2_000_000_000, "4"),
+        ],
+    );
+    let fed = fed(&file, &awkward_plan().0).unwrap();
+    assert_eq!(fed.metrics[1].series, [(0.0, 2.0), (1.0, 4.0)], "of one time, the last one in the file counts");
+}
+
+#[test]
+fn a_recording_of_another_program_that_is_cut_off_is_read_up_to_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("foreign.mcap");
+    let mut writer = WriteOptions::new().chunk_size(Some(1)).create(File::create(&file).unwrap()).unwrap();
+    let channel_id = writer.add_channel(0, "arm/command", "json", &BTreeMap::new()).unwrap();
+    for time in [1, 2, 3] {
+        let header = MessageHeader { channel_id, sequence: 0, log_time: time * 1_000_000_000, publish_time: 0 };
+        writer.write_to_known_channel(&header, b"1").unwrap();
+    }
+    writer.finish().unwrap();
+    let whole = fs::read(&file).unwrap();
+    let third = whole.windows(8).rposition(|window| window == 3_000_000_000u64.to_le_bytes()).unwrap();
+    let first = whole.windows(8).position(|window| window == 3_000_000_000u64.to_le_bytes()).unwrap();
+    assert!(first < third);
+    fs::write(&file, &whole[..first]).unwrap();
+    let fed = fed(&file, &awkward_plan().0).unwrap();
+    assert_eq!(fed.messages, 2);
+    let said = fed.warnings.last().unwrap();
+    assert_eq!(said, "the recording is cut off; what comes before, up to 1.000 s, is used");
+    let plan = awkward_plan().0;
+    let refused = signals(&file, &plan, &WireTable::new(&plan)).unwrap_err();
+    assert!(matches!(refused, RecordingError::CutOff { .. }), "{refused}");
+}
+
+/// A recording of one message in CDR, with its definition.
+fn in_cdr(file: &Path, topic: &str, name: &str, definition: &str, fields: &[u8]) {
+    let mut writer = WriteOptions::new().create(File::create(file).unwrap()).unwrap();
+    let schema = writer.add_schema(name, "ros2msg", definition.as_bytes()).unwrap();
+    let channel_id = writer.add_channel(schema, topic, "cdr", &BTreeMap::new()).unwrap();
+    let header = MessageHeader { channel_id, sequence: 0, log_time: 1, publish_time: 1 };
+    writer.write_to_known_channel(&header, &[&[0, 1, 0, 0], fields].concat()).unwrap();
+    writer.finish().unwrap();
+}
+
+#[test]
+fn a_message_has_to_have_what_is_read_of_it_and_may_be_of_another_shape() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("cdr.mcap");
+    // The space declares `level` and `count`, and no metric reads them.
+    let plan = awkward_plan().0;
+    let wires = WireTable::new(&plan);
+    in_cdr(&file, "zones/Z1", "p/msg/Zone", "float64 level", &1.5f64.to_le_bytes());
+    assert_eq!(fed(&file, &plan).unwrap().messages, 1, "nobody reads what is missing");
+    let said = signals(&file, &plan, &wires).unwrap_err().to_string();
+    assert!(said.contains("field `count`: expected a value, found nothing"), "{said}");
+    // A real that is a message of its own, as in `std_msgs`.
+    in_cdr(&file, "arm/command", "std_msgs/msg/Float64", "float64 data", &2.5f64.to_le_bytes());
+    assert_eq!(fed(&file, &plan).unwrap().metrics[1].value, Some(2.5));
+    in_cdr(&file, "arm/command", "std_msgs/msg/String", "string data", &[2, 0, 0, 0, b'a', 0]);
+    let said = fed(&file, &plan).unwrap_err().to_string();
+    assert!(said.contains("not of its declared type: expected real, found text"), "{said}");
+    in_cdr(&file, "arm/command", "std_msgs/msg/Float64", "nonsense", &[]);
+    let said = fed(&file, &plan).unwrap_err().to_string();
+    assert!(said.contains("the definition of `std_msgs/msg/Float64` in the file: line 1"), "{said}");
+}
+
+#[test]
 fn what_cannot_be_fed_is_said_in_words() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("foreign.mcap");
@@ -256,7 +331,7 @@ fn what_cannot_be_fed_is_said_in_words() {
             said(&[("zones/Z1", "json", 1, "{\"level\": 1}")]),
             said(&[("arm/command", "json", 1, "not json")]),
             said(&[("arm/command", "json", 2, "1"), ("zones/Z1", "cdr", 1, "1")]),
-            said(&[("arm/command", "json", 2, "1"), ("arm/command", "json", 1, "1")]),
+            said(&[("arm/command", "protobuf", 1, "1")]),
         ]
         .join("\n")
     );
@@ -279,7 +354,7 @@ fn what_cannot_be_fed_is_said_in_words() {
 }
 
 #[test]
-fn a_compressed_recording_is_refused_with_a_remedy() {
+fn a_recording_that_is_compressed_by_an_unknown_method_is_refused_with_a_remedy() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("compressed.mcap");
     let mut bytes = Cursor::new(Vec::new());
@@ -289,7 +364,7 @@ fn a_compressed_recording_is_refused_with_a_remedy() {
     writer.write_to_known_channel(&header, b"1").unwrap();
     writer.finish().unwrap();
     drop(writer);
-    // The chunk's header says how it is compressed, as a text after times, size and checksum: `lz4` instead of nothing.
+    // The chunk's header says how it is compressed, as a text after times, size and checksum: `lzo` instead of nothing.
     let bytes = bytes.into_inner();
     let chunk =
         bytes.iter().enumerate().skip(8).find(|(at, byte)| **byte == 6 && bytes[at + 9 + 28..].starts_with(&[0; 4]));
@@ -299,11 +374,11 @@ fn a_compressed_recording_is_refused_with_a_remedy() {
     made.extend(length.to_le_bytes());
     made.extend(&bytes[at + 9..at + 37]);
     made.extend([3, 0, 0, 0]);
-    made.extend(b"lz4");
+    made.extend(b"lzo");
     made.extend(&bytes[at + 41..]);
     fs::write(&file, made).unwrap();
     let said = fed(&file, &awkward_plan().0).unwrap_err().to_string();
-    assert!(said.contains("compressed (`lz4`)") && said.contains("mcap compress --compression none"), "{said}");
+    assert!(said.contains("compressed by `lzo`") && said.contains("mcap compress --compression zstd"), "{said}");
 }
 
 /// The same recording without its checksums, which are then not looked at: what is changed in it is not refused for

@@ -4,13 +4,13 @@ use std::fs::{self, File};
 use std::io::{BufWriter, Read as _};
 use std::path::Path;
 
-use mcap::records::{Metadata, Record};
+use mcap::records::{Metadata, Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
-use mcap::{McapError, McapResult, Writer};
+use mcap::{McapError, McapResult, Writer, parse_record};
 
 use sesame_base::observation::Outcome;
 
-use crate::trace::records::records;
+use crate::container::mcap::records;
 use crate::trace::writer::{finish, options};
 use crate::trace::{RUN, TraceError, how_it_ended, publish};
 
@@ -30,8 +30,10 @@ pub fn recover(unfinished: &Path, outcome: &Outcome, file: &Path) -> Result<(), 
 }
 
 fn copy(unfinished: &Path, outcome: &Outcome, saved: &Path) -> McapResult<()> {
-    let mut writer = options().create(BufWriter::new(File::create(saved)?))?;
     let mut file = File::open(unfinished)?;
+    // It begins with its profile, if it begins at all.
+    let mut started: Option<Writer<BufWriter<File>>> = None;
+    let start = |profile: &str| -> McapResult<_> { options(profile).create(BufWriter::new(File::create(saved)?)) };
     // Only complete chunks are read.
     let reading =
         LinearReaderOptions::default().with_skip_end_magic(true).with_emit_chunks(true).with_record_length_limit(LIMIT);
@@ -43,14 +45,33 @@ fn copy(unfinished: &Path, outcome: &Outcome, saved: &Path) -> McapResult<()> {
                 reader.notify_read(read);
             }
             // The first error is where the process died.
-            Ok(LinearReadEvent::Record { opcode, data }) => match records(opcode, data) {
-                Ok(records) => records.iter().try_for_each(|record| copy_record(&mut writer, record))?,
-                Err(_) => break,
-            },
+            Ok(LinearReadEvent::Record { opcode: op::HEADER, data }) => {
+                match (parse_record(op::HEADER, data), &started) {
+                    (Ok(Record::Header(header)), None) => started = Some(start(&header.profile)?),
+                    _ => break,
+                }
+            }
+            Ok(LinearReadEvent::Record { opcode, data }) => {
+                let Some(writer) = &mut started else { break };
+                let mut found = Vec::new();
+                // A chunk counts as a whole or not at all.
+                let whole = records(opcode, data, &mut |record| {
+                    found.push(record.into_owned());
+                    true
+                });
+                if whole.is_err() {
+                    break;
+                }
+                found.iter().try_for_each(|record| copy_record(writer, record))?;
+            }
             Err(McapError::Io(error)) => return Err(error.into()),
             Err(_) => break,
         }
     }
+    let mut writer = match started {
+        Some(writer) => writer,
+        None => start("")?,
+    };
     writer.write_metadata(&Metadata { name: RUN.to_owned(), metadata: how_it_ended(outcome) })?;
     finish(writer)
 }
