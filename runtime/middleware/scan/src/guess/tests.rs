@@ -26,7 +26,9 @@ fn in_words(guess: &Guess) -> String {
         Guess::Time => "time".to_owned(),
         Guess::List(of) => format!("list of {}", in_words(of)),
         Guess::Message { fields, left_out } => {
-            let fields = fields.iter().map(|(name, of)| format!("{name}: {}", in_words(of)));
+            let fields = fields.iter().map(|GuessedField { name, guess, optional }| {
+                format!("{}{name}: {}", if *optional { "optional " } else { "" }, in_words(guess))
+            });
             let left_out = left_out.iter().map(|omitted| format!("not {}: {}", omitted.name, omitted.why));
             format!("{{ {} }}", fields.chain(left_out).collect::<Vec<_>>().join("  "))
         }
@@ -38,16 +40,15 @@ fn said(payloads: &[Json], conventions: Conventions) -> String {
 }
 
 #[test]
-fn a_state_has_the_fields_that_each_message_has() {
+fn a_state_has_the_fields_of_all_messages_and_those_of_some_are_optional() {
     let states = [
         json!({ "driving": false, "x": 1, "y": 2.5, "loads": [], "errors": [{ "id": "E1", "level": 3 }], "zone": null }),
         json!({ "driving": true, "x": 7, "y": 2, "loads": [], "errors": [{ "id": "E2" }], "zone": "A", "a b": 1, "_": 1 }),
     ];
     assert_eq!(
         said(&states, Conventions::Json),
-        "{ driving: bool  errors: list of { id: text  not level: only 1 of 2 objects have it }  x: int  y: real  \
-         not _: its name cannot be that of a field in a space  not a b: its name cannot be that of a field in a space  not loads: its lists were empty  \
-         not zone: it came as null and a text }"
+        "{ driving: bool  errors: list of { id: text  optional level: int }  x: int  y: real  optional zone: text  \
+         not _: its name cannot be that of a field in a space  not a b: its name cannot be that of a field in a space  not loads: its lists were empty }"
     );
 }
 
@@ -61,17 +62,15 @@ fn points_times_and_numbers_that_json_does_not_have_are_as_the_middleware_writes
         json!({ "stamp": { "sec": 2, "nanosec": 0 }, "level": 1 }),
     ];
     assert_eq!(said(&stamped, Conventions::Rosbridge), "{ level: real  stamp: time }");
-    assert_eq!(
-        said(&stamped, Conventions::Json),
-        "{ stamp: { nanosec: int  sec: int }  not level: it came as null and a number }"
-    );
+    assert_eq!(said(&stamped, Conventions::Json), "{ optional level: int  stamp: { nanosec: int  sec: int } }");
     let texts = [json!("none"), json!(0.5)];
     assert_eq!(said(&texts, Conventions::Simlog2), "text");
     assert_eq!(said(&texts, Conventions::Simlog3), "none: it came as a number and a text");
     assert_eq!(said(&[json!(u64::MAX), json!(1)], Conventions::Json), "real");
     assert_eq!(said(&[], Conventions::Simlog2), "none: nothing came");
+    assert_eq!(said(&[json!({}), json!({ "a": 1 })], Conventions::Json), "{ optional a: int }");
     assert_eq!(
-        said(&[json!({}), json!({ "a": 1 })], Conventions::Json),
+        said(&[json!({}), json!({ "a": 1 })], Conventions::Rosbridge),
         "none: its objects have no field that a space can declare, for example not `a`: only 1 of 2 objects have it"
     );
 }
@@ -116,7 +115,10 @@ fn fits(value: &Json, guess: &Guess, conventions: Conventions) -> bool {
             .any(|names| names.iter().all(|name| value.get(name).is_some_and(Json::is_i64))),
         Guess::List(of) => value.as_array().is_some_and(|items| items.iter().all(|item| fits(item, of, conventions))),
         Guess::Message { fields, .. } => {
-            fields.iter().all(|(name, of)| value.get(name).is_some_and(|field| fits(field, of, conventions)))
+            fields.iter().all(|GuessedField { name, guess, optional }| match value.get(name) {
+                None | Some(Json::Null) if *optional => true,
+                field => field.is_some_and(|field| fits(field, guess, conventions)),
+            })
         }
     }
 }

@@ -39,7 +39,8 @@ fn words(guess: &Guess) -> String {
     match guess {
         Guess::List(of) => format!("list of {}", words(of)),
         Guess::Message { fields, .. } => {
-            let fields: Vec<String> = fields.iter().map(|(name, of)| format!("{name} {}", words(of))).collect();
+            let fields: Vec<String> =
+                fields.iter().map(|field| format!("{} {}", field.name, words(&field.guess))).collect();
             format!("{{{}}}", fields.join(", "))
         }
         plain => format!("{plain:?}").to_lowercase(),
