@@ -19,6 +19,8 @@ enum Computes {
     Greatest,
     Distance,
     SignedDistance,
+    /// From the values of successive messages.
+    Memory,
     Unary(UnaryFunction, Takes, Gives),
     /// A function of two numbers of one dimension, unless it takes plain ones.
     Binary(BinaryFunction, Takes, Gives),
@@ -52,6 +54,9 @@ const FUNCTIONS: &[(&str, Computes)] = &[
     ("max", Computes::Greatest),
     ("distance", Computes::Distance),
     ("signed_distance", Computes::SignedDistance),
+    ("previous", Computes::Memory),
+    ("rate", Computes::Memory),
+    ("integral", Computes::Memory),
     ("sqrt", Computes::Unary(UnaryFunction::Sqrt, Takes::Square, Gives::Same)),
     ("hypot", Computes::Binary(BinaryFunction::Hypot, Takes::Any, Gives::Same)),
     ("sin", Computes::Unary(UnaryFunction::Sin, Takes::Angle, Gives::Plain)),
@@ -105,6 +110,7 @@ impl<'a> Resolver<'a> {
             }
             (Some(Computes::Distance), _) => return self.distance(inputs, call.span, arguments),
             (Some(Computes::SignedDistance), [from, to]) => return self.signed_distance(inputs, from, to),
+            (Some(Computes::Memory), [_]) => return self.remembered(inputs, call),
             (Some(Computes::Unary(function, takes, gives)), [of]) => {
                 let (number, unit) = self.number(inputs, of)?;
                 let (number, unit) = self.argument(&name.text, takes, of.span, number, unit)?;
@@ -117,7 +123,7 @@ impl<'a> Resolver<'a> {
                 self.over_time(call.span, name, None);
                 return None;
             }
-            (Some(Computes::Absolute | Computes::Unary(..)), _) => "one value",
+            (Some(Computes::Absolute | Computes::Memory | Computes::Unary(..)), _) => "one value",
             (Some(Computes::Binary(..)), _) => "two values",
             (Some(Computes::SignedDistance), _) => "two arguments",
             (Some(Computes::Least | Computes::Greatest), _) => "two values or more",

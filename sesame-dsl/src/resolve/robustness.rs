@@ -138,7 +138,9 @@ impl<'a> Resolver<'a> {
                 }
                 self.predicate(parts, expression, left, *by, right)
             }
-            ExpressionKind::Field(_) | ExpressionKind::Members(..) if self.is_condition(expression) => {
+            ExpressionKind::Field(_) | ExpressionKind::Members(..) | ExpressionKind::Call(..)
+                if self.is_condition(expression) =>
+            {
                 let input = self.truth(&mut parts.inputs, expression)?;
                 Some(parts.truth(input))
             }
@@ -354,7 +356,7 @@ fn open_end(expression: &ast::Expression) -> Option<(Span, Span, Span)> {
 
 /// Whether a number may change during a run.
 fn varies(of: &Expression) -> bool {
-    matches!(of, Expression::Input(_) | Expression::Time)
+    matches!(of, Expression::Input(_) | Expression::Integral(_) | Expression::Time)
         || of.points().iter().any(|point| matches!(point, Point::Input(_)))
         || of.parts().into_iter().any(varies)
 }

@@ -216,6 +216,7 @@ pub fn evidence_above(name: &str, topic: u32, limit: f64) -> Evidence {
             members: Members::Min,
             list: None,
             text: None,
+            memory: Vec::new(),
         }],
         condition: formula::Condition::Compare {
             left: Expression::Input(0),

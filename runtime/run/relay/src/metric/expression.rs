@@ -5,9 +5,11 @@ use std::fmt;
 
 use sesame_plan::{BinaryFunction, Condition, Distance, Expression, Point, UnaryFunction};
 
+use crate::metric::memory::integral;
 use crate::metric::region::signed_distance;
 
-/// The values of a formula's inputs: a point, or a number (true is 1, false 0) followed by zeros.
+/// The values of a formula's inputs: a point, or a number (true is 1, false 0) followed by zeros. Of an integral it is
+/// what it came to with the last message, the value by which it grows since, and the time of that message in seconds.
 pub(crate) type Held = [f64; 3];
 
 /// What a formula is computed from at one moment.
@@ -27,6 +29,11 @@ impl<'a> Moment<'a> {
     /// The first function that had no value, of all that was computed.
     pub(crate) fn undefined(&self) -> Option<Undefined> {
         self.undefined.get()
+    }
+
+    /// By how much an integral grows each second.
+    pub(super) fn pace(&self, integral: u32) -> f64 {
+        self.inputs[integral as usize][1]
     }
 
     fn point(&self, point: Point) -> Held {
@@ -68,6 +75,7 @@ pub(super) fn number(of: &Expression, at: &Moment<'_>) -> f64 {
     match of {
         Expression::Constant(value) => *value,
         Expression::Input(input) => at.inputs[*input as usize][0],
+        Expression::Integral(input) => integral(at.inputs[*input as usize], at.time),
         Expression::Negate(of) => -number(of, at),
         Expression::Sum(of) => of.iter().map(|term| number(term, at)).reduce(|sum, term| sum + term).unwrap_or(0.0),
         Expression::Product(of) => {

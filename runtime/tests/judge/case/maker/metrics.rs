@@ -33,6 +33,7 @@ impl Maker {
             members,
             list: None,
             text: None,
+            memory: Vec::new(),
         })
     }
 
