@@ -169,6 +169,9 @@ const SYNONYMS: &[Synonym] = &[
     like("future", "eventually"),
     like("f", "eventually"),
     like("u", "until"),
+    same("weak_until", "weak until"),
+    like("unless", "weak until"),
+    like("w", "weak until"),
     // Types of messages.
     same("float", "real"),
     same("float32", "real"),

@@ -121,7 +121,8 @@ impl<'a> Resolver<'a> {
             ExpressionKind::Until(left, until, right) => {
                 let interval = self.interval(until.interval.as_ref());
                 let [left, right] = self.pair(parts, left, right)?;
-                Some(Temporal::Until(interval?, Box::new(left), Box::new(right)))
+                let kind = if until.weak { Temporal::WeakUntil } else { Temporal::Until };
+                Some(kind(interval?, Box::new(left), Box::new(right)))
             }
             ExpressionKind::Prefixed(prefixes, of) => self.prefixed(parts, prefixes, of),
             ExpressionKind::Truth(_) => {

@@ -185,6 +185,7 @@ pub(super) fn phrases_of(rule: Rule) -> Vec<String> {
         | Rule::k_always
         | Rule::k_eventually
         | Rule::k_pair
+        | Rule::k_weak
         | Rule::element
         | Rule::element_filter
         | Rule::element_key

@@ -172,7 +172,7 @@ fn temporal(formula: &stl::Formula, signals: usize) -> Checked {
             interval(*within)?;
             temporal(of, signals)
         }
-        Formula::Until { interval: within, left, right } => {
+        Formula::Until { interval: within, left, right, weak: _ } => {
             interval(*within)?;
             temporal(left, signals)?;
             temporal(right, signals)

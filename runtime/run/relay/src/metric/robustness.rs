@@ -661,6 +661,7 @@ mod tests {
                     .prop_map(move |(interval, of)| Formula::Eventually { interval, of: boxed(of) }),
                 (interval, inner.clone(), inner).prop_map(move |(interval, left, right)| Formula::Until {
                     interval,
+                    weak: false,
                     left: boxed(left),
                     right: boxed(right)
                 }),
