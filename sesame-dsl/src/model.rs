@@ -34,7 +34,7 @@ pub use sesame_plan::{
     Condition, Confirmation, Copies, Dimension, Direction, Distance, Distribution, Drain, Exploration, Expression,
     Interface, Members, MembersOf, Memory, MessageRun, Messages, Moment, NotFinite, OperationKind, OwnSetting, Point,
     Recorded, Region, Ros, Setting, SignedDistance, Statistic, Step, StepBy, Stepping, StopRule, Strategy,
-    StrategyKind, StrategyProperties, TextTest, Transport, Trend, UnaryFunction, ValueMode,
+    StrategyKind, StrategyProperties, TextTest, Transport, Trend, Turn, UnaryFunction, ValueMode,
 };
 
 use crate::span::FileId;

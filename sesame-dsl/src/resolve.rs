@@ -69,6 +69,7 @@ mod simulator;
 mod stop;
 mod system;
 mod words;
+mod wrapped;
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -34,6 +34,7 @@ pub(super) fn operation(
         priority: operation.priority,
         inclusion: operation.inclusion,
         timed: operation.timed,
+        wrapped: operation.wrapped,
         constraints,
     }
 }

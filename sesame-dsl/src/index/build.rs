@@ -470,6 +470,7 @@ impl<'a> Indexer<'a> {
             priority: _,
             inclusion: _,
             untimed: _,
+            wrapped: _,
             contains,
         } = &operation.body;
         for place in targets.iter().flat_map(|target| &target.places) {

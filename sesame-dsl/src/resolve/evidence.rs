@@ -8,11 +8,11 @@ use super::eddi::{Member, Members};
 use super::examples;
 use super::formula::MAX_DEPTH;
 use super::parts::first_part;
-use super::read::memory_named;
+use super::read::{Remembers, memory_named};
 use super::words::{list, type_in_words};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::eddi::{Evidence, Gate, Guarantee, Stale, StaleIs};
-use crate::model::{self, Comparison, Condition, Expression, Input, Memory, TextTest, Type};
+use crate::model::{self, Comparison, Condition, Expression, Input, TextTest, Type};
 use crate::similar::most_similar;
 use crate::span::Span;
 use crate::syntax::ast::eddi as written;
@@ -85,7 +85,7 @@ impl<'a> Resolver<'a> {
         if condition.reads_time() {
             let time = first_part(written, &|part| match &part.kind {
                 ExpressionKind::Field(path) if self.is_time(path) => Some((path.span, false)),
-                ExpressionKind::Call(name, _) if memory_named(&name.text) == Some(Memory::Integral) => {
+                ExpressionKind::Call(name, _) if memory_named(&name.text) == Some(Remembers::Integral) => {
                     Some((part.span, true))
                 }
                 _ => None,

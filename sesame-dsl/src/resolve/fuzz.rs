@@ -52,6 +52,10 @@ impl<'a> Resolver<'a> {
         let between = self.between_nodes(body);
         let constraints = self.constraints(&body.contains);
         let (mut targets, kind, mut parameters) = what?;
+        let wrapped = match self.single(&body.wrapped, "wrapped") {
+            Some(turn) => Some(self.wrapped(body, (body.wrapped[0].0, turn.as_ref()), &kind, &parameters)?),
+            None => None,
+        };
         let (nodes, choice) = match &body.resource {
             Some(resource) => self.members_of_node(resource)?,
             None => (None, self.members_of_targets(body, &mut targets)?),
@@ -80,6 +84,7 @@ impl<'a> Resolver<'a> {
             priority: priority?,
             inclusion: inclusion?,
             timed: body.untimed.is_empty(),
+            wrapped,
             constraints: constraints?,
         })
     }

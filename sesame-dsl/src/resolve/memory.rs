@@ -3,12 +3,12 @@
 //! Their argument is a topic or field, not a calculation: it is at messages that there is a next value, and the values
 //! of a calculation over several topics belong to no message.
 
-use sesame_plan::Reduction;
+use sesame_plan::{Finite, Reduction};
 
 use super::Resolver;
 use super::elements::Reading;
 use super::formula::{Number, position, scaled};
-use super::read::{Read, computed, memory_named, read_in};
+use super::read::{Read, Remembers, computed, memory_named, read_in};
 use super::words::type_in_words;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{Expression, Input, Members, Memory, Type};
@@ -58,17 +58,26 @@ impl<'a> Resolver<'a> {
                 self.report(diagnostic);
                 return None;
             }
-            reading.ty = match (memory, &reading.ty) {
-                (Memory::Previous, ty) => ty.clone(),
-                (Memory::Integral, Type::Int(unit) | Type::Real(unit)) => Type::Real(unit.clone()),
-                (Memory::Rate, Type::Int(unit) | Type::Real(unit)) => Type::Real(self.per_second(unit, whole)?),
-                (Memory::Rate, Type::Point(unit)) => Type::Point(self.per_second(unit, whole)?),
+            let (memory, ty) = match (memory, &reading.ty) {
+                (Remembers::Previous, ty) => (Memory::Previous, ty.clone()),
+                (Remembers::Integral, Type::Int(unit) | Type::Real(unit)) => {
+                    (Memory::Integral, Type::Real(unit.clone()))
+                }
+                (Remembers::Rate, Type::Int(unit) | Type::Real(unit)) => {
+                    (Memory::Rate, Type::Real(self.per_second(unit, whole)?))
+                }
+                (Remembers::Rate, Type::Point(unit)) => (Memory::Rate, Type::Point(self.per_second(unit, whole)?)),
+                (Remembers::Unwrapped, Type::Int(unit) | Type::Real(unit)) => {
+                    let turn = self.turn(&name.text, start.to(read.path.span), unit.as_ref())?;
+                    (Memory::Unwrapped { turn: Finite(turn) }, Type::Real(unit.clone()))
+                }
                 (_, ty) => {
                     let ty = ty.clone();
                     self.not_remembered(name, start.to(read.path.span), &ty);
                     return None;
                 }
             };
+            reading.ty = ty;
             reading.memory.push(memory);
         }
         self.one_by_one(read, &reading)?;
@@ -117,7 +126,7 @@ impl<'a> Resolver<'a> {
             return None;
         }
         let joined = matches!(reading.members, Members::Min | Members::Max | Members::Sum);
-        if *memory == Memory::Integral && joined && self.members_of(&reading.field) > 1 {
+        if *memory == Remembers::Integral && joined && self.members_of(&reading.field) > 1 {
             let written = self.text(read.path.span).to_owned();
             let title = format!("`{}` is a group of topics, but one value is integrated", read.path.topic.text);
             let argument = read.word.map_or(read.path.span, |(_, word)| word.to(read.path.span));
@@ -164,7 +173,7 @@ impl<'a> Resolver<'a> {
         let title = format!("`{called}(…)` needs a number, but `{written}` is {}", type_in_words(ty));
         let mut diagnostic = Diagnostic::new(Code::WRONG_TYPE, argument, title).label("expected a number");
         match ty {
-            Type::Bool if called == Memory::Integral.name() => {
+            Type::Bool if memory_named(called) == Some(Remembers::Integral) => {
                 diagnostic = diagnostic.note(format!("`duration({written})` is the time during which it is true"));
             }
             Type::Bool => {
@@ -204,7 +213,7 @@ impl<'a> Resolver<'a> {
     /// The type of what a formula reads; `None` also where that is a mistake. Reports nothing.
     pub(super) fn type_of_read(&self, read: &Read<'_>) -> Option<Type> {
         let ty = self.type_read(read.path, read.word.map(|(word, _)| word))?;
-        let kept = read.memory.iter().all(|(memory, _)| *memory == Memory::Previous);
+        let kept = read.memory.iter().all(|(memory, _)| *memory == Remembers::Previous);
         match ty {
             Type::Bool | Type::Text if !kept => None,
             ty => Some(ty),

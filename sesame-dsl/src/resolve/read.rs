@@ -1,9 +1,25 @@
 //! What formulas read of messages, as it is written: a path, a word before it, and functions of successive messages
 //! around it.
 
-use crate::model::Memory;
 use crate::span::Span;
 use crate::syntax::ast::{self, ExpressionKind, Name, Path};
+
+/// What a function computes from the values of successive messages.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Remembers {
+    Previous,
+    Rate,
+    Integral,
+    Unwrapped,
+}
+
+/// The functions of successive messages.
+const FUNCTIONS: [(&str, Remembers); 4] = [
+    ("previous", Remembers::Previous),
+    ("rate", Remembers::Rate),
+    ("integral", Remembers::Integral),
+    ("unwrapped", Remembers::Unwrapped),
+];
 
 /// What a formula reads of messages, as it is written.
 pub(super) struct Read<'a> {
@@ -11,7 +27,7 @@ pub(super) struct Read<'a> {
     /// The word before the path.
     pub(super) word: Option<(ast::Members, Span)>,
     /// What is computed from successive values, the innermost first, with the name that it has.
-    pub(super) memory: Vec<(Memory, &'a Name)>,
+    pub(super) memory: Vec<(Remembers, &'a Name)>,
 }
 
 impl<'a> Read<'a> {
@@ -22,8 +38,8 @@ impl<'a> Read<'a> {
 }
 
 /// What is computed from successive values by a function of this name.
-pub(super) fn memory_named(name: &str) -> Option<Memory> {
-    Memory::ALL.into_iter().find(|memory| memory.name() == name)
+pub(super) fn memory_named(name: &str) -> Option<Remembers> {
+    FUNCTIONS.into_iter().find(|(known, _)| *known == name).map(|(_, remembers)| remembers)
 }
 
 /// What an expression reads of messages, if that is all it is.
@@ -38,7 +54,7 @@ pub(super) fn read_in(expression: &ast::Expression) -> Option<Read<'_>> {
 }
 
 /// What an expression computes from successive values of another one, the innermost first, and that one.
-pub(super) fn computed(expression: &ast::Expression) -> (Vec<(Memory, &Name)>, &ast::Expression) {
+pub(super) fn computed(expression: &ast::Expression) -> (Vec<(Remembers, &Name)>, &ast::Expression) {
     let (mut memory, mut of) = (Vec::new(), expression);
     while let ExpressionKind::Call(name, arguments) = &of.kind
         && let ([argument], Some(next)) = (arguments.as_slice(), memory_named(&name.text))

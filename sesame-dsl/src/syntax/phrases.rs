@@ -93,6 +93,7 @@ pub(super) fn phrases_of(rule: Rule) -> Vec<String> {
         Rule::priority => &["`priority`"],
         Rule::inclusion => &["`inclusion`"],
         Rule::untimed => &["`untimed`"],
+        Rule::wrapped => &["`wrapped`"],
         Rule::to_nodes => &["`to`"],
         Rule::state_topic => &["`publishes`"],
         Rule::external => &["`external`"],

@@ -61,6 +61,10 @@ fn operations(units: &[&str]) -> String {
         let _ = writeln!(text, "operation stuck{at} on t{at} = stuck at {one}");
         let _ = writeln!(text, "operation biased{at} on p{at} = bias {corners}");
         let _ = writeln!(text, "operation noisy{at} on t{at} = noise {one}");
+        if ["mrad", "rad", "deg", "rev"].contains(unit) {
+            let _ = writeln!(text, "operation turned{at} on t{at} = drift [0{unit}/s, 1{unit}/s] wrapped");
+            let _ = writeln!(text, "operation tilted{at} on t{at} = random offset {one} wrapped [0{unit}, 1rev]");
+        }
     }
     text + r#"
         operation drifting on note.level = drift [0m/s, 1m/s]

@@ -58,7 +58,7 @@ fn unit_of_field<'a>(plan: &'a CampaignPlan, field: &FieldRef) -> Option<Unit<'a
 }
 
 /// The unit of the value behind the steps from a field.
-fn unit_in<'a>(plan: &'a CampaignPlan, field: &FieldRef, steps: &[Step]) -> Option<Unit<'a>> {
+pub(crate) fn unit_in<'a>(plan: &'a CampaignPlan, field: &FieldRef, steps: &[Step]) -> Option<Unit<'a>> {
     let mut ty = &plan.topic(field.topic).ty;
     let fields = field.path.iter().map(Some);
     let steps = steps.iter().map(|step| match step {

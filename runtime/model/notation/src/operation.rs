@@ -2,10 +2,11 @@
 
 use sesame_plan::condition::{Constraint, Integers};
 use sesame_plan::{
-    CampaignPlan, Distribution, Domain, Drain, Lengths, MembersOf, Metric, Operation, OperationKind, Parameter, Span,
-    TargetRef, Topic, value_path_in_words, without_member,
+    CampaignPlan, Distribution, Domain, Drain, FieldRef, Lengths, MembersOf, Metric, Operation, OperationKind,
+    Parameter, Span, TargetRef, Topic, value_path_in_words, without_member,
 };
 
+use crate::monitor::unit_in;
 use crate::text::{list, one_of, quoted};
 use crate::unit::Unit;
 
@@ -35,9 +36,17 @@ pub fn operation(plan: &CampaignPlan, operation: &Operation) -> String {
         priority: Some(operation.priority),
         inclusion: Some(operation.inclusion),
         untimed: !operation.timed,
+        wrapped: operation.wrapped.map(|turn| unit_of_places(plan, operation).range(turn.low, turn.high)),
         start_contains: operation.constraints.iter().map(|comparison| constraint(comparison, &plan.metrics)).collect(),
     };
     format!("{line} = {}{}", disturbance(operation), clauses.write())
+}
+
+/// The unit of the values that an operation changes.
+fn unit_of_places<'a>(plan: &'a CampaignPlan, operation: &Operation) -> Unit<'a> {
+    let field = operation.topic.map(|topic| FieldRef { topic, path: Vec::new() });
+    let place = operation.places.first().map_or(&[][..], Vec::as_slice);
+    field.and_then(|field| unit_in(plan, &field, place)).unwrap_or(Unit::None)
 }
 
 /// A parameter of the simulator that tests choose.
@@ -108,6 +117,8 @@ pub struct Clauses {
     pub inclusion: Option<f64>,
     /// Whether its active time does not count.
     pub untimed: bool,
+    /// The turn in which angles stay.
+    pub wrapped: Option<String>,
     /// What its start conditions contain.
     pub start_contains: Vec<String>,
 }
@@ -121,6 +132,7 @@ impl Clauses {
             self.priority.map(|priority| format!(" priority {priority}")),
             self.inclusion.map(|inclusion| format!(" inclusion {}", Unit::Share.number(inclusion))),
             self.untimed.then(|| " untimed".to_owned()),
+            self.wrapped.as_ref().map(|turn| format!(" wrapped {turn}")),
             (!self.start_contains.is_empty()).then(|| format!(" start contains {}", self.start_contains.join(", "))),
         ];
         clauses.into_iter().flatten().collect()

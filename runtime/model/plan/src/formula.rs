@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{FieldRef, Step, TopicId};
+use crate::{FieldRef, Finite, Step, TopicId};
 
 /// A metric computed from messages without any code of the user.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -155,18 +155,22 @@ pub enum Memory {
     /// The integral over time since the first message, in seconds times its unit. Each value holds until the next
     /// message. It is of one number, and the last that is computed.
     Integral,
+    /// An angle that is followed from message to message: it differs from the value by as many whole turns as bring it
+    /// nearest to what it was before. It is of one number.
+    Unwrapped {
+        /// A whole turn, in the unit of the value; positive.
+        turn: Finite,
+    },
 }
 
 impl Memory {
-    /// All of them.
-    pub const ALL: [Memory; 3] = [Memory::Previous, Memory::Rate, Memory::Integral];
-
     /// Its name in the language.
     pub const fn name(self) -> &'static str {
         match self {
             Memory::Previous => "previous",
             Memory::Rate => "rate",
             Memory::Integral => "integral",
+            Memory::Unwrapped { .. } => "unwrapped",
         }
     }
 }
@@ -421,6 +425,9 @@ pub enum BinaryFunction {
     Hypot,
     /// The first to the power of the second.
     Pow,
+    /// What is left of an angle without whole turns, the second: from minus half a turn up to and not including half a
+    /// turn.
+    Wrapped,
 }
 
 impl BinaryFunction {
@@ -430,6 +437,7 @@ impl BinaryFunction {
             BinaryFunction::Atan2 => "atan2",
             BinaryFunction::Hypot => "hypot",
             BinaryFunction::Pow => "pow",
+            BinaryFunction::Wrapped => "wrapped",
         }
     }
 }

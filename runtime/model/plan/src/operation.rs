@@ -55,6 +55,10 @@ pub struct Operation {
     /// Whether its active time counts in `fuzzing_time()`. Default true, and then not written.
     #[serde(default = "timed", skip_serializing_if = "is_timed")]
     pub timed: bool,
+    /// The turn in which it keeps the numbers that it changes, which are angles; `None` where it leaves them as they
+    /// come, and then not written.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wrapped: Option<Turn>,
     /// What its start conditions contain where a search grows them.
     pub constraints: Vec<Constraint>,
 }
@@ -222,6 +226,15 @@ impl Span {
     pub fn length(self) -> f64 {
         self.end - self.start
     }
+}
+
+/// One whole turn, in the unit of an angle: from `low` up to and not including `high`, which are finite and apart.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Turn {
+    /// The least angle.
+    pub low: f64,
+    /// The angle that is the least one again.
+    pub high: f64,
 }
 
 /// The permitted lengths of windows, in seconds; `0 <= low <= high`, and `high` is more than 0.

@@ -202,6 +202,11 @@ impl CampaignPlan {
         at("within", span(operation.within))?;
         at("lengths", operation.lengths.map_or(Ok(()), |found| lengths(found, operation.within)))?;
         at("inclusion", share(operation.inclusion))?;
+        if let Some(turn) = operation.wrapped {
+            let apart = turn.low < turn.high && (turn.high - turn.low).is_finite();
+            at("wrapped", require(apart, || format!("{} to {} is no turn", turn.low, turn.high)))?;
+            at("wrapped", require(operation.kind.adds(), || "it adds nothing to angles".to_owned()))?;
+        }
         each("constraints", &operation.constraints, |constraint| match constraint {
             Constraint::Variable { metric } => at("metric", self.has_metric(*metric)),
             Constraint::Integer { bounds } => at("bounds", integers(*bounds)),

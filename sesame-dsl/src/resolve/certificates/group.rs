@@ -144,7 +144,12 @@ impl<'a> Group<'a> {
             _ => None,
         };
         for memory in &input.memory {
-            text = format!("the {} of {text}", memory.name()).replace("the previous of", "the previous value of");
+            let what = match memory {
+                plan::Memory::Previous => "previous value",
+                plan::Memory::Unwrapped { .. } => "unwrapped angle",
+                plan::Memory::Rate | plan::Memory::Integral => memory.name(),
+            };
+            text = format!("the {what} of {text}");
             if *memory == plan::Memory::Rate {
                 unit = product(unit.as_ref(), Some(&Unit::seconds()), true).and_then(|(unit, _)| unit);
             }

@@ -30,6 +30,8 @@ pub(crate) struct OperationBody {
     pub(crate) priority: Vec<(Span, Quantity)>,
     pub(crate) inclusion: Vec<(Span, Quantity)>,
     pub(crate) untimed: Vec<Span>,
+    /// With the turn in which angles stay, if it is written.
+    pub(crate) wrapped: Vec<(Span, Option<Range>)>,
     pub(crate) contains: Vec<(Span, Vec<Contained>)>,
 }
 
@@ -49,6 +51,7 @@ impl OperationBody {
             priority: vec![],
             inclusion: vec![],
             untimed: vec![],
+            wrapped: vec![],
             contains: vec![],
         }
     }

@@ -35,6 +35,9 @@ impl Reader<'_> {
         let contains = children(pair, Rule::start_contains)
             .map(|clause| (self.keyword_span(&clause), self.contained(&clause)))
             .collect();
+        let wrapped = children(pair, Rule::wrapped)
+            .map(|clause| (self.keyword_span(&clause), child(&clause, Rule::range).map(|range| self.range(&range))))
+            .collect();
         let untimed = children(pair, Rule::untimed).map(|untimed| self.span(&untimed)).collect();
         let mut nodes = |rule| child(pair, rule).map(|nodes| (self.keyword_span(&nodes), self.with_members(&nodes)));
         let from = nodes(Rule::from_nodes);
@@ -55,6 +58,7 @@ impl Reader<'_> {
             priority,
             inclusion,
             untimed,
+            wrapped,
             contains,
         };
         Operation { head, body }

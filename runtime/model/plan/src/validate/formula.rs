@@ -86,6 +86,11 @@ fn sound_memory(input: &Input, members: usize) -> Checked {
     let Some((last, before)) = input.memory.split_last() else { return Ok(()) };
     let each = input.list.as_ref().is_some_and(|list| list.reduction == Reduction::Each);
     require(!each, || "is of each element of a list".to_owned())?;
+    for memory in &input.memory {
+        if let Memory::Unwrapped { turn } = memory {
+            positive(turn.0)?;
+        }
+    }
     require(input.text.is_none() || input.memory.iter().all(|of| *of == Memory::Previous), || {
         "a text has no rate and no integral".to_owned()
     })?;

@@ -5,6 +5,7 @@ use std::fmt;
 
 use sesame_plan::{BinaryFunction, Condition, Distance, Expression, Point, UnaryFunction};
 
+use crate::angle::wrapped;
 use crate::metric::memory::integral;
 use crate::metric::region::signed_distance;
 
@@ -126,6 +127,7 @@ fn binary(function: BinaryFunction, left: f64, right: f64) -> f64 {
         BinaryFunction::Atan2 => libm::atan2(left, right),
         BinaryFunction::Hypot => libm::hypot(left, right),
         BinaryFunction::Pow => libm::pow(left, right),
+        BinaryFunction::Wrapped => wrapped(left, -right / 2.0, right),
     }
 }
 
@@ -205,7 +207,7 @@ mod tests {
 
     #[test]
     fn functions_compute_what_their_names_say() {
-        use BinaryFunction::{Atan2, Hypot, Pow};
+        use BinaryFunction::{Atan2, Hypot, Pow, Wrapped};
         use UnaryFunction::{Acos, Asin, Atan, Cos, Exp, Ln, Sin, Sqrt, Tan};
         let half_turn = std::f64::consts::PI;
         let unary = [
@@ -223,7 +225,12 @@ mod tests {
             let found = number(&Expression::Unary { function, of: Box::new(constant(of)) }, &[]);
             assert!((found - value).abs() < 1e-15, "{} {found}", function.name());
         }
-        let binary = [(Atan2, 1.0, -1.0, 0.75 * half_turn), (Hypot, 3.0, 4.0, 5.0), (Pow, 2.0, 10.0, 1024.0)];
+        let binary = [
+            (Atan2, 1.0, -1.0, 0.75 * half_turn),
+            (Hypot, 3.0, 4.0, 5.0),
+            (Pow, 2.0, 10.0, 1024.0),
+            (Wrapped, 190.0, 360.0, -170.0),
+        ];
         for (function, left, right, value) in binary {
             let [left, right] = [left, right].map(|argument| Box::new(constant(argument)));
             assert_eq!(number(&Expression::Binary { function, left, right }, &[]), value, "{}", function.name());

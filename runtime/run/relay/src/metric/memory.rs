@@ -58,6 +58,11 @@ enum Stage {
         sum: f64,
         since: Option<(SimTime, f64)>,
     },
+    Unwrapped {
+        turn: f64,
+        /// What it came to last.
+        last: Option<f64>,
+    },
 }
 
 impl Stage {
@@ -66,6 +71,7 @@ impl Stage {
             Memory::Previous => Stage::Previous(None),
             Memory::Rate => Stage::Rate { last: None, earlier: None },
             Memory::Integral => Stage::Integral { sum: 0.0, since: None },
+            Memory::Unwrapped { turn } => Stage::Unwrapped { turn: turn.0, last: None },
         }
     }
 
@@ -101,6 +107,16 @@ impl Stage {
                     return Some(NOT_FINITE);
                 }
                 sum.is_finite().then_some([*sum, value[0], now.seconds()])
+            }
+            Stage::Unwrapped { turn, last } => {
+                if !finite {
+                    *last = None;
+                    return Some(NOT_FINITE);
+                }
+                let turns = last.map_or(0.0, |last| libm::round((last - value[0]) / *turn));
+                let followed = value[0] + turns * *turn;
+                *last = Some(followed);
+                Some([followed, 0.0, 0.0])
             }
         }
     }
@@ -197,6 +213,20 @@ mod tests {
             let is_told = rates.last().is_some_and(|last| last.0 == sent.last().unwrap().0) && rate(&sent).is_some();
             let expected = is_told.then(|| rate(&rates)).flatten();
             prop_assert!(close(taken(&[Memory::Rate, Memory::Rate], &sent), expected));
+        }
+    }
+
+    proptest! {
+        /// What turns by less than half a turn from one message to the next, and is sent without whole turns.
+        #[test]
+        fn an_angle_that_is_followed_has_all_its_turns(steps in prop::collection::vec(-179..180_i32, 1..30)) {
+            let mut stage = Stage::new(Memory::Unwrapped { turn: sesame_plan::Finite(360.0) });
+            let mut turned = 0;
+            for step in steps {
+                turned += step;
+                let sent = [f64::from((turned + 180).rem_euclid(360) - 180), 0.0, 0.0];
+                prop_assert_eq!(stage.take(sent, SimTime::ZERO), Some([f64::from(turned), 0.0, 0.0]));
+            }
         }
     }
 
