@@ -27,6 +27,7 @@ mod collect;
 mod condition;
 mod confirmation;
 mod contained;
+mod counted;
 mod coverage;
 mod custom;
 mod depth;

@@ -470,6 +470,7 @@ impl<'a> Indexer<'a> {
             priority: _,
             inclusion: _,
             untimed: _,
+            counted: _,
             wrapped: _,
             contains,
         } = &operation.body;

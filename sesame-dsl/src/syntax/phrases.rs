@@ -94,6 +94,8 @@ pub(super) fn phrases_of(rule: Rule) -> Vec<String> {
         Rule::inclusion => &["`inclusion`"],
         Rule::untimed => &["`untimed`"],
         Rule::wrapped => &["`wrapped`"],
+        Rule::next_messages => &["`next`"],
+        Rule::every_messages => &["`every`"],
         Rule::to_nodes => &["`to`"],
         Rule::state_topic => &["`publishes`"],
         Rule::external => &["`external`"],

@@ -85,6 +85,8 @@ fn operations(units: &[&str]) -> String {
         operation mixed on note = reorder [0s, 1s] drain drop
         operation twice on note = duplicate [1, 7]
         operation cut on note = blackhole
+        operation cut_some on note = blackhole next [1, 9] messages every [2, 3] messages
+        operation lost_some on one of note = packet loss [0%, 1%] every [2, 3] messages
         operation bent on t0 = custom {
           points: int [0, 1]  gain: real [0, 1]  reach: real[mm] [0mm, 1mm]
           shift: point [(0, 0, 0)m, (1, 1, 1)m]  frame: one of "a", "b"
@@ -229,7 +231,9 @@ fn operation(like: &Operation, end: f64, by_condition: bool) -> BoxedStrategy<Op
     (domains, texts, clauses)
         .prop_map(move |(domains, texts, ((start, stop), priority, inclusion, timed, constraints, lengths))| {
             let mut operation = like.clone();
-            for (parameter, domain) in operation.parameters.iter_mut().zip(domains) {
+            // Counts are from 1.
+            let own = operation.own_parameters().len();
+            for (parameter, domain) in operation.parameters.iter_mut().zip(domains).take(own) {
                 parameter.domain = domain;
             }
             if let OperationKind::RandomText { texts: offered } = &mut operation.kind {

@@ -2,7 +2,7 @@
 
 use sesame_plan::condition::{Constraint, Integers};
 use sesame_plan::{
-    CampaignPlan, Distribution, Domain, Drain, FieldRef, Lengths, MembersOf, Metric, Operation, OperationKind,
+    CampaignPlan, Counted, Distribution, Domain, Drain, FieldRef, Lengths, MembersOf, Metric, Operation, OperationKind,
     Parameter, Span, TargetRef, Topic, value_path_in_words, without_member,
 };
 
@@ -35,11 +35,21 @@ pub fn operation(plan: &CampaignPlan, operation: &Operation) -> String {
         lengths: operation.lengths,
         priority: Some(operation.priority),
         inclusion: Some(operation.inclusion),
+        counted: operation.counting_parameters().map(|(counted, parameter)| count(counted, parameter)).collect(),
         untimed: !operation.timed,
         wrapped: operation.wrapped.map(|turn| unit_of_places(plan, operation).range(turn.low, turn.high)),
         start_contains: operation.constraints.iter().map(|comparison| constraint(comparison, &plan.metrics)).collect(),
     };
     format!("{line} = {}{}", disturbance(operation), clauses.write())
+}
+
+/// How many messages a test may count out.
+fn count(counted: Counted, parameter: &Parameter) -> String {
+    let range = match &parameter.domain {
+        Domain::Number { low, high, .. } => Unit::None.range(*low, *high),
+        _ => String::new(),
+    };
+    format!("{} {range} messages", counted.name())
 }
 
 /// The unit of the values that an operation changes.
@@ -115,6 +125,8 @@ pub struct Clauses {
     pub priority: Option<i32>,
     /// The probability, a fraction, that a fresh test contains it.
     pub inclusion: Option<f64>,
+    /// Which messages of an activation it alters.
+    pub counted: Vec<String>,
     /// Whether its active time does not count.
     pub untimed: bool,
     /// The turn in which angles stay.
@@ -127,6 +139,7 @@ impl Clauses {
     /// The clauses, each after a space.
     pub fn write(&self) -> String {
         let clauses = [
+            (!self.counted.is_empty()).then(|| format!(" {}", self.counted.join(" "))),
             self.lengths.map(|lengths| format!(" for {}", Unit::SECONDS.range(lengths.low, lengths.high))),
             self.within.map(|within| format!(" within {}", Unit::SECONDS.range(within.start, within.end))),
             self.priority.map(|priority| format!(" priority {priority}")),
@@ -155,9 +168,8 @@ pub fn integer_constraint(bounds: Integers) -> String {
 /// What an operation does and permits.
 fn disturbance(operation: &Operation) -> String {
     let words = operation.kind.words();
-    // Which members a test chooses stands before their names.
-    let own = operation.parameters.len() - usize::from(matches!(operation.members, Some(MembersOf::Chosen(_))));
-    let parameters = &operation.parameters[..own];
+    // Which members a test chooses stands before their names, and which messages behind the kind.
+    let parameters = operation.own_parameters();
     let permitted: Vec<String> = match (&operation.kind, axes(parameters)) {
         (OperationKind::RandomValue { .. }, Some((unit, low, high))) => vec![unit.corners(low, high)],
         _ => parameters.iter().map(|parameter| permitted(&operation.kind, parameter)).collect(),

@@ -268,6 +268,7 @@ pub fn operation_with(name: &str, topic: u32, kind: OperationKind, parameters: V
         inclusion: 1.0,
         lengths: None,
         timed: true,
+        counted: Vec::new(),
         wrapped: None,
         constraints: Vec::new(),
     }

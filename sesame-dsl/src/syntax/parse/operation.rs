@@ -1,6 +1,7 @@
 //! Operations: what they disturb, and how.
 
 use sesame_grammar::Rule;
+use sesame_plan::Counted;
 
 use super::reader::{Pair, Reader, child, children, expect_child, first_of};
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
@@ -35,6 +36,11 @@ impl Reader<'_> {
         let contains = children(pair, Rule::start_contains)
             .map(|clause| (self.keyword_span(&clause), self.contained(&clause)))
             .collect();
+        let mut counted = Vec::new();
+        for (rule, by) in [(Rule::next_messages, Counted::Next), (Rule::every_messages, Counted::Every)] {
+            counted
+                .extend(children(pair, rule).map(|clause| (by, self.keyword_span(&clause), self.only_range(&clause))));
+        }
         let wrapped = children(pair, Rule::wrapped)
             .map(|clause| (self.keyword_span(&clause), child(&clause, Rule::range).map(|range| self.range(&range))))
             .collect();
@@ -58,6 +64,7 @@ impl Reader<'_> {
             priority,
             inclusion,
             untimed,
+            counted,
             wrapped,
             contains,
         };
