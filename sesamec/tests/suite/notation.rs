@@ -376,7 +376,8 @@ fn tests(operations: &[Operation], metrics: &[Metric]) -> impl Strategy<Value = 
 fn condition_space(metrics: &[Metric]) -> impl Strategy<Value = ConditionSpace> + use<> {
     let metrics: Vec<(Option<String>, bool)> =
         metrics.iter().map(|metric| (metric.unit.clone(), is_truth(metric))).collect();
-    let ranges = prop::collection::vec(prop::option::of((-1e9..-1e3f64, 1e3..1e9f64)), 2..4);
+    let range = (-1e9..-1e3f64, 1e3..1e9f64, prop::option::of(1e-5..1.0f64));
+    let ranges = prop::collection::vec(prop::option::of(range), 2..4);
     let end = prop_oneof![
         Just(ConditionEnd::Condition),
         ordered(1e-3..60.0f64).prop_map(|(low, high)| ConditionEnd::Length { low, high }),
@@ -387,12 +388,14 @@ fn condition_space(metrics: &[Metric]) -> impl Strategy<Value = ConditionSpace> 
                 .zip(ranges)
                 .zip(metrics.clone())
                 .map(|((id, range), (unit, truth))| {
-                    let range = if truth { Some((0.0, 1.0)) } else { range };
+                    let range = if truth { Some((0.0, 1.0, None)) } else { range };
+                    let step = range.and_then(|(low, high, share)| share.map(|share: f64| (high - low) * share));
                     Variable {
                         metric: MetricId(id),
                         unit,
                         low: range.map(|range| range.0),
                         high: range.map(|range| range.1),
+                        step,
                     }
                 })
                 .collect(),
