@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use sesame_notation::Unit;
-use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace};
+use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace, Variable};
 use sesame_plan::{CampaignPlan, ChoiceKind, Confirmation, Copies, Dimension};
 use sesame_search::coverage::{Feasible, Grid};
 use sesame_search::space::ParameterSpace;
