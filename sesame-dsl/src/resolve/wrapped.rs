@@ -39,7 +39,7 @@ impl<'a> Resolver<'a> {
         let of_point = matches!(amount.domain, Domain::Point { .. }) || amount.name == "x";
         let found = dimension(unit.as_ref());
         if of_point || found != Dimension::ANGLE {
-            let first = body.target.as_ref()?.places.first()?;
+            let first = body.targets.first()?.places.first()?;
             let is = if of_point { "a point".to_owned() } else { found.name() };
             let title = format!("`{}` is {is}, but only angles wrap", self.text(first.span));
             let diagnostic = Diagnostic::new(Code::WRONG_UNIT, clause, title)
