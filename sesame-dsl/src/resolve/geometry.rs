@@ -189,14 +189,14 @@ impl<'a> Resolver<'a> {
     fn operand(&mut self, inputs: &mut Vec<Input>, expression: &'a ast::Expression) -> Option<Operand<'a>> {
         let written = match &expression.kind {
             ExpressionKind::Field(_) | ExpressionKind::Members(..) => read_in(expression)?,
-            ExpressionKind::Call(name, _) if memory_named(&name.text).is_some() => match read_in(expression) {
-                Some(read) => read,
-                None => {
+            ExpressionKind::Call(name, _) if memory_named(&name.text).is_some() => {
+                let Some(read) = read_in(expression) else {
                     // It is reported as any number is.
                     self.number(inputs, expression);
                     return None;
-                }
-            },
+                };
+                read
+            }
             ExpressionKind::Point(point) => {
                 let unit = match &point.coordinates[0].unit {
                     Some(name) => Some(self.unit(name)?),

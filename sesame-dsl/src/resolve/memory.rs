@@ -64,9 +64,11 @@ impl<'a> Resolver<'a> {
                     (Memory::Integral, Type::Real(unit.clone()))
                 }
                 (Remembers::Rate, Type::Int(unit) | Type::Real(unit)) => {
-                    (Memory::Rate, Type::Real(self.per_second(unit, whole)?))
+                    (Memory::Rate, Type::Real(self.per_second(unit.as_ref(), whole)?))
                 }
-                (Remembers::Rate, Type::Point(unit)) => (Memory::Rate, Type::Point(self.per_second(unit, whole)?)),
+                (Remembers::Rate, Type::Point(unit)) => {
+                    (Memory::Rate, Type::Point(self.per_second(unit.as_ref(), whole)?))
+                }
                 (Remembers::Unwrapped, Type::Int(unit) | Type::Real(unit)) => {
                     let turn = self.turn(&name.text, start.to(read.path.span), unit.as_ref())?;
                     (Memory::Unwrapped { turn: Finite(turn) }, Type::Real(unit.clone()))
@@ -86,13 +88,13 @@ impl<'a> Resolver<'a> {
 
     /// The unit of a rate.
     #[expect(clippy::option_option, reason = "the outer `None` means a mistake, the inner is a plain number")]
-    fn per_second(&mut self, unit: &Option<Unit>, span: Span) -> Option<Option<Unit>> {
+    fn per_second(&mut self, unit: Option<&Unit>, span: Span) -> Option<Option<Unit>> {
         // Shares stay shares: `%` becomes `%/s`.
-        let plain = unit.as_ref().filter(|unit| dimension(Some(unit)) == dimension(None));
+        let plain = unit.filter(|unit| dimension(Some(unit)) == dimension(None));
         if let Some(rate) = plain.and_then(|unit| Unit::parse(&format!("{}/s", unit.text())).ok()) {
             return Some(Some(rate));
         }
-        let Some((rate, _)) = product(unit.as_ref(), Some(&Unit::seconds()), true) else {
+        let Some((rate, _)) = product(unit, Some(&Unit::seconds()), true) else {
             self.no_unit(span);
             return None;
         };

@@ -33,8 +33,8 @@ pub enum Condition {
 pub enum Operand {
     /// The value that a metric has at this moment, in its unit; its initial value before it has one.
     Variable(MetricId),
-    /// A number in the unit of the variable it is compared with; finite. Where a search grew it, it is whole or one of the
-    /// steps of the variable.
+    /// A number in the unit of the variable it is compared with; finite. Where a search grew it, it is whole, or one of
+    /// the steps of the variable.
     Number(f64),
 }
 

@@ -475,6 +475,13 @@ pub struct Parameter {
     pub domain: Domain,
 }
 
+impl Parameter {
+    /// Whether it is a probability of an operation of this kind: not one that counts messages.
+    pub fn is_probability(&self, kind: &OperationKind) -> bool {
+        kind.has_probabilities() && !matches!(self.domain, Domain::Number { integer: true, .. })
+    }
+}
+
 /// What a test may choose for a parameter.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]

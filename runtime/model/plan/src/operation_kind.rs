@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Domain, NodeId, Parameter};
+use crate::NodeId;
 
 /// What an operation does to the messages of its topic, with the parameters that a test chooses for it.
 ///
@@ -185,11 +185,6 @@ impl OperationKind {
     /// Whether its parameters are probabilities: fractions here, percentages in the `.sesame` file.
     pub fn has_probabilities(&self) -> bool {
         matches!(self, OperationKind::PacketLoss | OperationKind::BurstLoss | OperationKind::Slow { .. })
-    }
-
-    /// Whether one of its parameters is a probability: not one that counts messages.
-    pub fn is_probability(&self, parameter: &Parameter) -> bool {
-        self.has_probabilities() && !matches!(parameter.domain, Domain::Number { integer: true, .. })
     }
 
     /// Whether it draws numbers, so that the seed of a test's operation makes a difference. Of the user's code that is

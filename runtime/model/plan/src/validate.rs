@@ -202,7 +202,7 @@ impl CampaignPlan {
         at("within", span(operation.within))?;
         at("lengths", operation.lengths.map_or(Ok(()), |found| lengths(found, operation.within)))?;
         at("inclusion", share(operation.inclusion))?;
-        at("counted", self.sound_counts(operation))?;
+        at("counted", sound_counts(operation))?;
         if let Some(turn) = operation.wrapped {
             let apart = turn.low < turn.high && (turn.high - turn.low).is_finite();
             at("wrapped", require(apart, || format!("{} to {} is no turn", turn.low, turn.high)))?;
@@ -225,23 +225,6 @@ impl CampaignPlan {
         at("members", require(same, || "a test chooses those of all topics, or of none".to_owned()))?;
         let same = operation.places.is_empty() == target.places.is_empty();
         at("places", require(same, || "it acts on whole messages, or on values".to_owned()))
-    }
-
-    /// That the parameters by which a test counts messages are there, and are whole numbers from 1.
-    fn sound_counts(&self, operation: &Operation) -> Checked {
-        let counted = &operation.counted;
-        require(counted.is_sorted_by(|one, other| one < other), || "are not in their order".to_owned())?;
-        require(counted.is_empty() || operation.kind.acts_on_messages(), || "it acts on no messages".to_owned())?;
-        let counting: Vec<_> = operation.counting_parameters().collect();
-        require(counting.len() == counted.len(), || "lack a parameter".to_owned())?;
-        counting.into_iter().try_for_each(|(counted, parameter)| {
-            let is_count = |domain: &Domain| match domain {
-                Domain::Number { low, shape: ChoiceKind::Value, integer: true, .. } => *low >= 1.0,
-                _ => false,
-            };
-            let named = parameter.name == counted.name();
-            require(named && is_count(&parameter.domain), || format!("`{}` counts no messages", parameter.name))
-        })
     }
 
     /// That the members on which an operation acts are there, with a text for each choice of them.
@@ -379,6 +362,23 @@ fn earlier(ty: &Type, position: usize) -> Checked {
         Type::List { of } => at("of", earlier(of, position)),
         Type::Bool | Type::Int { .. } | Type::Real { .. } | Type::Text | Type::Point { .. } => Ok(()),
     }
+}
+
+/// That the parameters by which a test counts messages are there, and are whole numbers from 1.
+fn sound_counts(operation: &Operation) -> Checked {
+    let counted = &operation.counted;
+    require(counted.is_sorted_by(|one, other| one < other), || "are not in their order".to_owned())?;
+    require(counted.is_empty() || operation.kind.acts_on_messages(), || "it acts on no messages".to_owned())?;
+    let counting: Vec<_> = operation.counting_parameters().collect();
+    require(counting.len() == counted.len(), || "lack a parameter".to_owned())?;
+    counting.into_iter().try_for_each(|(counted, parameter)| {
+        let is_count = |domain: &Domain| match domain {
+            Domain::Number { low, shape: ChoiceKind::Value, integer: true, .. } => *low >= 1.0,
+            _ => false,
+        };
+        let named = parameter.name == counted.name();
+        require(named && is_count(&parameter.domain), || format!("`{}` counts no messages", parameter.name))
+    })
 }
 
 fn bound(bound: Bound) -> Checked {

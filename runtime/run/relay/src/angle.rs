@@ -1,7 +1,7 @@
 //! Angles on the circle: those that differ by whole turns are the same.
 
-/// The angle in `low..low + turn` that differs from this one by whole turns; itself if it lies there. What is not finite
-/// is not a number.
+/// The angle in `low..low + turn` that differs from this one by whole turns; itself if it lies there. Not a number for
+/// what is not finite.
 pub(crate) fn wrapped(angle: f64, low: f64, turn: f64) -> f64 {
     if (low..low + turn).contains(&angle) {
         return angle;

@@ -6,7 +6,6 @@ use std::fmt;
 use sesame_plan::{BinaryFunction, Condition, Distance, Expression, Point, UnaryFunction};
 
 use crate::angle::wrapped;
-use crate::metric::memory::integral;
 use crate::metric::region::signed_distance;
 
 /// The values of a formula's inputs: a point, or a number (true is 1, false 0) followed by zeros. Of an integral it is
@@ -129,6 +128,11 @@ fn binary(function: BinaryFunction, left: f64, right: f64) -> f64 {
         BinaryFunction::Pow => libm::pow(left, right),
         BinaryFunction::Wrapped => wrapped(left, -right / 2.0, right),
     }
+}
+
+/// What an integral has come to at a time in seconds.
+pub(super) fn integral([sum, value, since]: Held, time: f64) -> f64 {
+    sum + value * (time - since)
 }
 
 /// Whether a condition holds.

@@ -122,16 +122,12 @@ impl Stage {
     }
 }
 
-/// What an integral has come to, from what [`Memories::remember`] made of it and the time, in seconds.
-pub(super) fn integral([sum, value, since]: Held, time: f64) -> f64 {
-    sum + value * (time - since)
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::metric::expression::integral;
 
     /// A message: milliseconds, value.
     type Sent = (i64, f64);
