@@ -1,9 +1,9 @@
 //! `until` over a sliding window, on a queue made of two stacks.
 //!
-//! What `left until right` says of a stretch of time is two numbers: how well `left` holds all through it, and how well
-//! it gets to `right` within it. A weak `until` is content with either. Both follow from those of its parts, so they can
-//! be summed up in any grouping: on the stack that grows, all of it is one sum; on the stack that shrinks, each entry is
-//! the sum of all behind it.
+//! What `left until right` says of a stretch of time is two numbers: how well `left` holds all through it, and how
+//! well it gets to `right` within it. A weak `until` is content with either. Both follow from those of its parts, so
+//! they can be summed up in any grouping: on the stack that grows, all of it is one sum; on the stack that shrinks,
+//! each entry is the sum of all behind it.
 
 use std::collections::VecDeque;
 
