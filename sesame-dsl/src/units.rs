@@ -163,6 +163,11 @@ impl Unit {
         Unit { text: "rad".to_owned(), dimension: ANGLE, scale: Scale::ONE }
     }
 
+    /// The whole turn.
+    pub fn revolutions() -> Unit {
+        Unit { text: "rev".to_owned(), dimension: ANGLE, scale: Scale { numerator: 2, denominator: 1, pi: 1 } }
+    }
+
     /// Reads a unit: symbols with optional powers, joined by `*` and `/`, for example `m/s^2`.
     pub fn parse(text: &str) -> Result<Unit, UnitError> {
         let mut dimension = Dimension::NONE;

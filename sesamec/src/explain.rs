@@ -38,17 +38,19 @@ fn grammar(plan: &CampaignPlan, space: &ConditionSpace) -> String {
     } else {
         format!("? a whole number from {lowest} to {highest} ?")
     };
+    let stepped = space.variables.iter().any(|variable| variable.step.is_some());
     let rules = [
         ("compCond", "compCond, logicOp, compCond | basicCond".to_owned()),
         ("basicCond", "expr, binComp, var".to_owned()),
-        ("expr", "var | int".to_owned()),
+        ("expr", if stepped { "var | int | step" } else { "var | int" }.to_owned()),
         ("logicOp", "\"and\" | \"or\"".to_owned()),
         ("binComp", signs.join(" | ")),
         ("int", integers),
+        ("step", "? a number of a variable that has its own ?".to_owned()),
         ("var", variables.join(" | ")),
     ];
     let mut out = format!("(* the conditions of {}, in EBNF *)\n", plan.campaign.name);
-    for (left, right) in rules {
+    for (left, right) in rules.into_iter().filter(|(left, _)| stepped || *left != "step") {
         writeln!(out, "{left:<9} = {right} ;").expect("a string takes all text");
     }
     let mut notes = vec![match space.depth {
@@ -65,7 +67,11 @@ fn grammar(plan: &CampaignPlan, space: &ConditionSpace) -> String {
             (None, Some(high)) => Some(format!("is {} or less", unit.number(high))),
             (None, None) => None,
         };
-        let compared = metric.unit.as_ref().map(|unit| format!("is compared with whole numbers of {unit}"));
+        let compared = match (variable.step, &metric.unit) {
+            (Some(step), _) => Some(format!("is compared with numbers of its own, {} apart", unit.number(step))),
+            (None, Some(unit)) => Some(format!("is compared with whole numbers of {unit}")),
+            (None, None) => None,
+        };
         let initial = match (&metric.source, metric.initial) {
             (MetricSource::FuzzingTime, _) => None,
             (MetricSource::Monitor { score, .. }, _) if score.always_has_a_value() => None,

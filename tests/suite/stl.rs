@@ -60,8 +60,8 @@ fn any_formula() -> impl Strategy<Value = Formula> {
             1 => (one(), one()).prop_map(|(left, right)| Formula::Implies { left, right }),
             2 => (any_interval(), one()).prop_map(|(interval, of)| Formula::Always { interval, of }),
             2 => (any_interval(), one()).prop_map(|(interval, of)| Formula::Eventually { interval, of }),
-            3 => (any_interval(), one(), one())
-                .prop_map(|(interval, left, right)| Formula::Until { interval, left, right }),
+            3 => (any_interval(), any::<bool>(), one(), one())
+                .prop_map(|(interval, weak, left, right)| Formula::Until { interval, weak, left, right }),
         ]
     })
 }
@@ -92,9 +92,13 @@ fn words(formula: &Formula, samples: usize) -> String {
         Formula::Implies { left, right } => format!("({} -> {})", of(left), of(right)),
         Formula::Always { interval: i, of: inner } => format!("(always{} {})", interval(i), of(inner)),
         Formula::Eventually { interval: i, of: inner } => format!("(eventually{} {})", interval(i), of(inner)),
-        Formula::Until { interval: i, left, right } => {
+        Formula::Until { interval: i, weak, left, right } => {
             let (left, right) = (of(left), of(right));
-            format!("({left} until{} ({left} and {right}))", interval(i))
+            let until = format!("({left} until{} ({left} and {right}))", interval(i));
+            if !weak {
+                return until;
+            }
+            format!("({until} or (always{} {left}))", interval(&Interval { from: 0.0, ..*i }))
         }
     }
 }
@@ -112,8 +116,8 @@ fn in_seconds(formula: &Formula) -> Formula {
         Formula::Implies { left, right } => Formula::Implies { left: part(left), right: part(right) },
         Formula::Always { interval, of } => Formula::Always { interval: scaled(interval), of: part(of) },
         Formula::Eventually { interval, of } => Formula::Eventually { interval: scaled(interval), of: part(of) },
-        Formula::Until { interval, left, right } => {
-            Formula::Until { interval: scaled(interval), left: part(left), right: part(right) }
+        Formula::Until { interval, weak, left, right } => {
+            Formula::Until { interval: scaled(interval), weak: *weak, left: part(left), right: part(right) }
         }
     }
 }

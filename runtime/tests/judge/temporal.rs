@@ -55,7 +55,7 @@ impl Trace<'_> {
             Formula::Always { interval, of: inner } | Formula::Eventually { interval, of: inner } => {
                 of(interval, self.ends(inner))
             }
-            Formula::Until { interval, left, right } => of(interval, self.ends(left).min(self.ends(right))),
+            Formula::Until { interval, left, right, weak: _ } => of(interval, self.ends(left).min(self.ends(right))),
         }
     }
 
@@ -114,7 +114,7 @@ impl Trace<'_> {
             Formula::Implies { left, right } => self.both(left, right, |left, right| f64::max(-left, right)),
             Formula::Always { interval, of } => self.window(interval, of, f64::INFINITY, f64::min),
             Formula::Eventually { interval, of } => self.window(interval, of, f64::NEG_INFINITY, f64::max),
-            Formula::Until { interval, left, right } => {
+            Formula::Until { interval, weak, left, right } => {
                 let (from, to) = bounds(interval);
                 let end = self.ends(left).min(self.ends(right));
                 let until = self.ends(formula);
@@ -127,6 +127,11 @@ impl Trace<'_> {
                     self.between(&right, time + from, last)
                         .map(|(s, right)| self.between(&left, time, s).map(|(_, left)| left).fold(right, f64::min))
                         .fold(f64::NEG_INFINITY, f64::max)
+                        .max(if *weak {
+                            self.between(&left, time, last).map(|(_, left)| left).fold(f64::INFINITY, f64::min)
+                        } else {
+                            f64::NEG_INFINITY
+                        })
                 })
             }
         }

@@ -72,6 +72,7 @@ impl Selection {
             unit: unit(measured.metrics[variable.metric].unit.as_ref()),
             low: bound(variable.known.low),
             high: bound(variable.known.high),
+            step: variable.step,
         });
         plan::ActivationMode::Condition {
             space: to::ConditionSpace {

@@ -26,6 +26,7 @@ pub(super) fn inputs(inputs: &[model::Input]) -> Vec<plan::Input> {
         members: input.members,
         list: input.list.clone(),
         text: input.text.clone(),
+        memory: input.memory.clone(),
     });
     inputs.collect()
 }

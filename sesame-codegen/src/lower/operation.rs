@@ -34,6 +34,8 @@ pub(super) fn operation(
         priority: operation.priority,
         inclusion: operation.inclusion,
         timed: operation.timed,
+        counted: operation.counted.clone(),
+        wrapped: operation.wrapped,
         constraints,
     }
 }
@@ -77,6 +79,8 @@ pub(super) fn custom_operations(space: &Space) -> Vec<OperationPlan> {
             parameters: operation
                 .parameters
                 .iter()
+                // Counted messages are counted before the code is called.
+                .filter(|declared| operation.counted.iter().all(|counted| counted.name() != declared.name))
                 .map(|declared| (parameter(declared), declared.doc.clone()))
                 .collect(),
         }),

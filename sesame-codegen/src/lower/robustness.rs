@@ -29,7 +29,10 @@ fn formula(of: &Temporal) -> Formula {
         Temporal::Always(when, of) => Formula::Always { interval: *when, of: boxed(of) },
         Temporal::Eventually(when, of) => Formula::Eventually { interval: *when, of: boxed(of) },
         Temporal::Until(when, left, right) => {
-            Formula::Until { interval: *when, left: boxed(left), right: boxed(right) }
+            Formula::Until { interval: *when, weak: false, left: boxed(left), right: boxed(right) }
+        }
+        Temporal::WeakUntil(when, left, right) => {
+            Formula::Until { interval: *when, weak: true, left: boxed(left), right: boxed(right) }
         }
     }
 }
@@ -80,7 +83,7 @@ mod tests {
         let expected =
             |signal| Box::new(Formula::Predicate { signal, comparison: model::Comparison::AtLeast, constant: 2.0 });
         let interval = model::Interval { from: 1.0, to: Some(2.5) };
-        let right = Box::new(Formula::Until { interval, left: expected(0), right: expected(1) });
+        let right = Box::new(Formula::Until { interval, weak: false, left: expected(0), right: expected(1) });
         assert_eq!(found, Formula::Implies { left: Box::new(Formula::Not { of: expected(2) }), right });
     }
 }

@@ -470,6 +470,8 @@ impl<'a> Indexer<'a> {
             priority: _,
             inclusion: _,
             untimed: _,
+            counted: _,
+            wrapped: _,
             contains,
         } = &operation.body;
         for place in targets.iter().flat_map(|target| &target.places) {

@@ -132,6 +132,9 @@ pub struct Variable {
     pub metric: MetricId,
     /// Between what it lies, in the metric's unit.
     pub known: ValueRange,
+    /// How far apart the numbers are that it is compared with, all over what is known of it, which is finite then;
+    /// positive. `None` for the whole numbers of the space.
+    pub step: Option<f64>,
 }
 
 /// What the start condition of an operation has to contain wherever a search grows it.

@@ -3,7 +3,7 @@
 //! Numbers are in the units of the wire or of a conversion that is part of the expression; so evaluating one
 //! needs no units.
 
-use sesame_plan::{Aggregate, Condition, InList, Members, TextTest};
+use sesame_plan::{Aggregate, Condition, InList, Members, Memory, TextTest};
 
 use super::system::FieldPath;
 
@@ -35,4 +35,16 @@ pub struct Input {
     pub list: Option<InList>,
     /// For a text: the input is whether this holds of it.
     pub text: Option<TextTest>,
+    /// What is computed from the values of successive messages, the innermost first.
+    pub memory: Vec<Memory>,
+}
+
+impl Input {
+    /// The most that is computed from successive messages, one from the other.
+    pub const DEEPEST_MEMORY: usize = sesame_plan::Input::DEEPEST_MEMORY;
+
+    /// Whether it is an integral, which grows between messages.
+    pub fn is_integral(&self) -> bool {
+        self.memory.last() == Some(&Memory::Integral)
+    }
 }

@@ -1,7 +1,7 @@
 //! Fuzzing operations and the known tests that apply them.
 
 use super::condition::{Condition, Constraint};
-use sesame_plan::{Bound, Choice, ChoiceKind, MembersOf, Messages, OperationKind, Step};
+use sesame_plan::{Bound, Choice, ChoiceKind, Counted, MembersOf, Messages, OperationKind, Step, Turn};
 
 use super::declaration::Declaration;
 use super::ids::{MetricId, NodeId, OperationId, TopicId};
@@ -39,6 +39,10 @@ pub struct Operation {
     pub inclusion: f64,
     /// Whether its active time counts in `fuzzing_time()`. Default true.
     pub timed: bool,
+    /// By what a test counts out the messages that it alters: a parameter for each, behind those of the kind.
+    pub counted: Vec<Counted>,
+    /// The turn in which it keeps the angles that it changes, in their unit; `None` where it leaves them as they come.
+    pub wrapped: Option<Turn>,
     /// What its start conditions contain in campaigns that activate by condition; in written order.
     pub constraints: Vec<Constraint>,
 }

@@ -41,6 +41,8 @@ pub enum Temporal {
     Eventually(Interval, Box<Temporal>),
     /// The second holds at some time in the interval, and the first up to that time and at it.
     Until(Interval, Box<Temporal>, Box<Temporal>),
+    /// The same, or the first holds to the end of the interval.
+    WeakUntil(Interval, Box<Temporal>, Box<Temporal>),
 }
 
 impl Temporal {
@@ -50,7 +52,9 @@ impl Temporal {
             Temporal::Predicate(..) => 0,
             Temporal::Not(of) | Temporal::Always(_, of) | Temporal::Eventually(_, of) => of.depth(),
             Temporal::All(of) | Temporal::Any(of) => of.iter().map(Temporal::depth).max().unwrap_or(0),
-            Temporal::Implies(left, right) | Temporal::Until(_, left, right) => left.depth().max(right.depth()),
+            Temporal::Implies(left, right) | Temporal::Until(_, left, right) | Temporal::WeakUntil(_, left, right) => {
+                left.depth().max(right.depth())
+            }
         }
     }
 }

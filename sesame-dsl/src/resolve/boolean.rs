@@ -4,6 +4,7 @@ use std::cmp::Ordering;
 
 use super::Resolver;
 use super::formula::position;
+use super::read::read_in;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{Comparison, Condition, Expression, Input, TextTest, Type};
 use crate::span::Span;
@@ -32,7 +33,9 @@ impl<'a> Resolver<'a> {
                 self.one_outcome(expression, &left, comparison, &right);
                 Some(Condition::Compare { left, by: comparison, right })
             }
-            ExpressionKind::Field(_) | ExpressionKind::Members(..) if self.is_condition(expression) => {
+            ExpressionKind::Field(_) | ExpressionKind::Members(..) | ExpressionKind::Call(..)
+                if self.is_condition(expression) =>
+            {
                 self.truth(inputs, expression).map(Condition::Input)
             }
             ExpressionKind::Prefixed(prefixes, of) => {
@@ -110,16 +113,12 @@ impl<'a> Resolver<'a> {
 
     /// The position of a `bool` input, which the expression is according to [`Self::is_condition`].
     pub(super) fn truth(&mut self, inputs: &mut Vec<Input>, expression: &'a ast::Expression) -> Option<u32> {
-        let (path, members) = match &expression.kind {
-            ExpressionKind::Field(path) => (path, None),
-            ExpressionKind::Members(members, word, path) => (path, Some((*members, *word))),
-            _ => return None,
-        };
-        if matches!(members, Some((ast::Members::Sum, _))) {
-            self.not_summed(expression.span, path, "a `bool`");
+        let read = read_in(expression)?;
+        if matches!(read.word, Some((ast::Members::Sum, _))) {
+            self.not_summed(expression.span, read.path, "a `bool`");
             return None;
         }
-        let read = self.reading(path, members)?;
+        let read = self.read(&read)?;
         Some(position(inputs, read.input(None)))
     }
 
@@ -133,9 +132,7 @@ impl<'a> Resolver<'a> {
     pub(super) fn is_text(&self, expression: &ast::Expression) -> bool {
         match &expression.kind {
             ExpressionKind::Text(_) => true,
-            ExpressionKind::Field(path) => self.type_read(path, None) == Some(Type::Text),
-            ExpressionKind::Members(word, _, path) => self.type_read(path, Some(*word)) == Some(Type::Text),
-            _ => false,
+            _ => read_in(expression).and_then(|read| self.type_of_read(&read)) == Some(Type::Text),
         }
     }
 
@@ -163,15 +160,14 @@ impl<'a> Resolver<'a> {
                 return None;
             }
         };
-        let (path, members) = match &of.kind {
-            ExpressionKind::Field(path) if self.is_text(of) => (path, None),
-            ExpressionKind::Members(members, word, path) if self.is_text(of) => (path, Some((*members, *word))),
+        let read = match &of.kind {
             ExpressionKind::Text(_) => {
                 let title = format!("`{}` compares two constants", self.text(left.span.to(right.span)));
                 let diagnostic = Diagnostic::new(Code::WRONG_TYPE, left.span.to(right.span), title);
                 self.report(diagnostic.label("expected a topic or field of type `text` on one side"));
                 return None;
             }
+            _ if self.is_text(of) => read_in(of)?,
             _ => {
                 // Mistakes in the other side itself come first.
                 let before = self.diagnostics.len();
@@ -194,11 +190,11 @@ impl<'a> Resolver<'a> {
                 return None;
             }
         };
-        if matches!(members, Some((ast::Members::Sum, _))) {
-            self.not_summed(of.span, path, "a `text`");
+        if matches!(read.word, Some((ast::Members::Sum, _))) {
+            self.not_summed(of.span, read.path, "a `text`");
             return None;
         }
-        let read = self.reading(path, members)?;
+        let read = self.read(&read)?;
         Some(position(inputs, read.input(Some(test))))
     }
 
@@ -223,9 +219,7 @@ impl<'a> Resolver<'a> {
             | ExpressionKind::Prefixed(..)
             | ExpressionKind::Until(..)
             | ExpressionKind::Implies(..) => true,
-            ExpressionKind::Field(path) => self.type_read(path, None) == Some(Type::Bool),
-            ExpressionKind::Members(word, _, path) => self.type_read(path, Some(*word)) == Some(Type::Bool),
-            _ => false,
+            _ => read_in(expression).and_then(|read| self.type_of_read(&read)) == Some(Type::Bool),
         }
     }
 }

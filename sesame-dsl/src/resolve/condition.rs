@@ -318,12 +318,15 @@ impl<'a> Resolver<'a> {
     pub(super) fn condition_space(&mut self, by: &'a ByCondition) -> Option<ConditionSpace> {
         let found = self.find_all(&by.variables, Kind::Metric);
         let mut variables = Some(Vec::new());
-        for (name, range) in by.variables.iter().zip(&by.ranges) {
+        for ((name, range), step) in by.variables.iter().zip(&by.ranges).zip(&by.steps) {
             // Mistakes in names are reported already.
             let reported = self.diagnostics.len();
             let index = self.find(name, Kind::Metric);
             self.diagnostics.truncate(reported);
-            let variable = index.and_then(|index| self.variable(name, MetricId::from_index(index), range.as_ref()));
+            let variable = index.and_then(|index| {
+                let ranges = range.as_ref().map(|range| (range, step.as_ref()));
+                self.variable(name, MetricId::from_index(index), ranges)
+            });
             match (&mut variables, variable) {
                 (Some(variables), Some(variable)) => variables.push(variable),
                 _ => variables = None,
@@ -361,6 +364,7 @@ impl<'a> Resolver<'a> {
                 list(&names)
             ))
             .note("change `integers`, or add a metric whose values pass some of them");
+        let diagnostic = self.with_a_step(diagnostic, by, &space);
         self.report(diagnostic);
         None
     }
@@ -369,7 +373,8 @@ impl<'a> Resolver<'a> {
     /// unit.
     pub(super) fn is_comparable(&self, space: &ConditionSpace, variable: &Variable) -> bool {
         let unit = |variable: &Variable| self.metric_of(variable.metric).unit.as_ref();
-        variable.known.meets(space.integers)
+        variable.step.is_some()
+            || variable.known.meets(space.integers)
             || space.variables.iter().any(|other| {
                 other.metric != variable.metric
                     && same_unit(unit(variable), unit(other))
@@ -377,13 +382,35 @@ impl<'a> Resolver<'a> {
             })
     }
 
-    fn variable(&mut self, name: &'a ast::Name, id: MetricId, range: Option<&'a ast::Range>) -> Option<Variable> {
+    /// Suggests thresholds of its own for the first variable with a known range.
+    fn with_a_step(&self, diagnostic: Diagnostic, by: &ByCondition, space: &ConditionSpace) -> Diagnostic {
+        let ranged =
+            space.variables.iter().zip(&by.ranges).find_map(|(variable, range)| Some((variable, range.as_ref()?)));
+        let Some((Variable { metric, known: ValueRange { low, high }, .. }, range)) = ranged else { return diagnostic };
+        if low >= high || !(high - low).is_finite() {
+            return diagnostic;
+        }
+        // About a hundred steps, by a power of ten.
+        let apart = |decimals: i32| format!("1e{decimals}").parse::<f64>().unwrap_or(1.0);
+        let Some(step) = (-12..13).rev().map(apart).find(|step| *step <= (high - low) / 50.0) else {
+            return diagnostic;
+        };
+        let step = format!(" step {step}{}", unit_text(self.metric_of(*metric).unit.as_ref()));
+        diagnostic.suggest(format!("use numbers that are not whole, with `{}`", step.trim()), range.span.end(), step)
+    }
+
+    fn variable(
+        &mut self,
+        name: &'a ast::Name,
+        id: MetricId,
+        range: Option<(&'a ast::Range, Option<&'a ast::Quantity>)>,
+    ) -> Option<Variable> {
         let metric = self.metrics[id.index()].as_ref()?;
         let own = self.known_of(metric);
         self.known_during_a_test(id, name.span)?;
         let metric = self.metric_of(id);
         let (unit, initial, declared) = (metric.unit.clone(), metric.initial, metric.declaration.span);
-        let Some(range) = range else { return Some(Variable { metric: id, known: own }) };
+        let Some((range, step)) = range else { return Some(Variable { metric: id, known: own, step: None }) };
         let what = format!("metric `{}`", name.text);
         let found = self.range(range, unit.as_ref(), &what)?;
         if let Some(initial) = initial
@@ -405,7 +432,37 @@ impl<'a> Resolver<'a> {
             self.report(diagnostic);
             return None;
         }
-        Some(Variable { metric: id, known })
+        let step = match step {
+            Some(step) => Some(self.threshold_step(step, unit.as_ref(), &what, known)?),
+            None => None,
+        };
+        Some(Variable { metric: id, known, step })
+    }
+
+    /// How far apart the numbers are that a variable is compared with.
+    fn threshold_step(
+        &mut self,
+        written: &ast::Quantity,
+        unit: Option<&Unit>,
+        what: &str,
+        known: ValueRange,
+    ) -> Option<f64> {
+        const MOST: f64 = sesame_plan::condition::Variable::MOST_STEPS;
+        let step = self.value(written, unit, what)?;
+        let room = known.high - known.low;
+        let unit = unit_text(unit);
+        let label = if step <= 0.0 {
+            format!("expected more than 0{unit}")
+        } else if step > room {
+            format!("expected at most {room}{unit}, so that there are two numbers")
+        } else if room / step > MOST {
+            format!("expected at most a million steps in {room}{unit}")
+        } else {
+            return Some(step);
+        };
+        let title = format!("`{}` is no step through the range of {what}", self.text(written.span));
+        self.report(Diagnostic::new(Code::OUT_OF_RANGE, written.span, title).label(label));
+        None
     }
 
     fn depth(&mut self, count: ast::Count) -> Option<u32> {

@@ -7,7 +7,7 @@ use super::words::type_in_words;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::interfaces;
-use crate::model::{Comparison, FieldPath, Id as _, Input, Members, TextTest, TopicId, Type};
+use crate::model::{Comparison, FieldPath, Id as _, Input, Members, Memory, TextTest, TopicId, Type};
 use crate::similar::most_similar;
 use crate::span::Span;
 use crate::syntax::ast::{self, ComparedWith, Name, Path};
@@ -33,12 +33,15 @@ pub(super) struct Reading {
     pub(super) field: FieldPath,
     pub(super) members: Members,
     pub(super) list: Option<InList>,
+    /// What is computed from successive values, the innermost first.
+    pub(super) memory: Vec<Memory>,
     pub(super) ty: Type,
 }
 
 impl Reading {
     pub(super) fn input(self, text: Option<TextTest>) -> Input {
-        Input { field: self.field, members: self.members, list: self.list, text }
+        let Reading { field, members, list, memory, ty: _ } = self;
+        Input { field, members, list, text, memory }
     }
 }
 
@@ -82,7 +85,7 @@ impl<'a> Resolver<'a> {
             }
             let members = self.members(path, &field, only, word)?;
             let list = (!steps.is_empty()).then_some(InList { steps, reduction: Reduction::First });
-            return Some(Reading { field, members, list, ty });
+            return Some(Reading { field, members, list, memory: Vec::new(), ty });
         };
         let members = match reduction {
             Reduction::Max => Members::Max,
@@ -117,7 +120,7 @@ impl<'a> Resolver<'a> {
             self.report(diagnostic);
             return None;
         }
-        Some(Reading { field, members, list: Some(InList { steps, reduction }), ty })
+        Some(Reading { field, members, list: Some(InList { steps, reduction }), memory: Vec::new(), ty })
     }
 
     fn several_values(&mut self, path: &'a Path) {

@@ -8,6 +8,7 @@ use super::eddi::{Member, Members};
 use super::examples;
 use super::formula::MAX_DEPTH;
 use super::parts::first_part;
+use super::read::{Remembers, memory_named};
 use super::words::{list, type_in_words};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::eddi::{Evidence, Gate, Guarantee, Stale, StaleIs};
@@ -83,13 +84,23 @@ impl<'a> Resolver<'a> {
         }
         if condition.reads_time() {
             let time = first_part(written, &|part| match &part.kind {
-                ExpressionKind::Field(path) if self.is_time(path) => Some(path.span),
+                ExpressionKind::Field(path) if self.is_time(path) => Some((path.span, false)),
+                ExpressionKind::Call(name, _) if memory_named(&name.text) == Some(Remembers::Integral) => {
+                    Some((part.span, true))
+                }
                 _ => None,
             });
-            let title = "evidence cannot read the simulation time";
-            let diagnostic = Diagnostic::new(Code::BAD_MONITOR, time.unwrap_or(written.span), title)
+            let (span, integral) = time.unwrap_or((written.span, false));
+            let (title, note) = if integral {
+                let title = "evidence cannot read an integral, which grows between messages";
+                (title, "a metric can, such as `max(integral(power))`, and a requirement on that")
+            } else {
+                let note = "how long it must hold is said by `held`, and when it is too old by `stale after`";
+                ("evidence cannot read the simulation time", note)
+            };
+            let diagnostic = Diagnostic::new(Code::BAD_MONITOR, span, title)
                 .label("evidence changes when messages arrive")
-                .note("how long it must hold is said by `held`, and when it is too old by `stale after`");
+                .note(note);
             self.report(diagnostic);
             return None;
         }
@@ -144,7 +155,13 @@ impl<'a> Resolver<'a> {
             };
             Some(Evidence {
                 declaration: self.declaration(&guarantee.head),
-                inputs: vec![Input { field: field.clone(), members: model::Members::Min, list: None, text }],
+                inputs: vec![Input {
+                    field: field.clone(),
+                    members: model::Members::Min,
+                    list: None,
+                    text,
+                    memory: Vec::new(),
+                }],
                 condition,
                 held: 0.0,
                 stale: None,

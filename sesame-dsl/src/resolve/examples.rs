@@ -83,7 +83,8 @@ pub(super) fn choice(parameter: &Parameter, kind: &OperationKind) -> String {
 
 /// A value that is permitted for a parameter.
 pub(super) fn value(parameter: &Parameter, kind: &OperationKind) -> String {
-    let probability = kind.has_probabilities();
+    let count = matches!(parameter.domain, Domain::Number { integer: true, .. });
+    let probability = kind.has_probabilities() && !count;
     let unit = parameter.unit.as_ref().map_or("", Unit::text);
     let number = |value: f64| {
         if probability { format!("{}%", convert(value, None, Some(&percent()))) } else { format!("{value}{unit}") }

@@ -114,6 +114,7 @@ impl<'a> Resolver<'a> {
             (&aggregate, &when, every, &per, outbound)
             && self.members_of(&inputs[0].field) == 1
             && inputs[0].list.is_none()
+            && inputs[0].memory.is_empty()
         {
             return Some((MetricSource::Last(inputs[0].field.clone()), unit));
         }

@@ -19,6 +19,11 @@ enum Computes {
     Greatest,
     Distance,
     SignedDistance,
+    /// From the values of successive messages.
+    Memory,
+    /// An angle without whole turns.
+    Wrapped,
+    AngleBetween,
     Unary(UnaryFunction, Takes, Gives),
     /// A function of two numbers of one dimension, unless it takes plain ones.
     Binary(BinaryFunction, Takes, Gives),
@@ -52,6 +57,12 @@ const FUNCTIONS: &[(&str, Computes)] = &[
     ("max", Computes::Greatest),
     ("distance", Computes::Distance),
     ("signed_distance", Computes::SignedDistance),
+    ("previous", Computes::Memory),
+    ("rate", Computes::Memory),
+    ("integral", Computes::Memory),
+    ("wrapped", Computes::Wrapped),
+    ("unwrapped", Computes::Memory),
+    ("angle_between", Computes::AngleBetween),
     ("sqrt", Computes::Unary(UnaryFunction::Sqrt, Takes::Square, Gives::Same)),
     ("hypot", Computes::Binary(BinaryFunction::Hypot, Takes::Any, Gives::Same)),
     ("sin", Computes::Unary(UnaryFunction::Sin, Takes::Angle, Gives::Plain)),
@@ -105,6 +116,19 @@ impl<'a> Resolver<'a> {
             }
             (Some(Computes::Distance), _) => return self.distance(inputs, call.span, arguments),
             (Some(Computes::SignedDistance), [from, to]) => return self.signed_distance(inputs, from, to),
+            (Some(Computes::Wrapped), [of]) => {
+                let (number, unit) = self.number(inputs, of)?;
+                let turn = self.turn(&name.text, of.span, unit.as_ref())?;
+                return Some((without_turns(number, turn), unit));
+            }
+            (Some(Computes::AngleBetween), [from, to]) => {
+                let (numbers, unit) = self.common(inputs, &[from, to])?;
+                let turn = self.turn(&name.text, from.span, unit.as_ref())?;
+                let [from, to] = <[Expression; 2]>::try_from(numbers).expect("two arguments give two numbers");
+                let apart = Expression::Sum(vec![from, Expression::Negate(Box::new(to))]);
+                return Some((Expression::Absolute(Box::new(without_turns(apart, turn))), unit));
+            }
+            (Some(Computes::Memory), [_]) => return self.remembered(inputs, call),
             (Some(Computes::Unary(function, takes, gives)), [of]) => {
                 let (number, unit) = self.number(inputs, of)?;
                 let (number, unit) = self.argument(&name.text, takes, of.span, number, unit)?;
@@ -117,8 +141,8 @@ impl<'a> Resolver<'a> {
                 self.over_time(call.span, name, None);
                 return None;
             }
-            (Some(Computes::Absolute | Computes::Unary(..)), _) => "one value",
-            (Some(Computes::Binary(..)), _) => "two values",
+            (Some(Computes::Absolute | Computes::Memory | Computes::Wrapped | Computes::Unary(..)), _) => "one value",
+            (Some(Computes::AngleBetween | Computes::Binary(..)), _) => "two values",
             (Some(Computes::SignedDistance), _) => "two arguments",
             (Some(Computes::Least | Computes::Greatest), _) => "two values or more",
             (None, _) if AGGREGATES.contains(&name.text.as_str()) || scores().any(|score| score == name.text) => {
@@ -133,6 +157,12 @@ impl<'a> Resolver<'a> {
         };
         self.wrong_count(call.span, &name.text, takes, arguments.len());
         None
+    }
+
+    /// A whole turn in the unit of an angle; reports what is none.
+    pub(super) fn turn(&mut self, name: &str, span: Span, unit: Option<&Unit>) -> Option<f64> {
+        self.argument(name, Takes::Angle, span, Expression::Constant(0.0), unit.cloned())?;
+        Some(convert(1.0, Some(&Unit::revolutions()), unit))
     }
 
     pub(super) fn wrong_count(&mut self, call: Span, name: &str, takes: &str, count: usize) {
@@ -240,4 +270,10 @@ impl<'a> Resolver<'a> {
         self.report(diagnostic);
         None
     }
+}
+
+/// What is left of an angle without whole turns.
+fn without_turns(angle: Expression, turn: f64) -> Expression {
+    let (left, right) = (Box::new(angle), Box::new(Expression::Constant(turn)));
+    Expression::Binary { function: BinaryFunction::Wrapped, left, right }
 }

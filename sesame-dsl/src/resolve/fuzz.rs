@@ -8,8 +8,8 @@ use super::words::list;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{
-    self, Activation, Choice, ChoiceKind, Domain, Id as _, MessageRun, Messages, OperationId, OperationKind, Parameter,
-    Range,
+    self, Activation, Choice, ChoiceKind, Counted, Domain, Id as _, MessageRun, Messages, OperationId, OperationKind,
+    Parameter, Range,
 };
 
 use crate::span::Span;
@@ -52,15 +52,20 @@ impl<'a> Resolver<'a> {
         let between = self.between_nodes(body);
         let constraints = self.constraints(&body.contains);
         let (mut targets, kind, mut parameters) = what?;
+        let (counted, counts): (Vec<Counted>, Vec<Parameter>) = self.counted(body, &kind)?.into_iter().unzip();
+        let wrapped = match self.single(&body.wrapped, "wrapped") {
+            Some(turn) => Some(self.wrapped(body, (body.wrapped[0].0, turn.as_ref()), &kind, &parameters)?),
+            None => None,
+        };
         let (nodes, choice) = match &body.resource {
             Some(resource) => self.members_of_node(resource)?,
             None => (None, self.members_of_targets(body, &mut targets)?),
         };
-        if let Some(choice) = choice {
+        for choice in counts.into_iter().chain(choice) {
             if parameters.iter().any(|parameter| parameter.name == choice.name) {
                 let title = format!("this operation has a parameter `{}` of its own", choice.name);
                 let diagnostic = Diagnostic::new(Code::DEFINED_TWICE, operation.head.name.span, title)
-                    .label("a test chooses the members of the group by this name; rename the parameter");
+                    .label("a test chooses members of a group or messages by this name; rename the parameter");
                 self.report(diagnostic);
                 return None;
             }
@@ -80,6 +85,8 @@ impl<'a> Resolver<'a> {
             priority: priority?,
             inclusion: inclusion?,
             timed: body.untimed.is_empty(),
+            counted,
+            wrapped,
             constraints: constraints?,
         })
     }
@@ -480,7 +487,7 @@ impl<'a> Resolver<'a> {
                 None
             }
             (ast::Choice::Value(_) | ast::Choice::Range(_), Domain::Number { range, shape, integer }) => {
-                let probability = operation.kind.has_probabilities();
+                let probability = operation.kind.has_probabilities() && !*integer;
                 self.chosen_number(choice, index, (parameter, probability), (*range, *shape, *integer), example)
             }
             (_, domain) => {
@@ -558,7 +565,11 @@ impl<'a> Resolver<'a> {
 
     /// Where the permitted values of a parameter are declared.
     fn declared(&self, index: usize, parameter: &Parameter) -> Option<Span> {
-        match &self.file.operations[index].body.kind {
+        let body = &self.file.operations[index].body;
+        if let Some((.., range)) = body.counted.iter().find(|(counted, ..)| counted.name() == parameter.name) {
+            return Some(range.span);
+        }
+        match &body.kind {
             ast::OperationKind::Custom(custom) => {
                 custom.parameters.iter().find(|written| written.name.text == parameter.name).map(|written| written.span)
             }

@@ -3,6 +3,7 @@
 use super::Resolver;
 use super::elements::Reading;
 use super::formula::{Number, position};
+use super::read::{Read, memory_named, read_in};
 use super::region::scaled;
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::model::{self, Distance, Expression, FieldPath, Input, Point, SignedDistance, Type};
@@ -94,7 +95,7 @@ impl<'a> Resolver<'a> {
 
     /// The distances among a group's members.
     fn pairs(&mut self, inputs: &mut Vec<Input>, path: &'a Path, word: Span) -> Option<Number> {
-        let (read, unit) = self.point_read(path, None)?;
+        let (read, unit) = self.point_read(&Read::plain(path))?;
         if read.list.is_some() {
             let title = "`each pair of` is of the members of a group, not of the elements of a list";
             let label = "expected a group of topics";
@@ -123,7 +124,7 @@ impl<'a> Resolver<'a> {
             self.report(diagnostic);
             return None;
         };
-        let (left, right) = (self.point_read(path, None), self.point_read(of_other, None));
+        let (left, right) = (self.point_read(&Read::plain(path)), self.point_read(&Read::plain(of_other)));
         let ((left, unit), (right, right_unit)) = (left?, right?);
         let one = left.list.is_some() || right.list.is_some() || left.field.topic == right.field.topic;
         if one || self.members_of(&right.field) < 2 || right.members != model::Members::Min {
@@ -186,9 +187,16 @@ impl<'a> Resolver<'a> {
     }
 
     fn operand(&mut self, inputs: &mut Vec<Input>, expression: &'a ast::Expression) -> Option<Operand<'a>> {
-        let (path, members) = match &expression.kind {
-            ExpressionKind::Field(path) => (path, None),
-            ExpressionKind::Members(members, word, path) => (path, Some((*members, *word))),
+        let written = match &expression.kind {
+            ExpressionKind::Field(_) | ExpressionKind::Members(..) => read_in(expression)?,
+            ExpressionKind::Call(name, _) if memory_named(&name.text).is_some() => {
+                let Some(read) = read_in(expression) else {
+                    // It is reported as any number is.
+                    self.number(inputs, expression);
+                    return None;
+                };
+                read
+            }
             ExpressionKind::Point(point) => {
                 let unit = match &point.coordinates[0].unit {
                     Some(name) => Some(self.unit(name)?),
@@ -219,7 +227,8 @@ impl<'a> Resolver<'a> {
                 return None;
             }
         };
-        let (read, unit) = self.point_read(path, members)?;
+        let (path, members) = (written.path, written.word);
+        let (read, unit) = self.point_read(&written)?;
         let is_one = matches!(read.members, model::Members::Only(_));
         if self.members_of(&read.field) > 1
             && !is_one
@@ -236,8 +245,9 @@ impl<'a> Resolver<'a> {
     }
 
     /// What a formula reads at a path that leads to a point, with its unit.
-    fn point_read(&mut self, path: &'a Path, word: Option<(Members, Span)>) -> Option<(Reading, Option<Unit>)> {
-        let read = self.reading(path, word)?;
+    fn point_read(&mut self, written: &Read<'a>) -> Option<(Reading, Option<Unit>)> {
+        let path = written.path;
+        let read = self.read(written)?;
         if let Type::Point(unit) = &read.ty {
             let unit = unit.clone();
             return Some((read, unit));

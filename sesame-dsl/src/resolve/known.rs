@@ -55,6 +55,7 @@ fn never_negative(expression: &Expression) -> bool {
         Expression::Max(of) => of.iter().any(never_negative),
         Expression::Divide { value, by } => never_negative(value) && never_negative(by),
         Expression::Input(_)
+        | Expression::Integral(_)
         | Expression::Negate(_)
         | Expression::SignedDistance(_)
         | Expression::Unary { .. }

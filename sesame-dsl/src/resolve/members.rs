@@ -116,7 +116,13 @@ impl<'a> Resolver<'a> {
             self.report(Diagnostic::new(Code::TOO_LARGE, word.to(path.span), title).label("too many pairs"));
             return None;
         }
-        let of = |field: &FieldPath, members| Input { field: field.clone(), members, list: None, text: None };
+        let of = |field: &FieldPath, members| Input {
+            field: field.clone(),
+            members,
+            list: None,
+            text: None,
+            memory: Vec::new(),
+        };
         Some([of(field, Members::First), of(other.unwrap_or(field), Members::Second)])
     }
 

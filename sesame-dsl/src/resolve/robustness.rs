@@ -121,7 +121,8 @@ impl<'a> Resolver<'a> {
             ExpressionKind::Until(left, until, right) => {
                 let interval = self.interval(until.interval.as_ref());
                 let [left, right] = self.pair(parts, left, right)?;
-                Some(Temporal::Until(interval?, Box::new(left), Box::new(right)))
+                let kind = if until.weak { Temporal::WeakUntil } else { Temporal::Until };
+                Some(kind(interval?, Box::new(left), Box::new(right)))
             }
             ExpressionKind::Prefixed(prefixes, of) => self.prefixed(parts, prefixes, of),
             ExpressionKind::Truth(_) => {
@@ -138,7 +139,9 @@ impl<'a> Resolver<'a> {
                 }
                 self.predicate(parts, expression, left, *by, right)
             }
-            ExpressionKind::Field(_) | ExpressionKind::Members(..) if self.is_condition(expression) => {
+            ExpressionKind::Field(_) | ExpressionKind::Members(..) | ExpressionKind::Call(..)
+                if self.is_condition(expression) =>
+            {
                 let input = self.truth(&mut parts.inputs, expression)?;
                 Some(parts.truth(input))
             }
@@ -354,7 +357,7 @@ fn open_end(expression: &ast::Expression) -> Option<(Span, Span, Span)> {
 
 /// Whether a number may change during a run.
 fn varies(of: &Expression) -> bool {
-    matches!(of, Expression::Input(_) | Expression::Time)
+    matches!(of, Expression::Input(_) | Expression::Integral(_) | Expression::Time)
         || of.points().iter().any(|point| matches!(point, Point::Input(_)))
         || of.parts().into_iter().any(varies)
 }

@@ -93,6 +93,8 @@ pub(super) fn phrases_of(rule: Rule) -> Vec<String> {
         Rule::priority => &["`priority`"],
         Rule::inclusion => &["`inclusion`"],
         Rule::untimed => &["`untimed`"],
+        Rule::wrapped => &["`wrapped`"],
+        Rule::next_messages => &["`next`"],
         Rule::to_nodes => &["`to`"],
         Rule::state_topic => &["`publishes`"],
         Rule::external => &["`external`"],
@@ -174,7 +176,7 @@ pub(super) fn phrases_of(rule: Rule) -> Vec<String> {
         Rule::times | Rule::each_element => &["`*`"],
         Rule::over => &["`/`"],
         Rule::trigger | Rule::when_then | Rule::formula_when => &["`when`"],
-        Rule::formula_every => &["`every`"],
+        Rule::formula_every | Rule::every_messages => &["`every`"],
         Rule::formula_per => &["`per`"],
         Rule::formula_outbound => &["`outbound`"],
         Rule::formula_whole => &["`whole windows`"],
@@ -185,6 +187,7 @@ pub(super) fn phrases_of(rule: Rule) -> Vec<String> {
         | Rule::k_always
         | Rule::k_eventually
         | Rule::k_pair
+        | Rule::k_weak
         | Rule::element
         | Rule::element_filter
         | Rule::element_key

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use sesame_notation::Unit;
-use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace};
+use sesame_plan::condition::{Comparison, ConditionEnd, ConditionSpace, Variable};
 use sesame_plan::{CampaignPlan, ChoiceKind, Confirmation, Copies, Dimension};
 use sesame_search::coverage::{Feasible, Grid};
 use sesame_search::space::ParameterSpace;
@@ -190,7 +190,12 @@ fn conditions(space: &ConditionSpace) -> f64 {
     let signs = [Comparison::Below, Comparison::Above, Comparison::Equal].len() as f64;
     let variables = space.variables.len() as f64;
     let integers = space.integers.highest as f64 - space.integers.lowest as f64 + 1.0;
-    let comparisons = (signs * variables * (variables - 1.0 + integers)).log10();
+    let numbers = |variable: &Variable| match (variable.step, variable.low, variable.high) {
+        (Some(step), Some(low), Some(high)) => ((high - low) / step).floor() + 1.0,
+        _ => integers,
+    };
+    let numbers = space.variables.iter().map(numbers).sum::<f64>();
+    let comparisons = (signs * (variables * (variables - 1.0) + numbers)).log10();
     (1..space.depth).fold(comparisons, |smaller, _| total(&[comparisons, 2f64.log10() + 2.0 * smaller]))
 }
 

@@ -61,6 +61,10 @@ fn operations(units: &[&str]) -> String {
         let _ = writeln!(text, "operation stuck{at} on t{at} = stuck at {one}");
         let _ = writeln!(text, "operation biased{at} on p{at} = bias {corners}");
         let _ = writeln!(text, "operation noisy{at} on t{at} = noise {one}");
+        if ["mrad", "rad", "deg", "rev"].contains(unit) {
+            let _ = writeln!(text, "operation turned{at} on t{at} = drift [0{unit}/s, 1{unit}/s] wrapped");
+            let _ = writeln!(text, "operation tilted{at} on t{at} = random offset {one} wrapped [0{unit}, 1rev]");
+        }
     }
     text + r#"
         operation drifting on note.level = drift [0m/s, 1m/s]
@@ -81,6 +85,8 @@ fn operations(units: &[&str]) -> String {
         operation mixed on note = reorder [0s, 1s] drain drop
         operation twice on note = duplicate [1, 7]
         operation cut on note = blackhole
+        operation cut_some on note = blackhole next [1, 9] messages every [2, 3] messages
+        operation lost_some on one of note = packet loss [0%, 1%] every [2, 3] messages
         operation bent on t0 = custom {
           points: int [0, 1]  gain: real [0, 1]  reach: real[mm] [0mm, 1mm]
           shift: point [(0, 0, 0)m, (1, 1, 1)m]  frame: one of "a", "b"
@@ -225,7 +231,9 @@ fn operation(like: &Operation, end: f64, by_condition: bool) -> BoxedStrategy<Op
     (domains, texts, clauses)
         .prop_map(move |(domains, texts, ((start, stop), priority, inclusion, timed, constraints, lengths))| {
             let mut operation = like.clone();
-            for (parameter, domain) in operation.parameters.iter_mut().zip(domains) {
+            // Counts are from 1.
+            let own = operation.own_parameters().len();
+            for (parameter, domain) in operation.parameters.iter_mut().zip(domains).take(own) {
                 parameter.domain = domain;
             }
             if let OperationKind::RandomText { texts: offered } = &mut operation.kind {
@@ -368,7 +376,8 @@ fn tests(operations: &[Operation], metrics: &[Metric]) -> impl Strategy<Value = 
 fn condition_space(metrics: &[Metric]) -> impl Strategy<Value = ConditionSpace> + use<> {
     let metrics: Vec<(Option<String>, bool)> =
         metrics.iter().map(|metric| (metric.unit.clone(), is_truth(metric))).collect();
-    let ranges = prop::collection::vec(prop::option::of((-1e9..-1e3f64, 1e3..1e9f64)), 2..4);
+    let range = (-1e9..-1e3f64, 1e3..1e9f64, prop::option::of(1e-5..1.0f64));
+    let ranges = prop::collection::vec(prop::option::of(range), 2..4);
     let end = prop_oneof![
         Just(ConditionEnd::Condition),
         ordered(1e-3..60.0f64).prop_map(|(low, high)| ConditionEnd::Length { low, high }),
@@ -379,12 +388,14 @@ fn condition_space(metrics: &[Metric]) -> impl Strategy<Value = ConditionSpace> 
                 .zip(ranges)
                 .zip(metrics.clone())
                 .map(|((id, range), (unit, truth))| {
-                    let range = if truth { Some((0.0, 1.0)) } else { range };
+                    let range = if truth { Some((0.0, 1.0, None)) } else { range };
+                    let step = range.and_then(|(low, high, share)| share.map(|share: f64| (high - low) * share));
                     Variable {
                         metric: MetricId(id),
                         unit,
                         low: range.map(|range| range.0),
                         high: range.map(|range| range.1),
+                        step,
                     }
                 })
                 .collect(),

@@ -49,7 +49,7 @@ fn formulas(window: u32) -> [(&'static str, Formula, String, bool); 3] {
         ),
         (
             "until",
-            throughout(Formula::Until { interval, left: Box::new(above(0)), right: Box::new(above(1)) }),
+            throughout(Formula::Until { interval, weak: false, left: Box::new(above(0)), right: Box::new(above(1)) }),
             format!("always ((x > 0) until[0:{window}] ((x > 0) and (y > 0)))"),
             window <= 200,
         ),

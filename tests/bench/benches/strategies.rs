@@ -46,7 +46,7 @@ fn plan(search: Search, exploration: Option<Exploration>) -> CampaignPlan {
     plan.campaign.coverage = Some(CoverageGoal { axes: grid.axes().to_vec(), hits: 1, stop_at: None });
     plan.campaign.search = search;
     if matches!(exploration, Some(Exploration::Predict { .. })) {
-        let variable = Variable { metric: MetricId(1), unit: None, low: Some(0.0), high: Some(100.0) };
+        let variable = Variable { metric: MetricId(1), unit: None, low: Some(0.0), high: Some(100.0), step: None };
         let integers = Integers { lowest: 1, highest: 100 };
         let end = ConditionEnd::Condition;
         let space = ConditionSpace { variables: vec![variable], depth: 4, integers, end, times: 3 };

@@ -160,7 +160,7 @@ fn horizon(formula: &Formula) -> Option<f64> {
             Some(horizon(left)?.max(horizon(right)?))
         }
         Formula::Always { interval, of } | Formula::Eventually { interval, of } => Some(interval.to? + horizon(of)?),
-        Formula::Until { interval, left, right } => Some(interval.to? + horizon(left)?.max(horizon(right)?)),
+        Formula::Until { interval, left, right, weak: _ } => Some(interval.to? + horizon(left)?.max(horizon(right)?)),
     }
 }
 

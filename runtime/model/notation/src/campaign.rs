@@ -176,7 +176,10 @@ fn condition_space(plan: &CampaignPlan, space: &ConditionSpace) -> String {
         let metric = plan.metric(variable.metric);
         let unit = Unit::named(metric.unit.as_deref());
         match (variable.low, variable.high) {
-            (Some(low), Some(high)) => format!("{} in {}", metric.name, unit.range(low, high)),
+            (Some(low), Some(high)) => {
+                let step = variable.step.map_or(String::new(), |step| format!(" step {}", unit.number(step)));
+                format!("{} in {}{step}", metric.name, unit.range(low, high))
+            }
             // What is known of one end only follows from the metric itself.
             _ => metric.name.clone(),
         }

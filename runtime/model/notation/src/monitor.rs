@@ -58,7 +58,7 @@ fn unit_of_field<'a>(plan: &'a CampaignPlan, field: &FieldRef) -> Option<Unit<'a
 }
 
 /// The unit of the value behind the steps from a field.
-fn unit_in<'a>(plan: &'a CampaignPlan, field: &FieldRef, steps: &[Step]) -> Option<Unit<'a>> {
+pub(crate) fn unit_in<'a>(plan: &'a CampaignPlan, field: &FieldRef, steps: &[Step]) -> Option<Unit<'a>> {
     let mut ty = &plan.topic(field.topic).ty;
     let fields = field.path.iter().map(Some);
     let steps = steps.iter().map(|step| match step {
@@ -124,7 +124,7 @@ impl<'a> Names<'a> {
         };
         match expression {
             Expression::Constant(number) => unit.number(*number),
-            Expression::Input(at) => self.input(*at),
+            Expression::Input(at) | Expression::Integral(at) => self.input(*at),
             Expression::Negate(of) => format!("-{}", self.operand(of, unit)),
             Expression::Sum(of) => all(of, &|of| self.operand(of, unit), " + ").replace(" + -", " - "),
             Expression::Product(of) => all(of, &plain, " * "),
@@ -159,7 +159,7 @@ impl<'a> Names<'a> {
     /// The unit of what an expression adds up or chooses from, if it is that of a field.
     fn unit(&self, expression: &Expression) -> Option<Unit<'a>> {
         match expression {
-            Expression::Input(at) => self.unit_of_input(*at),
+            Expression::Input(at) | Expression::Integral(at) => self.unit_of_input(*at),
             Expression::Negate(of) | Expression::Absolute(of) => self.unit(of),
             Expression::Sum(of) | Expression::Min(of) | Expression::Max(of) => of.iter().find_map(|of| self.unit(of)),
             Expression::Distance(of) => self.unit_of_point(of.from).or_else(|| self.unit_of_point(of.to)),
@@ -203,7 +203,8 @@ impl<'a> Names<'a> {
     }
 
     fn input(&self, at: u32) -> String {
-        let Some(Input { field, members, list, text }) = self.inputs.get(at as usize) else { return "?".to_owned() };
+        let Some(input) = self.inputs.get(at as usize) else { return "?".to_owned() };
+        let Input { field, members, list, text, memory } = input;
         let mut name = name_of_field(self.plan, field);
         if let Members::Only(member) = members {
             let topic = self.plan.topic(field.topic);
@@ -230,6 +231,9 @@ impl<'a> Names<'a> {
                 Members::Sum => name = format!("sum({name})"),
                 Members::Each | Members::First | Members::Second | Members::Only(_) => {}
             }
+        }
+        for of in memory {
+            name = format!("{}({name})", of.name());
         }
         match text {
             Some(TextTest::Is(text)) => format!("{name} == {}", quoted(text)),
@@ -284,6 +288,7 @@ mod tests {
             members: Members::Min,
             list: None,
             text,
+            memory: Vec::new(),
         };
         let halves = Expression::Product(vec![
             Expression::Constant(0.5),

@@ -2,10 +2,11 @@
 
 use sesame_plan::condition::{Constraint, Integers};
 use sesame_plan::{
-    CampaignPlan, Distribution, Domain, Drain, Lengths, MembersOf, Metric, Operation, OperationKind, Parameter, Span,
-    TargetRef, Topic, value_path_in_words, without_member,
+    CampaignPlan, Counted, Distribution, Domain, Drain, FieldRef, Lengths, MembersOf, Metric, Operation, OperationKind,
+    Parameter, Span, TargetRef, Topic, value_path_in_words, without_member,
 };
 
+use crate::monitor::unit_in;
 use crate::text::{list, one_of, quoted};
 use crate::unit::Unit;
 
@@ -34,10 +35,28 @@ pub fn operation(plan: &CampaignPlan, operation: &Operation) -> String {
         lengths: operation.lengths,
         priority: Some(operation.priority),
         inclusion: Some(operation.inclusion),
+        counted: operation.counting_parameters().map(|(counted, parameter)| count(counted, parameter)).collect(),
         untimed: !operation.timed,
+        wrapped: operation.wrapped.map(|turn| unit_of_places(plan, operation).range(turn.low, turn.high)),
         start_contains: operation.constraints.iter().map(|comparison| constraint(comparison, &plan.metrics)).collect(),
     };
     format!("{line} = {}{}", disturbance(operation), clauses.write())
+}
+
+/// How many messages a test may count out.
+fn count(counted: Counted, parameter: &Parameter) -> String {
+    let range = match &parameter.domain {
+        Domain::Number { low, high, .. } => Unit::None.range(*low, *high),
+        _ => String::new(),
+    };
+    format!("{} {range} messages", counted.name())
+}
+
+/// The unit of the values that an operation changes.
+fn unit_of_places<'a>(plan: &'a CampaignPlan, operation: &Operation) -> Unit<'a> {
+    let field = operation.topic.map(|topic| FieldRef { topic, path: Vec::new() });
+    let place = operation.places.first().map_or(&[][..], Vec::as_slice);
+    field.and_then(|field| unit_in(plan, &field, place)).unwrap_or(Unit::None)
 }
 
 /// A parameter of the simulator that tests choose.
@@ -106,8 +125,12 @@ pub struct Clauses {
     pub priority: Option<i32>,
     /// The probability, a fraction, that a fresh test contains it.
     pub inclusion: Option<f64>,
+    /// Which messages of an activation it alters.
+    pub counted: Vec<String>,
     /// Whether its active time does not count.
     pub untimed: bool,
+    /// The turn in which angles stay.
+    pub wrapped: Option<String>,
     /// What its start conditions contain.
     pub start_contains: Vec<String>,
 }
@@ -116,11 +139,13 @@ impl Clauses {
     /// The clauses, each after a space.
     pub fn write(&self) -> String {
         let clauses = [
+            (!self.counted.is_empty()).then(|| format!(" {}", self.counted.join(" "))),
             self.lengths.map(|lengths| format!(" for {}", Unit::SECONDS.range(lengths.low, lengths.high))),
             self.within.map(|within| format!(" within {}", Unit::SECONDS.range(within.start, within.end))),
             self.priority.map(|priority| format!(" priority {priority}")),
             self.inclusion.map(|inclusion| format!(" inclusion {}", Unit::Share.number(inclusion))),
             self.untimed.then(|| " untimed".to_owned()),
+            self.wrapped.as_ref().map(|turn| format!(" wrapped {turn}")),
             (!self.start_contains.is_empty()).then(|| format!(" start contains {}", self.start_contains.join(", "))),
         ];
         clauses.into_iter().flatten().collect()
@@ -143,9 +168,8 @@ pub fn integer_constraint(bounds: Integers) -> String {
 /// What an operation does and permits.
 fn disturbance(operation: &Operation) -> String {
     let words = operation.kind.words();
-    // Which members a test chooses stands before their names.
-    let own = operation.parameters.len() - usize::from(matches!(operation.members, Some(MembersOf::Chosen(_))));
-    let parameters = &operation.parameters[..own];
+    // Which members a test chooses stands before their names, and which messages behind the kind.
+    let parameters = operation.own_parameters();
     let permitted: Vec<String> = match (&operation.kind, axes(parameters)) {
         (OperationKind::RandomValue { .. }, Some((unit, low, high))) => vec![unit.corners(low, high)],
         _ => parameters.iter().map(|parameter| permitted(&operation.kind, parameter)).collect(),

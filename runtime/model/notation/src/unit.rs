@@ -27,7 +27,7 @@ impl<'a> Unit<'a> {
 
     /// The unit of a parameter of an operation of this kind.
     pub fn of_parameter(kind: &OperationKind, parameter: &'a Parameter) -> Unit<'a> {
-        if kind.has_probabilities() { Unit::Share } else { Unit::named(parameter.unit.as_deref()) }
+        if parameter.is_probability(kind) { Unit::Share } else { Unit::named(parameter.unit.as_deref()) }
     }
 
     /// What stands behind a number.

@@ -1,5 +1,5 @@
 //! Conditions that switch operations on and off (paper §3.9.2, Table 1): comparisons between condition variables and
-//! whole numbers, joined by `and` and `or`.
+//! numbers, which are whole unless a variable has steps of its own, joined by `and` and `or`.
 //!
 //! One grammar for conditions written in a known test and for those that a search grows. A condition is a binary tree,
 //! so that trees are varied node by node.
@@ -33,7 +33,8 @@ pub enum Condition {
 pub enum Operand {
     /// The value that a metric has at this moment, in its unit; its initial value before it has one.
     Variable(MetricId),
-    /// A number in the unit of the variable it is compared with; finite. Whole where a search grew it.
+    /// A number in the unit of the variable it is compared with; finite. Where a search grew it, it is whole, or one of
+    /// the steps of the variable.
     Number(f64),
 }
 
@@ -77,7 +78,8 @@ pub struct ConditionSpace {
     /// The most levels of a condition's tree, from 1 to [`ConditionSpace::MOST_DEPTH`]: a comparison alone is one
     /// level.
     pub depth: u32,
-    /// The least and the greatest whole number that variables are compared with; `lowest <= highest`.
+    /// The least and the greatest whole number that variables without steps of their own are compared with; `lowest <=
+    /// highest`.
     pub integers: Integers,
     /// How an activation ends.
     pub end: ConditionEnd,
@@ -101,6 +103,15 @@ pub struct Variable {
     pub low: Option<f64>,
     /// The greatest value it can have, if known.
     pub high: Option<f64>,
+    /// How far apart the numbers are that it is compared with, from its least value to its greatest, which are known
+    /// then; positive. `None` for the whole numbers of the space, and then not written.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub step: Option<f64>,
+}
+
+impl Variable {
+    /// The most steps from the least to the greatest value.
+    pub const MOST_STEPS: f64 = 1e6;
 }
 
 /// Whole numbers from `lowest` to `highest`, both included; neither is beyond 2^53. `lowest <= highest`.
@@ -156,7 +167,7 @@ pub enum Constraint {
         /// Which.
         metric: MetricId,
     },
-    /// A whole number within bounds, both included.
+    /// A number within bounds, both included, which are whole.
     Integer {
         /// The bounds.
         bounds: Integers,

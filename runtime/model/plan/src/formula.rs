@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{FieldRef, Step, TopicId};
+use crate::{FieldRef, Finite, Step, TopicId};
 
 /// A metric computed from messages without any code of the user.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -46,9 +46,23 @@ pub struct Input {
     /// For a field that is a text: the input is whether this holds of it. `None` for all others, and then not written.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub text: Option<TextTest>,
+    /// What is computed from the values of successive messages, the innermost first: that of each member of a group
+    /// from its own messages. Empty for the value of the last message, and then not written.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub memory: Vec<Memory>,
 }
 
 impl Input {
+    /// The most that is computed from successive messages, one from the other: that of acceleration is two, of jerk
+    /// three.
+    pub const DEEPEST_MEMORY: usize = 8;
+
+    /// Whether it is an integral, which grows between messages: [`Expression::Integral`] reads it, and nothing else
+    /// does.
+    pub fn is_integral(&self) -> bool {
+        self.memory.last() == Some(&Memory::Integral)
+    }
+
     /// Where its messages come from.
     pub fn source(&self) -> Source {
         Source { topic: self.field.topic, only: self.only() }
@@ -129,6 +143,38 @@ pub enum TextTest {
     IsNot(String),
 }
 
+/// What is computed from the values of successive messages. A value that is not finite makes it begin anew.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Memory {
+    /// The value of the message before the last one; nothing before the second message.
+    Previous,
+    /// The difference quotient of the last message and the last one of an earlier instant, per second; nothing before
+    /// there are two such messages.
+    Rate,
+    /// The integral over time since the first message, in seconds times its unit. Each value holds until the next
+    /// message. It is of one number, and the last that is computed.
+    Integral,
+    /// An angle that is followed from message to message: it differs from the value by as many whole turns as bring it
+    /// nearest to what it was before. It is of one number.
+    Unwrapped {
+        /// A whole turn, in the unit of the value; positive.
+        turn: Finite,
+    },
+}
+
+impl Memory {
+    /// Its name in the language.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Memory::Previous => "previous",
+            Memory::Rate => "rate",
+            Memory::Integral => "integral",
+            Memory::Unwrapped { .. } => "unwrapped",
+        }
+    }
+}
+
 /// What is made of the last values of a group's members, of those that had a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -195,6 +241,9 @@ pub enum Expression {
     Constant(f64),
     /// An input that is a number: position in [`Formula::inputs`].
     Input(u32),
+    /// An input that [is an integral](Input::is_integral), up to the time at which it is read: position in
+    /// [`Formula::inputs`].
+    Integral(u32),
     /// The number with its sign changed.
     Negate(Box<Expression>),
     /// The sum, from left to right.
@@ -239,9 +288,15 @@ pub enum Expression {
 }
 
 impl Expression {
-    /// Whether it contains the simulation time, so that its value changes without a message.
+    /// Whether it contains the simulation time or an integral, so that its value changes without a message.
     pub fn reads_time(&self) -> bool {
-        matches!(self, Expression::Time) || self.parts().into_iter().any(Expression::reads_time)
+        matches!(self, Expression::Time | Expression::Integral(_))
+            || self.parts().into_iter().any(Expression::reads_time)
+    }
+
+    /// Whether it contains an integral.
+    pub fn integrates(&self) -> bool {
+        matches!(self, Expression::Integral(_)) || self.parts().into_iter().any(Expression::integrates)
     }
 
     /// The expressions that it is directly computed from, in order.
@@ -249,6 +304,7 @@ impl Expression {
         match self {
             Expression::Constant(_)
             | Expression::Input(_)
+            | Expression::Integral(_)
             | Expression::Distance(_)
             | Expression::SignedDistance(_)
             | Expression::Time => Vec::new(),
@@ -369,6 +425,9 @@ pub enum BinaryFunction {
     Hypot,
     /// The first to the power of the second.
     Pow,
+    /// What is left of an angle without whole turns, the second: from minus half a turn up to and not including half a
+    /// turn.
+    Wrapped,
 }
 
 impl BinaryFunction {
@@ -378,6 +437,7 @@ impl BinaryFunction {
             BinaryFunction::Atan2 => "atan2",
             BinaryFunction::Hypot => "hypot",
             BinaryFunction::Pow => "pow",
+            BinaryFunction::Wrapped => "wrapped",
         }
     }
 }
@@ -415,7 +475,7 @@ pub enum Condition {
 }
 
 impl Condition {
-    /// Whether it contains the simulation time, so that it changes without a message.
+    /// Whether it contains the simulation time or an integral, so that it changes without a message.
     pub fn reads_time(&self) -> bool {
         match self {
             Condition::Constant(_) | Condition::Input(_) => false,

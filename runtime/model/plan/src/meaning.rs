@@ -142,6 +142,8 @@ fn forget_what_is_for_people(plan: &mut CampaignPlan) {
             timed: _,
             constraints: _,
             lengths: _,
+            counted: _,
+            wrapped: _,
         } = operation;
         doc.clear();
     }

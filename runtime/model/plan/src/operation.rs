@@ -39,8 +39,13 @@ pub struct Operation {
     pub further: Vec<Target>,
     /// What it does to them.
     pub kind: OperationKind,
-    /// The parameters a test chooses, in the order that [`OperationKind`] documents.
+    /// The parameters a test chooses, in the order that [`OperationKind`] documents, then one for each of `counted`,
+    /// then that of chosen members.
     pub parameters: Vec<Parameter>,
+    /// By what a test counts out the messages that it alters while it is active; none for all messages, and then not
+    /// written. Each once, in their order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub counted: Vec<Counted>,
     /// The time outside of which it is never active (`within`); seconds, `start < end`. For an offline operation, which
     /// is never active, the whole run.
     pub within: Span,
@@ -55,6 +60,10 @@ pub struct Operation {
     /// Whether its active time counts in `fuzzing_time()`. Default true, and then not written.
     #[serde(default = "timed", skip_serializing_if = "is_timed")]
     pub timed: bool,
+    /// The turn in which it keeps the numbers that it changes, which are angles; `None` where it leaves them as they
+    /// come, and then not written.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wrapped: Option<Turn>,
     /// What its start conditions contain where a search grows them.
     pub constraints: Vec<Constraint>,
 }
@@ -122,6 +131,49 @@ impl Operation {
         self.target_on(topic).is_some_and(|(_, target)| self.acts_on_member(target, member, choices))
     }
 
+    /// Where the parameters by which a test counts messages begin: behind those of its kind.
+    fn first_counted(&self) -> usize {
+        let chosen = usize::from(matches!(self.members, Some(MembersOf::Chosen(_))));
+        self.parameters.len().saturating_sub(chosen + self.counted.len())
+    }
+
+    /// The parameters of its kind.
+    pub fn own_parameters(&self) -> &[Parameter] {
+        &self.parameters[..self.first_counted()]
+    }
+
+    /// The parameters by which a test counts messages.
+    pub fn counting_parameters(&self) -> impl Iterator<Item = (Counted, &Parameter)> {
+        self.counted.iter().copied().zip(&self.parameters[self.first_counted()..])
+    }
+
+    /// Which messages it alters with these choices of a test, of those on one wire while it is active.
+    pub fn counts(&self, choices: &[Choice]) -> Counts {
+        let mut counts = Counts::ALL;
+        let counting = self.counted.iter().zip(choices.iter().skip(self.first_counted()));
+        for (counted, choice) in counting {
+            let Choice::Value { value } = choice else { continue };
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` clamps")]
+            let count = (*value as u64).max(1);
+            match counted {
+                Counted::Next => counts.next = Some(count),
+                Counted::Every => counts.every = count,
+            }
+        }
+        counts
+    }
+
+    /// The number at which the parameter at a position disturbs nothing, or least, as
+    /// [`OperationKind::neutral_value`] says: few messages, far apart.
+    pub fn neutral_value(&self, parameter: usize) -> Option<f64> {
+        let counted = parameter.checked_sub(self.first_counted()).and_then(|at| self.counted.get(at));
+        match counted {
+            Some(Counted::Next) => Some(0.0),
+            Some(Counted::Every) => Some(f64::INFINITY),
+            None => self.kind.neutral_value(&self.parameters.get(parameter)?.name),
+        }
+    }
+
     /// Whether it acts on a path of one of its targets, by its position among the members, with these choices of a
     /// test.
     pub fn acts_on_member(&self, target: TargetRef<'_>, member: usize, choices: &[Choice]) -> bool {
@@ -178,6 +230,43 @@ impl Operation {
     }
 }
 
+/// By what a test counts out the messages that an operation alters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Counted {
+    /// The next ones of an activation: how many of them.
+    Next,
+    /// Every second, every third and so on: the first one that it alters is the second, or the third.
+    Every,
+}
+
+impl Counted {
+    /// The most that may be permitted, which no run has.
+    pub const MOST: f64 = 1e9;
+
+    /// Its name, and that of its parameter, in the language.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Counted::Next => "next",
+            Counted::Every => "every",
+        }
+    }
+}
+
+/// Which messages an operation alters, of those on one wire while it is active.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Counts {
+    /// How many it alters at most; `None` for any number.
+    pub next: Option<u64>,
+    /// Every how manieth, from 1.
+    pub every: u64,
+}
+
+impl Counts {
+    /// All messages.
+    pub const ALL: Counts = Counts { next: None, every: 1 };
+}
+
 /// Members of a group, by their positions.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -222,6 +311,15 @@ impl Span {
     pub fn length(self) -> f64 {
         self.end - self.start
     }
+}
+
+/// One whole turn, in the unit of an angle: from `low` up to and not including `high`, which are finite and apart.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Turn {
+    /// The least angle.
+    pub low: f64,
+    /// The angle that is the least one again.
+    pub high: f64,
 }
 
 /// The permitted lengths of windows, in seconds; `0 <= low <= high`, and `high` is more than 0.
@@ -375,6 +473,13 @@ pub struct Parameter {
     pub unit: Option<String>,
     /// What is permitted.
     pub domain: Domain,
+}
+
+impl Parameter {
+    /// Whether it is a probability of an operation of this kind: not one that counts messages.
+    pub fn is_probability(&self, kind: &OperationKind) -> bool {
+        kind.has_probabilities() && !matches!(self.domain, Domain::Number { integer: true, .. })
+    }
 }
 
 /// What a test may choose for a parameter.

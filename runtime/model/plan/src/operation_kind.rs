@@ -165,6 +165,18 @@ impl OperationKind {
         }
     }
 
+    /// Whether it adds to numbers, so that it can keep angles within one turn.
+    pub fn adds(&self) -> bool {
+        matches!(
+            self,
+            OperationKind::RandomValue { mode: ValueMode::Offset, .. }
+                | OperationKind::Bias
+                | OperationKind::Drift
+                | OperationKind::Noise
+                | OperationKind::RandomWalk
+        )
+    }
+
     /// Whether it acts on messages, so that it has a topic.
     pub fn acts_on_messages(&self) -> bool {
         !self.is_offline() && self.node().is_none()

@@ -83,6 +83,10 @@ pub enum Formula {
     Until {
         /// From now.
         interval: Interval,
+        /// Whether it is also enough that the left one holds from now to the end of the interval. Default false, and
+        /// then not written.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        weak: bool,
         /// What holds until then.
         left: Box<Formula>,
         /// What then holds.

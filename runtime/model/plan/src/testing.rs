@@ -216,6 +216,7 @@ pub fn evidence_above(name: &str, topic: u32, limit: f64) -> Evidence {
             members: Members::Min,
             list: None,
             text: None,
+            memory: Vec::new(),
         }],
         condition: formula::Condition::Compare {
             left: Expression::Input(0),
@@ -267,6 +268,8 @@ pub fn operation_with(name: &str, topic: u32, kind: OperationKind, parameters: V
         inclusion: 1.0,
         lengths: None,
         timed: true,
+        counted: Vec::new(),
+        wrapped: None,
         constraints: Vec::new(),
     }
 }

@@ -19,9 +19,9 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::condition::{Condition, Constraint, Operand};
 use crate::{
-    Activation, Bound, CampaignPlan, Choice, Domain, Failing, FieldRef, KnownTest, KnownTestId, LabTask, MembersOf,
-    MessageId, Messages, Metric, MetricId, MetricSource, Operation, OperationId, OperationKind, RequirementId, SCHEMA,
-    Shrinking, Span, Target, Task, Test, TopicId, Type, Undisturbed, Variations,
+    Activation, Bound, CampaignPlan, Choice, ChoiceKind, Domain, Failing, FieldRef, KnownTest, KnownTestId, LabTask,
+    MembersOf, MessageId, Messages, Metric, MetricId, MetricSource, Operation, OperationId, OperationKind,
+    RequirementId, SCHEMA, Shrinking, Span, Target, Task, Test, TopicId, Type, Undisturbed, Variations,
 };
 
 use check::{
@@ -202,6 +202,12 @@ impl CampaignPlan {
         at("within", span(operation.within))?;
         at("lengths", operation.lengths.map_or(Ok(()), |found| lengths(found, operation.within)))?;
         at("inclusion", share(operation.inclusion))?;
+        at("counted", sound_counts(operation))?;
+        if let Some(turn) = operation.wrapped {
+            let apart = turn.low < turn.high && (turn.high - turn.low).is_finite();
+            at("wrapped", require(apart, || format!("{} to {} is no turn", turn.low, turn.high)))?;
+            at("wrapped", require(operation.kind.adds(), || "it adds nothing to angles".to_owned()))?;
+        }
         each("constraints", &operation.constraints, |constraint| match constraint {
             Constraint::Variable { metric } => at("metric", self.has_metric(*metric)),
             Constraint::Integer { bounds } => at("bounds", integers(*bounds)),
@@ -356,6 +362,23 @@ fn earlier(ty: &Type, position: usize) -> Checked {
         Type::List { of } => at("of", earlier(of, position)),
         Type::Bool | Type::Int { .. } | Type::Real { .. } | Type::Text | Type::Point { .. } => Ok(()),
     }
+}
+
+/// That the parameters by which a test counts messages are there, and are whole numbers from 1.
+fn sound_counts(operation: &Operation) -> Checked {
+    let counted = &operation.counted;
+    require(counted.is_sorted_by(|one, other| one < other), || "are not in their order".to_owned())?;
+    require(counted.is_empty() || operation.kind.acts_on_messages(), || "it acts on no messages".to_owned())?;
+    let counting: Vec<_> = operation.counting_parameters().collect();
+    require(counting.len() == counted.len(), || "lack a parameter".to_owned())?;
+    counting.into_iter().try_for_each(|(counted, parameter)| {
+        let is_count = |domain: &Domain| match domain {
+            Domain::Number { low, shape: ChoiceKind::Value, integer: true, .. } => *low >= 1.0,
+            _ => false,
+        };
+        let named = parameter.name == counted.name();
+        require(named && is_count(&parameter.domain), || format!("`{}` counts no messages", parameter.name))
+    })
 }
 
 fn bound(bound: Bound) -> Checked {

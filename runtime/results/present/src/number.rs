@@ -119,7 +119,7 @@ pub fn exact(x: f64) -> String {
 /// The unit in which a parameter's values up to this one are written, and by what they are multiplied for that.
 pub fn scale<'p>(kind: &OperationKind, parameter: &'p Parameter, highest: f64) -> (f64, Option<&'p str>) {
     match kind {
-        kind if kind.has_probabilities() => (100.0, Some("%")),
+        kind if parameter.is_probability(kind) => (100.0, Some("%")),
         OperationKind::Latency { .. } | OperationKind::Reorder { .. } | OperationKind::Stale if highest < 1.0 => {
             (1000.0, Some("ms"))
         }

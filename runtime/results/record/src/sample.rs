@@ -132,6 +132,7 @@ pub fn offline_plan(end: ConditionEnd) -> CampaignPlan {
         unit: plan.metrics[metric as usize].unit.clone(),
         low: Some(0.0),
         high: Some(high),
+        step: None,
     };
     let variables = vec![variable(2, 3.0), variable(4, 700.0)];
     let integers = Integers { lowest: 1, highest: 20 };

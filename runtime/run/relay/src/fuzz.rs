@@ -147,7 +147,7 @@ impl Disturbance {
             _ => Err(lacks(name)),
         };
         let amount = |name: &str| chosen(name).and_then(Amount::from_choice).ok_or_else(|| lacks(name));
-        let places = Places::new(operation.targets().map(|target| target.places));
+        let places = Places::new(operation.targets().map(|target| target.places)).within(operation.wrapped);
         Ok(match &operation.kind {
             OperationKind::RandomValue { mode, integer } => {
                 let ranges = if chosen("x").is_some() {

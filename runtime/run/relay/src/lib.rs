@@ -8,6 +8,7 @@
 // These macros panic where nothing can be written: on a full disk, or after the reader has gone.
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
+mod angle;
 mod elements;
 pub mod evaluate;
 #[cfg(feature = "recordings")]

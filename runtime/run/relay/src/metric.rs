@@ -20,6 +20,9 @@ mod held;
 mod list_tests;
 #[cfg(test)]
 mod member_tests;
+mod memory;
+#[cfg(test)]
+mod memory_tests;
 mod probe;
 mod region;
 mod robustness;
@@ -31,6 +34,7 @@ pub use engine::{MetricError, MetricTable, Metrics};
 pub(crate) use engine::{Shown, next_mark};
 pub(crate) use expression::{Moment, holds};
 pub(crate) use held::{HeardValues, HeldInputs, hear};
+pub(crate) use memory::Memories;
 pub(crate) use probe::sample;
 pub use probe::unimplemented_hooks;
 

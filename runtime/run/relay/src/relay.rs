@@ -46,7 +46,7 @@ use sesame_plan::{
 };
 
 use crate::files::SpaceFiles;
-use crate::fuzz::{ChoiceError, Disturbance, KeyedRng, OnWire, OperationEntry, Order, Resource, RunContext};
+use crate::fuzz::{ChoiceError, Disturbance, KeyedRng, OnWire, OperationEntry, Order, PerWire, Resource, RunContext};
 use crate::metric::Metrics;
 use crate::monitor::Monitors;
 use crate::value::Value;
@@ -165,6 +165,8 @@ impl<'a> Relay<'a> {
                 since: SimTime::ZERO,
                 operation_seed: choice.operation_seed,
                 messages: choice.messages.clone(),
+                counts: operation.counts(&choice.parameters),
+                counted: PerWire::default(),
                 timed: operation.timed,
                 tail_since: None,
                 tails: Vec::new(),
@@ -445,6 +447,7 @@ impl<'a> Relay<'a> {
     fn begin_activity(&mut self, at: usize, now: SimTime) {
         let stage = &mut self.operations[at];
         stage.since = now;
+        stage.counted = PerWire::default();
         stage.end_tail(now);
         stage.disturbance.begin();
         self.order(at, true);
@@ -576,6 +579,8 @@ impl Exchange for Relay<'_> {
 mod activations;
 #[cfg(test)]
 mod behaviour;
+#[cfg(test)]
+mod counted;
 #[cfg(test)]
 mod links;
 #[cfg(test)]

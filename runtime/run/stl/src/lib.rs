@@ -29,6 +29,10 @@
 //! the moment at which `right` begins does not satisfy it. (It is this that keeps every subformula continuous from
 //! the right, like the signals, so that nothing happens between samples.)
 //!
+//! **Weak until** is the greater of the two: `left` gets to `right` in a window from `a` to `b`, or `left` holds from
+//! `t` to `t + b`, or to the end of the trace. It begins at `t` and not at `t + a`, since `left` has to hold from there
+//! in the other case too: what breaks before the window begins is never made good by it.
+//!
 //! **Time is dense**, as far as that can be told: simulation time is whole nanoseconds, so all signals jump at whole
 //! nanoseconds, and so do the robustness signals of all subformulas. For windows that are cut this holds since the last
 //! instant of a trace lasts one nanosecond, as any other does: were the trace to end with the instant itself, a window

@@ -97,7 +97,8 @@ struct Always {
 }
 
 /// `left until right` is computed as two parts that both hold: `left` holds up to the beginning of the window, and from
-/// there on it is an `until` with a window that begins at once.
+/// there on it is an `until` with a window that begins at once. A weak one, too: `left` all through is `left` up to the
+/// window and `left` all through that.
 #[derive(Debug, Clone)]
 struct Until {
     left: FormulaNode,
@@ -150,7 +151,7 @@ impl FormulaNode {
                 let of = FormulaNode::new(of, asked.seen_through(window), used)?;
                 return Ok(FormulaNode::from_operator(asked, always(window, asked, of.negated())).negated());
             }
-            Formula::Until { interval, left, right } => {
+            Formula::Until { interval, weak, left, right } => {
                 let window = window(*interval)?;
                 let seen = asked.seen_through(window);
                 let delay = Window { from: window.from, to: Some(window.from) };
@@ -161,7 +162,7 @@ impl FormulaNode {
                     input: Pair::default(),
                     delay: window.from,
                     before: SlidingMinimum::new(Window { from: 0, to: Some(window.from) }, asked),
-                    within: SlidingUntil::new(window.to.map(|to| to - window.from), asked.seen_through(delay)),
+                    within: SlidingUntil::new(window.to.map(|to| to - window.from), *weak, asked.seen_through(delay)),
                     ahead: VecDeque::new(),
                     parts: Pair::default(),
                 }))

@@ -31,7 +31,11 @@ fn eventually(interval: Interval, of: Formula) -> Formula {
 }
 
 fn until(interval: Interval, left: Formula, right: Formula) -> Formula {
-    Formula::Until { interval, left: Box::new(left), right: Box::new(right) }
+    Formula::Until { interval, weak: false, left: Box::new(left), right: Box::new(right) }
+}
+
+fn weak_until(interval: Interval, left: Formula, right: Formula) -> Formula {
+    Formula::Until { interval, weak: true, left: Box::new(left), right: Box::new(right) }
 }
 
 fn implies(left: Formula, right: Formula) -> Formula {
@@ -143,11 +147,15 @@ fn by_definition(formula: &Formula, trace: &Trace, start: i64, whole: bool) -> V
             let n = inner.len();
             (0..defined(interval, n)).map(|at| greatest(&inner[window(at, interval, n)])).collect()
         }
-        Formula::Until { interval, left, right } => {
+        Formula::Until { interval, weak, left, right } => {
             let (left, right) = (of(left), of(right));
             let n = left.len().min(right.len());
             let arrive = |at: usize, s: usize| right[s].min(least(&left[at..=s]));
-            let best = |at| greatest(&window(at, interval, n).map(|s| arrive(at, s)).collect::<Vec<f64>>());
+            let hold = |at: usize| least(&left[at..window(at, interval, n).end]);
+            let best = |at| {
+                let arrived = greatest(&window(at, interval, n).map(|s| arrive(at, s)).collect::<Vec<f64>>());
+                if *weak { arrived.max(hold(at)) } else { arrived }
+            };
             (0..defined(interval, n)).map(best).collect()
         }
     }
@@ -245,7 +253,8 @@ fn any_formula() -> impl Strategy<Value = Formula> {
             1 => two().prop_map(|(left, right)| Formula::Implies { left, right }),
             2 => (any_interval(), part.clone()).prop_map(|(interval, of)| always(interval, of)),
             2 => (any_interval(), part.clone()).prop_map(|(interval, of)| eventually(interval, of)),
-            3 => (any_interval(), two()).prop_map(|(interval, (left, right))| Formula::Until { interval, left, right }),
+            3 => (any_interval(), any::<bool>(), two())
+                .prop_map(|(interval, weak, (left, right))| Formula::Until { interval, weak, left, right }),
         ]
     })
 }
@@ -262,8 +271,8 @@ fn stretched(formula: &Formula, factor: f64) -> Formula {
         Formula::Implies { left, right } => Formula::Implies { left: part(left), right: part(right) },
         Formula::Always { interval, of } => Formula::Always { interval: stretch(*interval), of: part(of) },
         Formula::Eventually { interval, of } => Formula::Eventually { interval: stretch(*interval), of: part(of) },
-        Formula::Until { interval, left, right } => {
-            Formula::Until { interval: stretch(*interval), left: part(left), right: part(right) }
+        Formula::Until { interval, weak, left, right } => {
+            Formula::Until { interval: stretch(*interval), weak: *weak, left: part(left), right: part(right) }
         }
     }
 }
@@ -318,6 +327,19 @@ proptest! {
     fn eventually_is_as_defined(interval in any_interval(), of in any_predicate(), trace in any_trace()) {
         let formula = eventually(interval, of);
         prop_assert_eq!(robustness(&formula, &trace, 1), naive(&formula, &trace));
+    }
+
+    #[test]
+    fn a_weak_until_is_an_until_or_an_always(
+        interval in any_interval(), left in any_formula(), right in any_predicate(), trace in any_trace(),
+        whole in any::<bool>(),
+    ) {
+        let formula = weak_until(interval, left.clone(), right.clone());
+        let all_through = always(Interval { from: 0.0, ..interval }, left.clone());
+        let either = Formula::Or { left: Box::new(until(interval, left, right)), right: Box::new(all_through) };
+        let by = if whole { robustness_over_whole } else { robustness };
+        prop_assert_eq!(by(&formula, &trace, 1), by(&either, &trace, 1));
+        prop_assert_eq!(by(&formula, &trace, 1), naive_by(&formula, &trace, whole));
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! `until` over a sliding window, on a queue made of two stacks.
 //!
-//! What `left until right` says of a stretch of time is two numbers: how well `left` holds all through it, and how well
-//! it gets to `right` within it. Both follow from those of its parts, so they can be summed up in any grouping: on the
-//! stack that grows, all of it is one sum; on the stack that shrinks, each entry is the sum of all behind it.
+//! What `left until right` says of a stretch of time is two numbers: how well `left` holds all through it, and how
+//! well it gets to `right` within it. A weak `until` is content with either. Both follow from those of its parts, so
+//! they can be summed up in any grouping: on the stack that grows, all of it is one sum; on the stack that shrinks,
+//! each entry is the sum of all behind it.
 
 use std::collections::VecDeque;
 
@@ -25,6 +26,11 @@ impl Passage {
         Passage { hold: left, arrive: left.min(right) }
     }
 
+    /// The robustness of what is asked of it.
+    fn value(self, weak: bool) -> f64 {
+        if weak { self.arrive.max(self.hold) } else { self.arrive }
+    }
+
     /// This stretch and one right after it.
     fn then(self, later: Passage) -> Self {
         Passage { hold: self.hold.min(later.hold), arrive: self.arrive.max(self.hold.min(later.arrive)) }
@@ -43,6 +49,8 @@ struct Entry {
 pub(super) struct SlidingUntil {
     /// Length of the window; `None` for one without end.
     length: Option<i64>,
+    /// Whether `left` may hold all through the window instead.
+    weak: bool,
     /// The next time to be told, and the end of all that is asked.
     asked: Span,
     /// The earlier part of the window, earliest last; each passage reaches to the end of this part.
@@ -54,8 +62,8 @@ pub(super) struct SlidingUntil {
 }
 
 impl SlidingUntil {
-    pub(super) fn new(length: Option<i64>, asked: Span) -> Self {
-        SlidingUntil { length, asked, leaving: Vec::new(), entering: Vec::new(), entered: Passage::EMPTY }
+    pub(super) fn new(length: Option<i64>, weak: bool, asked: Span) -> Self {
+        SlidingUntil { length, weak, asked, leaving: Vec::new(), entering: Vec::new(), entered: Passage::EMPTY }
     }
 
     /// Whether the window has an end.
@@ -101,8 +109,10 @@ impl SlidingUntil {
         let end = end.min(self.asked.end);
         while self.asked.start < end {
             let told = match self.first() {
-                Some(first) => Piece { end: end.min(first.end), value: first.passage.then(self.entered).arrive },
-                None => Piece { end, value: f64::NEG_INFINITY },
+                Some(first) => {
+                    Piece { end: end.min(first.end), value: first.passage.then(self.entered).value(self.weak) }
+                }
+                None => Piece { end, value: Passage::EMPTY.value(self.weak) },
             };
             put(out, told.end, told.value);
             self.asked.start = told.end;

@@ -76,11 +76,11 @@ impl ShrinkSpace {
                 }
                 _ => Vec::new(),
             };
-            let parameters = operation.parameters.iter().map(|parameter| {
+            let parameters = operation.parameters.iter().enumerate().map(|(at, parameter)| {
                 let neutral = |range: Range, shape| {
                     let step = (range.high - range.low) * resolution;
                     let step = if range.integer { libm::round(step).max(1.0) } else { step };
-                    let end = operation.kind.neutral_value(&parameter.name).map(|end| end.clamp(range.low, range.high));
+                    let end = operation.neutral_value(at).map(|end| end.clamp(range.low, range.high));
                     // A value that is not stronger than another is left as it is.
                     let known = end.is_some() || shape == ChoiceKind::Range;
                     (known && !range.is_fixed()).then_some(NeutralValue { end, step })
@@ -89,7 +89,7 @@ impl ShrinkSpace {
                     ParameterSpace::Number(range, shape) => neutral(range, shape).map(Parameter::Number),
                     ParameterSpace::Point(axes) => {
                         let fixed = |range: Range| NeutralValue { end: Some(range.low), step: 0.0 };
-                        operation.kind.neutral_value(&parameter.name)?;
+                        operation.neutral_value(at)?;
                         Some(Parameter::Point(axes.map(|axis| neutral(axis, ChoiceKind::Value).unwrap_or(fixed(axis)))))
                     }
                     ParameterSpace::Items(_) => None,
@@ -222,8 +222,8 @@ pub fn strength(plan: &CampaignPlan, test: &Test) -> f64 {
 fn strength_of(plan: &CampaignPlan, used: &TestOperation) -> f64 {
     let operation = plan.operation(used.operation);
     let mut shares = Vec::new();
-    for (parameter, choice) in operation.parameters.iter().zip(&used.parameters) {
-        let end = operation.kind.neutral_value(&parameter.name);
+    for (at, (parameter, choice)) in operation.parameters.iter().zip(&used.parameters).enumerate() {
+        let end = operation.neutral_value(at);
         let mut add = |(low, high): (f64, f64), (from, to): (f64, f64), shape| {
             let share = match end.map(|end| end.clamp(low, high)) {
                 Some(end) => (from - end).abs().max((to - end).abs()) / (high - end).max(end - low),

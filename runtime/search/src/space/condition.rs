@@ -1,13 +1,15 @@
 //! Conditions that a search grows and varies (paper §3.9.2 and Table 1).
 //!
-//! Every condition made here is one of Table 1 over the campaign's variables and whole numbers, in the table's order
+//! Every condition made here is one of Table 1 over the campaign's variables and whole numbers, or the numbers that a
+//! variable has of its own, in the table's order
 //! (`expr binComp var`), has at most the campaign's levels, has no part that is constant, and, where it starts an
 //! operation, contains what that operation demands. Whatever would break one of these is tried again, so often at most;
 //! then what was there before stays, or a fresh condition takes its place.
 
 use sesame_base::condition::constant::{constant, has_constant_part};
 use sesame_base::condition::{depth, mentions};
-use sesame_plan::condition::{Comparison, Condition, ConditionSpace, Constraint, Integers, Operand};
+use sesame_plan::MetricId;
+use sesame_plan::condition::{Comparison, Condition, ConditionSpace, Constraint, Integers, Operand, Variable};
 use sesame_rng::Stream;
 
 use crate::space::range::{Range, StepSizes};
@@ -138,12 +140,78 @@ fn comparison(space: &ConditionSpace, stream: &mut Stream) -> Condition {
     };
     let mut drawn = draw(stream);
     for _ in 0..TRIES {
+        number_of_its_variable(&mut drawn, space, stream);
         if of_one_unit(&drawn, space) && constant(&drawn, &space.variables).is_none() {
             break;
         }
         drawn = draw(stream);
     }
     drawn
+}
+
+/// The numbers that a variable with steps of its own is compared with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Steps {
+    low: f64,
+    step: f64,
+    /// How many steps there are from the least number.
+    last: f64,
+    /// All numbers are whole multiples of its reciprocal, a power of ten, if such a one is known.
+    scale: Option<f64>,
+}
+
+impl Steps {
+    fn of(variable: &Variable) -> Option<Steps> {
+        let (step, low, high) = (variable.step?, variable.low?, variable.high?);
+        let whole = |number: f64| (number - libm::round(number)).abs() < 1e-6 && number.abs() < 1e15;
+        let scale = (0..13).map(|decimals| libm::pow(10.0, f64::from(decimals)));
+        let scale = scale.into_iter().find(|scale| whole(low * scale) && whole(step * scale));
+        Some(Steps { low, step, last: libm::floor((high - low) / step + 1e-9), scale })
+    }
+
+    fn of_metric(metric: MetricId, space: &ConditionSpace) -> Option<Steps> {
+        Steps::of(space.variables.iter().find(|variable| variable.metric == metric)?)
+    }
+
+    /// The number after so many steps, without the noise of floating point: `0.3`, not `0.30000000000000004`.
+    fn at(&self, steps: f64) -> f64 {
+        let number = self.low + steps * self.step;
+        self.scale.map_or(number, |scale| libm::round(number * scale) / scale)
+    }
+
+    /// After how many steps a number comes, or the nearest one that does.
+    fn nearest(&self, number: f64) -> f64 {
+        libm::round((number - self.low) / self.step).clamp(0.0, self.last)
+    }
+
+    /// Those within bounds, by their steps.
+    fn within(&self, low: f64, high: f64) -> Option<Range> {
+        let first = libm::ceil((low - self.low) / self.step - 1e-9).max(0.0);
+        let last = libm::floor((high - self.low) / self.step + 1e-9).min(self.last);
+        Range::numbers(first, last, true)
+    }
+
+    fn all(&self) -> Range {
+        Range { low: 0.0, high: self.last, shortest: 0.0, longest: f64::INFINITY, integer: true }
+    }
+}
+
+/// Makes the number in a comparison one that its variable is compared with, if that has steps of its own. Where a
+/// variable has none, its number may be left from one that has: then it is drawn anew.
+fn number_of_its_variable(comparison: &mut Condition, space: &ConditionSpace, stream: &mut Stream) {
+    let Condition::Compare { left: Operand::Number(number), right: Operand::Variable(metric), .. } = comparison else {
+        return;
+    };
+    match Steps::of_metric(*metric, space) {
+        Some(steps) if steps.at(steps.nearest(*number)) == *number => {}
+        Some(steps) => *number = steps.at(steps.all().number(stream)),
+        None => {
+            let whole = range(space.integers);
+            if libm::trunc(*number) != *number || !(whole.low..=whole.high).contains(number) {
+                *number = whole.number(stream);
+            }
+        }
+    }
 }
 
 fn sign(stream: &mut Stream) -> Comparison {
@@ -170,10 +238,22 @@ fn range(integers: Integers) -> Range {
 
 /// Puts what a constraint demands into a random comparison: a variable on the right, a number on the left.
 fn plant(condition: &mut Condition, constraint: &Constraint, space: &ConditionSpace, stream: &mut Stream) {
-    let Condition::Compare { left, right, .. } = random_comparison(condition, stream) else { return };
+    let comparison = random_comparison(condition, stream);
+    let Condition::Compare { left, right, .. } = comparison else { return };
     match *constraint {
-        Constraint::Variable { metric } => *right = Operand::Variable(metric),
+        Constraint::Variable { metric } => {
+            *right = Operand::Variable(metric);
+            number_of_its_variable(comparison, space, stream);
+        }
         Constraint::Integer { bounds } => {
+            if let Operand::Variable(metric) = *right
+                && let Some(steps) = Steps::of_metric(metric, space)
+            {
+                if let Some(within) = steps.within(bounds.lowest as f64, bounds.highest as f64) {
+                    *left = Operand::Number(steps.at(within.number(stream)));
+                }
+                return;
+            }
             let lowest = bounds.lowest.max(space.integers.lowest);
             let highest = bounds.highest.min(space.integers.highest);
             if lowest <= highest {
@@ -184,7 +264,12 @@ fn plant(condition: &mut Condition, constraint: &Constraint, space: &ConditionSp
 }
 
 fn change_comparison(condition: &mut Condition, space: &ConditionSpace, steps: StepSizes, stream: &mut Stream) {
-    let Condition::Compare { left, by, right } = random_comparison(condition, stream) else { return };
+    let comparison = random_comparison(condition, stream);
+    let Condition::Compare { left, by, right } = comparison else { return };
+    let own = match *right {
+        Operand::Variable(metric) => Steps::of_metric(metric, space),
+        Operand::Number(_) => None,
+    };
     let side = match stream.below(3) {
         0 => {
             *by = sign(stream);
@@ -193,10 +278,14 @@ fn change_comparison(condition: &mut Condition, space: &ConditionSpace, steps: S
         1 => left,
         _ => right,
     };
-    *side = match *side {
-        Operand::Variable(_) => variable(space, stream),
-        Operand::Number(number) => Operand::Number(range(space.integers).number_near(number, steps, stream)),
+    *side = match (*side, own) {
+        (Operand::Variable(_), _) => variable(space, stream),
+        (Operand::Number(number), Some(own)) => {
+            Operand::Number(own.at(own.all().number_near(own.nearest(number), steps, stream)))
+        }
+        (Operand::Number(number), None) => Operand::Number(range(space.integers).number_near(number, steps, stream)),
     };
+    number_of_its_variable(comparison, space, stream);
 }
 
 /// The number of parts of a condition, itself included.
@@ -307,7 +396,9 @@ pub(crate) mod tests {
 
     /// Spaces of one to four variables with and without known ranges, shallow and deep, that have something to grow.
     pub(crate) fn any_space() -> impl Strategy<Value = ConditionSpace> {
-        let variable = (prop::option::of(-3i32..4), prop::option::of(2i32..9));
+        // Some have steps of their own, of a tenth or of three quarters.
+        let step = prop_oneof![2 => Just(None), 1 => Just(Some(0.1)), 1 => Just(Some(0.75))];
+        let variable = (prop::option::of(-3i32..4), prop::option::of(2i32..9), step);
         let end = prop_oneof![
             Just(ConditionEnd::Condition),
             (0.5..5.0f64, 0.0..9.0f64).prop_map(|(low, more)| ConditionEnd::Length { low, high: low + more }),
@@ -316,12 +407,13 @@ pub(crate) mod tests {
             |(variables, depth, lowest, highest, end, times)| ConditionSpace {
                 variables: (0u32..)
                     .zip(variables)
-                    .map(|(n, (low, more))| Variable {
+                    .map(|(n, (low, more, step))| Variable {
                         metric: MetricId(n),
                         // The last of four is of a unit of its own.
                         unit: (n == 3).then(|| "mm".to_owned()),
                         low: low.map(f64::from),
                         high: more.map(|more| f64::from(low.unwrap_or(0) + more)),
+                        step: step.filter(|_| low.is_some() && more.is_some()),
                     })
                     .collect(),
                 depth,
@@ -356,12 +448,23 @@ pub(crate) mod tests {
             }
             Condition::Compare { left, right, .. } => {
                 let offered = |metric: MetricId| space.variables.iter().any(|variable| variable.metric == metric);
+                let compared =
+                    |variable: &Variable| matches!(*right, Operand::Variable(metric) if metric == variable.metric);
+                let own = space.variables.iter().find(|variable| variable.step.is_some() && compared(variable));
                 let expression = match *left {
                     Operand::Variable(metric) => offered(metric),
-                    Operand::Number(number) => {
-                        libm::trunc(number) == number
-                            && (space.integers.lowest as f64..=space.integers.highest as f64).contains(&number)
-                    }
+                    Operand::Number(number) => match own {
+                        Some(&Variable { low: Some(low), high: Some(high), step: Some(step), .. }) => {
+                            let steps = (number - low) / step;
+                            (steps - libm::round(steps)).abs() < 1e-9
+                                && (low..=high).contains(&number)
+                                && format!("{number}").len() < 8
+                        }
+                        _ => {
+                            libm::trunc(number) == number
+                                && (space.integers.lowest as f64..=space.integers.highest as f64).contains(&number)
+                        }
+                    },
                 };
                 let variable = matches!(*right, Operand::Variable(metric) if offered(metric));
                 let mixed = matches!((*left, *right), (Operand::Variable(a), Operand::Variable(b))
@@ -427,7 +530,8 @@ pub(crate) mod tests {
     }
 
     fn wide_space(depth: u32) -> ConditionSpace {
-        let variables = (0..4).map(|n| Variable { metric: MetricId(n), unit: None, low: None, high: None }).collect();
+        let variables =
+            (0..4).map(|n| Variable { metric: MetricId(n), unit: None, low: None, high: None, step: None }).collect();
         let integers = Integers { lowest: 1, highest: 20 };
         ConditionSpace { variables, depth, integers, end: ConditionEnd::Condition, times: 1 }
     }

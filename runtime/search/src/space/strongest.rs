@@ -20,9 +20,9 @@ pub struct Strongest {
 impl Strongest {
     /// Those of an operation with these parameters to choose.
     pub(crate) fn of(operation: &Operation, spaces: &[ParameterSpace]) -> Strongest {
-        let named = operation.parameters.iter().zip(spaces);
+        let spaces_of = spaces.iter().enumerate();
         let parameters: Vec<Vec<Choice>> =
-            named.map(|(named, space)| choices(space, operation.kind.neutral_value(&named.name))).collect();
+            spaces_of.map(|(at, space)| choices(space, operation.neutral_value(at))).collect();
         let count = |(choices, space): (&Vec<Choice>, &ParameterSpace)| match space {
             ParameterSpace::Point(_) => 1,
             ParameterSpace::Number(..) | ParameterSpace::Items(_) => choices.len(),

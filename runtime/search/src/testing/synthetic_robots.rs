@@ -127,7 +127,7 @@ impl SyntheticRobot {
             let signal = Metric { name: name.to_owned(), direction: None, ..plan.metrics[0].clone() };
             plan.metrics.push(signal);
         }
-        let variable = |n, high| Variable { metric: MetricId(n), unit: None, low: Some(0.0), high };
+        let variable = |n, high| Variable { metric: MetricId(n), unit: None, low: Some(0.0), high, step: None };
         plan.campaign.activation = ActivationMode::Condition {
             space: ConditionSpace {
                 variables: vec![variable(2, Some(20.0)), variable(3, Some(20.0)), variable(4, None)],

@@ -11,7 +11,7 @@ use sesame_plan::{Gate, MonitorId};
 use crate::model::eddi::{Eddi, Evidence};
 use crate::model::{Id as _, Topic, Type};
 use crate::resolve::SystemPart;
-use crate::units::Unit;
+use crate::units::{Unit, product};
 
 /// Monitors without mistakes, in groups that rely on each other: positions, in the order of declarations.
 pub(super) fn groups(eddis: &[Option<Eddi>]) -> Vec<Vec<usize>> {
@@ -116,6 +116,8 @@ impl<'a> Group<'a> {
             }
             _ => Values::ANY,
         };
+        // Rates of whole numbers are not whole, and beyond those that a message can carry.
+        let range = if input.memory.iter().all(|of| *of == plan::Memory::Previous) { range } else { Values::ANY };
         Values { group, ..range }
     }
 
@@ -136,10 +138,22 @@ impl<'a> Group<'a> {
             plan::Members::Sum => format!("the sum of {path}"),
             _ => path,
         };
-        let unit = match self.value(&input.field) {
+        let mut text = text;
+        let mut unit = match self.value(&input.field) {
             Some(Type::Int(unit) | Type::Real(unit)) => unit,
             _ => None,
         };
+        for memory in &input.memory {
+            let what = match memory {
+                plan::Memory::Previous => "previous value",
+                plan::Memory::Unwrapped { .. } => "unwrapped angle",
+                plan::Memory::Rate | plan::Memory::Integral => memory.name(),
+            };
+            text = format!("the {what} of {text}");
+            if *memory == plan::Memory::Rate {
+                unit = product(unit.as_ref(), Some(&Unit::seconds()), true).and_then(|(unit, _)| unit);
+            }
+        }
         (text, unit)
     }
 
@@ -247,6 +261,7 @@ fn evidence(evidence: &Evidence) -> plan::Evidence {
         members: input.members,
         list: input.list.clone(),
         text: input.text.clone(),
+        memory: input.memory.clone(),
     });
     plan::Evidence {
         name: evidence.declaration.name.clone(),

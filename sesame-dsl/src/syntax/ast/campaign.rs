@@ -62,9 +62,11 @@ pub(crate) enum ActivationMode {
 /// `condition over …`, with its settings as written.
 #[derive(Debug, Clone)]
 pub(crate) struct ByCondition {
-    /// The variables and their known ranges, as long as each other.
+    /// The variables, their known ranges and their steps, as long as each other.
     pub(crate) variables: Vec<Name>,
     pub(crate) ranges: Vec<Option<Range>>,
+    /// How far apart the numbers are that they are compared with, where that is written.
+    pub(crate) steps: Vec<Option<Quantity>>,
     pub(crate) depth: Vec<(Span, Count)>,
     pub(crate) integers: Vec<(Span, Range)>,
     pub(crate) lengths: Vec<(Span, Range)>,

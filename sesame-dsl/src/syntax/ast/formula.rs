@@ -87,7 +87,10 @@ pub(crate) enum PrefixWord {
 /// The word between two sides, and its interval.
 #[derive(Debug)]
 pub(crate) struct Until {
+    /// With the word before it.
     pub(crate) span: Span,
+    /// Whether the left side may hold to the end instead.
+    pub(crate) weak: bool,
     pub(crate) interval: Option<Range>,
 }
 

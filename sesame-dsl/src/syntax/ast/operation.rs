@@ -1,6 +1,7 @@
 //! Operations: what they disturb, and how.
 
 use sesame_grammar::Rule;
+use sesame_plan::Counted;
 
 use super::words::{Count, Head, Name, Path, Point, Quantity, Range, Text, UnitName, WithMember};
 use crate::span::Span;
@@ -30,6 +31,10 @@ pub(crate) struct OperationBody {
     pub(crate) priority: Vec<(Span, Quantity)>,
     pub(crate) inclusion: Vec<(Span, Quantity)>,
     pub(crate) untimed: Vec<Span>,
+    /// `next … messages` and `every … messages`, in written order.
+    pub(crate) counted: Vec<(Counted, Span, Range)>,
+    /// With the turn in which angles stay, if it is written.
+    pub(crate) wrapped: Vec<(Span, Option<Range>)>,
     pub(crate) contains: Vec<(Span, Vec<Contained>)>,
 }
 
@@ -49,6 +54,8 @@ impl OperationBody {
             priority: vec![],
             inclusion: vec![],
             untimed: vec![],
+            counted: vec![],
+            wrapped: vec![],
             contains: vec![],
         }
     }

@@ -150,6 +150,7 @@ impl Reader<'_> {
         let mut found = ByCondition {
             variables: vec![],
             ranges: vec![],
+            steps: vec![],
             depth: vec![],
             integers: vec![],
             lengths: vec![],
@@ -158,6 +159,7 @@ impl Reader<'_> {
         for variable in children(pair, Rule::condition_variable) {
             found.variables.push(self.metric_name(&expect_child(&variable, Rule::metric_name)));
             found.ranges.push(child(&variable, Rule::range).map(|range| self.range(&range)));
+            found.steps.push(child(&variable, Rule::signed).map(|step| self.signed(&step)));
         }
         if let Some(settings) = child(pair, Rule::condition_settings) {
             // Each setting has a default, so a block with errors lacks none.

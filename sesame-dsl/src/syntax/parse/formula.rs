@@ -65,8 +65,11 @@ impl Reader<'_> {
         let mut sides: Vec<Expression> = children(pair, Rule::relation).map(|side| self.relation(&side)).collect();
         let right = sides.pop().expect("a passage has a side");
         let Some(left) = sides.pop() else { return right };
+        let word = self.span(&expect_child(pair, Rule::k_until));
+        let weak = child(pair, Rule::k_weak).map(|weak| self.span(&weak));
         let until = Until {
-            span: self.span(&expect_child(pair, Rule::k_until)),
+            span: weak.map_or(word, |weak| weak.to(word)),
+            weak: weak.is_some(),
             interval: child(pair, Rule::range).map(|range| self.range(&range)),
         };
         self.whole(pair, ExpressionKind::Until(Box::new(left), until, Box::new(right)))

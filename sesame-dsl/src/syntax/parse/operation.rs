@@ -1,6 +1,7 @@
 //! Operations: what they disturb, and how.
 
 use sesame_grammar::Rule;
+use sesame_plan::Counted;
 
 use super::reader::{Pair, Reader, child, children, expect_child, first_of};
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
@@ -35,6 +36,14 @@ impl Reader<'_> {
         let contains = children(pair, Rule::start_contains)
             .map(|clause| (self.keyword_span(&clause), self.contained(&clause)))
             .collect();
+        let mut counted = Vec::new();
+        for (rule, by) in [(Rule::next_messages, Counted::Next), (Rule::every_messages, Counted::Every)] {
+            counted
+                .extend(children(pair, rule).map(|clause| (by, self.keyword_span(&clause), self.only_range(&clause))));
+        }
+        let wrapped = children(pair, Rule::wrapped)
+            .map(|clause| (self.keyword_span(&clause), child(&clause, Rule::range).map(|range| self.range(&range))))
+            .collect();
         let untimed = children(pair, Rule::untimed).map(|untimed| self.span(&untimed)).collect();
         let mut nodes = |rule| child(pair, rule).map(|nodes| (self.keyword_span(&nodes), self.with_members(&nodes)));
         let from = nodes(Rule::from_nodes);
@@ -55,6 +64,8 @@ impl Reader<'_> {
             priority,
             inclusion,
             untimed,
+            counted,
+            wrapped,
             contains,
         };
         Operation { head, body }

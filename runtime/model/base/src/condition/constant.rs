@@ -150,7 +150,10 @@ mod tests {
     use crate::condition::testing::{above, and, any_condition, below, compare, or, variable};
 
     fn ranges(ranges: &[(Option<f64>, Option<f64>)]) -> Vec<Variable> {
-        (0u32..).zip(ranges).map(|(n, &(low, high))| Variable { metric: MetricId(n), unit: None, low, high }).collect()
+        (0u32..)
+            .zip(ranges)
+            .map(|(n, &(low, high))| Variable { metric: MetricId(n), unit: None, low, high, step: None })
+            .collect()
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Whether a campaign can be done with the metrics, operations and tests of its plan.
 
-use crate::condition::{ConditionEnd, ConditionSpace};
+use crate::condition::{ConditionEnd, ConditionSpace, Variable};
 use crate::{
     ActivationMode, BoostedChildren, Campaign, CampaignPlan, Confirmation, CoverageGoal, Exploration, Search,
     Statistic, StopRule,
@@ -51,6 +51,12 @@ impl CampaignPlan {
             at("low", variable.low.map_or(Ok(()), finite))?;
             at("high", variable.high.map_or(Ok(()), finite))?;
             let ends = variable.low.zip(variable.high);
+            if let Some(step) = variable.step {
+                at("step", positive(step))?;
+                let steps = ends.map_or(0.0, |(low, high)| (high - low) / step);
+                let fits = (1.0..=Variable::MOST_STEPS).contains(&steps);
+                at("step", require(fits, || format!("makes {steps} steps")))?;
+            }
             ends.map_or(Ok(()), |(low, high)| require(low <= high, || format!("runs from {low} to {high}")))
         })?;
         at("depth", at_least_one(*depth))?;

@@ -1,14 +1,14 @@
 //! Whether the formulas of metrics mention only inputs and signals that they have.
 
 use crate::stl::{self, Robustness};
-use crate::{Aggregate, CampaignPlan, Expression, Formula, Input, Members, Point, Region, Span};
+use crate::{Aggregate, CampaignPlan, Expression, Formula, Input, Members, Memory, Point, Reduction, Region, Span};
 
 use super::check::{Checked, at, each, filled, finite, id, positive, require, span};
 
 impl CampaignPlan {
     pub(super) fn sound_formula(&self, formula: &Formula) -> Checked {
-        let inputs = formula.inputs.len();
-        at("inputs", filled(&formula.inputs))?;
+        let inputs = formula.inputs.as_slice();
+        at("inputs", filled(inputs))?;
         each("inputs", &formula.inputs, |input| self.sound_input(input))?;
         at("inputs", self.one_pair(&formula.inputs))?;
         let paired = formula.inputs.iter().any(|input| input.members == Members::First);
@@ -26,8 +26,8 @@ impl CampaignPlan {
     }
 
     pub(super) fn sound_robustness(&self, robustness: &Robustness) -> Checked {
-        let inputs = robustness.inputs.len();
-        at("inputs", filled(&robustness.inputs))?;
+        let inputs = robustness.inputs.as_slice();
+        at("inputs", filled(inputs))?;
         each("inputs", &robustness.inputs, |input| self.sound_input(input))?;
         at("inputs", self.one_pair(&robustness.inputs))?;
         let mut groups = robustness.inputs.iter().filter(|input| input.members == Members::Each);
@@ -47,13 +47,14 @@ impl CampaignPlan {
             let one = matches!(input.members, Members::Min | Members::Max | Members::Sum | Members::Only(_));
             at("members", require(one, || "are not taken together".to_owned()))
         })?;
-        at("condition", proposition(condition, inputs.len()))
+        at("condition", proposition(condition, inputs))
     }
 
     fn sound_input(&self, input: &Input) -> Checked {
         at("field", self.field(&input.field))?;
         let members = self.topic(input.field.topic).paths.len();
-        at("members", input.only().map_or(Ok(()), |only| id("member", only as usize, members)))
+        at("members", input.only().map_or(Ok(()), |only| id("member", only as usize, members)))?;
+        at("memory", sound_memory(input, members))
     }
 
     /// Inputs that are of a pair are of pairs of one group, or of one group and another, and no others are of each
@@ -79,8 +80,34 @@ impl CampaignPlan {
     }
 }
 
-fn expression(of: &Expression, inputs: usize) -> Checked {
-    let input = |index: u32| id("input", index as usize, inputs);
+/// What an input remembers is of single values: those of an integral change between messages, so that of several the
+/// least is not always the least, and elements of a list are others in each message.
+fn sound_memory(input: &Input, members: usize) -> Checked {
+    let Some((last, before)) = input.memory.split_last() else { return Ok(()) };
+    let each = input.list.as_ref().is_some_and(|list| list.reduction == Reduction::Each);
+    require(!each, || "is of each element of a list".to_owned())?;
+    for memory in &input.memory {
+        if let Memory::Unwrapped { turn } = memory {
+            positive(turn.0)?;
+        }
+    }
+    require(input.text.is_none() || input.memory.iter().all(|of| *of == Memory::Previous), || {
+        "a text has no rate and no integral".to_owned()
+    })?;
+    require(!before.contains(&Memory::Integral), || "more is computed from an integral".to_owned())?;
+    let joined = members > 1 && matches!(input.members, Members::Min | Members::Max | Members::Sum);
+    require(*last != Memory::Integral || !joined, || "an integral is of several members".to_owned())?;
+    require(input.memory.len() <= Input::DEEPEST_MEMORY, || format!("{} are nested", input.memory.len()))
+}
+
+/// An input that is read as it is.
+fn value(index: u32, inputs: &[Input]) -> Checked {
+    id("input", index as usize, inputs.len())?;
+    require(!inputs[index as usize].is_integral(), || format!("input {index} is an integral, and is read as a value"))
+}
+
+fn expression(of: &Expression, inputs: &[Input]) -> Checked {
+    let input = |index: u32| value(index, inputs);
     for point in of.points() {
         match point {
             Point::Input(index) => input(index)?,
@@ -90,6 +117,10 @@ fn expression(of: &Expression, inputs: usize) -> Checked {
     match of {
         Expression::Constant(number) => finite(*number)?,
         Expression::Input(index) => input(*index)?,
+        Expression::Integral(index) => {
+            id("input", *index as usize, inputs.len())?;
+            require(inputs[*index as usize].is_integral(), || format!("input {index} is no integral"))?;
+        }
         Expression::Min(of) | Expression::Max(of) => filled(of)?,
         Expression::Distance(distance) => finite(distance.scale)?,
         Expression::SignedDistance(distance) => region(&distance.to)?,
@@ -112,11 +143,11 @@ fn region(of: &Region) -> Checked {
     }
 }
 
-fn proposition(of: &crate::formula::Condition, inputs: usize) -> Checked {
+fn proposition(of: &crate::formula::Condition, inputs: &[Input]) -> Checked {
     use crate::formula::Condition;
     match of {
         Condition::Constant(_) => Ok(()),
-        Condition::Input(index) => id("input", *index as usize, inputs),
+        Condition::Input(index) => value(*index, inputs),
         Condition::Compare { left, right, by: _ } => {
             expression(left, inputs)?;
             expression(right, inputs)
@@ -146,7 +177,7 @@ fn temporal(formula: &stl::Formula, signals: usize) -> Checked {
             interval(*within)?;
             temporal(of, signals)
         }
-        Formula::Until { interval: within, left, right } => {
+        Formula::Until { interval: within, left, right, weak: _ } => {
             interval(*within)?;
             temporal(left, signals)?;
             temporal(right, signals)
@@ -156,4 +187,40 @@ fn temporal(formula: &stl::Formula, signals: usize) -> Checked {
 
 fn interval(interval: stl::Interval) -> Checked {
     span(Span { start: interval.from, end: interval.to.unwrap_or(interval.from) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{FieldRef, InList, TextTest, TopicId};
+
+    fn remembering(memory: &[Memory], members: Members) -> Input {
+        let field = FieldRef { topic: TopicId(0), path: Vec::new() };
+        Input { field, members, list: None, text: None, memory: memory.to_vec() }
+    }
+
+    #[test]
+    fn what_is_remembered_is_of_single_values_and_an_integral_is_the_last_of_it() {
+        use Memory::{Integral, Previous, Rate};
+        let sound = |memory: &[Memory], members| sound_memory(&remembering(memory, members), 2).is_ok();
+        assert!(sound(&[Previous, Rate, Rate], Members::Max));
+        assert!(sound(&[Rate, Integral], Members::Each));
+        assert!(sound(&[Integral], Members::Only(1)));
+        assert!(!sound(&[Integral], Members::Max));
+        assert!(!sound(&[Integral, Rate], Members::Each));
+        assert!(!sound(&[Rate; Input::DEEPEST_MEMORY + 1], Members::Each));
+        let list = Some(InList { steps: Vec::new(), reduction: Reduction::Each });
+        assert!(sound_memory(&Input { list, ..remembering(&[Rate], Members::Min) }, 1).is_err());
+        let text = Some(TextTest::Is("a".to_owned()));
+        assert!(sound_memory(&Input { text: text.clone(), ..remembering(&[Previous], Members::Min) }, 1).is_ok());
+        assert!(sound_memory(&Input { text, ..remembering(&[Rate], Members::Min) }, 1).is_err());
+    }
+
+    #[test]
+    fn an_integral_is_read_as_one_and_nothing_else_is() {
+        let inputs = [remembering(&[Memory::Integral], Members::Each), remembering(&[Memory::Rate], Members::Each)];
+        let sound = |of: Expression| expression(&of, &inputs).is_ok();
+        assert!(sound(Expression::Integral(0)) && sound(Expression::Input(1)));
+        assert!(!sound(Expression::Integral(1)) && !sound(Expression::Input(0)) && !sound(Expression::Integral(2)));
+    }
 }

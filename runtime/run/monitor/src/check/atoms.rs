@@ -85,7 +85,8 @@ impl Atoms {
         }
         let input = Input { text: None, ..input.clone() };
         let owner = owner(evidence, &input);
-        // What the least, the greatest and the sum of the same values have to do with each other is not known here.
+        // What the least, the greatest and the sum of the same values have to do with each other is not known here, nor
+        // what their rates and earlier values have to do with them.
         let other = |known: &Known| known.side == side && known.input.field == input.field;
         let mut loose = owner.is_some();
         for known in self.inputs.iter_mut().filter(|known| other(known)) {
@@ -98,7 +99,7 @@ impl Atoms {
     /// The number of an input of evidence, if it has one.
     pub(super) fn find(&self, evidence: EvidenceId, side: Side, input: &Input) -> Option<usize> {
         self.inputs.iter().position(|known| {
-            let of = |input: &Input| (input.field.clone(), input.members, input.list.clone());
+            let of = |input: &Input| (input.field.clone(), input.members, input.list.clone(), input.memory.clone());
             let same = of(&known.input) == of(input);
             same && (known.side, known.owner) == (side, owner(evidence, input))
         })

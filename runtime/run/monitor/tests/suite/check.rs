@@ -26,6 +26,7 @@ fn inputs() -> Vec<Input> {
         members: Members::Min,
         list: None,
         text,
+        memory: Vec::new(),
     };
     let is = |text: &str| Some(TextTest::Is(text.into()));
     let is_not = Some(TextTest::IsNot("b".into()));

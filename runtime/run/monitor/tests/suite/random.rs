@@ -86,6 +86,7 @@ fn evidence(held: i64, stale: Option<(i64, bool, bool)>) -> Evidence {
             members: Members::Min,
             list: None,
             text: None,
+            memory: Vec::new(),
         }],
         condition: Condition::Input(0),
         held: seconds(held),

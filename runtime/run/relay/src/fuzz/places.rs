@@ -1,9 +1,11 @@
 //! The values of a message that an operation changes.
 
-use sesame_plan::{Step, ValuePath};
+use sesame_plan::{Step, Turn, ValuePath};
 
+use crate::angle::wrapped;
 use crate::elements::{self, Found, chosen, positions};
 use crate::fuzz::action::{Action, OnWire};
+use crate::fuzz::change::map;
 use crate::value::Value;
 
 /// How many random numbers each value of a message may use.
@@ -11,17 +13,26 @@ const DRAWS_PER_VALUE: u64 = 8;
 
 /// The places of an operation in messages of each of its topics.
 #[derive(Debug, Clone)]
-pub struct Places(Vec<Vec<ValuePath>>);
+pub struct Places {
+    of_each: Vec<Vec<ValuePath>>,
+    /// The turn in which changed numbers stay, which are angles.
+    turn: Option<Turn>,
+}
 
 impl Places {
     /// The places in messages of each topic, or whole messages where the list is empty.
     pub fn new<'a>(of_each: impl IntoIterator<Item = &'a [ValuePath]>) -> Self {
         let places = |places: &[ValuePath]| if places.is_empty() { vec![Vec::new()] } else { places.to_vec() };
-        Places(of_each.into_iter().map(places).collect())
+        Places { of_each: of_each.into_iter().map(places).collect(), turn: None }
+    }
+
+    /// The same places, where numbers are angles that stay within this turn when they are changed.
+    pub fn within(self, turn: Option<Turn>) -> Self {
+        Places { turn, ..self }
     }
 
     fn of(&self, on: OnWire) -> &[ValuePath] {
-        self.0.get(on.target).map_or(&[], Vec::as_slice)
+        self.of_each.get(on.target).map_or(&[], Vec::as_slice)
     }
 
     /// Visits the values at these places in order, and returns what was done with the message. `change` returns whether
@@ -32,6 +43,16 @@ impl Places {
     /// their declared type.
     pub fn change(&self, on: OnWire, message: &mut Value, mut change: impl FnMut(&mut Value, u64) -> bool) -> Action {
         let mut changed = false;
+        let mut change = |value: &mut Value, draw: u64| match self.turn {
+            None => change(value, draw),
+            Some(turn) => {
+                let before = value.clone();
+                change(value, draw) && {
+                    map(value, |_, angle| wrapped(angle, turn.low, turn.high - turn.low));
+                    !value.is_same(&before)
+                }
+            }
+        };
         for (at, place) in (0u64..).zip(self.of(on)) {
             let mut next = (at << 32) * DRAWS_PER_VALUE;
             changed |= visit(message, place, &mut next, &mut change);
@@ -104,4 +125,27 @@ fn collect(value: &Value, path: &[Step], next: &mut u64, memory: &mut Memory) {
             *next += DRAWS_PER_VALUE;
         }
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fuzz::change::add;
+
+    /// What a value becomes, and whether it was changed, if this is added to it within a turn from 0 to 360.
+    fn added(by: f64, to: impl Into<Value>) -> (Value, bool) {
+        let mut value = to.into();
+        let places = Places::new([&[][..]]).within(Some(Turn { low: 0.0, high: 360.0 }));
+        let on = OnWire { member: 0, target: 0 };
+        let action = places.change(on, &mut value, |value, _| add(value, |_| by));
+        (value, matches!(action, Action::Changed))
+    }
+
+    #[test]
+    fn angles_stay_within_their_turn_and_whole_turns_change_nothing() {
+        assert_eq!(added(20.0, Value::Real(350.0)), (Value::Real(10.0), true));
+        assert_eq!(added(-20.0, Value::Int(10)), (Value::Int(350), true));
+        assert_eq!(added(720.0, Value::Real(5.0)), (Value::Real(5.0), false));
+        assert_eq!(added(0.0, Value::Real(-90.0)), (Value::Real(-90.0), false), "as it came");
+    }
 }

@@ -26,6 +26,7 @@ use crate::metric::attendance::Attendance;
 use crate::metric::expression::{Held, greatest, least};
 use crate::metric::growth::{next_change, next_crossing};
 use crate::metric::held::{HeardValues, HeldInputs, hear};
+use crate::metric::memory::Memories;
 use crate::metric::tally::{Tally, step};
 use crate::value::{Text, Value};
 
@@ -126,7 +127,11 @@ impl<'p> FormulaState<'p> {
             formula,
             several,
             timed,
-            common: Stream::new(HeldInputs::new(&formula.inputs, plan), if apart { of.states() } else { 1 }),
+            common: Stream::new(
+                HeldInputs::new(&formula.inputs, plan),
+                Memories::new(&formula.inputs, plan),
+                if apart { of.states() } else { 1 },
+            ),
             of,
             keys: BTreeMap::new(),
             attendance: several.then(|| Attendance::new(&formula.inputs, plan)),
@@ -164,8 +169,8 @@ impl<'p> FormulaState<'p> {
             Spoken { member: read.clone().any(of_members).then_some((member, second)), all: !read.all(of_members) };
         match &self.formula.per {
             None => {
-                self.common.held.hold(&self.formula.inputs, &self.heard, member);
-                self.common.hear(spoken);
+                self.common.memories.remember(&mut self.heard, member, context.now);
+                self.common.hear(&self.formula.inputs, &self.heard, member, spoken);
             }
             Some(per) if per.topic == topic => {
                 let key = match value.at(&per.path) {
@@ -186,13 +191,11 @@ impl<'p> FormulaState<'p> {
                 }
                 // A key that begins in this instant includes earlier messages of the same instant.
                 let stream = self.keys.entry(key).or_insert_with(|| self.common.clone());
-                stream.held.hold(&self.formula.inputs, &self.heard, member);
-                stream.hear(spoken);
+                stream.remember(&self.formula.inputs, &self.heard, (member, context.now), spoken);
             }
             Some(_) => {
                 for stream in std::iter::once(&mut self.common).chain(self.keys.values_mut()) {
-                    stream.held.hold(&self.formula.inputs, &self.heard, member);
-                    stream.hear(spoken);
+                    stream.remember(&self.formula.inputs, &self.heard, (member, context.now), spoken);
                 }
             }
         }
@@ -255,9 +258,10 @@ impl<'p> FormulaState<'p> {
         let (of, beyond): (_, fn(f64, f64) -> bool) = match &self.formula.aggregate {
             Aggregate::Min { of } => (of, |value, bound| value < bound),
             Aggregate::Max { of } => (of, |value, bound| value > bound),
+            Aggregate::Last { of } => (of, |_, _| false),
             _ => return None,
         };
-        // What was reached stays reached.
+        // What was reached stays reached, except by a last value.
         if value.is_some_and(|value| beyond(value, bound)) {
             return None;
         }
@@ -353,12 +357,13 @@ impl<'p> FormulaState<'p> {
 }
 
 /// Whether a formula changes while time passes, and its aggregate sees that: a message more or less counts in all
-/// others.
+/// others. Only the last value of what is integrated is that at the end of the run, if all messages count.
 fn changes_with_time(formula: &Formula) -> bool {
     let reads_time = match &formula.aggregate {
         Aggregate::Min { of } | Aggregate::Max { of } => of.reads_time(),
         Aggregate::Duration { of } => of.reads_time(),
-        Aggregate::Last { .. } | Aggregate::Mean { .. } | Aggregate::Count { .. } => return false,
+        Aggregate::Last { of } => return of.integrates() && formula.when.is_none() && formula.every.is_none(),
+        Aggregate::Mean { .. } | Aggregate::Count { .. } => return false,
     };
     reads_time || formula.when.as_ref().is_some_and(Condition::reads_time)
 }
@@ -404,6 +409,7 @@ struct Spoken {
 #[derive(Clone)]
 struct Stream {
     held: HeldInputs,
+    memories: Memories,
     /// One for each member or pair, if they have states of their own.
     tallies: Vec<Tally>,
     /// The sum and number of the values that counted in a mean, of all members.
@@ -420,13 +426,28 @@ struct Stream {
 }
 
 impl Stream {
-    fn new(held: HeldInputs, tallies: usize) -> Self {
+    fn new(held: HeldInputs, memories: Memories, tallies: usize) -> Self {
         let tallies = vec![Tally::default(); tallies];
-        Stream { held, tallies, sum: (0.0, 0.0), last: None, heard: false, others: false, spoke: Vec::new() }
+        Stream { held, memories, tallies, sum: (0.0, 0.0), last: None, heard: false, others: false, spoke: Vec::new() }
     }
 
-    /// Remembers a message whose values are held.
-    fn hear(&mut self, Spoken { member, all }: Spoken) {
+    /// Takes a message whose values are not those that formulas remember of several.
+    fn remember(&mut self, inputs: &[Input], heard: &HeardValues, (member, now): (usize, SimTime), spoken: Spoken) {
+        if self.memories.is_empty() {
+            self.hear(inputs, heard, member, spoken);
+            return;
+        }
+        let mut heard = heard.clone();
+        self.memories.remember(&mut heard, member, now);
+        self.hear(inputs, &heard, member, spoken);
+    }
+
+    /// Takes a message of which all values are computed.
+    fn hear(&mut self, inputs: &[Input], heard: &HeardValues, path: usize, Spoken { member, all }: Spoken) {
+        if heard.is_nothing() {
+            return;
+        }
+        self.held.hold(inputs, heard, path);
         self.heard = true;
         self.others |= all;
         if let Some(member) = member {

@@ -80,6 +80,7 @@ mod tests {
                 members: Members::Min,
                 list: None,
                 text: None,
+                memory: Vec::new(),
             };
             let mut attendance = Attendance::new(&[input(1), input(0), input(1)], &plan(Vec::new()));
             let spoke: Vec<Vec<bool>> = spoke.into_iter().filter(|instant| instant.contains(&true)).collect();

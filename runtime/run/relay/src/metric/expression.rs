@@ -5,9 +5,11 @@ use std::fmt;
 
 use sesame_plan::{BinaryFunction, Condition, Distance, Expression, Point, UnaryFunction};
 
+use crate::angle::wrapped;
 use crate::metric::region::signed_distance;
 
-/// The values of a formula's inputs: a point, or a number (true is 1, false 0) followed by zeros.
+/// The values of a formula's inputs: a point, or a number (true is 1, false 0) followed by zeros. Of an integral it is
+/// what it came to with the last message, the value by which it grows since, and the time of that message in seconds.
 pub(crate) type Held = [f64; 3];
 
 /// What a formula is computed from at one moment.
@@ -27,6 +29,11 @@ impl<'a> Moment<'a> {
     /// The first function that had no value, of all that was computed.
     pub(crate) fn undefined(&self) -> Option<Undefined> {
         self.undefined.get()
+    }
+
+    /// By how much an integral grows each second.
+    pub(super) fn pace(&self, integral: u32) -> f64 {
+        self.inputs[integral as usize][1]
     }
 
     fn point(&self, point: Point) -> Held {
@@ -68,6 +75,7 @@ pub(super) fn number(of: &Expression, at: &Moment<'_>) -> f64 {
     match of {
         Expression::Constant(value) => *value,
         Expression::Input(input) => at.inputs[*input as usize][0],
+        Expression::Integral(input) => integral(at.inputs[*input as usize], at.time),
         Expression::Negate(of) => -number(of, at),
         Expression::Sum(of) => of.iter().map(|term| number(term, at)).reduce(|sum, term| sum + term).unwrap_or(0.0),
         Expression::Product(of) => {
@@ -118,7 +126,13 @@ fn binary(function: BinaryFunction, left: f64, right: f64) -> f64 {
         BinaryFunction::Atan2 => libm::atan2(left, right),
         BinaryFunction::Hypot => libm::hypot(left, right),
         BinaryFunction::Pow => libm::pow(left, right),
+        BinaryFunction::Wrapped => wrapped(left, -right / 2.0, right),
     }
+}
+
+/// What an integral has come to at a time in seconds.
+pub(super) fn integral([sum, value, since]: Held, time: f64) -> f64 {
+    sum + value * (time - since)
 }
 
 /// Whether a condition holds.
@@ -197,7 +211,7 @@ mod tests {
 
     #[test]
     fn functions_compute_what_their_names_say() {
-        use BinaryFunction::{Atan2, Hypot, Pow};
+        use BinaryFunction::{Atan2, Hypot, Pow, Wrapped};
         use UnaryFunction::{Acos, Asin, Atan, Cos, Exp, Ln, Sin, Sqrt, Tan};
         let half_turn = std::f64::consts::PI;
         let unary = [
@@ -215,7 +229,12 @@ mod tests {
             let found = number(&Expression::Unary { function, of: Box::new(constant(of)) }, &[]);
             assert!((found - value).abs() < 1e-15, "{} {found}", function.name());
         }
-        let binary = [(Atan2, 1.0, -1.0, 0.75 * half_turn), (Hypot, 3.0, 4.0, 5.0), (Pow, 2.0, 10.0, 1024.0)];
+        let binary = [
+            (Atan2, 1.0, -1.0, 0.75 * half_turn),
+            (Hypot, 3.0, 4.0, 5.0),
+            (Pow, 2.0, 10.0, 1024.0),
+            (Wrapped, 190.0, 360.0, -170.0),
+        ];
         for (function, left, right, value) in binary {
             let [left, right] = [left, right].map(|argument| Box::new(constant(argument)));
             assert_eq!(number(&Expression::Binary { function, left, right }, &[]), value, "{}", function.name());

@@ -93,6 +93,7 @@ fn change(compared: &Compared<'_>, inputs: &[Held], now: SimTime) -> Option<SimT
 fn slope(of: &Expression, at: &Moment<'_>) -> Option<f64> {
     match of {
         Expression::Time => Some(1.0),
+        Expression::Integral(input) => Some(at.pace(*input)),
         Expression::Negate(of) => slope(of, at).map(|slope| -slope),
         Expression::Sum(terms) => terms.iter().map(|term| slope(term, at)).sum(),
         Expression::Product(factors) => {

@@ -7,7 +7,7 @@ use crate::metric::expression::{Held, greatest, least};
 use crate::value::Value;
 
 /// The held value of an input whose last value was not finite.
-const NOT_FINITE: Held = [f64::NAN; 3];
+pub(super) const NOT_FINITE: Held = [f64::NAN; 3];
 
 /// The values that a message has of a formula's inputs, by their positions.
 #[derive(Debug, Clone, Default)]
@@ -39,6 +39,15 @@ impl HeardValues {
     /// Whether there was none, as if the message had not come.
     pub(crate) fn is_nothing(&self) -> bool {
         self.values.is_empty() && self.lists.is_empty()
+    }
+
+    /// Puts another value of an input in the place of the one that was heard, if one was; `None` takes it out.
+    pub(super) fn replace(&mut self, input: usize, by: impl FnOnce(Held) -> Option<Held>) {
+        let Some(at) = self.values.iter().position(|(of, _)| *of == input) else { return };
+        match by(self.values[at].1) {
+            Some(value) => self.values[at].1 = value,
+            None => _ = self.values.remove(at),
+        }
     }
 
     /// The values of inputs that are one value.
@@ -173,7 +182,7 @@ fn number(number: f64) -> Held {
     [number, 0.0, 0.0]
 }
 
-fn is_finite(held: Held) -> bool {
+pub(super) fn is_finite(held: Held) -> bool {
     held.iter().all(|x| x.is_finite())
 }
 
@@ -186,7 +195,7 @@ fn truth(holds: bool) -> Held {
 }
 
 /// The number of members whose last values an input holds.
-fn members_of(input: &Input, plan: &CampaignPlan) -> usize {
+pub(super) fn members_of(input: &Input, plan: &CampaignPlan) -> usize {
     if input.only().is_some() { 1 } else { plan.topic(input.field.topic).paths.len() }
 }
 

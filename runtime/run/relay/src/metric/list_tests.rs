@@ -47,6 +47,7 @@ fn in_list(list: &str, steps: Vec<Step>, reduction: Reduction) -> Input {
         members: Members::Min,
         list: Some(InList { steps, reduction }),
         text: None,
+        memory: Vec::new(),
     }
 }
 

@@ -14,6 +14,7 @@ use crate::metric::aggregate::{each_of, pairs_of};
 use crate::metric::attendance::Attendance;
 use crate::metric::expression::{Moment, least, number};
 use crate::metric::held::{HeardValues, HeldInputs, hear};
+use crate::metric::memory::Memories;
 use crate::value::Value;
 use sesame_stl::{FormulaError, Monitor, Signal};
 
@@ -30,6 +31,7 @@ pub(super) struct RobustnessState<'p> {
     end: SimTime,
     attendance: Attendance,
     heard: HeardValues,
+    memories: Memories,
     /// A monitor without samples, to find out when a requirement was lost; `None` where nothing is required of it.
     fresh: Option<Monitor>,
 }
@@ -157,6 +159,7 @@ impl<'p> RobustnessState<'p> {
             end: SimTime::ZERO,
             attendance,
             heard: HeardValues::new(plan, &robustness.inputs),
+            memories: Memories::new(&robustness.inputs, plan),
             fresh: required.then_some(fresh),
         })
     }
@@ -180,6 +183,7 @@ impl<'p> RobustnessState<'p> {
         if let Some(several) = self.heard.note(inputs) {
             context.note(format!("in a message on `{}`, {several}", context.topic));
         }
+        self.memories.remember(&mut self.heard, member, context.now);
         if context.now > self.last {
             self.previous = std::mem::replace(&mut self.last, context.now);
         }
@@ -367,11 +371,23 @@ mod tests {
     }
 
     fn command() -> Input {
-        Input { field: FieldRef { topic: TopicId(0), path: Vec::new() }, members: Members::Min, list: None, text: None }
+        Input {
+            field: FieldRef { topic: TopicId(0), path: Vec::new() },
+            members: Members::Min,
+            list: None,
+            text: None,
+            memory: Vec::new(),
+        }
     }
 
     fn level(members: Members) -> Input {
-        Input { field: FieldRef { topic: TopicId(1), path: vec!["level".into()] }, members, list: None, text: None }
+        Input {
+            field: FieldRef { topic: TopicId(1), path: vec!["level".into()] },
+            members,
+            list: None,
+            text: None,
+            memory: Vec::new(),
+        }
     }
 
     fn above(signal: u32) -> Formula {
@@ -649,6 +665,7 @@ mod tests {
                     .prop_map(move |(interval, of)| Formula::Eventually { interval, of: boxed(of) }),
                 (interval, inner.clone(), inner).prop_map(move |(interval, left, right)| Formula::Until {
                     interval,
+                    weak: false,
                     left: boxed(left),
                     right: boxed(right)
                 }),

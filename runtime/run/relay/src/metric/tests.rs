@@ -29,11 +29,23 @@ fn payload(path: usize, number: f64) -> Value {
 }
 
 fn command() -> Input {
-    Input { field: FieldRef { topic: TopicId(0), path: Vec::new() }, members: Members::Min, list: None, text: None }
+    Input {
+        field: FieldRef { topic: TopicId(0), path: Vec::new() },
+        members: Members::Min,
+        list: None,
+        text: None,
+        memory: Vec::new(),
+    }
 }
 
 fn level(members: Members) -> Input {
-    Input { field: FieldRef { topic: TopicId(1), path: vec!["level".into()] }, members, list: None, text: None }
+    Input {
+        field: FieldRef { topic: TopicId(1), path: vec!["level".into()] },
+        members,
+        list: None,
+        text: None,
+        memory: Vec::new(),
+    }
 }
 
 fn formula(inputs: Vec<Input>, aggregate: Aggregate) -> Formula {

@@ -4,7 +4,7 @@ use sesame_base::time::SimTime;
 use sesame_monitor::Truth;
 use sesame_plan::{CampaignPlan, Evidence, TopicId};
 
-use crate::metric::{HeardValues, HeldInputs, Moment, hear, holds};
+use crate::metric::{HeardValues, HeldInputs, Memories, Moment, hear, holds};
 use crate::value::Value;
 use crate::wire::Wire;
 
@@ -14,6 +14,7 @@ pub(super) struct EvidenceState<'p> {
     held: HeldInputs,
     /// The values of the current message, per input.
     heard: HeardValues,
+    memories: Memories,
     sources: Sources,
 }
 
@@ -24,6 +25,7 @@ impl<'p> EvidenceState<'p> {
             evidence,
             held: HeldInputs::new(&evidence.inputs, plan),
             heard: HeardValues::new(plan, &evidence.inputs),
+            memories: Memories::new(&evidence.inputs, plan),
             sources: Sources::new(sources),
         }
     }
@@ -37,6 +39,7 @@ impl<'p> EvidenceState<'p> {
         value: &Value,
     ) -> Result<Came, String> {
         hear(&self.evidence.inputs, (topic, member), value, &mut self.heard)?;
+        self.memories.remember(&mut self.heard, member, now);
         if self.heard.is_nothing() {
             return Ok(Came::Nothing);
         }
@@ -63,7 +66,8 @@ impl<'p> EvidenceState<'p> {
 /// What comes of a message for evidence.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Came {
-    /// It has no element that the evidence reads, so it is as if it had not come.
+    /// It has no element that the evidence reads, or is the first of those from which a previous value or a rate is
+    /// computed, so it is as if it had not come.
     Nothing,
     /// Evidence with several sources waits for the end of the instant.
     Waits,

@@ -1,6 +1,6 @@
 //! What monitors hear in a recording, kept so that they can decide on it again: as it was recorded, or with delays.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use sesame_base::observation::ChangeCause;
@@ -11,7 +11,7 @@ use sesame_monitor::{Changes, EvidenceChange, EvidenceId, Network, Reading, Run,
 use sesame_plan::{CampaignPlan, MonitorId, Side};
 
 use super::evidence::{Sources, truth_of};
-use crate::metric::{HeardValues, HeldInputs, hear};
+use crate::metric::{HeardValues, HeldInputs, Memories, hear};
 use crate::value::Value;
 use crate::wire::{Wire, WireTable};
 
@@ -29,6 +29,7 @@ pub struct RecordedMonitors<'p> {
     recording: Recording,
     /// Per message: what evidence reads in it.
     contents: Vec<Vec<Content>>,
+    memories: BTreeMap<EvidenceId, Memories>,
     /// Per message: its number among those published on its wire.
     indices: Vec<u64>,
     warnings: Vec<String>,
@@ -84,6 +85,7 @@ impl<'p> RecordedMonitors<'p> {
             of_wire,
             recording,
             contents: Vec::new(),
+            memories: BTreeMap::new(),
             indices: Vec::new(),
             warnings: Vec::new(),
         }
@@ -97,7 +99,13 @@ impl<'p> RecordedMonitors<'p> {
         for id in self.streams[stream as usize].evidence.clone() {
             let inputs = &evidence_of(self.plan, &self.network, id).inputs;
             let mut heard = HeardValues::new(self.plan, inputs);
-            match hear(inputs, of, value, &mut heard) {
+            let found = hear(inputs, of, value, &mut heard);
+            if found.is_ok() {
+                // Messages of a topic that are late are late together, so what was computed from them stays.
+                let memories = self.memories.entry(id).or_insert_with(|| Memories::new(inputs, self.plan));
+                memories.remember(&mut heard, of.1, at);
+            }
+            match found {
                 Ok(_) if heard.is_nothing() => {}
                 Ok(_) => content.push((id, heard)),
                 Err(lacking) => self.note(id, wire, &lacking),

@@ -7,11 +7,12 @@ use sesame_base::activation::Activity;
 use sesame_base::observation::Counters;
 use sesame_base::time::SimTime;
 use sesame_plan::{
-    Activation, CampaignPlan, Compensation, Distribution, Drain, Fitted, OperationId, Span, Test, TopicId, Values,
+    Activation, CampaignPlan, Compensation, Counts, Distribution, Drain, Fitted, OperationId, Span, Test, TopicId,
+    Values,
 };
 use sesame_rng::{derive_seed, keyed_unit};
 
-use crate::fuzz::{Amount, Bias, Disturbance, Latency, Noise, OnWire, Places, Scale};
+use crate::fuzz::{Amount, Bias, Disturbance, Latency, Noise, OnWire, PerWire, Places, Scale};
 use crate::relay::Relay;
 use crate::relay::stage::Stage;
 
@@ -69,6 +70,8 @@ impl Relay<'_> {
             since: SimTime::ZERO,
             operation_seed: seed,
             messages: None,
+            counts: Counts::ALL,
+            counted: PerWire::default(),
             timed: false,
             tail_since: None,
             tails: Vec::new(),

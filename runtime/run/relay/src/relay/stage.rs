@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use sesame_base::activation::Activity;
 use sesame_base::observation::Counters;
 use sesame_base::time::SimTime;
-use sesame_plan::{Messages, NodeId, OperationId};
+use sesame_plan::{Counts, Messages, NodeId, OperationId};
 
-use crate::fuzz::{Disturbance, MessageContext};
+use crate::fuzz::{Disturbance, MessageContext, PerWire};
 use crate::relay::release::Why;
 use crate::value::Value;
 use crate::wire::Wire;
@@ -28,6 +28,10 @@ pub(super) struct Stage {
     pub(super) operation_seed: u64,
     /// The only messages that it alters; `None` for all.
     pub(super) messages: Option<Messages>,
+    /// Which messages of an activation it alters.
+    pub(super) counts: Counts,
+    /// Per wire: how many messages there were since it became active, and how many of them it was to alter.
+    pub(super) counted: PerWire<(u64, u64)>,
     /// Whether it counts in `fuzzing_time()`.
     pub(super) timed: bool,
     /// Since when it holds messages back without being active.
@@ -55,9 +59,18 @@ impl Stage {
         self.from.is_empty() || publisher.is_some_and(|publisher| self.from.contains(&publisher))
     }
 
-    /// Whether it alters a message while it is active, by the position of its wire and its number there.
-    pub(super) fn alters(&self, member: u64, number: u64) -> bool {
-        self.messages.as_ref().is_none_or(|messages| messages.hold(member, number))
+    /// Whether it alters a message while it is active, by the position of its wire and its number there. Called once
+    /// for each message, in order: it counts them.
+    pub(super) fn alters(&mut self, member: u64, number: u64) -> bool {
+        let listed = self.messages.as_ref().is_none_or(|messages| messages.hold(member, number));
+        if self.counts == Counts::ALL {
+            return listed;
+        }
+        let (seen, due) = self.counted.entry(member);
+        *seen += 1;
+        let is_due = *seen % self.counts.every == 0 && self.counts.next.is_none_or(|next| *due < next);
+        *due += u64::from(is_due);
+        listed && is_due
     }
 
     /// Decides on a message that it does not alter, so that what it does to others does not depend on which it alters.

@@ -33,6 +33,7 @@ impl Maker {
             members,
             list: None,
             text: None,
+            memory: Vec::new(),
         })
     }
 
@@ -153,7 +154,12 @@ impl Maker {
             2 => stl::Formula::Or { left: inner(self), right: inner(self) },
             3 => stl::Formula::Implies { left: inner(self), right: inner(self) },
             4..=5 => stl::Formula::Eventually { interval: self.interval(), of: inner(self) },
-            6 => stl::Formula::Until { interval: self.interval(), left: inner(self), right: inner(self) },
+            6 => stl::Formula::Until {
+                interval: self.interval(),
+                weak: self.chance(0.5),
+                left: inner(self),
+                right: inner(self),
+            },
             _ => stl::Formula::Always { interval: self.interval(), of: inner(self) },
         }
     }

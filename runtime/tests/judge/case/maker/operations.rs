@@ -136,6 +136,8 @@ impl Maker {
             within,
             priority: self.between(0, 1),
             timed: self.chance(0.8),
+            counted: Vec::new(),
+            wrapped: None,
             ..testing::operation_with(&format!("o{at}"), topic, kind, parameters)
         }
     }
