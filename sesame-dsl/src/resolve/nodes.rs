@@ -31,6 +31,8 @@ struct Listed {
     said: Said,
     /// What the topic's path stands for.
     members: Vec<Expanded>,
+    /// Where it is listed.
+    span: Span,
 }
 
 impl<'a> Resolver<'a> {
@@ -62,8 +64,10 @@ impl<'a> Resolver<'a> {
                 Some(named) => self.expanded(named, "node"),
                 None => Some(vec![Expanded::one(&node.head.name.text)]),
             };
-            let publishes = self.topics_listed(&node.publishes, "publishes");
-            let subscribes = self.topics_listed(&node.subscribes, "subscribes");
+            let mut publishes = self.topics_listed(&node.publishes, "publishes");
+            let mut subscribes = self.topics_listed(&node.subscribes, "subscribes");
+            self.parts_listed(&node.serves, true, [&mut publishes, &mut subscribes]);
+            self.parts_listed(&node.calls, false, [&mut publishes, &mut subscribes]);
             let ids = |listed: &Option<Vec<Listed>>| -> Option<Vec<TopicId>> {
                 Some(listed.as_ref()?.iter().map(|listed| listed.topic).collect())
             };
@@ -132,17 +136,13 @@ impl<'a> Resolver<'a> {
                 continue;
             };
             let topic = TopicId::from_index(index);
-            let said = match &listed.member {
-                None => Some(Said::Own),
-                Some(ast::Member { name: None, .. }) => Some(Said::All),
-                Some(ast::Member { name: Some(wanted), span }) => {
-                    self.named_member(topic, &listed.name, wanted, *span).map(|member| Said::These(vec![member]))
-                }
-            };
             let known = found.iter_mut().find(|known| known.topic == topic);
-            match (known, said) {
+            match (known, self.said(topic, listed)) {
                 (_, None) => complete = false,
-                (None, Some(said)) => found.push(Listed { topic, said, members: self.members_of_topic(topic) }),
+                (None, Some(said)) => {
+                    let members = self.members_of_topic(topic);
+                    found.push(Listed { topic, said, members, span: listed.span });
+                }
                 (Some(Listed { said: Said::These(known), .. }), Some(Said::These(more))) => {
                     known.extend(more);
                     known.sort_unstable();
@@ -156,6 +156,74 @@ impl<'a> Resolver<'a> {
             }
         }
         complete.then_some(found)
+    }
+
+    /// What a list says of the members of a topic. `None` was reported.
+    fn said(&mut self, topic: TopicId, listed: &WithMember) -> Option<Said> {
+        Some(match &listed.member {
+            None => Said::Own,
+            Some(ast::Member { name: None, .. }) => Said::All,
+            Some(ast::Member { name: Some(wanted), span }) => {
+                Said::These(vec![self.named_member(topic, &listed.name, wanted, *span)?])
+            }
+        })
+    }
+
+    /// Adds the topics of services and actions to what a node publishes and subscribes to: a server publishes all but
+    /// requests, a client requests only. `None` is what has a mistake.
+    fn parts_listed(
+        &mut self,
+        clauses: &'a [(Span, Vec<WithMember>)],
+        serves: bool,
+        mut lists: [&mut Option<Vec<Listed>>; 2],
+    ) {
+        for listed in self.single(clauses, if serves { "serves" } else { "calls" }).into_iter().flatten() {
+            let Some(parts) = self.parts_named(&listed.name) else {
+                lists.iter_mut().for_each(|list| **list = None);
+                continue;
+            };
+            for topic in parts.map(TopicId::from_index) {
+                let declared = self.system.topics.get(topic.index()).and_then(Option::as_ref);
+                let request = declared.map(|topic| topic.channel == Channel::Request);
+                let said = request.and_then(|request| Some((request, self.said(topic, listed)?)));
+                let Some((request, said)) = said else {
+                    // What is said of one part is said of all.
+                    lists.iter_mut().for_each(|list| **list = None);
+                    break;
+                };
+                let Some(list) = lists[usize::from(request == serves)].as_mut() else { continue };
+                match list.iter_mut().find(|known| known.topic == topic) {
+                    None => {
+                        let members = self.members_of_topic(topic);
+                        list.push(Listed { topic, said, members, span: listed.span });
+                    }
+                    Some(Listed { said: Said::These(known), .. }) if matches!(said, Said::These(_)) => {
+                        let Said::These(more) = said else { continue };
+                        known.extend(more);
+                        known.sort_unstable();
+                        known.dedup();
+                    }
+                    Some(known) => {
+                        let before = known.span;
+                        self.listed_twice(listed.span, before);
+                        lists.iter_mut().for_each(|list| **list = None);
+                        break;
+                    }
+                }
+            }
+        }
+    }
+
+    /// The topics of the service or action of this name.
+    fn parts_named(&mut self, name: &'a ast::Name) -> Option<Range<usize>> {
+        let known = self.names.get(name.text.as_str()).copied();
+        if let Some(parts) = known.and_then(|known| self.topics_of(known.kind, known.index)) {
+            return Some(parts);
+        }
+        // A system is likelier to have one that is meant among those that it has.
+        let kind = if self.ast_actions().next().is_some() { Kind::Action } else { Kind::Service };
+        self.find(name, kind);
+        None
     }
 
     /// The nodes of a list: of a group, all members or the one that is named.
