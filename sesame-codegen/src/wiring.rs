@@ -82,11 +82,15 @@ mod tests {
     const ARMS: &str = include_str!("../../sesame-dsl/tests/good/ros2.sesame");
 
     fn plan(text: &str) -> CampaignPlan {
+        plan_of(text, "delays")
+    }
+
+    fn plan_of(text: &str, campaign: &str) -> CampaignPlan {
         let mut sources = SourceMap::new();
         let file = sources.add("arms.sesame", text);
         let analysis = sesame_dsl::analyse(&sources, file);
         let space = analysis.model.unwrap_or_else(|| panic!("{:#?}", analysis.diagnostics));
-        let plan = crate::lower::lower(&space, space.campaign("delays").unwrap(), "arms.sesame", "sesamec 0.0.0").plan;
+        let plan = crate::lower::lower(&space, space.campaign(campaign).unwrap(), "arms.sesame", "sesamec 0.0.0").plan;
         plan.validate().unwrap();
         plan
     }
@@ -94,6 +98,18 @@ mod tests {
     #[test]
     fn each_node_gets_a_line_to_paste() {
         insta::assert_snapshot!(text(&plan(ARMS)));
+    }
+
+    #[test]
+    fn the_server_of_an_action_is_remapped_part_by_part() {
+        let robots = include_str!("../../sesame-dsl/tests/good/actions.sesame");
+        // An operation on one part alone.
+        let kept: Vec<&str> = robots
+            .lines()
+            .filter(|line| !line.starts_with("operation ") || line.contains("drive_goal_reply"))
+            .map(|line| if line.contains("operations lost") { "  operations denied 1 per test" } else { line })
+            .collect();
+        insta::assert_snapshot!(text(&plan_of(&kept.join("\n"), "first")));
     }
 
     #[test]

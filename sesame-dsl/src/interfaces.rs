@@ -104,11 +104,17 @@ pub fn full_name(written: &str, kind: &str, dialect: Dialect) -> Option<String> 
 
 /// Interfaces that are the same in every distribution of ROS, with their fields as in a `.msg` file.
 const KNOWN: &[(&str, &[(&str, &str)])] = &[
-    ("action_msgs/msg/GoalInfo", &[("unique_identifier_msgs/msg/UUID", "goal_id"), ("builtin_interfaces/msg/Time", "stamp")]),
+    (
+        "action_msgs/msg/GoalInfo",
+        &[("unique_identifier_msgs/msg/UUID", "goal_id"), ("builtin_interfaces/msg/Time", "stamp")],
+    ),
     ("action_msgs/msg/GoalStatus", &[("action_msgs/msg/GoalInfo", "goal_info"), ("int8", "status")]),
     ("action_msgs/msg/GoalStatusArray", &[("action_msgs/msg/GoalStatus[]", "status_list")]),
     ("action_msgs/srv/CancelGoal_Request", &[("action_msgs/msg/GoalInfo", "goal_info")]),
-    ("action_msgs/srv/CancelGoal_Response", &[("int8", "return_code"), ("action_msgs/msg/GoalInfo[]", "goals_canceling")]),
+    (
+        "action_msgs/srv/CancelGoal_Response",
+        &[("int8", "return_code"), ("action_msgs/msg/GoalInfo[]", "goals_canceling")],
+    ),
     ("builtin_interfaces/msg/Time", &[("int32", "sec"), ("uint32", "nanosec")]),
     ("builtin_interfaces/msg/Duration", &[("int32", "sec"), ("uint32", "nanosec")]),
     ("geometry_msgs/msg/Point", &[("float64", "x"), ("float64", "y"), ("float64", "z")]),
@@ -258,6 +264,29 @@ mod tests {
     }
 
     #[test]
+    fn what_services_and_actions_consist_of_has_types_too() {
+        let of_ros2 = |written: &str, kind: &str| full_name(written, kind, Dialect::Ros2);
+        for (part, whole) in [
+            ("std_srvs/srv/SetBool_Request", "std_srvs/srv/SetBool"),
+            ("a/action/B_Feedback", "a/action/B"),
+            ("a/action/B_FeedbackMessage", "a/action/B"),
+            ("a/action/B_SendGoal_Response", "a/action/B"),
+            ("a/action/B_GetResult_Request", "a/action/B"),
+        ] {
+            assert_eq!(of_ros2(part, "msg").as_deref(), Some(part));
+            assert_eq!(defined_in(part), whole);
+        }
+        for service in ["a/action/B_SendGoal", "a/action/B_GetResult"] {
+            assert_eq!(of_ros2(service, "srv").as_deref(), Some(service));
+        }
+        assert_eq!(of_ros2("a/B", "action").as_deref(), Some("a/action/B"));
+        for wrong in ["a/action/B", "a/action/B_Request", "a/action/_Goal", "a/action/B_C_Goal", "a/msg/B_Goal"] {
+            assert_eq!(of_ros2(wrong, "msg"), None, "{wrong}");
+        }
+        assert_eq!(defined_in("a/msg/B"), "a/msg/B");
+    }
+
+    #[test]
     fn types_on_the_wire_are_those_of_msg_files() {
         for text in ["uint8", "float64[36]", "string[]", "int8[<=5]", "wstring", "geometry_msgs/msg/Point[2]"] {
             assert_eq!(in_words(&wire_type(text, Dialect::Ros2).unwrap()), text);
@@ -279,5 +308,8 @@ mod tests {
         }
         assert!(is_point(known("geometry_msgs/msg/Point32").unwrap().last().unwrap()));
         assert!(!is_point(header.last().unwrap()));
+        let status = known("action_msgs/msg/GoalStatusArray").unwrap();
+        let names: Vec<&str> = status.iter().map(|interface| interface.name.rsplit('/').next().unwrap()).collect();
+        assert_eq!(names, ["UUID", "Time", "GoalInfo", "GoalStatus", "GoalStatusArray"]);
     }
 }

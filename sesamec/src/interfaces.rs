@@ -454,10 +454,16 @@ mod tests {
             found.into_iter().map(|interface| interface.name).collect()
         };
         let id = "unique_identifier_msgs/msg/UUID";
-        assert_eq!(names("a/action/Move_FeedbackMessage"), [id, "a/action/Move_Feedback", "a/action/Move_FeedbackMessage"]);
+        assert_eq!(
+            names("a/action/Move_FeedbackMessage"),
+            [id, "a/action/Move_Feedback", "a/action/Move_FeedbackMessage"]
+        );
         let goal = [id, "a/msg/Spot", "a/action/Move_Goal", "a/action/Move_SendGoal_Request"];
         assert_eq!(names("a/action/Move_SendGoal_Request"), goal);
-        assert_eq!(names("a/action/Stop_GetResult_Response"), ["a/action/Stop_Result", "a/action/Stop_GetResult_Response"]);
+        assert_eq!(
+            names("a/action/Stop_GetResult_Response"),
+            ["a/action/Stop_Result", "a/action/Stop_GetResult_Response"]
+        );
         assert_eq!(files.find(folders, "a/action/Move"), Ok(None), "it is no message");
     }
 

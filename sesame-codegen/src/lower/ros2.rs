@@ -10,8 +10,7 @@ use super::id::node_id;
 
 /// How the topics of a space are cut, in their order: if one of an action is, all of them are.
 pub(super) fn wirings(space: &Space, stepped: bool) -> Vec<plan::Wiring> {
-    let mut wirings: Vec<plan::Wiring> =
-        space.topics.iter().map(|(topic, _)| wiring(space, topic, stepped)).collect();
+    let mut wirings: Vec<plan::Wiring> = space.topics.iter().map(|(topic, _)| wiring(space, topic, stepped)).collect();
     // What is disturbed would otherwise be overtaken by the rest of its action, which nobody disturbs: a status by the
     // result, for example.
     let actions = || space.topics.values().map(|topic| topic.action.as_deref());

@@ -4,10 +4,11 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use super::{Kind, Resolver};
+use super::{Kind, Resolver, list};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::groups::{Expanded, expand, own_members};
 use crate::model::{self, Channel, Id as _, NodeId, TopicId, TopicMembers};
+use crate::similar::most_similar;
 use crate::span::Span;
 use crate::syntax::ast::{self, OperationBody, Target, WithMember};
 
@@ -197,32 +198,58 @@ impl<'a> Resolver<'a> {
                         let members = self.members_of_topic(topic);
                         list.push(Listed { topic, said, members, span: listed.span });
                     }
-                    Some(Listed { said: Said::These(known), .. }) if matches!(said, Said::These(_)) => {
-                        let Said::These(more) = said else { continue };
-                        known.extend(more);
-                        known.sort_unstable();
-                        known.dedup();
-                    }
                     Some(known) => {
-                        let before = known.span;
-                        self.listed_twice(listed.span, before);
-                        lists.iter_mut().for_each(|list| **list = None);
-                        break;
+                        if !known.takes(&said) {
+                            let before = known.span;
+                            self.listed_twice(listed.span, before);
+                            lists.iter_mut().for_each(|list| **list = None);
+                            break;
+                        }
                     }
                 }
             }
         }
     }
 
-    /// The topics of the service or action of this name.
+    /// The topics of the service or action of this name. `None` was reported.
     fn parts_named(&mut self, name: &'a ast::Name) -> Option<Range<usize>> {
         let known = self.names.get(name.text.as_str()).copied();
         if let Some(parts) = known.and_then(|known| self.topics_of(known.kind, known.index)) {
             return Some(parts);
         }
-        // A system is likelier to have one that is meant among those that it has.
-        let kind = if self.ast_actions().next().is_some() { Kind::Action } else { Kind::Service };
-        self.find(name, kind);
+        if self.silent.contains(name.text.as_str()) {
+            return None;
+        }
+        if let Some(known) = known {
+            let is = known.kind.with_article();
+            let title = format!("`{}` is {is}, not a service or an action", name.text);
+            let mut diagnostic = Diagnostic::new(Code::OTHER_KIND, name.span, title)
+                .label("expected a service or an action")
+                .secondary(known.span, format!("declared as {is} here"));
+            if known.kind == Kind::Topic {
+                diagnostic = diagnostic.note("topics stand after `publishes` and `subscribes`");
+            }
+            self.report(diagnostic);
+            return None;
+        }
+        self.silent.insert(&name.text);
+        // An import that failed may have declared it.
+        if self.file.incomplete {
+            return None;
+        }
+        let title = format!("no service or action named `{}`", name.text);
+        let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title).label("not found in this space");
+        let declared: Vec<&str> =
+            [Kind::Service, Kind::Action].into_iter().flat_map(|kind| self.names_of(kind)).collect();
+        if self.compared.more(declared.len()) {
+            diagnostic = match most_similar(&name.text, declared.iter().copied()) {
+                Some(similar) => diagnostic.did_you_mean(name.span, similar),
+                None if declared.is_empty() => diagnostic.note("this space declares no services and no actions"),
+                None if declared.len() <= 8 => diagnostic.note(format!("there are {}", list(&declared))),
+                None => diagnostic,
+            };
+        }
+        self.report(diagnostic);
         None
     }
 
@@ -361,6 +388,17 @@ impl<'a> Resolver<'a> {
 }
 
 impl Listed {
+    /// Adds further members, if both name some and none twice.
+    fn takes(&mut self, said: &Said) -> bool {
+        let (Said::These(known), Said::These(more)) = (&mut self.said, said) else { return false };
+        if known.iter().any(|member| more.contains(member)) {
+            return false;
+        }
+        known.extend(more);
+        known.sort_unstable();
+        true
+    }
+
     /// What a node uses of it, which may be a member of a group of nodes. Without a word, these are its own members of
     /// a group: those whose paths begin like its name or, if the topics and the nodes have the same members, the one of
     /// the same name; all where neither says anything.

@@ -58,14 +58,16 @@ impl<'a> Resolver<'a> {
         for action in self.ast_actions() {
             let paths = self.topic_paths(&action.path, "action");
             let types = self.types_of_action(action);
+            let mut free = true;
             for (at, (head, part)) in action.parts.iter().zip(&action::PARTS).enumerate() {
                 let paths = paths.as_ref().map(|(paths, members)| {
                     (paths.iter().map(|path| part.path_of(path)).collect::<Vec<_>>(), members.clone())
                 });
-                // Both directions of a service have its path.
-                let taking = paths.iter().filter(|_| part.channel != Channel::Reply).flat_map(|(paths, _)| paths);
-                for path in taking {
-                    self.take_path(taken, part.channel, path, action.path.span);
+                // Both directions of a service have its path. Of two equal actions, one part says it for all.
+                if free && part.channel != Channel::Reply {
+                    for path in paths.iter().flat_map(|(paths, _)| paths) {
+                        free &= self.take_path(taken, part.channel, path, action.path.span);
+                    }
                 }
                 let ty = types.as_ref().map(|types| types[at].clone());
                 let written = part.path_of(&action.path.text);
@@ -196,16 +198,18 @@ impl<'a> Resolver<'a> {
         Ok(Some(found))
     }
 
-    /// Notes the path of a topic or service; reports one that was taken before.
-    pub(super) fn take_path(&mut self, taken: &mut TakenPaths, channel: Channel, path: &str, span: Span) {
+    /// Notes the path of a topic or service. False, and reported, if it was taken before.
+    pub(super) fn take_path(&mut self, taken: &mut TakenPaths, channel: Channel, path: &str, span: Span) -> bool {
         let (paths, what) = match channel {
             Channel::Topic => (&mut taken.topics, "topics"),
             Channel::Request | Channel::Reply => (&mut taken.services, "services"),
         };
-        match paths.get(path) {
-            Some(&first) => self.same_path(what, path, span, first),
-            None => _ = paths.insert(path.to_owned(), span),
-        }
+        let Some(&first) = paths.get(path) else {
+            paths.insert(path.to_owned(), span);
+            return true;
+        };
+        self.same_path(what, path, span, first);
+        false
     }
 }
 

@@ -59,6 +59,9 @@ impl<'a> Resolver<'a> {
     }
 
     pub(super) fn same_path(&mut self, what: &str, path: &str, again: Span, first: Span) {
+        // Services and actions are looked at after topics, wherever they stand.
+        let swapped = again.file == first.file && again < first;
+        let (again, first) = if swapped { (first, again) } else { (again, first) };
         let diagnostic = Diagnostic::new(Code::SAME_PATH, again, format!("two {what} have the path `{path}`"))
             .label("used again here")
             .secondary(first, "first used here");

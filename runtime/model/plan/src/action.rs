@@ -20,12 +20,7 @@ pub const INFIX: &str = "/_action/";
 
 /// The topics of an action, with the directions of its services.
 pub const PARTS: [ActionPart; 8] = {
-    const fn part(
-        name: &'static str,
-        path: &'static str,
-        channel: Channel,
-        interface: &'static str,
-    ) -> ActionPart {
+    const fn part(name: &'static str, path: &'static str, channel: Channel, interface: &'static str) -> ActionPart {
         ActionPart { name, path, channel, interface }
     }
     [

@@ -5,8 +5,8 @@ use sesame_grammar::Rule;
 use super::reader::{Pair, Reader, child, children, expect_child, first_of};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::syntax::ast::{
-    Action, Answer, Clock, Field, Head, Message, Name, Node, Proxy, Secret, Service, Settings, Simulator, StepBy, StepChannel,
-    Stepping, System, Text, Topic, Transport, Type, TypeKind,
+    Action, Answer, Clock, Field, Head, Message, Name, Node, Proxy, Secret, Service, Settings, Simulator, StepBy,
+    StepChannel, Stepping, System, Text, Topic, Transport, Type, TypeKind,
 };
 use crate::syntax::blocks;
 use sesame_plan::{Compression, Dialect, Quality, SimulatorKind};
