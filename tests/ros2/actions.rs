@@ -66,7 +66,7 @@ impl Robots {
              operation deaf   on nav_cancel_request = blackhole\n\
              operation more   on nav_goal_request.goal.order = stuck at [0, 20]\n\
              test no_goals   {{ lost from 1s to 4s }}\n\
-             test is_late    {{ late latency 1s from 0s to 6s }}\n\
+             test is_late    {{ late delay 1s from 0s to 6s }}\n\
              test is_silent  {{ silent from 0s to 6s }}\n\
              test is_refused {{ refuse from 0s to 6s }}\n\
              test goes_on    {{ deaf from 0s to 6s }}\n\
