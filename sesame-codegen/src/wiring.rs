@@ -82,15 +82,11 @@ mod tests {
     const ARMS: &str = include_str!("../../sesame-dsl/tests/good/ros2.sesame");
 
     fn plan(text: &str) -> CampaignPlan {
-        plan_of(text, "delays")
-    }
-
-    fn plan_of(text: &str, campaign: &str) -> CampaignPlan {
         let mut sources = SourceMap::new();
         let file = sources.add("arms.sesame", text);
         let analysis = sesame_dsl::analyse(&sources, file);
         let space = analysis.model.unwrap_or_else(|| panic!("{:#?}", analysis.diagnostics));
-        let plan = crate::lower::lower(&space, space.campaign(campaign).unwrap(), "arms.sesame", "sesamec 0.0.0").plan;
+        let plan = crate::lower::lower(&space, space.campaign("delays").unwrap(), "arms.sesame", "sesamec 0.0.0").plan;
         plan.validate().unwrap();
         plan
     }
@@ -102,14 +98,25 @@ mod tests {
 
     #[test]
     fn the_server_of_an_action_is_remapped_part_by_part() {
-        let robots = include_str!("../../sesame-dsl/tests/good/actions.sesame");
-        // An operation on one part alone.
-        let kept: Vec<&str> = robots
-            .lines()
-            .filter(|line| !line.starts_with("operation ") || line.contains("drive_goal_reply"))
-            .map(|line| if line.contains("operations lost") { "  operations denied 1 per test" } else { line })
-            .collect();
-        insta::assert_snapshot!(text(&plan_of(&kept.join("\n"), "first")));
+        let robots = "space robots\n\
+            system {\n\
+              simulator robots = ros2\n\
+              message Goal     = \"cell_msgs/action/Drive_Goal\" { to: point[m] }\n\
+              message Result   = \"cell_msgs/action/Drive_Result\" { }\n\
+              message Feedback = \"cell_msgs/action/Drive_Feedback\" { left: real[m] }\n\
+              action drive = \"/{r1,r2}/drive\" : \"cell_msgs/action/Drive\"\n\
+              node robot \"/{r1,r2}/robot\" { serves drive }\n\
+              node fleet { calls drive }\n\
+            }\n\
+            metric left minimise default 9m = min(each of drive_feedback.feedback.left)\n\
+            operation denied on drive_goal_reply.accepted = stuck at false\n\
+            campaign delays {\n\
+              objectives left\n\
+              operations denied 1 per test\n\
+              search     random { evaluations 10 }\n\
+              end        after 5s\n\
+            }\n";
+        insta::assert_snapshot!(text(&plan(robots)));
     }
 
     #[test]
