@@ -97,6 +97,29 @@ mod tests {
     }
 
     #[test]
+    fn the_server_of_an_action_is_remapped_part_by_part() {
+        let robots = "space robots\n\
+            system {\n\
+              simulator robots = ros2\n\
+              message Goal     = \"cell_msgs/action/Drive_Goal\" { to: point[m] }\n\
+              message Result   = \"cell_msgs/action/Drive_Result\" { }\n\
+              message Feedback = \"cell_msgs/action/Drive_Feedback\" { left: real[m] }\n\
+              action drive = \"/{r1,r2}/drive\" : \"cell_msgs/action/Drive\"\n\
+              node robot \"/{r1,r2}/robot\" { serves drive }\n\
+              node fleet { calls drive }\n\
+            }\n\
+            metric left minimise default 9m = min(each of drive_feedback.feedback.left)\n\
+            operation denied on drive_goal_reply.accepted = stuck at false\n\
+            campaign delays {\n\
+              objectives left\n\
+              operations denied 1 per test\n\
+              search     random { evaluations 10 }\n\
+              end        after 5s\n\
+            }\n";
+        insta::assert_snapshot!(text(&plan(robots)));
+    }
+
+    #[test]
     fn the_plan_of_a_system_of_ros_is_as_blessed() {
         let plan = plan(ARMS);
         insta::assert_snapshot!(crate::lower::tests::base().compact(&crate::lower::tests::tree(&plan)));

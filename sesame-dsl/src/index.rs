@@ -66,6 +66,8 @@ pub enum Kind {
     Topic,
     /// A service.
     Service,
+    /// An action of ROS 2.
+    Action,
     /// A node.
     Node,
     /// A metric.
@@ -104,6 +106,7 @@ impl Kind {
             Kind::Field => "field",
             Kind::Topic => "topic",
             Kind::Service => "service",
+            Kind::Action => "action",
             Kind::Node => "node",
             Kind::Metric => "metric",
             Kind::Requirement => "requirement",
@@ -121,7 +124,7 @@ impl Kind {
     }
 
     pub(crate) fn with_article(self) -> String {
-        let article = if matches!(self, Kind::Operation | Kind::Evidence) { "an" } else { "a" };
+        let article = if matches!(self, Kind::Action | Kind::Operation | Kind::Evidence) { "an" } else { "a" };
         format!("{article} {}", self.word())
     }
 }

@@ -7,9 +7,8 @@ use sesame_plan::{Dialect, Interface, InterfaceField, Primitive, WireType};
 
 /// Where definitions of messages come from: the layouts of ROS interfaces, and what a dialect of `MAVLink` has.
 pub trait Interfaces {
-    /// The layout of an interface such as `sensor_msgs/msg/JointState`, or `std_srvs/srv/SetBool_Request` and
-    /// `std_srvs/srv/SetBool_Response` for the two directions of a service: last in a list in which each comes after
-    /// those that it contains. `None` if no folder has it; an error is a clause such as "it cannot be read".
+    /// The layout of an interface such as `sensor_msgs/msg/JointState`, or of one that a service or an action consists
+    /// of, such as `std_srvs/srv/SetBool_Request`: last in a list in which each comes after those that it contains. `None` if no folder has it; an error is a clause such as "it cannot be read".
     fn find(&self, folders: Folders<'_>, name: &str) -> Result<Option<Vec<Interface>>, String>;
 
     /// The messages that these files define, and those that they include. The files are relative to the folder of the
@@ -50,14 +49,49 @@ impl Interfaces for NoInterfaces {
     }
 }
 
-/// The full name of an interface of a kind, `msg` or `srv`: `sensor_msgs/JointState` is short for
-/// `sensor_msgs/msg/JointState`. `None` if it cannot be the name of one. ROS 1 allows underscores and small letters
+/// What interfaces consist of: their kind, the kind of those, and the ends of their names.
+const CONSISTS_OF: [(&str, &str, &[&str]); 3] = [
+    ("srv", "msg", &["_Request", "_Response"]),
+    ("action", "srv", &["_SendGoal", "_GetResult"]),
+    (
+        "action",
+        "msg",
+        &[
+            "_Goal",
+            "_Result",
+            "_Feedback",
+            "_FeedbackMessage",
+            "_SendGoal_Request",
+            "_SendGoal_Response",
+            "_GetResult_Request",
+            "_GetResult_Response",
+        ],
+    ),
+];
+
+/// The interface that has a definition of its own: for `std_srvs/srv/SetBool_Request`, it is `std_srvs/srv/SetBool`.
+pub fn defined_in(name: &str) -> &str {
+    let kind = name.split('/').nth(1);
+    let of = CONSISTS_OF.iter().filter(|(whole, part, _)| kind == Some(whole) && *part == "msg");
+    let mut ends = of.flat_map(|(.., ends)| *ends);
+    ends.find_map(|end| name.strip_suffix(end)).unwrap_or(name)
+}
+
+/// The full name of an interface of a kind, `msg`, `srv` or `action`: `sensor_msgs/JointState` is short for
+/// `sensor_msgs/msg/JointState`. What services and actions consist of are interfaces too, such as
+/// `std_srvs/srv/SetBool_Request`. `None` if it cannot be the name of one. ROS 1 allows underscores and small letters
 /// where ROS 2 does not: `ublox_msgs/CfgGNSS_Block`, `tf/tfMessage`.
 pub fn full_name(written: &str, kind: &str, dialect: Dialect) -> Option<String> {
     let parts: Vec<&str> = written.split('/').collect();
-    let (package, name) = match parts[..] {
-        [package, name] => (package, name),
-        [package, of, name] if of == kind => (package, name),
+    let (package, whole, name, end) = match parts[..] {
+        [package, name] => (package, kind, name, ""),
+        [package, of, name] if of == kind => (package, kind, name, ""),
+        [package, of, name] => {
+            let ends = CONSISTS_OF.iter().filter(|(whole, part, _)| *whole == of && *part == kind);
+            let mut ends = ends.flat_map(|(.., ends)| *ends);
+            let (name, end) = ends.find_map(|end| Some((name.strip_suffix(end)?, *end)))?;
+            (package, of, name, end)
+        }
         _ => return None,
     };
     let package_fits = package.starts_with(|first: char| first.is_ascii_lowercase())
@@ -65,11 +99,22 @@ pub fn full_name(written: &str, kind: &str, dialect: Dialect) -> Option<String> 
     let of_ros1 = dialect == Dialect::Ros1;
     let name_fits = name.starts_with(|first: char| first.is_ascii_uppercase() || of_ros1 && first.is_ascii_lowercase())
         && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || of_ros1 && byte == b'_');
-    (package_fits && name_fits).then(|| format!("{package}/{kind}/{name}"))
+    (package_fits && name_fits).then(|| format!("{package}/{whole}/{name}{end}"))
 }
 
 /// Interfaces that are the same in every distribution of ROS, with their fields as in a `.msg` file.
 const KNOWN: &[(&str, &[(&str, &str)])] = &[
+    (
+        "action_msgs/msg/GoalInfo",
+        &[("unique_identifier_msgs/msg/UUID", "goal_id"), ("builtin_interfaces/msg/Time", "stamp")],
+    ),
+    ("action_msgs/msg/GoalStatus", &[("action_msgs/msg/GoalInfo", "goal_info"), ("int8", "status")]),
+    ("action_msgs/msg/GoalStatusArray", &[("action_msgs/msg/GoalStatus[]", "status_list")]),
+    ("action_msgs/srv/CancelGoal_Request", &[("action_msgs/msg/GoalInfo", "goal_info")]),
+    (
+        "action_msgs/srv/CancelGoal_Response",
+        &[("int8", "return_code"), ("action_msgs/msg/GoalInfo[]", "goals_canceling")],
+    ),
     ("builtin_interfaces/msg/Time", &[("int32", "sec"), ("uint32", "nanosec")]),
     ("builtin_interfaces/msg/Duration", &[("int32", "sec"), ("uint32", "nanosec")]),
     ("geometry_msgs/msg/Point", &[("float64", "x"), ("float64", "y"), ("float64", "z")]),
@@ -88,6 +133,7 @@ const KNOWN: &[(&str, &[(&str, &str)])] = &[
     ("std_srvs/srv/SetBool_Response", &[("bool", "success"), ("string", "message")]),
     ("std_srvs/srv/Trigger_Request", &[]),
     ("std_srvs/srv/Trigger_Response", &[("bool", "success"), ("string", "message")]),
+    ("unique_identifier_msgs/msg/UUID", &[("uint8[16]", "uuid")]),
 ];
 
 /// An interface that needs no file, after those that it contains.
@@ -97,7 +143,7 @@ pub fn known(name: &str) -> Option<Vec<Interface>> {
     let mut of = Vec::new();
     for (ty, field) in *fields {
         let ty = wire_type(ty, Dialect::Ros2).expect("the table has types");
-        if let WireType::Interface { name } = &ty {
+        if let WireType::Interface { name } = innermost(&ty) {
             found.extend(known(name).expect("the table has what its interfaces contain"));
         }
         of.push(InterfaceField { name: (*field).to_owned(), ty });
@@ -218,6 +264,29 @@ mod tests {
     }
 
     #[test]
+    fn what_services_and_actions_consist_of_has_types_too() {
+        let of_ros2 = |written: &str, kind: &str| full_name(written, kind, Dialect::Ros2);
+        for (part, whole) in [
+            ("std_srvs/srv/SetBool_Request", "std_srvs/srv/SetBool"),
+            ("a/action/B_Feedback", "a/action/B"),
+            ("a/action/B_FeedbackMessage", "a/action/B"),
+            ("a/action/B_SendGoal_Response", "a/action/B"),
+            ("a/action/B_GetResult_Request", "a/action/B"),
+        ] {
+            assert_eq!(of_ros2(part, "msg").as_deref(), Some(part));
+            assert_eq!(defined_in(part), whole);
+        }
+        for service in ["a/action/B_SendGoal", "a/action/B_GetResult"] {
+            assert_eq!(of_ros2(service, "srv").as_deref(), Some(service));
+        }
+        assert_eq!(of_ros2("a/B", "action").as_deref(), Some("a/action/B"));
+        for wrong in ["a/action/B", "a/action/B_Request", "a/action/_Goal", "a/action/B_C_Goal", "a/msg/B_Goal"] {
+            assert_eq!(of_ros2(wrong, "msg"), None, "{wrong}");
+        }
+        assert_eq!(defined_in("a/msg/B"), "a/msg/B");
+    }
+
+    #[test]
     fn types_on_the_wire_are_those_of_msg_files() {
         for text in ["uint8", "float64[36]", "string[]", "int8[<=5]", "wstring", "geometry_msgs/msg/Point[2]"] {
             assert_eq!(in_words(&wire_type(text, Dialect::Ros2).unwrap()), text);
@@ -239,5 +308,8 @@ mod tests {
         }
         assert!(is_point(known("geometry_msgs/msg/Point32").unwrap().last().unwrap()));
         assert!(!is_point(header.last().unwrap()));
+        let status = known("action_msgs/msg/GoalStatusArray").unwrap();
+        let names: Vec<&str> = status.iter().map(|interface| interface.name.rsplit('/').next().unwrap()).collect();
+        assert_eq!(names, ["UUID", "Time", "GoalInfo", "GoalStatus", "GoalStatusArray"]);
     }
 }

@@ -52,7 +52,7 @@ pub struct Space {
     pub messages: Arena<MessageId, Message>,
     /// Layouts of ROS types: those of messages with one and what they contain, each after those it contains.
     pub interfaces: Vec<Interface>,
-    /// Topics, in declaration order; those of services come last.
+    /// Topics, in declaration order; those of services come after them, and those of actions last.
     pub topics: Arena<TopicId, Topic>,
     /// Nodes, in declaration order.
     pub nodes: Arena<NodeId, Node>,

@@ -270,6 +270,16 @@ impl<'a> Resolver<'a> {
                 if (definition.kind, kind) == (Kind::Metric, Kind::Requirement) {
                     diagnostic = diagnostic.note(format!("or a bound on the metric, such as `{name} <= 0`"));
                 }
+                if kind == Kind::Topic
+                    && let Some(topics) = self.topics_of(definition.kind, definition.index)
+                {
+                    let ast_topics = self.ast_topics().count();
+                    let of_services = self.ast_services().flat_map(|service| [&service.request, &service.reply]);
+                    let of_actions = self.ast_actions().flat_map(|action| &action.parts);
+                    let names = of_services.chain(of_actions).map(|head| head.name.text.as_str());
+                    let names: Vec<&str> = names.skip(topics.start - ast_topics).take(topics.len()).collect();
+                    diagnostic = diagnostic.note(format!("its topics are {}", list(&names)));
+                }
                 self.report(diagnostic);
                 return None;
             }

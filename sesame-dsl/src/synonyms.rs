@@ -245,6 +245,11 @@ const SYNONYMS: &[Synonym] = &[
     like("publisher", "publishes"),
     same("subscribe", "subscribes"),
     like("subscriber", "subscribes"),
+    same("serve", "serves"),
+    like("server", "serves"),
+    like("offers", "serves"),
+    same("call", "calls"),
+    like("client", "calls"),
     // Clauses of campaigns.
     like("objective", "objectives"),
     like("goals", "objectives"),

@@ -1,8 +1,8 @@
-//! Definitions of messages in files. For ROS, these are messages and services in folders: each file is read when it is
+//! Definitions of messages in files. For ROS, these are messages, services and actions in folders: each file is read when it is
 //! asked for, in the order in which one contains another. For `MAVLink`, these are the files of a dialect, read once.
 //!
 //! A folder holds packages, as `share` of a distribution and the folder of a workspace's sources do:
-//! `PACKAGE/msg/NAME.msg`, `PACKAGE/srv/NAME.srv`, or `.idl` in their place. A package that is not there is searched in
+//! `PACKAGE/msg/NAME.msg`, `PACKAGE/srv/NAME.srv`, `PACKAGE/action/NAME.action`, or `.idl` in their place. A package that is not there is searched in
 //! the repositories below ([`workspace`]).
 
 mod workspace;
@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use sesame_codegen::input::{self, Unreadable};
-use sesame_dsl::interfaces::{Folders, Interfaces, UnusableFile, known};
+use sesame_dsl::interfaces::{Folders, Interfaces, UnusableFile, defined_in, known};
 use sesame_interfaces::mavlink::{self, Definitions};
 use sesame_plan::{Dialect, Interface, InterfaceField, WireType};
 
@@ -22,7 +22,7 @@ const MOST_FILES: usize = 2000;
 /// The longest chain of messages that contain each other.
 const DEEPEST: usize = 64;
 
-/// A file that defines a message or a service.
+/// A file that defines a message, a service or an action.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Definition {
     /// Where it is.
@@ -42,12 +42,15 @@ pub(crate) enum Format {
     Msg,
     /// A service.
     Srv,
-    /// Either, in the notation of DDS.
+    /// An action of ROS 2.
+    Action,
+    /// Any of these, in the notation of DDS.
     Idl,
 }
 
 /// What a definition is of: of the interface `PACKAGE/msg/NAME` one layout, of `PACKAGE/srv/NAME` those of
-/// `PACKAGE/srv/NAME_Request` and `PACKAGE/srv/NAME_Response`. What they contain is named in full.
+/// `PACKAGE/srv/NAME_Request` and `PACKAGE/srv/NAME_Response`, of `PACKAGE/action/NAME` those of all messages that it
+/// consists of. What they contain is named in full.
 pub(crate) type Parse = fn(name: &str, definition: &Definition) -> Result<Vec<Interface>, String>;
 
 /// The layouts of a definition; `None` where no folder has one.
@@ -59,7 +62,7 @@ type Dialects = Result<Vec<Interface>, Vec<UnusableFile>>;
 /// Layouts from files.
 pub(crate) struct Files {
     parse: Parse,
-    /// By the name of the message or service.
+    /// By the name of the message, service or action.
     read: RefCell<BTreeMap<String, Read>>,
     /// By the files, and the file to which they are relative.
     dialects: RefCell<BTreeMap<(Vec<String>, String), Dialects>>,
@@ -78,13 +81,17 @@ fn parse(name: &str, definition: &Definition) -> Result<Vec<Interface>, String> 
     let package = name.split('/').next().unwrap_or_default();
     let last = name.rsplit('/').next().unwrap_or_default();
     let text = definition.text.as_str();
-    let definitions = match (definition.format, definition.dialect) {
+    let mut definitions = match (definition.format, definition.dialect) {
         (Format::Msg, Dialect::Ros1) => sesame_interfaces::ros1::msg(package, last, text).map(|one| vec![one]),
         (Format::Srv, Dialect::Ros1) => sesame_interfaces::ros1::srv(package, last, text).map(Vec::from),
         (Format::Msg, Dialect::Ros2) => sesame_interfaces::msg(package, last, text).map(|one| vec![one]),
         (Format::Srv, Dialect::Ros2) => sesame_interfaces::srv(package, last, text).map(Vec::from),
+        (Format::Action, _) => sesame_interfaces::action(package, last, text).map(Vec::from),
         (Format::Idl, _) => sesame_interfaces::idl(text),
     };
+    if let (Ok(definitions), true) = (&mut definitions, name.split('/').nth(1) == Some("action")) {
+        definitions.extend(sesame_interfaces::action::messages(package, last));
+    }
     let layout = |definition: sesame_interfaces::Definition| Interface {
         name: definition.name,
         fields: definition.fields.into_iter().map(|field| InterfaceField { name: field.name, ty: field.ty }).collect(),
@@ -101,7 +108,7 @@ impl Files {
 
     /// The layout of an interface itself.
     fn layout(&self, folders: Folders<'_>, name: &str) -> Result<Option<Interface>, String> {
-        let defined = defined_as(name);
+        let defined = defined_in(name);
         if !self.read.borrow().contains_key(defined) {
             let read = self.read.borrow().len();
             let found = if read < MOST_FILES {
@@ -134,7 +141,7 @@ impl Files {
         };
         let plain =
             |part: &str| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
-        if !plain(package) || !plain(last) || !["msg", "srv"].contains(&kind) || parts.next().is_some() {
+        if !plain(package) || !plain(last) || !FORMATS.iter().any(|(of, _)| *of == kind) || parts.next().is_some() {
             return None;
         }
         let beside = Path::new(folders.file).parent().unwrap_or(Path::new(""));
@@ -226,22 +233,18 @@ fn dialect(files: &[String], beside: &str) -> Dialects {
     Ok(definitions.iter().map(mavlink::Definition::interface).collect())
 }
 
-/// The message or service whose definition has an interface.
-fn defined_as(name: &str) -> &str {
-    let ends = ["_Request", "_Response"];
-    let of_service = name.contains("/srv/").then(|| ends.iter().find_map(|end| name.strip_suffix(end)));
-    of_service.flatten().unwrap_or(name)
-}
-
 /// Whether a message or service needs no file.
 fn is_known(name: &str) -> bool {
     known(name).is_some() || known(&format!("{name}_Request")).is_some()
 }
 
-/// The file in a package that may define an interface of a kind, `msg` or `srv`.
+/// The kinds of interfaces, and how those of a kind are written in a file that ends with its name.
+const FORMATS: [(&str, Format); 3] = [("msg", Format::Msg), ("srv", Format::Srv), ("action", Format::Action)];
+
+/// The file in a package that may define an interface of a kind.
 fn in_package(package: &Path, kind: &str, name: &str) -> Option<(PathBuf, Format)> {
-    let format = if kind == "msg" { Format::Msg } else { Format::Srv };
-    [(kind, format), ("idl", Format::Idl)].into_iter().find_map(|(extension, format)| {
+    let own = FORMATS.into_iter().find(|(of, _)| *of == kind);
+    own.into_iter().chain([("idl", Format::Idl)]).find_map(|(extension, format)| {
         let file = package.join(kind).join(format!("{name}.{extension}"));
         file.exists().then_some((file, format))
     })
@@ -423,6 +426,45 @@ mod tests {
         let files = [("first/a/srv/Move.srv", "a/msg/Leaf --- "), ("first/a/msg/Leaf.msg", "")];
         assert_eq!(found(&files, "a/srv/Move_Request").unwrap().unwrap(), ["a/msg/Leaf", "a/srv/Move_Request"]);
         assert_eq!(found(&files, "a/srv/Move_Response").unwrap().unwrap(), ["a/srv/Move_Response"]);
+    }
+
+    #[test]
+    fn an_action_is_all_messages_that_it_consists_of() {
+        let folder = tempfile::tempdir().unwrap();
+        let idl = "module a { module action {\n\
+                     struct Stop_Goal { boolean now; };\n\
+                     struct Stop_Result { boolean done; };\n\
+                     struct Stop_Feedback { double left; };\n\
+                   }; };\n";
+        for (path, text) in [
+            ("a/action/Move.action", "Spot to\n---\nbool done\n---\nfloat64 left\n"),
+            ("a/action/Stop.idl", idl),
+            ("a/msg/Spot.msg", "float64 x\n"),
+        ] {
+            let path = folder.path().join(path);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, text).unwrap();
+        }
+        let file = folder.path().join("cell.sesame");
+        let written = [".".to_owned()];
+        let folders = Folders { written: &written, file: file.to_str().unwrap(), dialect: Dialect::Ros2 };
+        let files = Files::default();
+        let names = |name: &str| -> Vec<String> {
+            let found = files.find(folders, name).unwrap().unwrap();
+            found.into_iter().map(|interface| interface.name).collect()
+        };
+        let id = "unique_identifier_msgs/msg/UUID";
+        assert_eq!(
+            names("a/action/Move_FeedbackMessage"),
+            [id, "a/action/Move_Feedback", "a/action/Move_FeedbackMessage"]
+        );
+        let goal = [id, "a/msg/Spot", "a/action/Move_Goal", "a/action/Move_SendGoal_Request"];
+        assert_eq!(names("a/action/Move_SendGoal_Request"), goal);
+        assert_eq!(
+            names("a/action/Stop_GetResult_Response"),
+            ["a/action/Stop_Result", "a/action/Stop_GetResult_Response"]
+        );
+        assert_eq!(files.find(folders, "a/action/Move"), Ok(None), "it is no message");
     }
 
     #[test]

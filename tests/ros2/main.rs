@@ -9,6 +9,7 @@ mod environment;
 mod peer;
 mod relaying;
 
+mod actions;
 mod budget;
 mod codec;
 mod examples;

@@ -8,9 +8,18 @@ use sesame_plan::WireType;
 
 use super::id::node_id;
 
-/// How the topics of a space are cut, in their order.
+/// How the topics of a space are cut, in their order: if one of an action is, all of them are.
 pub(super) fn wirings(space: &Space, stepped: bool) -> Vec<plan::Wiring> {
-    space.topics.iter().map(|(topic, _)| wiring(space, topic, stepped)).collect()
+    let mut wirings: Vec<plan::Wiring> = space.topics.iter().map(|(topic, _)| wiring(space, topic, stepped)).collect();
+    // What is disturbed would otherwise be overtaken by the rest of its action, which nobody disturbs: a status by the
+    // result, for example.
+    let actions = || space.topics.values().map(|topic| topic.action.as_deref());
+    let cut: BTreeSet<&str> =
+        actions().zip(&wirings).filter(|(_, wiring)| wiring.cut).filter_map(|(action, _)| action).collect();
+    for (action, wiring) in actions().zip(&mut wirings) {
+        wiring.cut |= action.is_some_and(|action| cut.contains(action));
+    }
+    wirings
 }
 
 /// Whether a monitor of the runner publishes on a topic: its state, or what is to bring the system into a safe state.

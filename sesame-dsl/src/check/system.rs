@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use sesame_plan::without_member;
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{Declaration, MetricSource, Operation, Space, TopicId};
+use crate::model::{Channel, Declaration, MetricSource, Operation, Space, TopicId};
 use crate::resolve::list;
 
 /// Operations whose name ends with the name of a topic that they do not disturb.
@@ -88,11 +88,13 @@ fn partly_unheard(operation: &Operation, topic: &Declaration) -> Diagnostic {
 const SHARED: [&str; 5] = ["tf", "tf_static", "diagnostics", "rosout", "parameter_events"];
 
 /// Topics, or members of groups, that more than one declared node or monitor publishes. The members of one group of
-/// nodes share a topic because it is declared so.
+/// nodes share a topic because it is declared so, and a service or action may have many clients.
 pub(super) fn two_publishers(space: &Space, diagnostics: &mut Vec<Diagnostic>) {
+    let mut actions: BTreeSet<&str> = BTreeSet::new();
     for (id, topic) in space.topics.iter() {
         let is_shared = |path: &String| path.rsplit('/').next().is_some_and(|last| SHARED.contains(&last));
-        if topic.paths.iter().all(is_shared) {
+        let is_said = topic.action.as_deref().is_some_and(|action| actions.contains(action));
+        if topic.channel == Channel::Request || is_said || topic.paths.iter().all(is_shared) {
             continue;
         }
         let publishers = publishers(space, id);
@@ -106,6 +108,7 @@ pub(super) fn two_publishers(space: &Space, diagnostics: &mut Vec<Diagnostic>) {
             }
         }
         let [first, second, further @ ..] = together.as_slice() else { continue };
+        actions.extend(topic.action.as_deref());
         let (topic, kind) = (&topic.declaration, first.kind);
         let title = if !further.is_empty() {
             let names: Vec<&str> = together.iter().map(|one| one.name).collect();

@@ -69,21 +69,31 @@ fn used_metrics(space: &Space) -> BTreeSet<MetricId> {
     used
 }
 
-/// Topics of the file itself that no node publishes or subscribes to and nothing else uses, if there are nodes.
+/// Topics of the file itself that no node publishes or subscribes to and nothing else uses, if there are nodes. An
+/// action is used if any of its topics is.
 pub(super) fn topics(space: &Space, root: FileId, diagnostics: &mut Vec<Diagnostic>) {
     if space.nodes.is_empty() {
         return;
     }
     let used = used_topics(space);
+    let mut actions: BTreeSet<&str> = used.iter().filter_map(|&topic| space.topics[topic].action.as_deref()).collect();
     for (id, topic) in space.topics.iter() {
         let declaration = &topic.declaration;
-        if !used.contains(&id) && declaration.span.file == root {
-            let title = format!("topic `{}` is never used", declaration.name);
-            diagnostics.push(
-                Diagnostic::new(Code::UNUSED_TOPIC, declaration.span, title)
-                    .label("no node publishes or subscribes to it, and nothing else uses it"),
-            );
+        if used.contains(&id) || declaration.span.file != root {
+            continue;
         }
+        let (title, label) = match topic.action.as_deref() {
+            // Said once for all of its topics.
+            Some(action) if !actions.insert(action) => continue,
+            Some(action) => {
+                (format!("action `{action}` is never used"), "no node serves or calls it, and nothing else uses it")
+            }
+            None => (
+                format!("topic `{}` is never used", declaration.name),
+                "no node publishes or subscribes to it, and nothing else uses it",
+            ),
+        };
+        diagnostics.push(Diagnostic::new(Code::UNUSED_TOPIC, declaration.span, title).label(label));
     }
 }
 

@@ -143,7 +143,7 @@ impl<'a> Indexer<'a> {
     }
 
     fn declare_system(&mut self, system: &'a System) -> SystemIds {
-        let System { simulators, messages, topics, services, nodes, .. } = system;
+        let System { simulators, messages, topics, services, actions, nodes, .. } = system;
         let simulators = simulators.iter().map(|simulator| self.declare(Kind::Simulator, &simulator.head)).collect();
         let mut message_ids = Vec::new();
         for message in messages {
@@ -167,6 +167,12 @@ impl<'a> Indexer<'a> {
             self.declare(Kind::Service, &service.head);
             self.declare(Kind::Topic, &service.request);
             self.declare(Kind::Topic, &service.reply);
+        }
+        for action in actions {
+            self.declare(Kind::Action, &action.head);
+            for part in &action.parts {
+                self.declare(Kind::Topic, part);
+            }
         }
         let nodes = nodes.iter().map(|node| self.declare(Kind::Node, &node.head)).collect();
         SystemIds { simulators, messages: message_ids, topics: topic_ids, nodes }
@@ -390,6 +396,7 @@ impl<'a> Indexer<'a> {
             messages,
             topics,
             services: _,
+            actions: _,
             nodes,
             launches,
             terminates: _,
@@ -405,7 +412,8 @@ impl<'a> Indexer<'a> {
             self.type_of(&topic.ty, id);
         }
         for (node, &id) in nodes.iter().zip(&ids.nodes) {
-            for listed in [&node.publishes, &node.subscribes].into_iter().flatten().flat_map(|(_, listed)| listed) {
+            let lists = [&node.publishes, &node.subscribes, &node.serves, &node.calls];
+            for listed in lists.into_iter().flatten().flat_map(|(_, listed)| listed) {
                 self.mention(&listed.name, id);
             }
             self.mention_all(&node.every_step, id);

@@ -149,6 +149,8 @@ pub struct Topic {
     pub ty: Type,
     /// Whether it is a topic of the middleware, or one direction of a service.
     pub channel: Channel,
+    /// The name of the action that it is a part of, if it is one.
+    pub action: Option<String>,
 }
 
 /// A topic, or some members of a group of topics.

@@ -44,8 +44,10 @@ impl<'a> Resolver<'a> {
         add(Kind::Simulator, self.simulators().map(|simulator| &simulator.head).collect());
         add(Kind::Message, self.ast_messages().map(|message| &message.head).collect());
         let of_services = self.ast_services().flat_map(|service| [&service.request, &service.reply]);
-        add(Kind::Topic, self.ast_topics().map(|topic| &topic.head).chain(of_services).collect());
+        let of_actions = self.ast_actions().flat_map(|action| &action.parts);
+        add(Kind::Topic, self.ast_topics().map(|topic| &topic.head).chain(of_services).chain(of_actions).collect());
         add(Kind::Service, self.ast_services().map(|service| &service.head).collect());
+        add(Kind::Action, self.ast_actions().map(|action| &action.head).collect());
         add(Kind::Node, self.ast_nodes().map(|node| &node.head).collect());
         add(Kind::Metric, file.metrics.iter().map(|metric| &metric.head).collect());
         add(Kind::Requirement, file.requirements.iter().map(|requirement| &requirement.head).collect());

@@ -1,6 +1,6 @@
 //! Members of groups by their names: `odom[r1]`.
 
-use super::words::list;
+use super::words::{article, list};
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::groups::{Expanded, expand};
@@ -15,7 +15,7 @@ impl Resolver<'_> {
         match expand(&path.text) {
             Ok(members) => Some(members),
             Err(why) => {
-                let title = format!("`{}` is not the path of a {what}", path.text);
+                let title = format!("`{}` is not the path of {}", path.text, article(what));
                 self.report(Diagnostic::new(Code::BAD_PATH, path.span, title).label(why));
                 None
             }
@@ -76,7 +76,11 @@ impl Resolver<'_> {
     /// The member of a topic that a path or list names in brackets. `None` was reported.
     pub(super) fn named_member(&mut self, topic: TopicId, name: &ast::Name, wanted: &str, span: Span) -> Option<u32> {
         let members = self.members_of_topic(topic);
-        let declared = self.system.topics[topic.index()].as_ref()?.declaration.span;
-        self.member_named(&members, wanted, span, ("topic", &name.text, declared))
+        let declared = self.system.topics[topic.index()].as_ref()?;
+        let what = match self.names.get(name.text.as_str()).map(|named| named.kind) {
+            Some(kind @ (Kind::Service | Kind::Action)) => kind.word(),
+            _ => Kind::Topic.word(),
+        };
+        self.member_named(&members, wanted, span, (what, &name.text, declared.declaration.span))
     }
 }

@@ -3,6 +3,7 @@
 use sesame_plan::{Dialect, SimulatorKind, SimulatorProperties};
 
 use super::Resolver;
+use super::words::article;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{Clock, Ros, StepBy, Stepping};
 use crate::span::Span;
@@ -174,7 +175,7 @@ impl<'a> Resolver<'a> {
         match absolute(name) {
             Ok(name) => Some(name),
             Err(why) => {
-                let title = format!("`{name}` is not the name of a {what} in ROS");
+                let title = format!("`{name}` is not the name of {} in ROS", article(what));
                 self.report(Diagnostic::new(Code::BAD_PATH, span, title).label(why));
                 None
             }

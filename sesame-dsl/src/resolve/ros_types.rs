@@ -42,7 +42,19 @@ pub(super) enum Layout {
     Block(String),
 }
 
+/// The kinds of interfaces of ROS, what they are the types of, and an example.
+const KINDS: [(&str, &str, &str); 3] = [
+    ("msg", "a message", "sensor_msgs/msg/JointState"),
+    ("srv", "a service", "std_srvs/srv/SetBool"),
+    ("action", "an action", "nav2_msgs/action/NavigateToPose"),
+];
+
 impl<'a> Resolver<'a> {
+    /// The message of the file with this type.
+    pub(super) fn declared_message(&self, interface: &str) -> Option<MessageId> {
+        self.system.ros.declared.get(interface).map(|&index| self.system.message_ids[index])
+    }
+
     /// Looks the layouts of all messages up.
     pub(super) fn layouts(&mut self, messages: &[&'a ast::Message]) {
         self.system.ros.taken = messages.iter().map(|message| message.head.name.text.to_upper_camel_case()).collect();
@@ -94,14 +106,25 @@ impl<'a> Resolver<'a> {
         }
         let name = interfaces::full_name(&written.text, kind, self.dialect());
         if name.is_none() {
-            let (what, example) = if kind == "msg" {
-                ("message", "sensor_msgs/msg/JointState")
-            } else {
-                ("service", "std_srvs/srv/SetBool")
-            };
-            let title = format!("`{}` is not the type of a {what} in ROS", written.text);
-            let diagnostic = Diagnostic::new(Code::BAD_PATH, written.span, title)
+            let (_, what, example) =
+                KINDS.into_iter().find(|(of, ..)| *of == kind).expect("each kind of an interface has a row");
+            let title = format!("`{}` is not the type of {what} in ROS", written.text);
+            let mut diagnostic = Diagnostic::new(Code::BAD_PATH, written.span, title)
                 .label(format!("expected a package and a type, for example `{example}`"));
+            let other = KINDS.into_iter().find(|(of, ..)| {
+                let named = written.text.split('/').nth(1) == Some(of);
+                *of != kind && named && interfaces::full_name(&written.text, of, self.dialect()).is_some()
+            });
+            if let Some((of, other, _)) = other {
+                diagnostic = diagnostic.note(match of {
+                    "action" => format!(
+                        "it is the type of {other}: declare it with `action NAME = \"PATH\" : \"{0}\"`; the messages that \
+                         it consists of have types of their own, such as `{0}_Goal`",
+                        written.text
+                    ),
+                    _ => format!("it is the type of {other}"),
+                });
+            }
             self.report(diagnostic);
         }
         name

@@ -1,8 +1,7 @@
 //! Topics and nodes of the system, and the fields that paths into messages lead to.
 
-use std::collections::BTreeMap;
-
 use super::elements::Reading;
+use super::services::TakenPaths;
 use super::words::type_in_words;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
@@ -29,25 +28,22 @@ impl<'a> Resolver<'a> {
         self.count_nodes();
         let simulator = self.simulators().next().and_then(|simulator| self.simulator(simulator));
         self.messages();
-        self.topics();
+        let mut taken = TakenPaths::default();
+        self.topics(&mut taken);
         self.defined_messages();
-        self.services();
+        self.services(&mut taken);
+        self.actions(&mut taken);
         self.nodes();
         simulator
     }
 
-    fn topics(&mut self) {
-        let mut paths: BTreeMap<String, Span> = BTreeMap::new();
+    fn topics(&mut self, taken: &mut TakenPaths) {
         for topic in self.ast_topics() {
             let ty = self.type_of(&topic.ty);
             let ty = ty.filter(|ty| self.has_a_layout(topic, ty));
             let members = self.topic_paths(&topic.path, "topic");
             for member in members.iter().flat_map(|(paths, _)| paths) {
-                if let Some(&first) = paths.get(member) {
-                    self.same_path("topics", member, topic.path.span, first);
-                } else {
-                    paths.insert(member.clone(), topic.path.span);
-                }
+                self.take_path(taken, Channel::Topic, member, topic.path.span);
             }
             let resolved = ty.zip(members).map(|(ty, (paths, members))| model::Topic {
                 declaration: self.declaration(&topic.head),
@@ -56,12 +52,16 @@ impl<'a> Resolver<'a> {
                 members,
                 ty,
                 channel: Channel::Topic,
+                action: None,
             });
             self.system.topics.push(resolved);
         }
     }
 
     pub(super) fn same_path(&mut self, what: &str, path: &str, again: Span, first: Span) {
+        // Services and actions are looked at after topics, wherever they stand.
+        let swapped = again.file == first.file && again < first;
+        let (again, first) = if swapped { (first, again) } else { (again, first) };
         let diagnostic = Diagnostic::new(Code::SAME_PATH, again, format!("two {what} have the path `{path}`"))
             .label("used again here")
             .secondary(first, "first used here");
@@ -115,7 +115,7 @@ impl<'a> Resolver<'a> {
         false
     }
 
-    /// The paths of a topic or service: one, or those of the members of its group, with their names. In ROS the paths
+    /// The paths of a topic, service or action: one, or those of the members of its group, with their names. In ROS the paths
     /// are absolute.
     pub(super) fn topic_paths(&mut self, path: &ast::Text, what: &str) -> Option<(Vec<String>, Vec<String>)> {
         if path.text.trim().is_empty() {
@@ -136,7 +136,8 @@ impl<'a> Resolver<'a> {
     pub(super) fn path_of_topic(&self, topic: TopicId) -> Option<&'a ast::Text> {
         let paths = self.ast_topics().map(|topic| &topic.path);
         let of_services = self.ast_services().flat_map(|service| [&service.path, &service.path]);
-        paths.chain(of_services).nth(topic.index())
+        let of_actions = self.ast_actions().flat_map(|action| action.parts.iter().map(|_| &action.path));
+        paths.chain(of_services).chain(of_actions).nth(topic.index())
     }
 
     /// What a path refers to: its topic, and the type at its end. `None` was reported, here or before.

@@ -34,3 +34,9 @@ pub(super) fn type_in_words(ty: &Type) -> String {
         Type::Message(_) => "a message".to_owned(),
     }
 }
+
+/// A word with its article.
+pub(super) fn article(word: &str) -> String {
+    let article = if word.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
+    format!("{article} {word}")
+}

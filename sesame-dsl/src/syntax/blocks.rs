@@ -145,6 +145,7 @@ pub(super) const BLOCKS: &[Block] = &[
             Member::declaration(Rule::message, "message"),
             Member::declaration(Rule::topic, "topic"),
             Member::declaration(Rule::service, "service"),
+            Member::declaration(Rule::action, "action"),
             Member::declaration(Rule::node, "node"),
             Member::new(Rule::launch, "launch"),
             Member::new(Rule::terminate, "terminate"),
@@ -259,6 +260,8 @@ pub(super) const BLOCKS: &[Block] = &[
         members: &[
             Member::new(Rule::publishes, "publishes"),
             Member::new(Rule::subscribes, "subscribes"),
+            Member::new(Rule::serves, "serves"),
+            Member::new(Rule::calls, "calls"),
             Member::new(Rule::launch, "launch"),
             Member::new(Rule::answers, "answers"),
             Member::like(Rule::every_step, "every", "every step"),

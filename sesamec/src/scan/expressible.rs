@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use sesame_dsl::diagnostic::visible_lines;
 use sesame_notation::quoted;
-use sesame_scan::{CLOCK, Facts, FoundService, FoundTopic, System, TypeSource};
+use sesame_scan::{CLOCK, Facts, FoundAction, FoundService, FoundTopic, System, TypeSource};
 
 use super::comments::LeftOut;
 use super::origin::Origin;
@@ -76,6 +76,25 @@ pub(super) fn services<'a>(facts: &'a Facts, origin: Origin<'_>, left_out: &mut 
             left_out.decide(&format!("service {what} is used with another type as well"));
         } else {
             expressible.push(service);
+        }
+    }
+    expressible
+}
+
+/// Actions that the space can have.
+pub(super) fn actions<'a>(facts: &'a Facts, origin: Origin<'_>, left_out: &mut LeftOut) -> Vec<&'a FoundAction> {
+    let mut expressible = Vec::new();
+    for action in &facts.actions {
+        let path = quoted(&action.path);
+        let what = format!("{path} of type {}", quoted(&action.ty));
+        if action.ty.is_empty() {
+            left_out.decide(&format!("nobody said the type of action {path}"));
+        } else if !is_ros_name(&action.path) {
+            left_out.decide(&format!("action {what} has no name of ROS"));
+        } else if !origin.services.contains(&action.ty) {
+            left_out.decide(&format!("no folder has the type of action {what}"));
+        } else {
+            expressible.push(action);
         }
     }
     expressible

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use sesame_dsl::groups::{expand, own_members};
 use sesame_plan::with_member;
-use sesame_scan::{FoundNode, FoundService, FoundTopic, System};
+use sesame_scan::{FoundAction, FoundNode, FoundService, FoundTopic, System};
 
 use super::groups::{Line, fold_by};
 
@@ -12,50 +12,56 @@ use super::groups::{Line, fold_by};
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Node<'a> {
     pub(super) found: &'a FoundNode,
-    /// What it publishes, and what it subscribes to, as a node lists it.
-    pub(super) lists: &'a [Vec<String>; 2],
+    /// What it lists, by the words of [`WORDS`].
+    pub(super) lists: &'a Lists,
 }
 
-/// What each node publishes, and what it subscribes to, services included, as a node lists it.
+/// What a node publishes, subscribes to, serves and calls, as it lists it.
+pub(super) type Lists = [Vec<String>; 4];
+
+/// The words of these lists.
+pub(super) const WORDS: [&str; 4] = ["publishes", "subscribes", "serves", "calls"];
+
+/// What each node lists.
 pub(super) fn lists_of_nodes(
     nodes: &[&FoundNode],
     topics: &[(String, Line<&FoundTopic>)],
     services: &[(String, Line<&FoundService>)],
-) -> Vec<[Vec<String>; 2]> {
-    let mut lists: BTreeMap<&str, [BTreeMap<String, Vec<u32>>; 2]> = BTreeMap::new();
+    actions: &[(String, Line<&FoundAction>)],
+) -> Vec<Lists> {
+    let mut lists: BTreeMap<&str, [BTreeMap<&str, Vec<u32>>; 4]> = BTreeMap::new();
     // The path that each name in the lists stands for.
-    let mut paths: BTreeMap<String, &str> = BTreeMap::new();
+    let mut paths: BTreeMap<&str, &str> = BTreeMap::new();
     for (name, line) in topics {
-        paths.insert(name.clone(), &line.path);
+        paths.insert(name, &line.path);
         for (member, topic) in (0u32..).zip(&line.of) {
             for (side, nodes) in [&topic.publishers, &topic.subscribers].into_iter().enumerate() {
                 for node in nodes {
-                    lists.entry(node).or_default()[side].entry(name.clone()).or_default().push(member);
+                    lists.entry(node).or_default()[side].entry(name).or_default().push(member);
                 }
             }
         }
     }
-    for (name, line) in services {
-        let [request, reply] = ["request", "reply"].map(|end| format!("{name}_{end}"));
-        paths.insert(request.clone(), &line.path);
-        paths.insert(reply.clone(), &line.path);
-        for (member, service) in (0u32..).zip(&line.of) {
-            for (nodes, ends) in [(&service.servers, [&reply, &request]), (&service.clients, [&request, &reply])] {
-                for node in nodes {
-                    for (side, end) in ends.into_iter().enumerate() {
-                        lists.entry(node).or_default()[side].entry(end.clone()).or_default().push(member);
-                    }
-                }
+    let of_services = services.iter().flat_map(|(name, line)| {
+        line.of.iter().map(move |service| (name, &line.path, [&service.servers, &service.clients])).zip(0u32..)
+    });
+    let of_actions = actions.iter().flat_map(|(name, line)| {
+        line.of.iter().map(move |action| (name, &line.path, [&action.servers, &action.clients])).zip(0u32..)
+    });
+    for ((name, path, ends), member) in of_services.chain(of_actions) {
+        paths.insert(name, path);
+        for (side, nodes) in (2..).zip(ends) {
+            for node in nodes {
+                lists.entry(node).or_default()[side].entry(name).or_default().push(member);
             }
         }
     }
-    let none = [BTreeMap::new(), BTreeMap::new()];
+    let none = std::array::from_fn(|_| BTreeMap::new());
     let listed = |node: &&FoundNode| {
         let of_node = lists.get(node.name.as_str()).unwrap_or(&none);
-        let list = |side: &BTreeMap<String, Vec<u32>>| {
-            side.iter().flat_map(|(name, members)| words(name, paths[name], members, &node.name)).collect()
-        };
-        [list(&of_node[0]), list(&of_node[1])]
+        of_node
+            .each_ref()
+            .map(|side| side.iter().flat_map(|(name, members)| words(name, paths[name], members, &node.name)).collect())
     };
     nodes.iter().map(listed).collect()
 }
@@ -74,11 +80,7 @@ fn words(name: &str, path: &str, used: &[u32], node: &str) -> Vec<String> {
 }
 
 /// Folds nodes of ROS into groups: if they list the same, and differ in their namespaces.
-pub(super) fn fold_nodes<'a>(
-    system: &System,
-    nodes: &[&'a FoundNode],
-    lists: &'a [[Vec<String>; 2]],
-) -> Vec<Line<Node<'a>>> {
+pub(super) fn fold_nodes<'a>(system: &System, nodes: &[&'a FoundNode], lists: &'a [Lists]) -> Vec<Line<Node<'a>>> {
     let nodes: Vec<Node<'a>> = nodes.iter().zip(lists).map(|(found, lists)| Node { found, lists }).collect();
     if !system.is_ros() {
         let alone = |node: Node<'a>| {

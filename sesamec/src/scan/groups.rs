@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use sesame_scan::{FoundService, FoundTopic};
+use sesame_scan::{FoundAction, FoundService, FoundTopic};
 
 /// One that was found, or several as a group.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,6 +40,18 @@ pub(super) fn fold_services<'a>(services: &[&'a FoundService]) -> Vec<Line<&'a F
         |service, part| {
             let nodes = [&service.servers, &service.clients].map(|nodes| without(nodes, part));
             (service.ty.clone(), nodes)
+        },
+    )
+}
+
+/// Folds actions into groups in the same way.
+pub(super) fn fold_actions<'a>(actions: &[&'a FoundAction]) -> Vec<Line<&'a FoundAction>> {
+    fold_by(
+        actions,
+        |action| action.path.clone(),
+        |action, part| {
+            let nodes = [&action.servers, &action.clients].map(|nodes| without(nodes, part));
+            (action.ty.clone(), nodes)
         },
     )
 }

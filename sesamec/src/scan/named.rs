@@ -5,12 +5,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use heck::ToUpperCamelCase as _;
 use sesame_legacy::Names;
 use sesame_notation::quoted;
-use sesame_scan::{Facts, FoundService, FoundTopic};
+use sesame_plan::action;
+use sesame_scan::{Facts, FoundAction, FoundService, FoundTopic};
 
 use super::comments::LeftOut;
 use super::expressible::is_ros_name;
-use super::grouped_nodes::{Node, fold_nodes, lists_of_nodes};
-use super::groups::{Line, fold, fold_services};
+use super::grouped_nodes::{Lists, Node, fold_nodes, lists_of_nodes};
+use super::groups::{Line, fold, fold_actions, fold_services};
 use super::simulator::words_of_topic;
 
 /// All names.
@@ -21,6 +22,7 @@ pub(super) struct Named<'a> {
     /// Topics as the space has them.
     pub(super) topics: Vec<(String, Line<&'a FoundTopic>)>,
     pub(super) services: Vec<(String, Line<&'a FoundService>)>,
+    pub(super) actions: Vec<(String, Line<&'a FoundAction>)>,
     pub(super) nodes: Vec<(String, Line<Node<'a>>)>,
 }
 
@@ -29,8 +31,8 @@ pub(super) fn name_all<'a>(
     facts: &'a Facts,
     needed: &[&'a str],
     topics: &[&'a FoundTopic],
-    services: &[&'a FoundService],
-    lists: &'a mut Vec<[Vec<String>; 2]>,
+    (services, actions): (&[&'a FoundService], &[&'a FoundAction]),
+    lists: &'a mut Vec<Lists>,
     left_out: &mut LeftOut,
 ) -> Named<'a> {
     let mut names = Names::default();
@@ -42,7 +44,11 @@ pub(super) fn name_all<'a>(
     let topics = fold(topics).into_iter();
     let topics: Vec<_> = topics.map(|line| (names.take(&words_of_topic(system, &line.name), "topic"), line)).collect();
     let services = fold_services(services).into_iter();
-    let services: Vec<_> = services.map(|line| (service_name(&mut names, &line.name), line)).collect();
+    let services: Vec<_> =
+        services.map(|line| (name_with(&mut names, &line.name, "service", &["request", "reply"]), line)).collect();
+    let parts = action::PARTS.map(|part| part.name);
+    let actions = fold_actions(actions).into_iter();
+    let actions: Vec<_> = actions.map(|line| (name_with(&mut names, &line.name, "action", &parts), line)).collect();
     let mut expressible = Vec::new();
     for node in &facts.nodes {
         if !system.is_ros() || is_ros_name(&node.name) {
@@ -51,7 +57,7 @@ pub(super) fn name_all<'a>(
             left_out.decide(&format!("node {} has no name of ROS", quoted(&node.name)));
         }
     }
-    *lists = lists_of_nodes(&expressible, &topics, &services);
+    *lists = lists_of_nodes(&expressible, &topics, &services, &actions);
     let nodes = fold_nodes(system, &expressible, lists).into_iter();
     let nodes: Vec<_> = nodes.map(|line| (names.take(&line.name, "node"), line)).collect();
     let simulator = names.take("robots", "simulator");
@@ -60,6 +66,7 @@ pub(super) fn name_all<'a>(
         .iter()
         .map(|(name, _)| name.as_str())
         .chain(services.iter().map(|(name, _)| name.as_str()))
+        .chain(actions.iter().map(|(name, _)| name.as_str()))
         .chain(nodes.iter().map(|(name, _)| name.as_str()))
         .chain([simulator.as_str()])
         .collect();
@@ -71,19 +78,20 @@ pub(super) fn name_all<'a>(
         }
     };
     let messages = needed.iter().map(|ty| (*ty, message(ty))).collect();
-    Named { simulator, messages, topics, services, nodes }
+    Named { simulator, messages, topics, services, actions, nodes }
 }
 
-/// A name for a service, whose requests and replies have names that begin with it.
-fn service_name(names: &mut Names, path: &str) -> String {
+/// A name for a service or an action, whose topics have names that begin with it and have these ends.
+fn name_with(names: &mut Names, path: &str, what: &str, ends: &[&str]) -> String {
     let path: String = path.chars().take(40).collect();
     loop {
-        let name = names.take(&path, "service");
-        let [request, reply] = ["request", "reply"].map(|end| {
+        let name = names.take(&path, what);
+        // Each is taken, so that the next name is another one.
+        let free = ends.iter().filter(|end| {
             let wanted = format!("{name}_{end}");
-            names.take(&wanted, "service") == wanted
+            names.take(&wanted, what) == wanted
         });
-        if request && reply {
+        if free.count() == ends.len() {
             return name;
         }
     }

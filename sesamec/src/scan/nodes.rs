@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use sesame_notation::quoted;
 use sesame_scan::System;
 
-use super::grouped_nodes::Node;
+use super::grouped_nodes::{Node, WORDS};
 use super::named::Named;
 
 /// A block for each node, or group of them.
@@ -22,7 +22,7 @@ pub(super) fn nodes(system: &System, named: &Named<'_>) -> String {
         // Only nodes of ROS have names of their own.
         let own = if system.is_ros() { format!("{} ", quoted(&line.path)) } else { String::new() };
         _ = writeln!(text, "node {name} {own}{{");
-        for (word, listed) in ["publishes", "subscribes"].iter().zip(*lists) {
+        for (word, listed) in WORDS.iter().zip(*lists) {
             if !listed.is_empty() {
                 let listed: Vec<&str> = listed.iter().map(String::as_str).collect();
                 _ = writeln!(text, "{word:<10} {}", wrapped(&listed));

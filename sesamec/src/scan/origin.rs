@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 pub struct Origin<'a> {
     /// The folders with definitions of types, as they are written.
     pub folders: &'a [String],
-    /// The types of services that have a layout.
+    /// The types of services and actions that have a layout.
     pub services: &'a BTreeSet<String>,
     /// Lines of the simulator that say how it was reached, such as where a secret is.
     pub settings: &'a [String],

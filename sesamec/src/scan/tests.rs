@@ -104,7 +104,8 @@ fn a_system_is_its_nodes_topics_and_services() {
         service("/cell/plan", "nav_msgs/srv/GetPlan"),
     ];
     let mut facts = facts(topics, services, &["/arm/driver", "/cell", "/idle"]);
-    facts.actions.push(FoundAction { path: "/go".to_owned(), ty: "nav2_msgs/action/NavigateToPose".to_owned() });
+    let (path, ty) = ("/go".to_owned(), "nav2_msgs/action/NavigateToPose".to_owned());
+    facts.actions.push(FoundAction { path, ty, ..FoundAction::default() });
     facts.nodes[2].count = 2;
     insta::assert_snapshot!(written(&facts, &[]));
 }

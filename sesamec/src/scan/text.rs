@@ -2,14 +2,13 @@
 
 use std::fmt::Write as _;
 
-use sesame_notation::quoted;
 use sesame_scan::Facts;
 
 use super::comments::LeftOut;
 use super::named::name_all;
 use super::nodes::nodes;
 use super::origin::Origin;
-use super::topics::{service_lines, topic_lines};
+use super::topics::{action_lines, service_lines, topic_lines};
 use super::types::Types;
 use super::{blocks, expressible, simulator};
 
@@ -20,16 +19,10 @@ pub(super) fn space(facts: &Facts, types: &Types, origin: Origin<'_>) -> String 
     let clock = simulator::clock(facts);
     let topics = expressible::topics(facts, types, origin, clock, &mut left_out);
     let services = expressible::services(facts, origin, &mut left_out);
-    for action in &facts.actions {
-        left_out.decide(&format!(
-            "the language has no actions: {} of type {}",
-            quoted(&action.path),
-            quoted(&action.ty)
-        ));
-    }
+    let actions = expressible::actions(facts, origin, &mut left_out);
     let needed = types.needed(topics.iter().filter_map(|topic| topic.ty.as_deref()));
     let mut lists = Vec::new();
-    let named = name_all(facts, &needed, &topics, &services, &mut lists, &mut left_out);
+    let named = name_all(facts, &needed, &topics, (&services, &actions), &mut lists, &mut left_out);
     simulator::unseen(facts, &mut left_out);
 
     let mut text = simulator::heading(facts);
@@ -42,6 +35,7 @@ pub(super) fn space(facts: &Facts, types: &Types, origin: Origin<'_>) -> String 
         blocks::messages(system, types, &named.messages, &needed),
         topic_lines(system, types, &named),
         service_lines(system, &named),
+        action_lines(&named),
         left_out.text(),
         nodes(system, &named),
         if simulator::lacks_a_node(facts) { format!("node {} {{ }}\n", simulator::UNHEARD) } else { String::new() },

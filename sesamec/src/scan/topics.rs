@@ -1,4 +1,4 @@
-//! Topics and services of the space, each with what was seen of it.
+//! Topics, services and actions of the space, each with what was seen of it.
 
 use sesame_notation::quoted;
 use sesame_scan::{FoundTopic, NOBODY, System};
@@ -62,6 +62,17 @@ pub(super) fn service_lines(system: &System, named: &Named<'_>) -> String {
         }
         let ty = service.ty.as_deref().unwrap_or_default();
         format!("service {name} = {} : {}  // {}\n", quoted(&line.path), quoted(ty), who.join(", "))
+    });
+    lines.collect()
+}
+
+/// A line for each action.
+pub(super) fn action_lines(named: &Named<'_>) -> String {
+    let lines = named.actions.iter().map(|(name, line)| {
+        let Some(action) = line.of.first() else { return String::new() };
+        let who = [(&action.servers, "server"), (&action.clients, "client")];
+        let who = who.map(|(nodes, what)| counted(nodes.len() as u64, what)).join(", ");
+        format!("action {name} = {} : {}  // {who}\n", quoted(&line.path), quoted(&action.ty))
     });
     lines.collect()
 }

@@ -198,9 +198,13 @@ pub struct FoundService {
 pub struct FoundAction {
     /// Its path.
     pub path: String,
-    /// Its type, for example `nav2_msgs/action/NavigateToPose`.
+    /// Its type, for example `nav2_msgs/action/NavigateToPose`; empty if it is unknown.
     #[serde(rename = "type")]
     pub ty: String,
+    /// The node of each server; `?` for an unknown node.
+    pub servers: Vec<String>,
+    /// The node of each client, in the same way.
+    pub clients: Vec<String>,
 }
 
 /// A type of messages.

@@ -9,6 +9,7 @@
 //! every other quantity is in the unit its field, metric or topic declares (the unit on the wire), probabilities are in
 //! `0..=1`.
 
+pub mod action;
 mod brokers;
 mod bus;
 mod campaign;

@@ -13,6 +13,7 @@ pub(crate) struct System {
     pub(crate) messages: Vec<Message>,
     pub(crate) topics: Vec<Topic>,
     pub(crate) services: Vec<Service>,
+    pub(crate) actions: Vec<Action>,
     pub(crate) nodes: Vec<Node>,
     pub(crate) launches: Vec<(Span, Launch)>,
     pub(crate) terminates: Vec<(Span, Command)>,
@@ -186,6 +187,16 @@ pub(crate) struct Service {
     pub(crate) ros_type: Text,
 }
 
+/// An action of ROS 2: a topic for each of [`sesame_plan::action::PARTS`].
+#[derive(Debug)]
+pub(crate) struct Action {
+    pub(crate) head: Head,
+    /// Its topics, whose names are not written.
+    pub(crate) parts: Vec<Head>,
+    pub(crate) path: Text,
+    pub(crate) ros_type: Text,
+}
+
 #[derive(Debug)]
 pub(crate) struct Node {
     pub(crate) head: Head,
@@ -193,6 +204,10 @@ pub(crate) struct Node {
     pub(crate) named: Option<Text>,
     pub(crate) publishes: Vec<(Span, Vec<WithMember>)>,
     pub(crate) subscribes: Vec<(Span, Vec<WithMember>)>,
+    /// The services and actions that it offers.
+    pub(crate) serves: Vec<(Span, Vec<WithMember>)>,
+    /// The services and actions of others that it uses.
+    pub(crate) calls: Vec<(Span, Vec<WithMember>)>,
     pub(crate) launches: Vec<(Span, Launch)>,
     pub(crate) answers: Vec<(Span, Vec<Answer>)>,
     pub(crate) every_step: Vec<(Span, Vec<Name>)>,

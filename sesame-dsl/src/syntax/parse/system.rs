@@ -5,8 +5,8 @@ use sesame_grammar::Rule;
 use super::reader::{Pair, Reader, child, children, expect_child, first_of};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::syntax::ast::{
-    Answer, Clock, Field, Head, Message, Name, Node, Proxy, Secret, Service, Settings, Simulator, StepBy, StepChannel,
-    Stepping, System, Text, Topic, Transport, Type, TypeKind,
+    Action, Answer, Clock, Field, Head, Message, Name, Node, Proxy, Secret, Service, Settings, Simulator, StepBy,
+    StepChannel, Stepping, System, Text, Topic, Transport, Type, TypeKind,
 };
 use crate::syntax::blocks;
 use sesame_plan::{Compression, Dialect, Quality, SimulatorKind};
@@ -20,6 +20,7 @@ impl Reader<'_> {
             messages: vec![],
             topics: vec![],
             services: vec![],
+            actions: vec![],
             nodes: vec![],
             launches: vec![],
             terminates: vec![],
@@ -35,6 +36,7 @@ impl Reader<'_> {
                 ty: reader.type_of(&expect_child(&member, Rule::type_of)),
             }),
             Rule::service => system.services.push(reader.service(&member)),
+            Rule::action => system.actions.push(reader.action(&member)),
             Rule::node => system.nodes.push(reader.node(&member)),
             Rule::launch => system.launches.push((reader.keyword_span(&member), reader.launch(&member))),
             Rule::terminate => system.terminates.push((reader.keyword_span(&member), reader.command(&member))),
@@ -173,14 +175,22 @@ impl Reader<'_> {
 
     fn service(&mut self, pair: &Pair<'_>) -> Service {
         let head = self.head(pair);
-        let mut texts = children(pair, Rule::text).map(|text| self.text_of(&text)).collect::<Vec<_>>().into_iter();
-        let direction = |suffix: &str| Head {
-            name: Name { text: format!("{}_{suffix}", head.name.text), span: head.name.span },
-            ..head.clone()
-        };
-        let [request, reply] = ["request", "reply"].map(direction);
-        let mut next = || texts.next().expect("a service has a path and a type");
-        Service { path: next(), ros_type: next(), head, request, reply }
+        let [path, ros_type] = self.path_and_type(pair);
+        let [request, reply] = ["request", "reply"].map(|end| part(&head, end));
+        Service { path, ros_type, head, request, reply }
+    }
+
+    fn action(&mut self, pair: &Pair<'_>) -> Action {
+        let head = self.head(pair);
+        let [path, ros_type] = self.path_and_type(pair);
+        let parts = sesame_plan::action::PARTS.iter().map(|of| part(&head, of.name)).collect();
+        Action { path, ros_type, head, parts }
+    }
+
+    /// The two texts of a service or an action.
+    fn path_and_type(&mut self, pair: &Pair<'_>) -> [Text; 2] {
+        let mut texts = children(pair, Rule::text);
+        [(); 2].map(|()| self.text_of(&texts.next().expect("a service and an action have a path and a type")))
     }
 
     fn message(&mut self, pair: &Pair<'_>) -> Message {
@@ -242,6 +252,8 @@ impl Reader<'_> {
             named,
             publishes: vec![],
             subscribes: vec![],
+            serves: vec![],
+            calls: vec![],
             launches: vec![],
             answers: vec![],
             every_step: vec![],
@@ -252,6 +264,8 @@ impl Reader<'_> {
             match member.as_rule() {
                 Rule::publishes => node.publishes.push((span, reader.with_members(&member))),
                 Rule::subscribes => node.subscribes.push((span, reader.with_members(&member))),
+                Rule::serves => node.serves.push((span, reader.with_members(&member))),
+                Rule::calls => node.calls.push((span, reader.with_members(&member))),
                 Rule::launch => node.launches.push((span, reader.launch(&member))),
                 Rule::every_step => node.every_step.push((span, reader.names(&member))),
                 Rule::broker => node.brokers.push((span, reader.text_of(&expect_child(&member, Rule::text)))),
@@ -267,4 +281,10 @@ impl Reader<'_> {
         });
         node
     }
+}
+
+/// A topic of a service or an action, whose name begins with that of the declaration.
+fn part(declared: &Head, end: &str) -> Head {
+    let name = Name { text: format!("{}_{end}", declared.name.text), span: declared.name.span };
+    Head { name, ..declared.clone() }
 }

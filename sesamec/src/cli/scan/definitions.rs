@@ -1,11 +1,11 @@
-//! Folders with the definitions of messages and services of ROS.
+//! Folders with the definitions of messages, services and actions of ROS.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use anyhow::bail;
 use sesame_dsl::interfaces::{self, Folders, Interfaces as _};
-use sesame_plan::Dialect;
+use sesame_plan::{Dialect, action};
 use sesame_scan::Facts;
 
 use crate::interfaces::Files;
@@ -43,17 +43,20 @@ impl Definitions {
         Folders { written: &self.written, file: FILE, dialect }
     }
 
-    /// The types of services that have layouts of requests and replies.
+    /// The types of services and actions that have layouts of all that they consist of.
     pub(super) fn services(&self, facts: &Facts) -> BTreeSet<String> {
         let folders = self.folders(facts.system.dialect());
-        let types: BTreeSet<&String> = facts.services.iter().filter_map(|service| service.ty.as_ref()).collect();
         let has_layout =
             |part: &str| interfaces::known(part).is_some() || matches!(self.files.find(folders, part), Ok(Some(_)));
-        let has_layouts = |ty: &str| {
-            interfaces::full_name(ty, "srv", folders.dialect).as_deref() == Some(ty)
-                && ["Request", "Response"].into_iter().all(|part| has_layout(&format!("{ty}_{part}")))
-        };
-        types.into_iter().filter(|ty| has_layouts(ty)).cloned().collect()
+        let is_named = |ty: &str, kind| interfaces::full_name(ty, kind, folders.dialect).as_deref() == Some(ty);
+        let services = facts.services.iter().filter_map(|service| service.ty.as_ref()).filter(|ty| {
+            is_named(ty, "srv") && ["Request", "Response"].iter().all(|part| has_layout(&format!("{ty}_{part}")))
+        });
+        let actions =
+            facts.actions.iter().map(|action| &action.ty).filter(|ty| {
+                is_named(ty, "action") && action::PARTS.iter().all(|part| has_layout(&part.interface_of(ty)))
+            });
+        services.chain(actions).cloned().collect()
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use sesame_plan::action::INFIX;
 use sesame_scan::{Arrivals, Facts, FoundAction, FoundNode, FoundService, FoundTopic, NOBODY, OF_EVERY_NODE, System};
 
 use crate::names::{self, Kind};
@@ -21,9 +22,6 @@ pub(super) struct Seen {
     pub(super) hash: Option<String>,
 }
 
-/// What is between the path of an action and the names of its topics and services.
-const ACTION: &str = "/_action/";
-
 /// What these publishers and subscribers are in ROS; `heard` is by topic and type in DDS.
 pub(super) fn assemble(
     system: System,
@@ -37,13 +35,18 @@ pub(super) fn assemble(
     for seen in seen {
         let Some((kind, path)) = names::in_ros(&seen.topic) else { continue };
         let ty = names::interface(&seen.type_name).unwrap_or_else(|| seen.type_name.clone());
-        if let Some((action, part)) = path.rsplit_once(ACTION) {
+        if let Some((action, part)) = path.rsplit_once(INFIX) {
             let ty = action_type(&ty, part);
             let found = actions
                 .entry(action)
                 .or_insert_with(|| FoundAction { path: action.to_owned(), ..FoundAction::default() });
             if found.ty.is_empty() {
                 found.ty = ty.unwrap_or_default();
+            }
+            // As of a service: the requests for goals say who is there.
+            let by = seen.node.clone().unwrap_or_else(|| NOBODY.to_owned());
+            if kind == Kind::Request && part == "send_goal" && !hidden(&by) {
+                if seen.publishes { &mut found.clients } else { &mut found.servers }.push(by);
             }
             continue;
         }
@@ -94,8 +97,13 @@ pub(super) fn assemble(
         service.servers.sort();
         service.clients.sort();
     }
+    let mut actions: Vec<FoundAction> = actions.into_values().collect();
+    for action in &mut actions {
+        action.servers.sort();
+        action.clients.sort();
+    }
     let nodes = nodes(names, &topics, &services);
-    Facts { nodes, topics, services, actions: actions.into_values().collect(), ..Facts::of(system) }
+    Facts { nodes, topics, services, actions, ..Facts::of(system) }
 }
 
 fn topic(path: &str, ty: String, heard: Option<Arrivals>) -> FoundTopic {

@@ -1,0 +1,178 @@
+//! Actions between real servers and clients: goals, their answers, feedback, results and cancellations pass through the
+//! relay undisturbed, and each of them can be lost, late or changed.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Stdio};
+use std::time::Instant;
+
+use serde_json::Value;
+use sesame_tests::{Done, command, done, fresh_folder, sesamec, workspace};
+
+use crate::environment::{Domain, Vendor};
+use crate::peer::LIMIT;
+
+/// Two robots that count, and a manager that calls both: it lets the first one count to the end, and cancels what the
+/// second one does.
+struct Robots {
+    folder: PathBuf,
+    /// Held for as long as they are used.
+    _domain: Domain,
+}
+
+impl Robots {
+    fn new(name: &str) -> Option<Robots> {
+        let python = Vendor::Jazzy.python()?;
+        let (folder, domain) = (fresh_folder(name), Domain::free());
+        let share = Vendor::share(&python).display().to_string();
+        let python = python.display().to_string();
+        let program = workspace().join("tests/ros2/peers/counter.py").display().to_string();
+        let ready = "{ ready when line \"up\" within 120s }";
+        let text = format!(
+            "space robots\n\
+             system {{\n\
+               simulator robots = ros2 {{ domain {domain}  types {share:?} }}\n\
+               message Word = \"std_msgs/msg/String\" {{ data: text }}\n\
+               message Time = \"std_msgs/msg/Float64\" {{ data: real[s] }}\n\
+               topic said = \"/{{r1,r2}}/said\" : Word\n\
+               topic took = \"/{{r1,r2}}/took\" : Time\n\
+               topic counted = \"/{{r1,r2}}/counted\" : Time\n\
+               action nav = \"/{{r1,r2}}/count\" : \"test_msgs/action/Fibonacci\"\n\
+               node counter \"/{{r1,r2}}/counter\" {{\n\
+                 launch {python:?} {program:?} \"counter\" \"{{ros-args}}\" \"--ros-args\" \"-r\" \"__ns:=/{{member}}\" {ready}\n\
+                 serves nav\n\
+               }}\n\
+               node manager \"/manager\" {{\n\
+                 launch {python:?} {program:?} \"manager\" \"r1\" \"r2-\" \"{{ros-args}}\" {ready}\n\
+                 publishes said, took, counted  calls nav\n\
+               }}\n\
+             }}\n\
+             metric succeeded maximise default 0 = count(said[r1].data == \"succeeded\")\n\
+             metric cancelled default 0 = count(said[r2].data == \"cancelled\")\n\
+             metric uncancelled default 0 = count(said[r2].data == \"succeeded\")\n\
+             metric accepted  default 0 = count(said[r1].data == \"accepted\")\n\
+             metric refused   default 0 = count(said[r1].data == \"refused\")\n\
+             metric unanswered default 0 = count(said[r1].data == \"no answer\")\n\
+             metric felt      default 0 = count(said[r1].data == \"feedback\")\n\
+             metric longest   default 0s = max(took[r1].data)\n\
+             metric furthest  default 0s = max(counted[r1].data)\n\
+             metric goals     default 0 = count(nav_goal_request[r1].goal.order == 4)\n\
+             metric reached   default 0 = count(nav_result_reply[r1].status == 4)\n\
+             metric executing default 0s = duration(count of nav_status[r1].status_list[status == 2] > 0)\n\
+             operation lost   on nav_goal_request = blackhole\n\
+             operation late   on nav_result_reply = latency [0s, 3s]\n\
+             operation silent on nav_feedback from counter[r1] = blackhole\n\
+             operation refuse on nav_goal_reply.accepted = stuck at false\n\
+             operation deaf   on nav_cancel_request = blackhole\n\
+             operation more   on nav_goal_request.goal.order = stuck at [0, 20]\n\
+             test no_goals   {{ lost from 1s to 4s }}\n\
+             test is_late    {{ late delay 1s from 0s to 6s }}\n\
+             test is_silent  {{ silent from 0s to 6s }}\n\
+             test is_refused {{ refuse from 0s to 6s }}\n\
+             test goes_on    {{ deaf from 0s to 6s }}\n\
+             test counts_on  {{ more value 8 from 0s to 6s }}\n\
+             campaign first {{\n\
+               objectives succeeded\n\
+               observes   cancelled, uncancelled, accepted, refused, unanswered, felt, longest, furthest, goals, reached, executing\n\
+               operations lost, late, silent, refuse, deaf, more 1 per test\n\
+               search     random {{ evaluations 2 }}\n\
+               end        after 6s\n\
+             }}\n",
+            domain = domain.number,
+        );
+        fs::write(folder.join("robots.sesame"), text).expect("a space can be written");
+        Some(Robots { folder, _domain: domain })
+    }
+
+    fn sesamec(&self, arguments: &[&str]) -> Done {
+        done(command(sesamec()).args(arguments).current_dir(&self.folder))
+    }
+}
+
+#[test]
+fn each_part_of_an_action_passes_undisturbed_and_can_be_disturbed() {
+    let Some(robots) = Robots::new("actions") else { return };
+    robots.sesamec(&["check", "robots.sesame"]).expect(0);
+    let wiring = robots.sesamec(&["explain", "wiring", "robots.sesame"]).expect(0).out;
+    for part in ["send_goal", "cancel_goal", "get_result", "status"] {
+        let rule = format!("-r /r1/count/_action/{part}:=/r1/count/_action/{part}/undisturbed");
+        assert!(wiring.contains(&rule), "{wiring}");
+    }
+    let rule = "-r /r1/count/_action/feedback:=/r1/count/_action/feedback/from/counter/r1";
+    assert!(wiring.contains(rule), "{wiring}");
+    assert!(!wiring.contains("# node manager"), "a client keeps its names: {wiring}");
+
+    let tests = ["no_goals", "is_late", "is_silent", "is_refused", "goes_on", "counts_on"];
+    robots.sesamec(&[&["known", "robots.sesame"], &tests[..]].concat()).expect(0);
+    let listed = robots.sesamec(&["list", "robots.sesame", "--results", "known", "--format", "json"]).expect(0);
+    let listed: Value = serde_json::from_str(&listed.out).expect("it is JSON");
+    let value = |test: &str, metric: &str| -> f64 {
+        let found = listed["tests"].as_array().expect("it lists tests").iter().find(|row| row["test"] == test);
+        let found = found.unwrap_or_else(|| panic!("no {test} in {listed:#}"));
+        found["measured"][metric].as_f64().unwrap_or_else(|| panic!("no {metric} in {listed:#}"))
+    };
+    let one = |metric: &str| value("T0", metric);
+    // Undisturbed, goals are reached or cancelled, and what the topics of the action say is what happened.
+    assert!(one("succeeded") >= 2.0 && one("accepted") >= 2.0 && one("cancelled") >= 2.0, "{listed:#}");
+    assert!(one("refused") + one("unanswered") + one("uncancelled") == 0.0, "{listed:#}");
+    assert!(one("felt") >= 2.0 * one("succeeded") && one("furthest") == 4.0, "{listed:#}");
+    assert!((one("goals") - one("accepted")).abs() <= 1.0, "{listed:#}");
+    assert!((one("reached") - one("succeeded")).abs() <= 1.0 && one("executing") > 1.0, "{listed:#}");
+
+    assert!(value("T1", "unanswered") >= 1.0, "goals are lost: {listed:#}");
+    assert!(value("T2", "longest") > 1.3 && value("T2", "succeeded") >= 1.0, "results are late: {listed:#}");
+    assert!(value("T3", "felt") <= 4.0 && value("T3", "succeeded") >= 2.0, "no feedback comes: {listed:#}");
+    assert!(value("T4", "refused") >= 2.0 && value("T4", "accepted") <= 1.0, "goals are refused: {listed:#}");
+    assert!(value("T5", "uncancelled") >= 1.0 && value("T5", "cancelled") <= 1.0, "nothing is cancelled: {listed:#}");
+    assert!(value("T6", "furthest") == 8.0, "it counts to another number: {listed:#}");
+}
+
+/// A program that is ended with the test.
+struct Program(Child);
+
+impl Program {
+    fn start(python: &Path, domain: &Domain, arguments: &[&str]) -> Program {
+        let mut program = command(python);
+        program.arg(workspace().join("tests/ros2/peers/counter.py")).args(arguments);
+        program.env("ROS_DOMAIN_ID", domain.number.to_string()).env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST");
+        Program(program.stdout(Stdio::null()).spawn().expect("a peer can be started"))
+    }
+}
+
+impl Drop for Program {
+    fn drop(&mut self) {
+        _ = self.0.kill();
+        _ = self.0.wait();
+    }
+}
+
+#[test]
+fn a_scan_declares_actions_with_their_servers_and_clients() {
+    let Some(python) = Vendor::Jazzy.python() else { return };
+    let (folder, domain) = (fresh_folder("scanned_actions"), Domain::free());
+    let _programs = [
+        Program::start(&python, &domain, &["counter", "--ros-args", "-r", "__ns:=/r1"]),
+        Program::start(&python, &domain, &["counter", "--ros-args", "-r", "__ns:=/r2"]),
+        Program::start(&python, &domain, &["manager", "r1", "r2"]),
+    ];
+    let share = Vendor::share(&python).display().to_string();
+    let number = domain.number.to_string();
+    let arguments = ["scan", "ros2", "--domain", &number, "--types", &share, "--seconds", "8"];
+    let begun = Instant::now();
+    let all = [
+        "action count = \"/{r1,r2}/count\" : \"test_msgs/action/Fibonacci\"  // 1 server, 1 client",
+        "node counter \"/{r1,r2}/counter\"",
+        "serves count",
+        "calls count",
+    ];
+    let squeezed = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let space = loop {
+        let found = done(command(sesamec()).args(arguments).current_dir(&folder)).expect(0).out;
+        if all.iter().all(|part| squeezed(&found).contains(&squeezed(part))) {
+            break found;
+        }
+        assert!(begun.elapsed() < LIMIT, "more is awaited:\n{found}");
+    };
+    fs::write(folder.join("scanned.sesame"), space).expect("a space can be written");
+    done(command(sesamec()).args(["check", "scanned.sesame"]).current_dir(&folder)).expect(0);
+}
