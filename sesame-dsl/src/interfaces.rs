@@ -11,12 +11,36 @@ pub trait Interfaces {
     /// of, such as `std_srvs/srv/SetBool_Request`: last in a list in which each comes after those that it contains. `None` if no folder has it; an error is a clause such as "it cannot be read".
     fn find(&self, folders: Folders<'_>, name: &str) -> Result<Option<Vec<Interface>>, String>;
 
+    /// The constants of an interface that are numbers or texts, in declared order; none if no folder has it.
+    fn constants(&self, folders: Folders<'_>, name: &str) -> Vec<Constant> {
+        let _ = (folders, name);
+        Vec::new()
+    }
+
     /// The messages that these files define, and those that they include. The files are relative to the folder of the
     /// `.sesame` file `beside`. `None` where no files are read, so that nothing is known of any message.
     fn dialect(&self, files: &[String], beside: &str) -> Result<Option<Vec<Interface>>, Vec<UnusableFile>> {
         let _ = (files, beside);
         Ok(None)
     }
+}
+
+/// A value with a name, which messages of a type have in their fields.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Constant {
+    /// Its name.
+    pub name: String,
+    /// Its value.
+    pub value: ConstantValue,
+}
+
+/// The value of a constant.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ConstantValue {
+    /// A number; finite.
+    Number(f64),
+    /// A text.
+    Text(String),
 }
 
 /// A file of a dialect that cannot be used, or includes one that cannot.
@@ -150,6 +174,26 @@ pub fn known(name: &str) -> Option<Vec<Interface>> {
     }
     found.push(interface(name.to_owned(), of));
     Some(found)
+}
+
+/// The constants of interfaces that need no file.
+const CONSTANTS: &[(&str, &[(&str, f64)])] = &[(
+    "action_msgs/msg/GoalStatus",
+    &[
+        ("STATUS_UNKNOWN", 0.0),
+        ("STATUS_ACCEPTED", 1.0),
+        ("STATUS_EXECUTING", 2.0),
+        ("STATUS_CANCELING", 3.0),
+        ("STATUS_SUCCEEDED", 4.0),
+        ("STATUS_CANCELED", 5.0),
+        ("STATUS_ABORTED", 6.0),
+    ],
+)];
+
+/// The constants of an interface that needs no file.
+pub(crate) fn known_constants(name: &str) -> Vec<Constant> {
+    let of = CONSTANTS.iter().filter(|(known, _)| *known == name).flat_map(|(_, constants)| *constants);
+    of.map(|(name, value)| Constant { name: (*name).to_owned(), value: ConstantValue::Number(*value) }).collect()
 }
 
 /// What is on the wire of an interface without fields. It means nothing, so the language does not show it.

@@ -26,6 +26,7 @@ mod chosen;
 mod collect;
 mod condition;
 mod confirmation;
+mod constants;
 mod contained;
 mod counted;
 mod coverage;

@@ -1,9 +1,10 @@
-//! Definitions of messages in files. For ROS, these are messages, services and actions in folders: each file is read when it is
-//! asked for, in the order in which one contains another. For `MAVLink`, these are the files of a dialect, read once.
+//! Definitions of messages in files. For ROS, these are messages, services and actions in folders: each file is read
+//! when it is asked for, in the order in which one contains another. For `MAVLink`, these are the files of a dialect,
+//! read once.
 //!
 //! A folder holds packages, as `share` of a distribution and the folder of a workspace's sources do:
-//! `PACKAGE/msg/NAME.msg`, `PACKAGE/srv/NAME.srv`, `PACKAGE/action/NAME.action`, or `.idl` in their place. A package that is not there is searched in
-//! the repositories below ([`workspace`]).
+//! `PACKAGE/msg/NAME.msg`, `PACKAGE/srv/NAME.srv`, `PACKAGE/action/NAME.action`, or `.idl` in their place. A package
+//! that is not there is searched in the repositories below ([`workspace`]).
 
 mod workspace;
 
@@ -12,7 +13,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use sesame_codegen::input::{self, Unreadable};
-use sesame_dsl::interfaces::{Folders, Interfaces, UnusableFile, defined_in, known};
+use sesame_dsl::interfaces::{Constant, ConstantValue, Folders, Interfaces, UnusableFile, defined_in, known};
 use sesame_interfaces::mavlink::{self, Definitions};
 use sesame_plan::{Dialect, Interface, InterfaceField, WireType};
 
@@ -78,6 +79,30 @@ impl Default for Files {
 
 /// The layouts of a definition of ROS.
 fn parse(name: &str, definition: &Definition) -> Result<Vec<Interface>, String> {
+    let layout = |definition: sesame_interfaces::Definition| Interface {
+        name: definition.name,
+        fields: definition.fields.into_iter().map(|field| InterfaceField { name: field.name, ty: field.ty }).collect(),
+    };
+    Ok(definitions(name, definition)?.into_iter().map(layout).collect())
+}
+
+/// A constant with a number or a text, as a file writes it; `None` for any other.
+fn constant(written: &sesame_interfaces::Constant) -> Option<Constant> {
+    let text = written.value.trim();
+    let quoted = |quote: char| text.strip_prefix(quote).and_then(|rest| rest.strip_suffix(quote));
+    let hexadecimal = || i64::from_str_radix(text.strip_prefix("0x").or(text.strip_prefix("0X"))?, 16).ok();
+    #[expect(clippy::cast_precision_loss, reason = "the language has no other numbers")]
+    let number = text.parse().ok().or_else(|| hexadecimal().map(|number| number as f64));
+    let value = match (number, quoted('"').or(quoted('\''))) {
+        (Some(number), _) if f64::is_finite(number) => ConstantValue::Number(number),
+        (_, Some(text)) => ConstantValue::Text(text.to_owned()),
+        _ => return None,
+    };
+    Some(Constant { name: written.name.clone(), value })
+}
+
+/// What a definition of ROS declares.
+fn definitions(name: &str, definition: &Definition) -> Result<Vec<sesame_interfaces::Definition>, String> {
     let package = name.split('/').next().unwrap_or_default();
     let last = name.rsplit('/').next().unwrap_or_default();
     let text = definition.text.as_str();
@@ -92,12 +117,7 @@ fn parse(name: &str, definition: &Definition) -> Result<Vec<Interface>, String> 
     if let (Ok(definitions), true) = (&mut definitions, name.split('/').nth(1) == Some("action")) {
         definitions.extend(sesame_interfaces::action::messages(package, last));
     }
-    let layout = |definition: sesame_interfaces::Definition| Interface {
-        name: definition.name,
-        fields: definition.fields.into_iter().map(|field| InterfaceField { name: field.name, ty: field.ty }).collect(),
-    };
-    let definitions = definitions.map_err(|error| error.to_string())?;
-    Ok(definitions.into_iter().map(layout).collect())
+    definitions.map_err(|error| error.to_string())
 }
 
 impl Files {
@@ -124,13 +144,18 @@ impl Files {
     }
 
     fn definition(&self, folders: Folders<'_>, name: &str) -> Read {
+        let Some(definition) = self.text(folders, name)? else { return Ok(None) };
+        (self.parse)(name, &definition).map(Some).map_err(|why| format!("{}: {why}", definition.file.display()))
+    }
+
+    /// The file that defines an interface, with what it says.
+    fn text(&self, folders: Folders<'_>, name: &str) -> Result<Option<Definition>, String> {
         let Some((file, format)) = self.file(folders, name) else { return Ok(None) };
         let text = input::text(&file).map_err(|unreadable| match unreadable {
             Unreadable::System(error) => format!("{} cannot be read: {error}", file.display()),
             other => format!("{}: {other}", file.display()),
         })?;
-        let definition = Definition { file, format, dialect: folders.dialect, text };
-        (self.parse)(name, &definition).map(Some).map_err(|why| format!("{}: {why}", definition.file.display()))
+        Ok(Some(Definition { file, format, dialect: folders.dialect, text }))
     }
 
     /// The first file of the folders that may define an interface: each folder's own packages, then those below it.
@@ -214,6 +239,14 @@ impl Interfaces for Files {
         let mut found = Vec::new();
         let there = self.add(folders, name, &mut Vec::new(), &mut found)?;
         Ok(there.then_some(found))
+    }
+
+    fn constants(&self, folders: Folders<'_>, name: &str) -> Vec<Constant> {
+        let defined = defined_in(name);
+        let Ok(Some(definition)) = self.text(folders, defined) else { return Vec::new() };
+        let found = definitions(defined, &definition).unwrap_or_default();
+        let of = found.iter().filter(|definition| definition.name == name);
+        of.flat_map(|definition| &definition.constants).filter_map(constant).collect()
     }
 
     fn dialect(&self, files: &[String], beside: &str) -> Result<Option<Vec<Interface>>, Vec<UnusableFile>> {

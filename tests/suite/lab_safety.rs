@@ -123,5 +123,5 @@ fn what_cannot_be_found_in_recordings_is_refused_with_what_to_do() {
     let second = lab(&["contacts"], &[&project.space, &trace, &trace]).expect(2);
     assert!(second.err.contains("--second"), "{}", second.err);
     let space = refused(&[], &[&project.space, &project.space]);
-    assert!(space.contains("this is not an MCAP file"), "{space}");
+    assert!(space.contains("this is no recording that can be read"), "{space}");
 }

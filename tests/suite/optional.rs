@@ -96,7 +96,7 @@ fn what_a_message_lacks_is_as_if_it_had_not_come_and_operations_on_messages_act_
     let known = without_cargo(&project, &["known", SPACE, "--format", "json"]);
     let found: Value = serde_json::from_str(&known.out).unwrap_or_else(|_| panic!("{}\n{}", known.out, known.err));
     let show = |test: &str| -> Value {
-        let shown = without_cargo(&project, &["show", SPACE, test, "--format", "json"]).expect(0);
+        let shown = without_cargo(&project, &["show", SPACE, test, "--results", "known", "--format", "json"]).expect(0);
         serde_json::from_str(&shown.out).unwrap()
     };
     let metric = |test: &Value, name: &str| -> f64 {

@@ -1,5 +1,6 @@
 //! Messages, topics, nodes and what starts them, from the model to the plan.
 
+use sesame_dsl::interfaces::{Constant, ConstantValue};
 use sesame_dsl::model::{self, Id as _, Space};
 use sesame_dsl::units::Unit;
 use sesame_plan as plan;
@@ -13,7 +14,12 @@ pub(super) fn message(message: &model::Message) -> plan::MessageType {
         doc: field.declaration.doc.clone(),
         ty: ty(&field.ty),
     });
+    let number = |constant: &Constant| match constant.value {
+        ConstantValue::Number(number) => Some(plan::NamedNumber { name: constant.name.clone(), number }),
+        ConstantValue::Text(_) => None,
+    };
     plan::MessageType {
+        constants: message.constants.iter().filter_map(number).collect(),
         name: message.declaration.name.clone(),
         doc: message.declaration.doc.clone(),
         fields: fields.collect(),

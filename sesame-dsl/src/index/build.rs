@@ -101,6 +101,8 @@ struct Indexer<'a> {
     types: BTreeMap<DefinitionId, &'a Type>,
     /// Messages with a type of ROS.
     of_ros: BTreeSet<DefinitionId>,
+    /// The names of constants that messages declare.
+    constants: BTreeSet<&'a str>,
     /// The names of the space, which are not settled before all are there.
     heads: Vec<(&'a Name, DefinitionId)>,
 }
@@ -152,6 +154,7 @@ impl<'a> Indexer<'a> {
             if message.ros_type.is_some() {
                 self.of_ros.insert(id);
             }
+            self.constants.extend(message.constants.iter().map(|constant| constant.name.text.as_str()));
             for field in &message.fields {
                 let field_id = self.declare_member(Kind::Field, &field.head, id);
                 self.types.insert(field_id, &field.ty);
@@ -287,11 +290,23 @@ impl<'a> Indexer<'a> {
         target
     }
 
+    /// Whether a path is the name of a constant: one that a message declares or, since definitions in files are not
+    /// read here, a word in capital letters that names nothing else.
+    fn is_constant(&self, path: &Path) -> bool {
+        let name = path.topic.text.as_str();
+        path.is_name() && !self.names.contains_key(name) && (self.constants.contains(name) || in_capitals(name))
+    }
+
     fn path(&mut self, path: &'a Path, within: DefinitionId) {
-        if self.part(path, within) {
+        if self.part(path, within) || self.is_constant(path) {
             return;
         }
         let mut target = self.mention(&path.topic, within);
+        let of_message = target.is_some_and(|target| self.index.definition(target).kind == Kind::Message);
+        if of_message && path.fields.len() == 1 {
+            // `Battery.LOW` is a constant.
+            return;
+        }
         let mut outer = None;
         let fields = path.fields.iter().map(|name| Some((name, None)));
         let steps = path.elements.iter().map(|step| match step {
@@ -651,4 +666,9 @@ impl<'a> Indexer<'a> {
             .collect();
         Index { definitions, references, unread }
     }
+}
+
+/// Whether a name is written like a constant: `STATUS_OK`.
+fn in_capitals(name: &str) -> bool {
+    name.bytes().any(|byte| byte.is_ascii_uppercase()) && !name.bytes().any(|byte| byte.is_ascii_lowercase())
 }

@@ -2,6 +2,7 @@
 
 use super::declaration::Declaration;
 use super::ids::{MessageId, TopicId};
+use crate::interfaces::Constant;
 use crate::span::Span;
 use crate::units::Unit;
 use sesame_plan::{Channel, Proxy, Ros, Transport};
@@ -101,6 +102,8 @@ pub struct Message {
     pub fields: Vec<Field>,
     /// Its type in ROS, for example `sensor_msgs/msg/JointState`: that of one of [`crate::model::Space::interfaces`].
     pub interface: Option<String>,
+    /// Values that its fields may have, with names: those that are declared, then those of its definition.
+    pub constants: Vec<Constant>,
 }
 
 /// One field of a message type. Its name is the one on the wire, so a keyword of the language is allowed.

@@ -131,8 +131,17 @@ impl<'a> Resolver<'a> {
     /// Whether an expression is a text, of a message or written. Reports nothing.
     pub(super) fn is_text(&self, expression: &ast::Expression) -> bool {
         match &expression.kind {
-            ExpressionKind::Text(_) => true,
+            _ if self.written_text(expression).is_some() => true,
             _ => read_in(expression).and_then(|read| self.type_of_read(&read)) == Some(Type::Text),
+        }
+    }
+
+    /// The text that an expression is without any message: one in quotes, or a constant. Reports nothing.
+    fn written_text(&self, expression: &ast::Expression) -> Option<String> {
+        match &expression.kind {
+            ExpressionKind::Text(text) => Some(text.text.clone()),
+            ExpressionKind::Field(path) => self.text_constant(path),
+            _ => None,
         }
     }
 
@@ -144,14 +153,14 @@ impl<'a> Resolver<'a> {
         by: Comparison,
         right: &'a ast::Expression,
     ) -> Option<u32> {
-        let (of, text) = match (&left.kind, &right.kind) {
-            (_, ExpressionKind::Text(text)) => (left, text),
-            (ExpressionKind::Text(text), _) => (right, text),
-            _ if !matches!(by, Comparison::Equal | Comparison::NotEqual) => {
+        let (of, text) = match [left, right].map(|side| self.written_text(side)) {
+            [_, Some(text)] => (left, text),
+            [Some(text), None] => (right, text),
+            [None, None] if !matches!(by, Comparison::Equal | Comparison::NotEqual) => {
                 self.texts_have_no_order(left.span.to(right.span));
                 return None;
             }
-            _ => {
+            [None, None] => {
                 let (text, other) = if self.is_text(left) { (left, right) } else { (right, left) };
                 let title = format!("`{}` can only be compared with a text in double quotes", self.text(text.span));
                 let diagnostic = Diagnostic::new(Code::WRONG_TYPE, other.span, title)
@@ -161,7 +170,7 @@ impl<'a> Resolver<'a> {
             }
         };
         let read = match &of.kind {
-            ExpressionKind::Text(_) => {
+            _ if self.written_text(of).is_some() => {
                 let title = format!("`{}` compares two constants", self.text(left.span.to(right.span)));
                 let diagnostic = Diagnostic::new(Code::WRONG_TYPE, left.span.to(right.span), title);
                 self.report(diagnostic.label("expected a topic or field of type `text` on one side"));
@@ -183,8 +192,8 @@ impl<'a> Resolver<'a> {
             }
         };
         let test = match by {
-            Comparison::Equal => TextTest::Is(text.text.clone()),
-            Comparison::NotEqual => TextTest::IsNot(text.text.clone()),
+            Comparison::Equal => TextTest::Is(text),
+            Comparison::NotEqual => TextTest::IsNot(text),
             _ => {
                 self.texts_have_no_order(left.span.to(right.span));
                 return None;

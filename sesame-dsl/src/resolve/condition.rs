@@ -3,6 +3,7 @@
 use super::words::list;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
+use crate::interfaces::ConstantValue;
 use crate::model::condition::{Comparison, Condition, ConditionSpace, Integers, Operand, ValueRange, Variable};
 use crate::model::{Activation, End, Id as _, Metric, MetricId, MetricSource, Range};
 use crate::span::Span;
@@ -147,6 +148,19 @@ impl<'a> Resolver<'a> {
             (Side::Number(number), Side::Metric(metric)) => {
                 (Operand::Number(self.in_unit_of(metric, right.span, number)?), Operand::Variable(metric))
             }
+            (Side::Metric(metric), Side::Constant(number)) => {
+                self.is_plain(metric, left.span, right.span)?;
+                (Operand::Variable(metric), Operand::Number(number))
+            }
+            (Side::Constant(number), Side::Metric(metric)) => {
+                self.is_plain(metric, right.span, left.span)?;
+                (Operand::Number(number), Operand::Variable(metric))
+            }
+            (Side::Constant(_), Side::Number(_) | Side::Constant(_)) | (Side::Number(_), Side::Constant(_)) => {
+                let title = format!("`{}` compares two constants", self.text(whole.span));
+                self.report(Diagnostic::new(Code::CONSTANT_COMPARISON, whole.span, title).label("constant"));
+                return None;
+            }
             (Side::Metric(metric), Side::Truth(truth)) if self.equals_truth(metric, by) => {
                 (Operand::Variable(metric), number_of(truth))
             }
@@ -191,6 +205,10 @@ impl<'a> Resolver<'a> {
         match &side.kind {
             ExpressionKind::Number(quantity) => Some(Side::Number(quantity)),
             ExpressionKind::Truth(truth) => Some(Side::Truth(*truth)),
+            ExpressionKind::Field(path) if self.is_constant(path) => match self.constant_of(path)?? {
+                ConstantValue::Number(number) => Some(Side::Constant(number)),
+                ConstantValue::Text(_) => self.no_metric(side),
+            },
             ExpressionKind::Field(path) if self.is_part(path) => {
                 self.metric_of_path(path).map(|index| Side::Metric(MetricId::from_index(index)))
             }
@@ -268,6 +286,15 @@ impl<'a> Resolver<'a> {
     fn in_unit_of(&mut self, metric: MetricId, span: Span, number: &ast::Quantity) -> Option<f64> {
         let unit = self.metric_of(metric).unit.clone();
         self.value(number, unit.as_ref(), &format!("metric `{}`", self.text(span)))
+    }
+
+    /// Reports a metric with a unit that is compared with a constant, which has none.
+    fn is_plain(&mut self, metric: MetricId, span: Span, constant: Span) -> Option<()> {
+        let Some(unit) = self.metric_of(metric).unit.clone() else { return Some(()) };
+        let [name, constant_name] = [span, constant].map(|span| self.text(span));
+        let title = format!("`{constant_name}` is a plain number, but `{name}` is in `{}`", unit.text());
+        self.report(Diagnostic::new(Code::WRONG_UNIT, constant, title).label("expected a number with a unit"));
+        None
     }
 
     /// Two metrics are compared as plain numbers, so they must have the same unit.
@@ -503,6 +530,8 @@ impl<'a> Resolver<'a> {
 #[derive(Clone, Copy)]
 enum Side<'a> {
     Number(&'a ast::Quantity),
+    /// A constant of a message, a plain number.
+    Constant(f64),
     Metric(MetricId),
     Truth(bool),
 }

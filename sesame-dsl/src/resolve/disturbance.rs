@@ -291,6 +291,15 @@ impl<'a> Resolver<'a> {
                 let parameter = Parameter { name: "value".to_owned(), doc: String::new(), unit: None, domain };
                 Some((found?.0, OperationKind::StuckAt { truth: None }, vec![parameter]))
             }
+            ast::Stuck::Constants(names) => {
+                let is = |ty: &Type| matches!(ty, Type::Int(None) | Type::Real(None));
+                let found = self.values(target, "`stuck at` a constant", "a number without a unit", is);
+                let numbers = self.numbers_of_constants(names)?;
+                let texts = names.iter().map(|name| self.text(name.span).to_owned()).collect();
+                let domain = Domain::Texts(texts);
+                let parameter = Parameter { name: "value".to_owned(), doc: String::new(), unit: None, domain };
+                Some((found?.0, OperationKind::StuckAtConstant { numbers }, vec![parameter]))
+            }
             ast::Stuck::Truth(truth, span) => {
                 let user = format!("`stuck at {}`", self.text(*span));
                 let (target, _) = self.values(target, &user, "a `bool`", |ty| matches!(ty, Type::Bool))?;

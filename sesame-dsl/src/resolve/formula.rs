@@ -6,6 +6,7 @@ use super::function::is_function;
 use super::parts::first_part;
 use super::score::scores;
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
+use crate::interfaces::ConstantValue;
 use crate::model::{Aggregate, Condition, Expression, FieldPath, Formula, Id as _, Input, Members};
 use crate::model::{MetricSource, Type};
 use crate::span::Span;
@@ -280,6 +281,14 @@ impl<'a> Resolver<'a> {
     // ----- numbers
 
     pub(super) fn number(&mut self, inputs: &mut Vec<Input>, expression: &'a ast::Expression) -> Option<Number> {
+        if let ExpressionKind::Field(path) = &expression.kind
+            && let Some(constant) = self.constant_of(path)
+        {
+            return match constant? {
+                ConstantValue::Number(number) => Some((Expression::Constant(number), None)),
+                ConstantValue::Text(_) => self.not_a_number(expression.span, "a text"),
+            };
+        }
         match &expression.kind {
             ExpressionKind::Number(quantity) => {
                 let unit = self.unit_in_formula(quantity)?;

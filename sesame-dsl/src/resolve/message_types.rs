@@ -39,7 +39,7 @@ impl<'a> Resolver<'a> {
 
     /// Reports a message that is too large, unless a message in it is too large and was reported.
     fn too_many_values(&mut self, message: &model::Message, at: Span, count: u64) {
-        let model::Message { declaration, fields, interface: _ } = message;
+        let model::Message { declaration, fields, interface: _, constants: _ } = message;
         let values = &self.system.values;
         if fields.iter().any(|field| values_in(&field.ty, values) > MAX_VALUES) {
             return;
@@ -181,7 +181,8 @@ impl<'a> Resolver<'a> {
             optional: field.optional.is_some(),
         });
         let fields = fields.collect();
-        complete.then(|| model::Message { declaration: self.declaration(&message.head), fields, interface })
+        let constants = self.constants_of(message, interface.as_deref());
+        complete.then(|| model::Message { declaration: self.declaration(&message.head), fields, interface, constants })
     }
 
     /// Whether messages of the simulator may lack a field; reports the word `optional` if not.

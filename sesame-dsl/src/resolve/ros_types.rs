@@ -243,7 +243,8 @@ impl<'a> Resolver<'a> {
             fields[position] = field;
         }
         let interface = Some(last.name.clone());
-        complete.then(|| model::Message { declaration: self.declaration(&message.head), fields, interface })
+        let constants = self.constants_of(message, interface.as_deref());
+        complete.then(|| model::Message { declaration: self.declaration(&message.head), fields, interface, constants })
     }
 
     fn unknown_field(&mut self, message: &ast::Message, name: &ast::Name, layout: &Interface) {
@@ -414,7 +415,8 @@ impl<'a> Resolver<'a> {
         let line = self.sources.position(at).line;
         let doc = format!("The ROS type `{}`.", layout.name);
         let declaration = Declaration { name, span: at, line, doc };
-        let message = model::Message { declaration, fields, interface: Some(layout.name.clone()) };
+        let constants = self.constants_defined(&layout.name);
+        let message = model::Message { declaration, fields, interface: Some(layout.name.clone()), constants };
         let id = self.add_message(Some(message), at);
         self.system.ros.implicit.insert(layout.name.clone(), id);
         id

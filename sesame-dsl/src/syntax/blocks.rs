@@ -250,7 +250,10 @@ pub(super) const BLOCKS: &[Block] = &[
         name: "message",
         error: Rule::error_field,
         one: Rule::one_field,
-        members: &[Member::named(Rule::field, "a field such as `level: real[mm]`")],
+        members: &[
+            Member::named(Rule::field, "a field such as `level: real[mm]`"),
+            Member::new(Rule::constant, "constant"),
+        ],
     },
     Block {
         rule: Rule::node,

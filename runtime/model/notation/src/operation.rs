@@ -186,6 +186,11 @@ fn disturbance(operation: &Operation) -> String {
             format!("{words} {{ {}}}", parameters.collect::<String>())
         }
         OperationKind::RandomText { texts } => format!("{words} {}", list(texts)),
+        // Names of constants stand without quotes.
+        OperationKind::StuckAtConstant { .. } => {
+            let names = operation.parameters.first().and_then(|value| value.domain.items()).unwrap_or_default();
+            format!("{words} {}{}", if names.len() > 1 { "one of " } else { "" }, names.join(", "))
+        }
         OperationKind::BurstLoss => {
             let clauses =
                 parameters.iter().zip(&permitted).map(|(parameter, range)| format!("{} {range}  ", parameter.name));

@@ -92,7 +92,8 @@ fn forget_what_is_for_people(plan: &mut CampaignPlan) {
     }
     // Nothing of a campaign depends on what is done with its results.
     labs.clear();
-    for MessageType { name: _, doc, fields } in messages {
+    for MessageType { name: _, doc, fields, constants } in messages {
+        constants.clear();
         doc.clear();
         for Field { name: _, doc, ty: _, optional: _ } in fields {
             doc.clear();

@@ -30,6 +30,11 @@ pub enum OperationKind {
         /// The truth value, where that is what is replaced.
         truth: Option<bool>,
     },
+    /// Replaces numbers by that of a constant. One parameter `value`: the name of the constant, a text.
+    StuckAtConstant {
+        /// The number of each name that the parameter permits; finite.
+        numbers: Vec<f64>,
+    },
     /// Adds one and the same. One parameter `bias`: a number, or a point.
     Bias,
     /// Adds what grows with the time since the operation went on. One parameter `rate`: a number or a point, in the
@@ -201,6 +206,7 @@ impl OperationKind {
             | OperationKind::Custom { .. } => true,
             OperationKind::Latency { distribution, .. } => *distribution != Distribution::Fixed,
             OperationKind::StuckAt { .. }
+            | OperationKind::StuckAtConstant { .. }
             | OperationKind::Bias
             | OperationKind::Drift
             | OperationKind::Scale
@@ -225,6 +231,7 @@ impl OperationKind {
             OperationKind::RandomValue { .. }
             | OperationKind::RandomText { .. }
             | OperationKind::StuckAt { .. }
+            | OperationKind::StuckAtConstant { .. }
             | OperationKind::Bias
             | OperationKind::Drift
             | OperationKind::Noise
@@ -270,6 +277,7 @@ impl OperationKind {
             OperationKind::Scene { usual, .. } => *usual,
             OperationKind::RandomValue { mode: ValueMode::Absolute, .. }
             | OperationKind::StuckAt { .. }
+            | OperationKind::StuckAtConstant { .. }
             | OperationKind::RandomText { .. }
             | OperationKind::NotFinite { .. }
             | OperationKind::Freeze
@@ -301,7 +309,7 @@ impl OperationKind {
             OperationKind::RandomValue { mode: ValueMode::Absolute, .. } => "random absolute",
             OperationKind::RandomValue { mode: ValueMode::Offset, .. } => "random offset",
             OperationKind::RandomText { .. } => "random one of",
-            OperationKind::StuckAt { truth: None } => "stuck at",
+            OperationKind::StuckAt { truth: None } | OperationKind::StuckAtConstant { .. } => "stuck at",
             OperationKind::StuckAt { truth: Some(true) } => "stuck at true",
             OperationKind::StuckAt { truth: Some(false) } => "stuck at false",
             OperationKind::Bias => "bias",

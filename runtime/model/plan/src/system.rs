@@ -13,6 +13,18 @@ pub struct MessageType {
     pub doc: String,
     /// Its fields, in declaration order.
     pub fields: Vec<Field>,
+    /// The names of numbers that its fields may have; for people who read results.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub constants: Vec<NamedNumber>,
+}
+
+/// A number with a name.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NamedNumber {
+    /// Its name.
+    pub name: String,
+    /// The number; finite.
+    pub number: f64,
 }
 
 /// One field of a message type.
@@ -259,6 +271,26 @@ pub struct FieldRef {
 }
 
 impl CampaignPlan {
+    /// The name of a number in a field of a topic's messages: of the constants of the message with this field the only
+    /// one that is this number, or the only one whose name begins like the field's: `MODE_AUTO` of `mode`.
+    pub fn constant(&self, topic: TopicId, path: &[&str], number: f64) -> Option<&str> {
+        let (field, outer) = path.split_last()?;
+        let mut ty = &self.topics.get(topic.index())?.ty;
+        for name in outer {
+            let Type::Message { id } = ty else { return None };
+            ty = &self.messages.get(id.index())?.fields.iter().find(|field| field.name == *name)?.ty;
+        }
+        let Type::Message { id } = ty else { return None };
+        let equal = self.messages.get(id.index())?.constants.iter().filter(|constant| constant.number == number);
+        let names: Vec<&str> = equal.map(|constant| constant.name.as_str()).collect();
+        let start = format!("{}_", field.to_ascii_uppercase());
+        let own: Vec<&str> = names.iter().copied().filter(|name| name.starts_with(&start)).collect();
+        match (names.as_slice(), own.as_slice()) {
+            ([only], _) | (_, [only]) => Some(only),
+            _ => None,
+        }
+    }
+
     /// Whether a message of its type may lack a value: a field on the way to it is optional.
     pub fn may_lack(&self, value: &FieldRef) -> bool {
         let mut ty = self.topics.get(value.topic.index()).map(|topic| &topic.ty);

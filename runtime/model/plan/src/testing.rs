@@ -110,7 +110,7 @@ pub fn simlog_mut(simulator: &mut Simulator) -> &mut Simlog {
 
 /// A message type.
 pub fn message(name: &str, fields: Vec<Field>) -> MessageType {
-    MessageType { name: name.to_owned(), doc: String::new(), fields }
+    MessageType { name: name.to_owned(), doc: String::new(), fields, constants: Vec::new() }
 }
 
 /// A field of a message type.
@@ -337,6 +337,10 @@ pub fn operation(topic: u32, kind: OperationKind) -> Operation {
         OperationKind::Reorder { .. } => vec![value("window", 0.0, 5.0)],
         OperationKind::Duplicate => vec![whole("copies", 1.0, 100.0)],
         OperationKind::Slow { .. } => vec![value("share", 0.1, 0.9)],
+        OperationKind::StuckAtConstant { numbers } => {
+            let texts = (0..numbers.len()).map(|at| format!("C{at}")).collect();
+            vec![parameter("value", Domain::Texts { texts })]
+        }
         OperationKind::RandomText { .. }
         | OperationKind::StuckAt { truth: Some(_) }
         | OperationKind::NotFinite { .. }

@@ -193,6 +193,12 @@ impl CampaignPlan {
         if let OperationKind::RandomText { texts } = &operation.kind {
             at("kind.texts", filled(texts))?;
         }
+        if let OperationKind::StuckAtConstant { numbers } = &operation.kind {
+            each("kind.numbers", numbers, |number| finite(*number))?;
+            let names = operation.parameters.first().and_then(|value| value.domain.items());
+            let fits = names.is_some_and(|names| names.len() == numbers.len());
+            at("kind.numbers", require(fits, || "there is not one for each name of a constant".to_owned()))?;
+        }
         at("parameters", distinct(operation.parameters.iter().map(|parameter| &parameter.name)))?;
         each("parameters", &operation.parameters, |parameter| {
             at("name", name(&parameter.name))?;

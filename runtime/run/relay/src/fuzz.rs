@@ -169,6 +169,15 @@ impl Disturbance {
                 };
                 Disturbance::StuckAt(StuckAt { places, at })
             }
+            OperationKind::StuckAtConstant { numbers } => {
+                let names = operation.parameters.first().and_then(|value| value.domain.items());
+                let number = match (names, chosen("value")) {
+                    (Some(names), Some(Choice::Text { text })) => names.iter().position(|name| name == text),
+                    _ => None,
+                };
+                let number = number.and_then(|at| numbers.get(at)).ok_or_else(|| lacks("value"))?;
+                Disturbance::StuckAt(StuckAt { places, at: Stuck::Amount(Amount::Number(*number)) })
+            }
             OperationKind::Bias => Disturbance::Bias(Bias { places, bias: amount("bias")? }),
             OperationKind::ClockSkew => Disturbance::Bias(Bias { places, bias: amount("skew")? }),
             OperationKind::Drift => Disturbance::Drift(Drift { places, rate: amount("rate")? }),

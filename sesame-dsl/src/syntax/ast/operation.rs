@@ -154,6 +154,7 @@ impl OperationKind {
                 Some(amounts.span())
             }
             OperationKind::StuckAt(Stuck::Texts(texts)) => Some(texts.first()?.span.to(texts.last()?.span)),
+            OperationKind::StuckAt(Stuck::Constants(names)) => Some(names.first()?.span.to(names.last()?.span)),
             OperationKind::Latency { range, .. }
             | OperationKind::Reorder { range, .. }
             | OperationKind::Scene(Scene { range, .. }) => Some(range.span),
@@ -195,6 +196,8 @@ impl Amounts {
 pub(crate) enum Stuck {
     Amounts(Amounts),
     Texts(Vec<Text>),
+    /// Names of constants of messages; at least one.
+    Constants(Vec<Path>),
     Truth(bool, Span),
 }
 

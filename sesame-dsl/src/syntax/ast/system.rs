@@ -137,7 +137,21 @@ pub(crate) struct Message {
     /// Whether it has a block of fields.
     pub(crate) block: bool,
     pub(crate) fields: Vec<Field>,
+    pub(crate) constants: Vec<Constant>,
     pub(crate) has_errors: bool,
+}
+
+/// A number or a text with a name, which messages have in their fields.
+#[derive(Debug)]
+pub(crate) struct Constant {
+    pub(crate) name: Name,
+    pub(crate) value: ConstantValue,
+}
+
+#[derive(Debug)]
+pub(crate) enum ConstantValue {
+    Number(Quantity),
+    Text(Text),
 }
 
 #[derive(Debug)]

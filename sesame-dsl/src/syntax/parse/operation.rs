@@ -133,6 +133,10 @@ impl Reader<'_> {
                 OperationKind::StuckAt(match (child(kind, Rule::text_domain), child(kind, Rule::truth)) {
                     (Some(texts), _) => Stuck::Texts(self.listed(&texts)),
                     (_, Some(truth)) => Stuck::Truth(child(&truth, Rule::k_true).is_some(), self.span(&truth)),
+                    _ if let Some(constants) = child(kind, Rule::constants) => {
+                        let names = children(&constants, Rule::constant_name).map(|name| self.path(&name));
+                        Stuck::Constants(names.collect())
+                    }
                     _ => Stuck::Amounts(self.amounts(kind).expect("a value is stuck at something")),
                 })
             }

@@ -5,7 +5,7 @@ use sesame_grammar::Rule;
 use super::reader::{Pair, Reader, child, children, expect_child, first_of};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::syntax::ast::{
-    Action, Answer, Clock, Field, Head, Message, Name, Node, Proxy, Secret, Service, Settings, Simulator, StepBy,
+    self, Action, Answer, Clock, Field, Head, Message, Name, Node, Proxy, Secret, Service, Settings, Simulator, StepBy,
     StepChannel, Stepping, System, Text, Topic, Transport, Type, TypeKind,
 };
 use crate::syntax::blocks;
@@ -197,9 +197,17 @@ impl Reader<'_> {
         let head = self.head(pair);
         let ros_type = child(pair, Rule::ros_type).map(|ty| self.text_of(&expect_child(&ty, Rule::text)));
         let block = child(pair, Rule::open).is_some();
-        let mut fields = Vec::new();
+        let (mut fields, mut constants) = (Vec::new(), Vec::new());
         let has_errors = self.members(pair, |reader, field| {
             let name = expect_child(&field, Rule::field_name);
+            if field.as_rule() == Rule::constant {
+                let value = match child(&field, Rule::text) {
+                    Some(text) => ast::ConstantValue::Text(reader.text_of(&text)),
+                    None => ast::ConstantValue::Number(reader.signed(&expect_child(&field, Rule::signed))),
+                };
+                constants.push(ast::Constant { name: reader.field_name(&name), value });
+                return;
+            }
             fields.push(Field {
                 head: Head {
                     name: reader.field_name(&name),
@@ -211,7 +219,7 @@ impl Reader<'_> {
                 wire: child(&field, Rule::wire_type).map(|wire| reader.text_of(&expect_child(&wire, Rule::text))),
             });
         });
-        Message { head, ros_type, block, fields, has_errors }
+        Message { head, ros_type, block, fields, constants, has_errors }
     }
 
     pub(super) fn type_of(&mut self, pair: &Pair<'_>) -> Type {

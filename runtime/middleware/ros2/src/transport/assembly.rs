@@ -9,17 +9,13 @@ use sesame_relay::transport::TransportError;
 
 use super::service::Client;
 use super::session::{ClockReader, Connected, Session, Stepper};
-use super::wall_clock::now;
+use super::wall_clock::{SETTLE, now};
 use crate::dds::{DdsError, Endpoint, Sample, mirrored};
 use crate::graph::NodeEntities;
 use crate::names;
 
 /// How often it is looked who is there while nothing else happens.
 const LOOK: Duration = Duration::from_millis(20);
-
-/// How long nobody may appear before the system counts as complete: a peer that is matched on this side may need as
-/// long to match us.
-const SETTLE: Duration = Duration::from_millis(300);
 
 /// How long nobody may appear or leave before a system that is ready, and lacks something because of a node that is
 /// there, is given up: those that are started together appear within such a time, and nothing else will mend it.
@@ -49,6 +45,9 @@ impl Session {
                     found = true;
                 }
             }
+        }
+        for service in &mut self.services {
+            found |= service.offer(&publishers, &subscribers, &mut self.dds)?;
         }
         if let ClockReader::Topic { path, reader: reader @ None } = &mut self.clock {
             let topic = names::topic(path);

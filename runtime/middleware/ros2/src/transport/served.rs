@@ -1,10 +1,14 @@
 //! Services between their clients and their server: requests and replies pass through the relay as messages of two
 //! topics.
 //!
+//! Of a service that is cut, the half towards the clients appears once the server is there and has had time to see the
+//! other half: a client that waits for its service calls it at once, and DDS loses a request that nobody takes yet.
+//!
 //! A reply belongs to a request, which its client has numbered. The relay numbers requests of its own towards the
 //! server and remembers whose they are; so a reply finds its client even if operations have held it back.
 
 use std::collections::BTreeMap;
+use std::time::Instant;
 
 use rustdds::rpc::SampleIdentity;
 use rustdds::{GUID, SequenceNumber};
@@ -14,6 +18,7 @@ use sesame_relay::wire::{Wire, WireTable, wanted};
 
 use crate::dds::{DdsError, Endpoint, Participant, ReaderId, Received, Sample, WriterId, mirrored};
 use crate::names;
+use crate::transport::wall_clock::{SETTLE, now};
 use crate::transport::wires::absolute;
 
 /// How many calls are remembered; the oldest are forgotten.
@@ -38,14 +43,18 @@ pub(super) struct Served {
     asked: BTreeMap<SequenceNumber, SampleIdentity>,
     /// Where replies of the server to our requests go.
     address: GUID,
+    /// Since when its server has been there, while it is not yet offered to clients.
+    served_since: Option<Instant>,
 }
 
 /// What is needed for one direction.
 struct Half {
     wire: Wire,
     codec: Codec,
-    reader: ReaderId,
-    /// `None` where it is only listened to.
+    type_name: String,
+    /// `None` for requests of a service that is not yet offered to clients.
+    reader: Option<ReaderId>,
+    /// `None` where it is only listened to, and for replies of a service that is not yet offered to clients.
     writer: Option<WriterId>,
     /// Per message that the relay was given in this run: the client whose call it belongs to.
     clients: BTreeMap<u64, SampleIdentity>,
@@ -58,22 +67,36 @@ impl Half {
         interfaces: &[Interface],
         wires: &WireTable,
         wire: Wire,
-        [read, write]: [&str; 2],
-        cut: bool,
+        [read, write]: [Option<&str>; 2],
         dds: &mut Participant,
     ) -> Result<Self, DdsError> {
         let topic = wires.topic(wire);
         let interface = plan.topic(topic).interface.clone().unwrap_or_default();
         let codec = Codec::new(interfaces, &interface, &wanted(plan, topic));
         let codec = codec.map_err(|error| DdsError(error.to_string()))?;
-        let (type_name, qos) = (names::type_name(&interface), mirrored([]));
-        let reader = dds.read(read, &type_name, &qos)?;
-        let writer = if cut { Some(dds.publish(write, &type_name, &qos)?) } else { None };
-        Ok(Half { wire, codec, reader, writer, clients: BTreeMap::new(), count: 0 })
+        let type_name = names::type_name(&interface);
+        let mut half = Half { wire, codec, type_name, reader: None, writer: None, clients: BTreeMap::new(), count: 0 };
+        if let Some(read) = read {
+            half.read(read, dds)?;
+        }
+        if let Some(write) = write {
+            half.write(write, dds)?;
+        }
+        Ok(half)
+    }
+
+    fn read(&mut self, topic: &str, dds: &mut Participant) -> Result<(), DdsError> {
+        self.reader = Some(dds.read(topic, &self.type_name, &mirrored([]))?);
+        Ok(())
+    }
+
+    fn write(&mut self, topic: &str, dds: &mut Participant) -> Result<(), DdsError> {
+        self.writer = Some(dds.publish(topic, &self.type_name, &mirrored([]))?);
+        Ok(())
     }
 }
 
-/// The services of a plan, joined at once: what they are is known before anybody appears.
+/// The services of a plan, joined at once towards their servers: what they are is known before anybody appears.
 pub(super) fn services(
     plan: &CampaignPlan,
     interfaces: &[Interface],
@@ -90,11 +113,12 @@ pub(super) fn services(
         let path = absolute(wires.path(wire));
         let server = if cut { format!("{path}/undisturbed") } else { path.clone() };
         let (asked, forwarded) = (names::request(&path), names::request(&server));
-        let (answered, answer) = (names::reply(&server), names::reply(&path));
-        let request = Half::join(plan, interfaces, wires, wire, [&asked, &forwarded], cut, dds)?;
-        let reply = Half::join(plan, interfaces, wires, reply, [&answered, &answer], cut, dds)?;
-        let address = dds.reader_guid(reply.reader).unwrap_or(GUID::GUID_UNKNOWN);
-        services.push(Served { path, cut, request, reply, asked: BTreeMap::new(), address });
+        let answered = names::reply(&server);
+        let of_requests = if cut { [None, Some(forwarded.as_str())] } else { [Some(asked.as_str()), None] };
+        let request = Half::join(plan, interfaces, wires, wire, of_requests, dds)?;
+        let reply = Half::join(plan, interfaces, wires, reply, [Some(&answered), None], dds)?;
+        let address = reply.reader.and_then(|reader| dds.reader_guid(reader)).unwrap_or(GUID::GUID_UNKNOWN);
+        services.push(Served { path, cut, request, reply, asked: BTreeMap::new(), address, served_since: None });
     }
     Ok(services)
 }
@@ -127,6 +151,29 @@ impl Served {
         [Direction::Request, Direction::Reply].into_iter().find(|&direction| self.wire(direction) == wire)
     }
 
+    /// Offers the service to clients if it is cut and its server is there for long enough; true if it is new to them.
+    pub(super) fn offer(
+        &mut self,
+        publishers: &[Endpoint],
+        subscribers: &[Endpoint],
+        dds: &mut Participant,
+    ) -> Result<bool, DdsError> {
+        if !self.cut || self.request.reader.is_some() {
+            return Ok(false);
+        }
+        let answers = names::reply(&self.server());
+        if !self.is_served(subscribers) || publishers.iter().all(|endpoint| endpoint.topic != answers) {
+            self.served_since = None;
+            return Ok(false);
+        }
+        if self.served_since.get_or_insert_with(now).elapsed() < SETTLE {
+            return Ok(false);
+        }
+        self.request.read(&names::request(&self.path), dds)?;
+        self.reply.write(&names::reply(&self.path), dds)?;
+        Ok(true)
+    }
+
     /// Forgets the messages of the run before. Calls that are under way stay known.
     pub(super) fn begin(&mut self) {
         for direction in [Direction::Request, Direction::Reply] {
@@ -139,7 +186,7 @@ impl Served {
     /// What a sample is of this service, and the client whose call it belongs to; `None` if it is nothing of it, or
     /// answers a call that nobody remembers.
     pub(super) fn recognise(&mut self, received: &Received) -> Option<(Direction, SampleIdentity)> {
-        if received.reader == self.request.reader {
+        if Some(received.reader) == self.request.reader {
             // The client may want its reply at its reader.
             let address =
                 received.related.map(|related| related.writer_guid).filter(|&guid| guid != GUID::GUID_UNKNOWN);
@@ -147,7 +194,7 @@ impl Served {
             let client = SampleIdentity { writer_guid, sequence_number: received.identity.sequence_number };
             return Some((Direction::Request, client));
         }
-        if received.reader != self.reply.reader {
+        if Some(received.reader) != self.reply.reader {
             return None;
         }
         let related = received.related?;
@@ -201,12 +248,16 @@ impl Served {
         if self.cut { format!("{}/undisturbed", self.path) } else { self.path.clone() }
     }
 
+    /// Whether its server is there.
+    fn is_served(&self, subscribers: &[Endpoint]) -> bool {
+        let topic = names::request(&self.server());
+        subscribers.iter().any(|endpoint| endpoint.topic == topic)
+    }
+
     /// What is missing before a run, in a phrase.
     pub(super) fn missing(&self, subscribers: &[Endpoint]) -> Option<String> {
-        let server = self.server();
-        let topic = names::request(&server);
-        let served = subscribers.iter().any(|endpoint| endpoint.topic == topic);
-        (!served).then(|| format!("nobody serves `{server}`"))
+        let offered = !self.cut || self.request.reader.is_some();
+        (!offered || !self.is_served(subscribers)).then(|| format!("nobody serves `{}`", self.server()))
     }
 
     /// Who serves it directly although it is cut.
@@ -218,7 +269,7 @@ impl Served {
     /// Whether clients are there for replies, and a server for requests.
     pub(super) fn heard(&self, direction: Direction, subscribers: &[Endpoint]) -> bool {
         let topic = match direction {
-            Direction::Request => return self.missing(subscribers).is_none(),
+            Direction::Request => return self.is_served(subscribers),
             Direction::Reply => names::reply(&self.path),
         };
         subscribers.iter().any(|endpoint| endpoint.topic == topic)

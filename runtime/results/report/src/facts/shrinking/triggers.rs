@@ -147,12 +147,18 @@ fn moment_words(plan: &CampaignPlan, moment: &Moment) -> String {
 fn while_words(plan: &CampaignPlan, State { wire, field, holds }: &State) -> String {
     let name = signal(plan, *wire, field);
     match holds {
-        Holds::Value(value) => format!("while {name} is {value}"),
+        Holds::Value(value) => format!("while {name} is {}", constant(plan, *wire, field, value).unwrap_or(value)),
         Holds::Moves => format!("while {name} moves"),
         Holds::Rests => format!("while {name} rests"),
         Holds::Speaks => format!("while messages of {name} come"),
         Holds::FallsSilent => format!("while {name} is silent"),
     }
+}
+
+/// The name of a number that a field has, if it is a constant of its message.
+fn constant<'a>(plan: &'a CampaignPlan, wire: u32, field: &str, value: &str) -> Option<&'a str> {
+    let topic = wires(plan).get(wire as usize)?.topic;
+    plan.constant(topic, &field.split('.').collect::<Vec<_>>(), value.parse().ok()?)
 }
 
 /// A field as the language names it, or the topic for messages as such; of a topic of several paths, the path.

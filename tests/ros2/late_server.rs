@@ -1,0 +1,56 @@
+//! A client that waits for its service and calls it once, while the server takes long to come up: its call is answered
+//! as without the runner, although the service is cut.
+
+use std::fs;
+
+use serde_json::Value;
+use sesame_tests::{command, done, fresh_folder, sesamec, workspace};
+
+use crate::environment::{Domain, Vendor};
+
+#[test]
+fn the_only_call_of_a_client_is_answered_however_late_the_server_comes() {
+    let Some(python) = Vendor::Jazzy.python() else { return };
+    let python = python.display().to_string();
+    let (folder, domain) = (fresh_folder("late_server"), Domain::free());
+    let program = workspace().join("tests/ros2/peers/gripper.py").display().to_string();
+    let ready = "{ ready when line \"up\" within 120s }";
+    let text = format!(
+        "space gripper\n\
+         system {{\n\
+           simulator cell = ros2 {{ domain {domain} }}\n\
+           message Closed = \"std_msgs/msg/Float64\"\n\
+           topic closed = \"/closed\" : Closed\n\
+           service grip = \"/gripper/close\" : \"std_srvs/srv/SetBool\"\n\
+           node client \"/client\" {{\n\
+             launch {python:?} {program:?} \"client\" \"{{ros-args}}\" {ready}\n\
+             publishes closed, grip_request  subscribes grip_reply\n\
+           }}\n\
+           node server \"/server\" {{\n\
+             launch {python:?} {program:?} \"server\" \"{{ros-args}}\" {ready}\n\
+             publishes grip_reply  subscribes grip_request\n\
+           }}\n\
+         }}\n\
+         metric finished maximise default 0 = max(closed.data)\n\
+         operation lag  on grip_reply   = latency [0s, 1s]\n\
+         operation lose on grip_request = blackhole\n\
+         test lost {{ lose from 0s to 8s }}\n\
+         campaign c {{\n\
+           objectives finished\n\
+           operations lag 1 per test\n\
+           search     random {{ evaluations 1 }}\n\
+           end        after 8s\n\
+         }}\n",
+        domain = domain.number,
+    );
+    fs::write(folder.join("gripper.sesame"), text).expect("a space can be written");
+    let sesamec = |arguments: &[&str]| done(command(sesamec()).args(arguments).current_dir(&folder));
+    sesamec(&["known", "gripper.sesame", "lost"]).expect(0);
+    let listed = sesamec(&["list", "gripper.sesame", "--results", "known", "--format", "json"]).expect(0);
+    let listed: Value = serde_json::from_str(&listed.out).expect("it is JSON");
+    let finished = |test: &str| {
+        let found = listed["tests"].as_array().expect("it lists tests").iter().find(|row| row["test"] == test);
+        found.and_then(|row| row["measured"]["finished"].as_f64()).unwrap_or_else(|| panic!("no {test} in {listed:#}"))
+    };
+    assert_eq!(finished("T0"), 1.0, "{listed:#}");
+}
