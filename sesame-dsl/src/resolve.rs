@@ -2,8 +2,8 @@
 //!
 //! 1. [`collect`] collects names, and reports duplicates and missing declarations
 //! 2. [`system`] resolves message types (ordered so that each follows those it contains), topics, the simulator, and
-//!    [`nodes`] nodes; [`groups`] says what paths stand for; [`ros2`], [`ros_types`] and [`services`] resolve those of
-//!    ROS, [`bus`] addresses, [`mavlink`] what its files define
+//!    [`nodes`] nodes, with what they serve and call ([`served`]); [`groups`] says what paths stand for; [`ros2`],
+//!    [`ros_types`] and [`services`] resolve those of ROS, [`bus`] addresses, [`mavlink`] what its files define
 //! 3. [`eddi`] resolves runtime monitors, with their [`evidence`]
 //! 4. [`metrics`] resolves metrics and requirements; [`formula`] resolves formulas, with [`function`], [`geometry`],
 //!    [`region`] and [`members`]; [`score`] what is said of monitors
@@ -66,6 +66,7 @@ mod ros2;
 mod ros_types;
 mod scene;
 mod score;
+mod served;
 mod services;
 mod simulator;
 mod stop;

@@ -4,11 +4,10 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use super::{Kind, Resolver, list};
+use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::groups::{Expanded, expand, own_members};
 use crate::model::{self, Channel, Id as _, NodeId, TopicId, TopicMembers};
-use crate::similar::most_similar;
 use crate::span::Span;
 use crate::syntax::ast::{self, OperationBody, Target, WithMember};
 
@@ -18,7 +17,7 @@ pub(super) fn node_of_plans(node: NodeId) -> sesame_plan::NodeId {
 }
 
 /// What a node says of the members of a group of topics.
-enum Said {
+pub(super) enum Said {
     /// Nothing: its own ones.
     Own,
     All,
@@ -27,13 +26,13 @@ enum Said {
 }
 
 /// A topic that a node lists.
-struct Listed {
-    topic: TopicId,
-    said: Said,
+pub(super) struct Listed {
+    pub(super) topic: TopicId,
+    pub(super) said: Said,
     /// What the topic's path stands for.
-    members: Vec<Expanded>,
+    pub(super) members: Vec<Expanded>,
     /// Where it is listed.
-    span: Span,
+    pub(super) span: Span,
 }
 
 impl<'a> Resolver<'a> {
@@ -160,7 +159,7 @@ impl<'a> Resolver<'a> {
     }
 
     /// What a list says of the members of a topic. `None` was reported.
-    fn said(&mut self, topic: TopicId, listed: &WithMember) -> Option<Said> {
+    pub(super) fn said(&mut self, topic: TopicId, listed: &WithMember) -> Option<Said> {
         Some(match &listed.member {
             None => Said::Own,
             Some(ast::Member { name: None, .. }) => Said::All,
@@ -168,89 +167,6 @@ impl<'a> Resolver<'a> {
                 Said::These(vec![self.named_member(topic, &listed.name, wanted, *span)?])
             }
         })
-    }
-
-    /// Adds the topics of services and actions to what a node publishes and subscribes to: a server publishes all but
-    /// requests, a client requests only. `None` is what has a mistake.
-    fn parts_listed(
-        &mut self,
-        clauses: &'a [(Span, Vec<WithMember>)],
-        serves: bool,
-        mut lists: [&mut Option<Vec<Listed>>; 2],
-    ) {
-        for listed in self.single(clauses, if serves { "serves" } else { "calls" }).into_iter().flatten() {
-            let Some(parts) = self.parts_named(&listed.name) else {
-                lists.iter_mut().for_each(|list| **list = None);
-                continue;
-            };
-            for topic in parts.map(TopicId::from_index) {
-                let declared = self.system.topics.get(topic.index()).and_then(Option::as_ref);
-                let request = declared.map(|topic| topic.channel == Channel::Request);
-                let said = request.and_then(|request| Some((request, self.said(topic, listed)?)));
-                let Some((request, said)) = said else {
-                    // What is said of one part is said of all.
-                    lists.iter_mut().for_each(|list| **list = None);
-                    break;
-                };
-                let Some(list) = lists[usize::from(request == serves)].as_mut() else { continue };
-                match list.iter_mut().find(|known| known.topic == topic) {
-                    None => {
-                        let members = self.members_of_topic(topic);
-                        list.push(Listed { topic, said, members, span: listed.span });
-                    }
-                    Some(known) => {
-                        if !known.takes(&said) {
-                            let before = known.span;
-                            self.listed_twice(listed.span, before);
-                            lists.iter_mut().for_each(|list| **list = None);
-                            break;
-                        }
-                    }
-                }
-            }
-        }
-    }
-
-    /// The topics of the service or action of this name. `None` was reported.
-    fn parts_named(&mut self, name: &'a ast::Name) -> Option<Range<usize>> {
-        let known = self.names.get(name.text.as_str()).copied();
-        if let Some(parts) = known.and_then(|known| self.topics_of(known.kind, known.index)) {
-            return Some(parts);
-        }
-        if self.silent.contains(name.text.as_str()) {
-            return None;
-        }
-        if let Some(known) = known {
-            let is = known.kind.with_article();
-            let title = format!("`{}` is {is}, not a service or an action", name.text);
-            let mut diagnostic = Diagnostic::new(Code::OTHER_KIND, name.span, title)
-                .label("expected a service or an action")
-                .secondary(known.span, format!("declared as {is} here"));
-            if known.kind == Kind::Topic {
-                diagnostic = diagnostic.note("topics stand after `publishes` and `subscribes`");
-            }
-            self.report(diagnostic);
-            return None;
-        }
-        self.silent.insert(&name.text);
-        // An import that failed may have declared it.
-        if self.file.incomplete {
-            return None;
-        }
-        let title = format!("no service or action named `{}`", name.text);
-        let mut diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title).label("not found in this space");
-        let declared: Vec<&str> =
-            [Kind::Service, Kind::Action].into_iter().flat_map(|kind| self.names_of(kind)).collect();
-        if self.compared.more(declared.len()) {
-            diagnostic = match most_similar(&name.text, declared.iter().copied()) {
-                Some(similar) => diagnostic.did_you_mean(name.span, similar),
-                None if declared.is_empty() => diagnostic.note("this space declares no services and no actions"),
-                None if declared.len() <= 8 => diagnostic.note(format!("there are {}", list(&declared))),
-                None => diagnostic,
-            };
-        }
-        self.report(diagnostic);
-        None
     }
 
     /// The nodes of a list: of a group, all members or the one that is named.
@@ -388,17 +304,6 @@ impl<'a> Resolver<'a> {
 }
 
 impl Listed {
-    /// Adds further members, if both name some and none twice.
-    fn takes(&mut self, said: &Said) -> bool {
-        let (Said::These(known), Said::These(more)) = (&mut self.said, said) else { return false };
-        if known.iter().any(|member| more.contains(member)) {
-            return false;
-        }
-        known.extend(more);
-        known.sort_unstable();
-        true
-    }
-
     /// What a node uses of it, which may be a member of a group of nodes. Without a word, these are its own members of
     /// a group: those whose paths begin like its name or, if the topics and the nodes have the same members, the one of
     /// the same name; all where neither says anything.

@@ -115,8 +115,8 @@ impl<'a> Resolver<'a> {
         false
     }
 
-    /// The paths of a topic, service or action: one, or those of the members of its group, with their names. In ROS the paths
-    /// are absolute.
+    /// The paths of a topic, service or action: one, or those of the members of its group, with their names. In ROS the
+    /// paths are absolute.
     pub(super) fn topic_paths(&mut self, path: &ast::Text, what: &str) -> Option<(Vec<String>, Vec<String>)> {
         if path.text.trim().is_empty() {
             return None;

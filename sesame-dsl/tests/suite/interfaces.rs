@@ -65,6 +65,25 @@ impl Interfaces for Memory {
             }
             "cell_msgs/srv/Move_Request" => found.push(interface(name, &[("to", inner("cell_msgs/msg/Header"))])),
             "cell_msgs/srv/Move_Response" => found = vec![interface(name, &[])],
+            _ if name.starts_with("cell_msgs/action/Drive_") => {
+                let id = WireType::Array { of: Box::new(of(Primitive::Uint8)), length: 16 };
+                let id = interface("unique_identifier_msgs/msg/UUID", &[("uuid", id)]);
+                let part = |name: &str| interface(name, &[("x", of(Primitive::Float64))]);
+                let messages = sesame_plan::action::messages("cell_msgs/action/Drive");
+                match messages.into_iter().find(|message| message.name == name) {
+                    Some(message) => {
+                        found.push(id);
+                        for field in &message.fields {
+                            match &field.ty {
+                                WireType::Interface { name } if name.contains("/Drive_") => found.push(part(name)),
+                                _ => {}
+                            }
+                        }
+                        found.push(message);
+                    }
+                    None => found.push(part(name)),
+                }
+            }
             _ => return Ok(None),
         }
         Ok(Some(found))
@@ -141,6 +160,36 @@ fn a_service_has_two_topics_with_its_messages() {
     assert_eq!(topics, ["moving_request", "moving_reply"]);
     assert_eq!(message(&space, "MoveRequest"), "to: Header");
     assert_eq!(message(&space, "MoveResponse"), "");
+}
+
+#[test]
+fn an_action_has_eight_topics_with_its_messages_and_fields_have_units_where_one_declares_them() {
+    let space = model(
+        r#"message Goal = "cell_msgs/action/Drive_Goal" { x: real[m] }
+           message Told = "cell_msgs/action/Drive_FeedbackMessage"
+           action drive = "drive" : "cell_msgs/Drive"
+           topic copy = "copy" : Told"#,
+    );
+    let topics: Vec<String> =
+        space.topics.values().map(|topic| format!("{} {}", topic.declaration.name, topic.paths[0])).collect();
+    let of_action = [
+        "drive_goal_request /drive/_action/send_goal",
+        "drive_goal_reply /drive/_action/send_goal",
+        "drive_cancel_request /drive/_action/cancel_goal",
+        "drive_cancel_reply /drive/_action/cancel_goal",
+        "drive_result_request /drive/_action/get_result",
+        "drive_result_reply /drive/_action/get_result",
+        "drive_feedback /drive/_action/feedback",
+        "drive_status /drive/_action/status",
+    ];
+    assert_eq!(topics[0], "copy /copy");
+    assert_eq!(topics[1..], of_action);
+    assert_eq!(message(&space, "Goal"), "x: Real in m");
+    assert_eq!(message(&space, "DriveSendGoalRequest"), "goal_id: UUID, goal: Goal");
+    assert_eq!(message(&space, "DriveGetResultResponse"), "status: Int(None), result: DriveResult");
+    assert_eq!(message(&space, "GoalStatusArray"), "status_list: list of GoalStatus");
+    let feedback = space.topics.values().find(|topic| topic.declaration.name == "drive_feedback").unwrap();
+    assert_eq!(feedback.ty, space.topics.values().next().unwrap().ty, "the declared message is taken");
 }
 
 #[test]

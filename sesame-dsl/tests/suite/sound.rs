@@ -44,10 +44,12 @@ pub(crate) fn has_a_sound_answer(text: &str) -> (FileId, Analysis) {
     }
     let Index { definitions, references, unread } = &analysis.index;
     for definition in definitions {
-        // The topics of a service stand where its name does.
+        // The topics of a service or an action stand where its name does.
         let written = sources.snippet(definition.span);
-        let of_service = ["_request", "_reply"].iter().any(|end| definition.name == format!("{written}{end}"));
-        assert!(definition.name == written || of_service, "{definition:?}");
+        let of_actions = sesame_plan::action::PARTS.map(|part| part.name);
+        let ends = ["request", "reply"].into_iter().chain(of_actions);
+        let is_part = || ends.into_iter().any(|end| definition.name == format!("{written}_{end}"));
+        assert!(definition.name == written || is_part(), "{definition:?}");
         let within = definition.full_span.range();
         assert!(sources.file(definition.span.file).text().get(within).is_some(), "{definition:?}");
     }

@@ -177,14 +177,14 @@ impl Reader<'_> {
         let head = self.head(pair);
         let [path, ros_type] = self.path_and_type(pair);
         let [request, reply] = ["request", "reply"].map(|end| part(&head, end));
-        Service { path, ros_type, head, request, reply }
+        Service { head, request, reply, path, ros_type }
     }
 
     fn action(&mut self, pair: &Pair<'_>) -> Action {
         let head = self.head(pair);
         let [path, ros_type] = self.path_and_type(pair);
         let parts = sesame_plan::action::PARTS.iter().map(|of| part(&head, of.name)).collect();
-        Action { path, ros_type, head, parts }
+        Action { head, parts, path, ros_type }
     }
 
     /// The two texts of a service or an action.
