@@ -148,6 +148,7 @@ impl<'a> Resolver<'a> {
         let name = path.fields.last().unwrap_or(&path.topic);
         let diagnostic = match most_similar(&name.text, all.iter().map(String::as_str)) {
             Some(similar) => diagnostic.label("not a constant of any message").did_you_mean(name.span, similar),
+            None if !path.fields.is_empty() => diagnostic.label("the message has no such constant"),
             None => diagnostic
                 .label("expected a range such as `[0, 1]`, `true`, `false`, or the name of a constant")
                 .note("constants are those of messages: `constant IDLE = 0`, or of the definitions of their types"),

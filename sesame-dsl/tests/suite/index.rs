@@ -61,7 +61,7 @@ fn the_key_of_a_filter_is_a_field_of_the_elements_or_a_list_beside_theirs() {
     assert!(!has_errors);
     let of = |name: &str| uses(&sources, &index, name).into_iter().map(|(name, _)| name).collect::<Vec<_>>();
     assert_eq!(of("Joints.name"), ["elbow", "turning", "bent", "names", "names", "names", "names"]);
-    assert_eq!(of("Joints.position"), ["elbow", "bent"]);
+    assert_eq!(of("Joints.position"), ["elbow", "turning", "widest", "bent"]);
     assert_eq!(of("Transform.child"), ["apart", "apart", "moved"]);
     assert_eq!(of("Transform.at"), ["apart", "apart", "home", "height", "height", "moved"]);
     assert_eq!(of("Part.level"), ["worst", "failing"]);
