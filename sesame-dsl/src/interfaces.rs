@@ -8,7 +8,8 @@ use sesame_plan::{Dialect, Interface, InterfaceField, Primitive, WireType};
 /// Where definitions of messages come from: the layouts of ROS interfaces, and what a dialect of `MAVLink` has.
 pub trait Interfaces {
     /// The layout of an interface such as `sensor_msgs/msg/JointState`, or of one that a service or an action consists
-    /// of, such as `std_srvs/srv/SetBool_Request`: last in a list in which each comes after those that it contains. `None` if no folder has it; an error is a clause such as "it cannot be read".
+    /// of, such as `std_srvs/srv/SetBool_Request`: last in a list in which each comes after those that it contains.
+    /// `None` if no folder has it; an error is a clause such as "it cannot be read".
     fn find(&self, folders: Folders<'_>, name: &str) -> Result<Option<Vec<Interface>>, String>;
 
     /// The constants of an interface that are numbers or texts, in declared order; none if no folder has it.
