@@ -11,8 +11,8 @@ use crate::interpreted::without_cargo;
 
 const SPACE: &str = "vendors.sesame";
 
-/// `acme` is always sure of its position, which it has from the second on; `bolt` loses it every other time, and says so
-/// in one of two ways. It counts the states that a control would get, and those that are late.
+/// `acme` always knows its position; `bolt` loses it every other time, and says so in one of two ways. The simulator
+/// counts the states that a control would get.
 const SIMULATOR: &str = r#"
 import json, sys
 
