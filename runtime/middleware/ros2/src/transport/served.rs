@@ -44,7 +44,7 @@ pub(super) struct Served {
     /// Where replies of the server to our requests go.
     address: GUID,
     /// Since when its server has been there, while it is not yet offered to clients.
-    served_since: Option<Instant>,
+    there_since: Option<Instant>,
 }
 
 /// What is needed for one direction.
@@ -118,7 +118,7 @@ pub(super) fn services(
         let request = Half::join(plan, interfaces, wires, wire, of_requests, dds)?;
         let reply = Half::join(plan, interfaces, wires, reply, [Some(&answered), None], dds)?;
         let address = reply.reader.and_then(|reader| dds.reader_guid(reader)).unwrap_or(GUID::GUID_UNKNOWN);
-        services.push(Served { path, cut, request, reply, asked: BTreeMap::new(), address, served_since: None });
+        services.push(Served { path, cut, request, reply, asked: BTreeMap::new(), address, there_since: None });
     }
     Ok(services)
 }
@@ -163,10 +163,10 @@ impl Served {
         }
         let answers = names::reply(&self.server());
         if !self.is_served(subscribers) || publishers.iter().all(|endpoint| endpoint.topic != answers) {
-            self.served_since = None;
+            self.there_since = None;
             return Ok(false);
         }
-        if self.served_since.get_or_insert_with(now).elapsed() < SETTLE {
+        if self.there_since.get_or_insert_with(now).elapsed() < SETTLE {
             return Ok(false);
         }
         self.request.read(&names::request(&self.path), dds)?;
