@@ -130,10 +130,12 @@ impl Reader<'_> {
                 None => OperationKind::RandomText(self.listed(&expect_child(kind, Rule::text_domain))),
             },
             Rule::stuck_at => {
-                OperationKind::StuckAt(match (child(kind, Rule::text_domain), child(kind, Rule::truth)) {
-                    (Some(texts), _) => Stuck::Texts(self.listed(&texts)),
-                    (_, Some(truth)) => Stuck::Truth(child(&truth, Rule::k_true).is_some(), self.span(&truth)),
-                    _ if let Some(constants) = child(kind, Rule::constants) => {
+                let [texts, truth, constants] =
+                    [Rule::text_domain, Rule::truth, Rule::constants].map(|rule| child(kind, rule));
+                OperationKind::StuckAt(match (texts, truth, constants) {
+                    (Some(texts), ..) => Stuck::Texts(self.listed(&texts)),
+                    (_, Some(truth), _) => Stuck::Truth(child(&truth, Rule::k_true).is_some(), self.span(&truth)),
+                    (.., Some(constants)) => {
                         let names = children(&constants, Rule::constant_name).map(|name| self.path(&name));
                         Stuck::Constants(names.collect())
                     }
