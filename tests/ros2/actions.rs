@@ -57,8 +57,8 @@ impl Robots {
              metric longest   default 0s = max(took[r1].data)\n\
              metric furthest  default 0s = max(counted[r1].data)\n\
              metric goals     default 0 = count(nav_goal_request[r1].goal.order == 4)\n\
-             metric reached   default 0 = count(nav_result_reply[r1].status == 4)\n\
-             metric executing default 0s = duration(count of nav_status[r1].status_list[status == 2] > 0)\n\
+             metric reached   default 0 = count(nav_result_reply[r1].status == STATUS_SUCCEEDED)\n\
+             metric executing default 0s = duration(count of nav_status[r1].status_list[status == STATUS_EXECUTING] > 0)\n\
              operation lost   on nav_goal_request = blackhole\n\
              operation late   on nav_result_reply = latency [0s, 3s]\n\
              operation silent on nav_feedback from counter[r1] = blackhole\n\

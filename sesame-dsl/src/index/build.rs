@@ -11,9 +11,9 @@ use crate::syntax::ast::eddi::{Eddi, State};
 use crate::syntax::ast::lifecycle::{Launch, ReadyWhen};
 use crate::syntax::ast::physical::Physical;
 use crate::syntax::ast::{
-    self, Activation, ActivationMode, Campaign, Contained, Expression, ExpressionKind, Formula, FormulaKind, Head,
-    Metric, MetricSource, Name, Operation, OperationBody, OperationKind, Path, Resource, Step, System, Test,
-    TriggerEnd, Type, TypeKind,
+    self, Activation, ActivationMode, Campaign, ComparedWith, Contained, Expression, ExpressionKind, Formula,
+    FormulaKind, Head, Metric, MetricSource, Name, Operation, OperationBody, OperationKind, Path, Resource, Step,
+    System, Test, TriggerEnd, Type, TypeKind,
 };
 
 /// Makes the index of what was read.
@@ -306,6 +306,13 @@ impl<'a> Indexer<'a> {
         if of_message && path.fields.len() == 1 {
             // `Battery.LOW` is a constant.
             return;
+        }
+        for step in &path.elements {
+            if let Step::Filter(filter) = step
+                && let ComparedWith::Constant(constant) = &filter.with
+            {
+                self.path(constant, within);
+            }
         }
         let mut outer = None;
         let fields = path.fields.iter().map(|name| Some((name, None)));

@@ -90,7 +90,7 @@ impl<'a> Resolver<'a> {
     pub(super) fn constant_of(&mut self, path: &'a Path) -> Option<Option<ConstantValue>> {
         let found = self.constants_named(path);
         if found.is_empty() && self.is_of_message(path) {
-            self.no_constant(path);
+            self.no_constant(path, "a number");
             return Some(None);
         }
         let (_, first) = *found.first()?;
@@ -131,7 +131,7 @@ impl<'a> Resolver<'a> {
                     complete = false;
                 }
                 None => {
-                    self.no_constant(name);
+                    self.no_constant(name, "a range such as `[0, 1]`, `true`, `false`");
                     complete = false;
                 }
             }
@@ -139,7 +139,15 @@ impl<'a> Resolver<'a> {
         complete.then_some(numbers)
     }
 
-    fn no_constant(&mut self, path: &'a Path) {
+    /// The value of a constant that a filter of a list names. `None` was reported.
+    pub(super) fn constant_in_filter(&mut self, path: &'a Path) -> Option<ConstantValue> {
+        self.constant_of(path).unwrap_or_else(|| {
+            self.no_constant(path, "a number, a text, `true`, `false`");
+            None
+        })
+    }
+
+    fn no_constant(&mut self, path: &'a Path, expected: &str) {
         let written = self.text(path.span).to_owned();
         let all = self.system.messages.iter().flatten().flat_map(|message| &message.constants);
         let all: Vec<String> = all.map(|constant| constant.name.clone()).collect();
@@ -150,7 +158,7 @@ impl<'a> Resolver<'a> {
             Some(similar) => diagnostic.label("not a constant of any message").did_you_mean(name.span, similar),
             None if !path.fields.is_empty() => diagnostic.label("the message has no such constant"),
             None => diagnostic
-                .label("expected a range such as `[0, 1]`, `true`, `false`, or the name of a constant")
+                .label(format!("expected {expected}, or the name of a constant"))
                 .note("constants are those of messages: `constant IDLE = 0`, or of the definitions of their types"),
         };
         self.report(diagnostic);

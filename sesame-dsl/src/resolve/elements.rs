@@ -6,11 +6,12 @@ use super::boolean::relation;
 use super::words::type_in_words;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::interfaces;
+use crate::interfaces::{self, ConstantValue};
 use crate::model::{Comparison, FieldPath, Id as _, Input, Members, Memory, TextTest, TopicId, Type};
 use crate::similar::most_similar;
 use crate::span::Span;
 use crate::syntax::ast::{self, ComparedWith, Name, Path};
+use crate::units::Unit;
 
 /// Where a path leads.
 pub(super) struct Place {
@@ -341,18 +342,35 @@ impl<'a> Resolver<'a> {
         let by = relation(filter.by);
         let what = format!("`{}`", self.text(filter.key_span));
         let equality = matches!(by, Comparison::Equal | Comparison::NotEqual);
+        let constant = match &filter.with {
+            ComparedWith::Constant(name) => Some(self.constant_in_filter(name)?),
+            _ => None,
+        };
+        let compared = |value, unit: &Option<Unit>| Compared::Number {
+            value: Finite(value),
+            unit: unit.as_ref().map(|unit| unit.text().to_owned()),
+        };
         let with = match (&filter.with, &ty) {
+            (ComparedWith::Constant(_), Type::Text) if equality && let Some(ConstantValue::Text(text)) = &constant => {
+                Compared::Text(text.clone())
+            }
+            (ComparedWith::Constant(_), Type::Int(unit) | Type::Real(unit))
+                if let Some(ConstantValue::Number(number)) = constant =>
+            {
+                compared(number, unit)
+            }
             (ComparedWith::Text(text), Type::Text) if equality => Compared::Text(text.text.clone()),
             (ComparedWith::Truth(truth, _), Type::Bool) if equality => Compared::Truth(*truth),
             (ComparedWith::Number(number), Type::Int(unit) | Type::Real(unit)) => {
                 let value = self.value(number, unit.as_ref(), &what)?;
-                Compared::Number { value: Finite(value), unit: unit.as_ref().map(|unit| unit.text().to_owned()) }
+                compared(value, unit)
             }
             (with, ty) => {
                 let span = match with {
                     ComparedWith::Number(number) => number.span,
                     ComparedWith::Text(text) => text.span,
                     ComparedWith::Truth(_, span) => *span,
+                    ComparedWith::Constant(path) => path.span,
                 };
                 let fits =
                     matches!((with, ty), (ComparedWith::Text(_), Type::Text) | (ComparedWith::Truth(..), Type::Bool));

@@ -133,6 +133,8 @@ pub(crate) enum ComparedWith {
     Number(Quantity),
     Text(Text),
     Truth(bool, Span),
+    /// The name of a constant.
+    Constant(Path),
 }
 
 /// Three numbers of one unit.

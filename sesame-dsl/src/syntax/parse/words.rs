@@ -150,6 +150,8 @@ impl Reader<'_> {
             ComparedWith::Text(self.any_text(&text))
         } else if let Some(truth) = child(pair, Rule::truth) {
             ComparedWith::Truth(child(&truth, Rule::k_true).is_some(), self.span(&truth))
+        } else if let Some(constant) = child(pair, Rule::constant_name) {
+            ComparedWith::Constant(self.path(&constant))
         } else {
             ComparedWith::Number(self.signed(&expect_child(pair, Rule::signed)))
         };
