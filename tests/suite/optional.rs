@@ -67,7 +67,7 @@ metric places_of_acme maximise default 0 = count(state["acme/1"].agvPosition.x >
 metric speeds_of_bolt maximise default 0 = count(state["bolt/7"].velocity.vx > 0m/s)
 metric sideways       maximise default 0 = count(state["bolt/7"].velocity.vy > 0m/s)
 metric states_of_bolt maximise default 0 = count(state["bolt/7"].headerId >= 0)
-metric far            maximise default 0m = max(state["bolt/7"].agvPosition.x)
+metric far            maximise default 0m = max(state["bolt/7"].agvPosition.x) outbound
 metric got            maximise default 0 = last(heard)
 requirement R1 "Bolt stays near" = far <= 1000m
 

@@ -350,22 +350,16 @@ impl<'a> Resolver<'a> {
             value: Finite(value),
             unit: unit.as_ref().map(|unit| unit.text().to_owned()),
         };
-        let with = match (&filter.with, &ty) {
-            (ComparedWith::Constant(_), Type::Text) if equality && let Some(ConstantValue::Text(text)) = &constant => {
-                Compared::Text(text.clone())
-            }
-            (ComparedWith::Constant(_), Type::Int(unit) | Type::Real(unit))
-                if let Some(ConstantValue::Number(number)) = constant =>
-            {
-                compared(number, unit)
-            }
-            (ComparedWith::Text(text), Type::Text) if equality => Compared::Text(text.text.clone()),
-            (ComparedWith::Truth(truth, _), Type::Bool) if equality => Compared::Truth(*truth),
-            (ComparedWith::Number(number), Type::Int(unit) | Type::Real(unit)) => {
+        let with = match (&filter.with, &constant, &ty) {
+            (_, Some(ConstantValue::Text(text)), Type::Text) if equality => Compared::Text(text.clone()),
+            (_, Some(ConstantValue::Number(number)), Type::Int(unit) | Type::Real(unit)) => compared(*number, unit),
+            (ComparedWith::Text(text), _, Type::Text) if equality => Compared::Text(text.text.clone()),
+            (ComparedWith::Truth(truth, _), _, Type::Bool) if equality => Compared::Truth(*truth),
+            (ComparedWith::Number(number), _, Type::Int(unit) | Type::Real(unit)) => {
                 let value = self.value(number, unit.as_ref(), &what)?;
                 compared(value, unit)
             }
-            (with, ty) => {
+            (with, _, ty) => {
                 let span = match with {
                     ComparedWith::Number(number) => number.span,
                     ComparedWith::Text(text) => text.span,

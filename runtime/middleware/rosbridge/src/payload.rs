@@ -136,14 +136,14 @@ impl Payloads {
         match value {
             Value::Bool(truth) => *there = Json::from(*truth),
             Value::Int(number) => *there = Json::from(*number),
-            Value::Real(number) => match time_names(there) {
-                Some(names) => *there = time(*number, names),
+            Value::Real(number) => {
                 // What JSON has no number for becomes `null`, or a bare word where the bridge wrote one.
-                None => {
-                    let word = bare::number(there).and_then(|_| bare::word(*number));
-                    *there = word.unwrap_or_else(|| Json::from(*number));
-                }
-            },
+                let word = bare::number(there).and_then(|_| bare::word(*number));
+                *there = match time_names(there) {
+                    Some(names) => time(*number, names),
+                    None => word.unwrap_or_else(|| Json::from(*number)),
+                };
+            }
             Value::Text(text) => *there = Json::from(text.as_str()),
             Value::Point([x, y, z]) => *there = json!({ "x": x, "y": y, "z": z }),
             Value::List(items) => {
