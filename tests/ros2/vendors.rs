@@ -116,9 +116,9 @@ fn relayed_of_many_types(vendor: Vendor, types: u32, count: u32) {
     for (at, kind) in kinds.iter().enumerate() {
         assert_eq!(heard["digests"][at], sent["digests"][at], "{kind} through {vendor:?}");
     }
+    assert_eq!(system.notes(), [""; 0]);
     assert_eq!(heard["count"], sent["count"]);
     assert_eq!(Some(relayed.messages()), sent["count"].as_u64());
-    assert_eq!(system.notes(), [""; 0]);
 }
 
 #[test]
