@@ -44,7 +44,7 @@ fn the_only_call_of_a_client_is_answered_however_late_the_server_comes() {
     fs::write(folder.join("gripper.sesame"), text).expect("a space can be written");
     let sesamec = |arguments: &[&str]| done(command(sesamec()).args(arguments).current_dir(&folder));
     // The call comes before the run begins, as soon as all nodes are there, so nothing is left to be late in it.
-    sesamec(&["run", "gripper.sesame", "--", "--allow-unheard", "--workers", "1", "--results", "one"]).expect(0);
+    sesamec(&["run", "gripper.sesame", "--", "--allow-unheard", "--workers", "1", "--results", "one"]).expect(3);
     let listed = sesamec(&["list", "gripper.sesame", "--results", "one/1", "--format", "json"]).expect(0);
     let listed: Value = serde_json::from_str(&listed.out).expect("it is JSON");
     let finished = |test: &str| {
