@@ -92,7 +92,7 @@ impl Target {
 pub struct TargetRef<'a> {
     /// The topic.
     pub topic: TopicId,
-    /// The members of a group; `None` for all of them, or for a topic that is no group.
+    /// The members of a group; `None` for all of them, or for a topic that is not a group.
     pub members: Option<&'a MembersOf>,
     /// The values in each message; none where it acts on whole messages.
     pub places: &'a [ValuePath],
@@ -258,7 +258,7 @@ impl Counted {
 pub struct Counts {
     /// How many it alters at most; `None` for any number.
     pub next: Option<u64>,
-    /// Every how manieth, from 1.
+    /// How many messages there are for each that it alters, which is the last of them; at least 1.
     pub every: u64,
 }
 

@@ -38,13 +38,8 @@ pub struct Field {
     #[serde(rename = "type")]
     pub ty: Type,
     /// Whether messages may lack it, or have `null` in its place. Only JSON has such fields.
-    #[serde(default, skip_serializing_if = "is_false")]
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub optional: bool,
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference")]
-fn is_false(truth: &bool) -> bool {
-    !truth
 }
 
 /// The type of a field or topic.
@@ -271,44 +266,91 @@ pub struct FieldRef {
 }
 
 impl CampaignPlan {
-    /// The name of a number in a field of a topic's messages: of the constants of the message with this field the only
-    /// one that is this number, or the only one whose name begins like the field's: `MODE_AUTO` of `mode`.
+    /// The fields on the way to a value in the messages of a topic, each with its message: as far as the path has names
+    /// of fields.
+    fn fields_to<'a, 'p, S: AsRef<str>>(
+        &'a self,
+        topic: TopicId,
+        path: &'p [S],
+    ) -> impl Iterator<Item = (&'a MessageType, &'a Field)> + use<'a, 'p, S> {
+        let mut ty = self.topics.get(topic.index()).map(|topic| &topic.ty);
+        path.iter().map_while(move |name| {
+            let Some(Type::Message { id }) = ty else { return None };
+            let message = self.messages.get(id.index())?;
+            let field = message.fields.iter().find(|field| field.name == name.as_ref())?;
+            ty = Some(&field.ty);
+            Some((message, field))
+        })
+    }
+
+    /// The name of a number in a field of a topic's messages, if it is clear which constant of the message is meant:
+    /// the only one of this number whose name begins like the field's, `MODE_AUTO` of `mode`; or the only one of this
+    /// number, if the message has no other number that could be meant.
     pub fn constant(&self, topic: TopicId, path: &[&str], number: f64) -> Option<&str> {
-        let (field, outer) = path.split_last()?;
-        let mut ty = &self.topics.get(topic.index())?.ty;
-        for name in outer {
-            let Type::Message { id } = ty else { return None };
-            ty = &self.messages.get(id.index())?.fields.iter().find(|field| field.name == *name)?.ty;
+        let (message, field) = self.fields_to(topic, path).nth(path.len().checked_sub(1)?)?;
+        let is_number = |field: &&Field| matches!(field.ty, Type::Int { .. } | Type::Real { .. });
+        if !is_number(&field) {
+            return None;
         }
-        let Type::Message { id } = ty else { return None };
-        let equal = self.messages.get(id.index())?.constants.iter().filter(|constant| constant.number == number);
-        let names: Vec<&str> = equal.map(|constant| constant.name.as_str()).collect();
-        let start = format!("{}_", field.to_ascii_uppercase());
-        let own: Vec<&str> = names.iter().copied().filter(|name| name.starts_with(&start)).collect();
-        match (names.as_slice(), own.as_slice()) {
-            ([only], _) | (_, [only]) => Some(only),
+        let equal = || message.constants.iter().filter(|constant| constant.number == number);
+        let start = format!("{}_", field.name.to_ascii_uppercase());
+        let own: Vec<&NamedNumber> = equal().filter(|constant| constant.name.starts_with(&start)).collect();
+        let all: Vec<&NamedNumber> =
+            if message.fields.iter().filter(is_number).count() == 1 { equal().collect() } else { Vec::new() };
+        match (own.as_slice(), all.as_slice()) {
+            ([only], _) | ([], [only]) => Some(&only.name),
             _ => None,
         }
     }
 
     /// Whether a message of its type may lack a value: a field on the way to it is optional.
     pub fn may_lack(&self, value: &FieldRef) -> bool {
-        let mut ty = self.topics.get(value.topic.index()).map(|topic| &topic.ty);
-        value.path.iter().any(|name| {
-            let Some(Type::Message { id }) = ty else { return false };
-            let field = self
-                .messages
-                .get(id.index())
-                .and_then(|message| message.fields.iter().find(|field| field.name == *name));
-            ty = field.map(|field| &field.ty);
-            field.is_some_and(|field| field.optional)
-        })
+        self.fields_to(value.topic, &value.path).any(|(_, field)| field.optional)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{in_brackets, with_member, without_member};
+    use super::{NamedNumber, Type, in_brackets, with_member, without_member};
+    use crate::testing::{field, message, plan, topic};
+    use crate::{FieldRef, MessageId, TopicId};
+
+    const INT: Type = Type::Int { unit: None };
+
+    #[test]
+    fn a_number_has_the_name_of_a_constant_only_where_it_is_clear_which() {
+        let mut plan = plan(Vec::new());
+        let named = |name: &str, number| NamedNumber { name: name.to_owned(), number };
+        let constants = vec![named("STATUS_OK", 1.0), named("STATUS_BAD", 2.0), named("HEALTH_BAD", 2.0)];
+        let mut battery = message("Battery", vec![field("status", INT), field("cells", INT)]);
+        battery.constants = constants;
+        let mut mode = message("Mode", vec![field("mode", INT), field("name", Type::Text)]);
+        mode.constants = vec![named("IDLE", 0.0), named("DRIVING", 1.0)];
+        plan.messages = vec![battery, mode];
+        let of = |id| Type::Message { id: MessageId(id) };
+        plan.topics = vec![topic("battery", &["b"], of(0)), topic("mode", &["m"], of(1))];
+        let name = |topic, field, number| plan.constant(TopicId(topic), &[field], number);
+        assert_eq!(name(0, "status", 2.0), Some("STATUS_BAD"), "it begins like its field");
+        assert_eq!(name(0, "status", 3.0), None);
+        assert_eq!(name(0, "cells", 1.0), None, "one cell is no status");
+        assert_eq!(name(1, "mode", 1.0), Some("DRIVING"), "the message has one number");
+        assert_eq!(name(1, "name", 1.0), None, "a text is no number");
+        assert_eq!((name(1, "none", 1.0), plan.constant(TopicId(1), &[], 1.0)), (None, None));
+    }
+
+    #[test]
+    fn a_value_may_be_lacking_if_a_field_on_the_way_to_it_is_optional() {
+        let mut plan = plan(Vec::new());
+        let mut at = field("at", Type::Message { id: MessageId(0) });
+        at.optional = true;
+        plan.messages = vec![message("Place", vec![field("x", INT)]), message("State", vec![at, field("id", INT)])];
+        plan.topics = vec![topic("state", &["s"], Type::Message { id: MessageId(1) })];
+        let may_lack = |path: &[&str]| {
+            plan.may_lack(&FieldRef { topic: TopicId(0), path: path.iter().map(|&name| name.to_owned()).collect() })
+        };
+        assert!(may_lack(&["at", "x"]) && may_lack(&["at"]));
+        assert!(!may_lack(&["id"]) && !may_lack(&[]));
+    }
 
     #[test]
     fn a_member_is_written_as_it_can_be_read() {

@@ -20,7 +20,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use crate::condition::{Condition, Constraint, Operand};
 use crate::{
     Activation, Bound, CampaignPlan, Choice, ChoiceKind, Domain, Failing, FieldRef, KnownTest, KnownTestId, LabTask,
-    MembersOf, MessageId, Messages, Metric, MetricId, MetricSource, Operation, OperationId, OperationKind,
+    MembersOf, MessageId, Messages, Metric, MetricId, MetricSource, NamedNumber, Operation, OperationId, OperationKind,
     RequirementId, SCHEMA, Shrinking, Span, Target, Task, Test, TopicId, Type, Undisturbed, Variations,
 };
 
@@ -73,7 +73,9 @@ impl CampaignPlan {
                 at("type", earlier(&field.ty, index))
             };
             at(&format!("messages[{index}].name"), name(&message.name))?;
-            at(&format!("messages[{index}]"), each("fields", &message.fields, field))
+            at(&format!("messages[{index}]"), each("fields", &message.fields, field))?;
+            let constant = |constant: &NamedNumber| at("number", finite(constant.number));
+            at(&format!("messages[{index}]"), each("constants", &message.constants, constant))
         })?;
         each("topics", &self.topics, |topic| {
             at("name", name(&topic.name))?;

@@ -119,7 +119,7 @@ fn expression(of: &Expression, inputs: &[Input]) -> Checked {
         Expression::Input(index) => input(*index)?,
         Expression::Integral(index) => {
             id("input", *index as usize, inputs.len())?;
-            require(inputs[*index as usize].is_integral(), || format!("input {index} is no integral"))?;
+            require(inputs[*index as usize].is_integral(), || format!("input {index} is not an integral"))?;
         }
         Expression::Min(of) | Expression::Max(of) => filled(of)?,
         Expression::Distance(distance) => finite(distance.scale)?,
