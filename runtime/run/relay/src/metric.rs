@@ -33,7 +33,7 @@ mod tests;
 pub use engine::{MetricError, MetricTable, Metrics};
 pub(crate) use engine::{Shown, next_mark};
 pub(crate) use expression::{Moment, holds};
-pub(crate) use held::{HeardValues, HeldInputs, hear};
+pub(crate) use held::{HeardValues, HeldInputs, Optional, hear};
 pub(crate) use memory::Memories;
 pub(crate) use probe::sample;
 pub use probe::unimplemented_hooks;

@@ -71,7 +71,7 @@ pub struct Relay<'a> {
     operations: Vec<Stage>,
     /// Positions of the test's operations by priority, then declaration.
     order: Vec<usize>,
-    /// Per wire: the stages a message passes, in order, with the wire's position in the operation's topic. The test's
+    /// Per wire: the stages a message passes, in order, with the wire as the operation counts it. The test's
     /// operations come first.
     pipelines: Vec<Vec<(usize, OnWire)>>,
     /// Per wire: how many stages of its pipeline are operations of the test. Behind them the message is delivered, as

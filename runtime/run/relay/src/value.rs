@@ -193,6 +193,11 @@ pub enum Value {
 }
 
 impl Value {
+    /// Whether it is a message that nobody reads.
+    pub fn is_opaque(&self) -> bool {
+        matches!(self, Value::Opaque(_))
+    }
+
     /// The value at the end of a path of field names. The coordinates of a point are only numbers: see
     /// [`Value::number_at`].
     pub fn at<S: AsRef<str>>(&self, path: &[S]) -> Option<&Value> {

@@ -25,7 +25,7 @@ use crate::metric::Context;
 use crate::metric::attendance::Attendance;
 use crate::metric::expression::{Held, greatest, least};
 use crate::metric::growth::{next_change, next_crossing};
-use crate::metric::held::{HeardValues, HeldInputs, hear};
+use crate::metric::held::{HeardValues, HeldInputs, Optional, Read, hear};
 use crate::metric::memory::Memories;
 use crate::metric::tally::{Tally, step};
 use crate::value::{Text, Value};
@@ -50,6 +50,7 @@ pub(super) struct FormulaState<'p> {
     evaluated: Option<SimTime>,
     /// The values of the current message, per input.
     heard: HeardValues,
+    optional: Optional,
     /// Whether a message may lack the key of `per`.
     key_is_optional: bool,
 }
@@ -136,7 +137,8 @@ impl<'p> FormulaState<'p> {
             keys: BTreeMap::new(),
             attendance: several.then(|| Attendance::new(&formula.inputs, plan)),
             evaluated: None,
-            heard: HeardValues::new(plan, &formula.inputs),
+            heard: HeardValues::default(),
+            optional: Optional::new(&formula.inputs, plan),
             key_is_optional: formula.per.as_ref().is_some_and(|per| plan.may_lack(per)),
         }
     }
@@ -144,13 +146,16 @@ impl<'p> FormulaState<'p> {
     /// A message on the `member`th path of a topic, at the context's time. Returns whether the formula waits for the
     /// end of the instant, for which [`FormulaState::settle`] is called.
     pub(super) fn message(&mut self, topic: TopicId, member: usize, value: &Value, context: &mut Context) -> bool {
-        let heard = hear(&self.formula.inputs, (topic, member), value, &mut self.heard);
-        if let Some(attendance) = self.attendance.as_mut().filter(|_| !self.heard.lacks()) {
+        let read = hear(&self.formula.inputs, &self.optional, (topic, member), value, &mut self.heard);
+        if read == Ok(Read::Lacking) {
+            return false;
+        }
+        if let Some(attendance) = &mut self.attendance {
             attendance.heard(context.now, topic, member);
         }
-        match heard {
-            Ok(true) => {}
-            Ok(false) => context.read_not_finite(),
+        match read {
+            Ok(Read::NotFinite) => context.read_not_finite(),
+            Ok(_) => {}
             Err(lacking) => {
                 context.note(format!("a message on `{}` has no value `{lacking}`", context.topic));
                 return false;

@@ -18,24 +18,30 @@ pub(crate) struct HeardValues {
     lists: Vec<(usize, Vec<Held>)>,
     /// The first input for which several elements of a list were there, although it is one value.
     several: Option<usize>,
-    /// Of each input, whether a message may lack its value.
-    optional: Vec<bool>,
-    /// Whether the last message lacked an optional value: it is as if it had not come.
-    lacks: bool,
+}
+
+/// For each input of a formula, whether a message may lack its value.
+#[derive(Debug, Clone)]
+pub(crate) struct Optional(Vec<bool>);
+
+impl Optional {
+    pub(crate) fn new(inputs: &[Input], plan: &CampaignPlan) -> Self {
+        Optional(inputs.iter().map(|input| plan.may_lack(&input.field)).collect())
+    }
+}
+
+/// What a message is for a formula.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Read {
+    /// All values that it has are finite.
+    Finite,
+    /// Some are not.
+    NotFinite,
+    /// It lacks an optional value, so that it is as if it had not come.
+    Lacking,
 }
 
 impl HeardValues {
-    /// Nothing yet of these inputs.
-    pub(crate) fn new(plan: &CampaignPlan, inputs: &[Input]) -> Self {
-        let optional = inputs.iter().map(|input| plan.may_lack(&input.field)).collect();
-        HeardValues { optional, ..HeardValues::default() }
-    }
-
-    /// Whether the last message lacked an optional value, so that it is as if it had not come.
-    pub(crate) fn lacks(&self) -> bool {
-        self.lacks
-    }
-
     /// Whether there was none, as if the message had not come.
     pub(crate) fn is_nothing(&self) -> bool {
         self.values.is_empty() && self.lists.is_empty()
@@ -64,19 +70,19 @@ impl HeardValues {
     }
 }
 
-/// Reads the values of the inputs that a message on the `member`th path of a topic has, and returns whether all of them
-/// are finite. The error is a missing field that is not optional.
+/// Reads the values of the inputs that a message on the `member`th path of a topic has. The error is a missing field
+/// that is not optional.
 pub(crate) fn hear(
     inputs: &[Input],
+    optional: &Optional,
     (topic, member): (TopicId, usize),
     value: &Value,
     heard: &mut HeardValues,
-) -> Result<bool, String> {
+) -> Result<Read, String> {
     heard.values.clear();
     heard.lists.clear();
     heard.several = None;
-    heard.lacks = false;
-    let mut all_finite = true;
+    let mut read = Read::Finite;
     for (at, input) in inputs.iter().enumerate().filter(|(_, input)| input.reads(topic, member)) {
         let path = &input.field.path;
         let held = match (&input.list, value.at(path)) {
@@ -89,19 +95,17 @@ pub(crate) fn hear(
             (Some(_), None) => None,
         };
         let Some(held) = held else {
-            if !heard.optional.get(at).is_some_and(|optional| *optional) {
-                return Err(path.join("."));
-            }
             heard.values.clear();
             heard.lists.clear();
-            heard.lacks = true;
-            return Ok(true);
+            return if optional.0[at] { Ok(Read::Lacking) } else { Err(path.join(".")) };
         };
         let finite = is_finite(held);
-        all_finite &= finite;
+        if !finite {
+            read = Read::NotFinite;
+        }
         heard.values.push((at, if finite { held } else { NOT_FINITE }));
     }
-    Ok(all_finite)
+    Ok(read)
 }
 
 /// What a list in a message is for an input; `None` if the message is as if it had not come, or all is in `heard`.

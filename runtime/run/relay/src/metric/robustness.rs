@@ -13,7 +13,7 @@ use crate::metric::Context;
 use crate::metric::aggregate::{each_of, pairs_of};
 use crate::metric::attendance::Attendance;
 use crate::metric::expression::{Moment, least, number};
-use crate::metric::held::{HeardValues, HeldInputs, hear};
+use crate::metric::held::{HeardValues, HeldInputs, Optional, Read, hear};
 use crate::metric::memory::Memories;
 use crate::value::Value;
 use sesame_stl::{FormulaError, Monitor, Signal};
@@ -31,6 +31,7 @@ pub(super) struct RobustnessState<'p> {
     end: SimTime,
     attendance: Attendance,
     heard: HeardValues,
+    optional: Optional,
     memories: Memories,
     /// A monitor without samples, to find out when a requirement was lost; `None` where nothing is required of it.
     fresh: Option<Monitor>,
@@ -158,7 +159,8 @@ impl<'p> RobustnessState<'p> {
             previous: SimTime::ZERO,
             end: SimTime::ZERO,
             attendance,
-            heard: HeardValues::new(plan, &robustness.inputs),
+            heard: HeardValues::default(),
+            optional: Optional::new(&robustness.inputs, plan),
             memories: Memories::new(&robustness.inputs, plan),
             fresh: required.then_some(fresh),
         })
@@ -167,14 +169,14 @@ impl<'p> RobustnessState<'p> {
     /// A message on the `member`th path of a topic, at the context's time.
     pub(super) fn message(&mut self, topic: TopicId, member: usize, value: &Value, context: &mut Context) {
         let Robustness { inputs, signals, .. } = self.robustness;
-        let heard = hear(inputs, (topic, member), value, &mut self.heard);
-        if self.heard.lacks() {
+        let read = hear(inputs, &self.optional, (topic, member), value, &mut self.heard);
+        if read == Ok(Read::Lacking) {
             return;
         }
         self.attendance.heard(context.now, topic, member);
-        match heard {
-            Ok(true) => {}
-            Ok(false) => context.read_not_finite(),
+        match read {
+            Ok(Read::NotFinite) => context.read_not_finite(),
+            Ok(_) => {}
             Err(lacking) => {
                 context.note(format!("a message on `{}` has no value `{lacking}`", context.topic));
                 return;

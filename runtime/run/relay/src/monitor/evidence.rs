@@ -4,7 +4,7 @@ use sesame_base::time::SimTime;
 use sesame_monitor::Truth;
 use sesame_plan::{CampaignPlan, Evidence, TopicId};
 
-use crate::metric::{HeardValues, HeldInputs, Memories, Moment, hear, holds};
+use crate::metric::{HeardValues, HeldInputs, Memories, Moment, Optional, hear, holds};
 use crate::value::Value;
 use crate::wire::Wire;
 
@@ -14,6 +14,7 @@ pub(super) struct EvidenceState<'p> {
     held: HeldInputs,
     /// The values of the current message, per input.
     heard: HeardValues,
+    optional: Optional,
     memories: Memories,
     sources: Sources,
 }
@@ -24,7 +25,8 @@ impl<'p> EvidenceState<'p> {
         EvidenceState {
             evidence,
             held: HeldInputs::new(&evidence.inputs, plan),
-            heard: HeardValues::new(plan, &evidence.inputs),
+            heard: HeardValues::default(),
+            optional: Optional::new(&evidence.inputs, plan),
             memories: Memories::new(&evidence.inputs, plan),
             sources: Sources::new(sources),
         }
@@ -38,7 +40,7 @@ impl<'p> EvidenceState<'p> {
         now: SimTime,
         value: &Value,
     ) -> Result<Came, String> {
-        hear(&self.evidence.inputs, (topic, member), value, &mut self.heard)?;
+        hear(&self.evidence.inputs, &self.optional, (topic, member), value, &mut self.heard)?;
         self.memories.remember(&mut self.heard, member, now);
         if self.heard.is_nothing() {
             return Ok(Came::Nothing);

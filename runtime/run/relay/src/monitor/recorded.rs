@@ -11,7 +11,7 @@ use sesame_monitor::{Changes, EvidenceChange, EvidenceId, Network, Reading, Run,
 use sesame_plan::{CampaignPlan, MonitorId, Side};
 
 use super::evidence::{Sources, truth_of};
-use crate::metric::{HeardValues, HeldInputs, Memories, hear};
+use crate::metric::{HeardValues, HeldInputs, Memories, Optional, hear};
 use crate::value::Value;
 use crate::wire::{Wire, WireTable};
 
@@ -29,7 +29,8 @@ pub struct RecordedMonitors<'p> {
     recording: Recording,
     /// Per message: what evidence reads in it.
     contents: Vec<Vec<Content>>,
-    memories: BTreeMap<EvidenceId, Memories>,
+    /// Of evidence that had a message: which of its inputs a message may lack, and what it remembers.
+    readers: BTreeMap<EvidenceId, (Optional, Memories)>,
     /// Per message: its number among those published on its wire.
     indices: Vec<u64>,
     warnings: Vec<String>,
@@ -85,7 +86,7 @@ impl<'p> RecordedMonitors<'p> {
             of_wire,
             recording,
             contents: Vec::new(),
-            memories: BTreeMap::new(),
+            readers: BTreeMap::new(),
             indices: Vec::new(),
             warnings: Vec::new(),
         }
@@ -98,14 +99,15 @@ impl<'p> RecordedMonitors<'p> {
         let of = (self.wires.topic(wire), self.wires.member(wire));
         for id in self.streams[stream as usize].evidence.clone() {
             let inputs = &evidence_of(self.plan, &self.network, id).inputs;
-            let mut heard = HeardValues::new(self.plan, inputs);
-            let found = hear(inputs, of, value, &mut heard);
-            if found.is_ok() {
+            let new = || (Optional::new(inputs, self.plan), Memories::new(inputs, self.plan));
+            let (optional, memories) = self.readers.entry(id).or_insert_with(new);
+            let mut heard = HeardValues::default();
+            let read = hear(inputs, optional, of, value, &mut heard);
+            if read.is_ok() {
                 // Messages of a topic that are late are late together, so what was computed from them stays.
-                let memories = self.memories.entry(id).or_insert_with(|| Memories::new(inputs, self.plan));
                 memories.remember(&mut heard, of.1, at);
             }
-            match found {
+            match read {
                 Ok(_) if heard.is_nothing() => {}
                 Ok(_) => content.push((id, heard)),
                 Err(lacking) => self.note(id, wire, &lacking),

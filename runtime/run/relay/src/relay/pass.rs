@@ -38,14 +38,13 @@ impl Relay<'_> {
         for tap in &mut self.taps {
             tap.published(now, wire, index, &value);
         }
-        let is_read = !matches!(value, Value::Opaque(_));
-        if is_read {
+        if !value.is_opaque() {
             self.metrics.published(now, wire, index, &value);
             self.monitors_hear(Side::Inbound, wire, index, &value);
-        }
-        if is_read && self.conditions.read[wire.index()] {
-            self.evaluate_conditions();
-            self.release_due(deliveries);
+            if self.conditions.read[wire.index()] {
+                self.evaluate_conditions();
+                self.release_due(deliveries);
+            }
         }
         let message = Held { wire, publisher, by_monitor, published: index, index, value, next_stage: 0 };
         self.pass(now, message, deliveries);
@@ -133,7 +132,7 @@ impl Relay<'_> {
             return;
         }
         if self.phase != Phase::Over {
-            let is_read = !matches!(message.value, Value::Opaque(_));
+            let is_read = !message.value.is_opaque();
             if is_read {
                 self.metrics.delivered(now, message.wire, message.published, &message.value);
             }
