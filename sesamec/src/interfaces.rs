@@ -497,7 +497,7 @@ mod tests {
             names("a/action/Stop_GetResult_Response"),
             ["a/action/Stop_Result", "a/action/Stop_GetResult_Response"]
         );
-        assert_eq!(files.find(folders, "a/action/Move"), Ok(None), "it is no message");
+        assert_eq!(files.find(folders, "a/action/Move"), Ok(None), "it is not a message");
     }
 
     #[test]

@@ -107,7 +107,7 @@ fn what_a_message_lacks_is_as_if_it_had_not_come_and_operations_on_messages_act_
     assert!(found.is_object(), "{found:#}");
     let reference = show("T0");
     let states = metric(&reference, "states_of_bolt");
-    // Of the numbers from 0 on, the even ones have a position, and every fourth from 1 on has a speed.
+    // States are numbered from 0. The even ones have a position, and every fourth from 1 on has a speed.
     let (places, speeds) = ((states / 2.0).ceil(), ((states - 1.0) / 4.0).ceil());
     assert!(states >= 78.0, "{states}");
     assert_eq!(metric(&reference, "places_of_acme"), states);

@@ -70,7 +70,7 @@ pub struct Target {
     /// The topic.
     pub topic: TopicId,
     /// The members of a group on which it acts, by their positions; `None` for all topics of a group, or for a topic
-    /// that is no group. A test chooses members of all topics, or of none.
+    /// that is not a group. A test chooses members of all topics, or of none.
     pub members: Option<MembersOf>,
     /// The values in each message that it changes, in written order, all of one type; none exactly where it acts on
     /// whole messages.

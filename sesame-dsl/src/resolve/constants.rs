@@ -86,7 +86,7 @@ impl<'a> Resolver<'a> {
 
     /// What a path stands for if it is the name of a constant; `None` inside of what was reported: a name that means
     /// different things in several messages.
-    #[expect(clippy::option_option, reason = "the outer one is for what is no constant")]
+    #[expect(clippy::option_option, reason = "the outer one is for what is not a constant")]
     pub(super) fn constant_of(&mut self, path: &'a Path) -> Option<Option<ConstantValue>> {
         let found = self.constants_named(path);
         if found.is_empty() && self.is_of_message(path) {

@@ -136,7 +136,7 @@ impl<'a> Resolver<'a> {
                 Some((target, same, equal)) if same == kind && equal == parameters => targets.push(target),
                 found => {
                     complete = false;
-                    // What fits the first topic and not this one is no mistake of the amounts.
+                    // The amounts fit the first topic, so the mistake is that this one is unlike it.
                     let of_target =
                         |found: &Diagnostic| written.span.lo <= found.span.lo && found.span.hi <= written.span.hi;
                     if found.is_some() || !self.diagnostics[before..].iter().any(of_target) {

@@ -63,7 +63,7 @@ impl<'a> Resolver<'a> {
                 let paths = paths.as_ref().map(|(paths, members)| {
                     (paths.iter().map(|path| part.path_of(path)).collect::<Vec<_>>(), members.clone())
                 });
-                // Both directions of a service have its path. Of two equal actions, one part says it for all.
+                // Both directions of a service have its path. If two actions are equal, one of their parts says so for all.
                 if free && part.channel != Channel::Reply {
                     for path in paths.iter().flat_map(|(paths, _)| paths) {
                         free &= self.take_path(taken, part.channel, path, action.path.span);

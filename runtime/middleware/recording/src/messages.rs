@@ -20,7 +20,7 @@ pub struct RecordedMessage<'a> {
     /// When it was recorded, in nanoseconds.
     pub time: u64,
     /// Its value, with all fields; or why it cannot be read, in words for the user. Messages in JSON have no layout
-    /// without a space, and are no values here.
+    /// without a space, so they cannot be read.
     pub value: Result<Value, String>,
 }
 

@@ -1,8 +1,8 @@
 //! Services between their clients and their server: requests and replies pass through the relay as messages of two
 //! topics.
 //!
-//! Of a service that is cut, the half towards the clients appears once the server is there and has had time to see the
-//! other half: a client that waits for its service calls it at once, and DDS loses a request that nobody takes yet.
+//! The runner offers a service that is cut to its clients once the server is there and has had time to see the runner:
+//! a client that waits for its service calls it at once, and DDS loses a request that nobody takes yet.
 //!
 //! A reply belongs to a request, which its client has numbered. The relay numbers requests of its own towards the
 //! server and remembers whose they are; so a reply finds its client even if operations have held it back.
