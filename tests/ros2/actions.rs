@@ -2,34 +2,27 @@
 //! relay undisturbed, and each of them can be lost, late or changed.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Stdio};
 use std::time::Instant;
 
 use serde_json::Value;
-use sesame_tests::{Done, command, done, fresh_folder, sesamec, workspace};
+use sesame_tests::{command, done, fresh_folder, sesamec, workspace};
 
-use crate::environment::{Domain, Vendor};
+use crate::environment::{Domain, Space, Vendor};
 use crate::peer::LIMIT;
 
 /// Two robots that count, and a manager that calls both: it lets the first one count to the end, and cancels what the
 /// second one does.
-struct Robots {
-    folder: PathBuf,
-    /// Held for as long as they are used.
-    _domain: Domain,
-}
-
-impl Robots {
-    fn new(name: &str) -> Option<Robots> {
-        let python = Vendor::Jazzy.python()?;
-        let (folder, domain) = (fresh_folder(name), Domain::free());
-        let share = Vendor::share(&python).display().to_string();
-        let python = python.display().to_string();
-        let program = workspace().join("tests/ros2/peers/counter.py").display().to_string();
-        let ready = "{ ready when line \"up\" within 120s }";
-        let text = format!(
-            "space robots\n\
+fn robots(name: &str) -> Option<Space> {
+    let python = Vendor::Jazzy.python()?;
+    let domain = Domain::free();
+    let share = Vendor::share(&python).display().to_string();
+    let python = python.display().to_string();
+    let program = workspace().join("tests/ros2/peers/counter.py").display().to_string();
+    let ready = "{ ready when line \"up\" within 120s }";
+    let text = format!(
+        "space robots\n\
              system {{\n\
                simulator robots = ros2 {{ domain {domain}  types {share:?} }}\n\
                message Word = \"std_msgs/msg/String\" {{ data: text }}\n\
@@ -78,20 +71,14 @@ impl Robots {
                search     random {{ evaluations 2 }}\n\
                end        after 6s\n\
              }}\n",
-            domain = domain.number,
-        );
-        fs::write(folder.join("robots.sesame"), text).expect("a space can be written");
-        Some(Robots { folder, _domain: domain })
-    }
-
-    fn sesamec(&self, arguments: &[&str]) -> Done {
-        done(command(sesamec()).args(arguments).current_dir(&self.folder))
-    }
+        domain = domain.number,
+    );
+    Some(Space::write(name, domain, "robots.sesame", &text))
 }
 
 #[test]
 fn each_part_of_an_action_passes_undisturbed_and_can_be_disturbed() {
-    let Some(robots) = Robots::new("actions") else { return };
+    let Some(robots) = robots("actions") else { return };
     robots.sesamec(&["check", "robots.sesame"]).expect(0);
     let wiring = robots.sesamec(&["explain", "wiring", "robots.sesame"]).expect(0).out;
     for part in ["send_goal", "cancel_goal", "get_result", "status"] {

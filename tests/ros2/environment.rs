@@ -1,9 +1,10 @@
 //! The Pythons of the peers, and domains and ports in which tests do not hear each other.
 
+use std::fs;
 use std::net::{Ipv4Addr, UdpSocket};
 use std::path::{Path, PathBuf};
 
-use sesame_tests::from_own_place;
+use sesame_tests::{Done, command, done, fresh_folder, from_own_place, sesamec};
 
 /// An environment with a middleware.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,6 +58,27 @@ impl Vendor {
 /// that is an error.
 pub(crate) fn packages_of_roslib() -> Option<PathBuf> {
     sesame_peers::named("SESAME_ROSLIB")
+}
+
+/// A space in a folder of its own, whose nodes are in a domain of their own.
+pub(crate) struct Space {
+    folder: PathBuf,
+    /// Held for as long as it is used.
+    _domain: Domain,
+}
+
+impl Space {
+    /// Writes a file with this text.
+    pub(crate) fn write(name: &str, domain: Domain, file: &str, text: &str) -> Space {
+        let folder = fresh_folder(name);
+        fs::write(folder.join(file), text).expect("a space can be written");
+        Space { folder, _domain: domain }
+    }
+
+    /// `sesamec` in its folder.
+    pub(crate) fn sesamec(&self, arguments: &[&str]) -> Done {
+        done(command(sesamec()).args(arguments).current_dir(&self.folder))
+    }
 }
 
 /// A domain, and maybe the ones after it, that no other test on this machine uses meanwhile.

@@ -2,30 +2,19 @@
 //! disturbed by its name or by the choice of a test, a scene sets a parameter of a node, and a start that waits for one
 //! says so.
 
-use std::fs;
-use std::path::PathBuf;
-
 use serde_json::Value;
-use sesame_tests::{Done, command, done, fresh_folder, sesamec, workspace};
+use sesame_tests::workspace;
 
-use crate::environment::{Domain, Vendor};
+use crate::environment::{Domain, Space, Vendor};
 
-/// Two carts and their manager.
-struct Fleet {
-    folder: PathBuf,
-    /// Held for as long as it is used.
-    _domain: Domain,
-}
-
-impl Fleet {
-    /// With further declarations of its system.
-    fn new(name: &str, more: &str) -> Option<Fleet> {
-        let python = Vendor::Jazzy.python()?.display().to_string();
-        let (folder, domain) = (fresh_folder(name), Domain::free());
-        let program = workspace().join("tests/ros2/peers/cart.py").display().to_string();
-        let ready = "{ ready when line \"up\" within 120s }";
-        let text = format!(
-            "space carts\n\
+/// Two carts and their manager, with further declarations of their system.
+fn fleet(name: &str, more: &str) -> Option<Space> {
+    let python = Vendor::Jazzy.python()?.display().to_string();
+    let domain = Domain::free();
+    let program = workspace().join("tests/ros2/peers/cart.py").display().to_string();
+    let ready = "{ ready when line \"up\" within 120s }";
+    let text = format!(
+        "space carts\n\
              system {{\n\
                simulator carts = ros2 {{ domain {domain} }}\n\
                message Place = \"std_msgs/msg/Float64\" {{ data: real[m] }}\n\
@@ -63,20 +52,14 @@ impl Fleet {
                search     random {{ evaluations 2 }}\n\
                end        after 4s\n\
              }}\n",
-            domain = domain.number,
-        );
-        fs::write(folder.join("carts.sesame"), text).expect("a space can be written");
-        Some(Fleet { folder, _domain: domain })
-    }
-
-    fn sesamec(&self, arguments: &[&str]) -> Done {
-        done(command(sesamec()).args(arguments).current_dir(&self.folder))
-    }
+        domain = domain.number,
+    );
+    Some(Space::write(name, domain, "carts.sesame", &text))
 }
 
 #[test]
 fn each_cart_has_its_own_topics_one_of_them_is_disturbed_and_a_scene_drives_them_faster() {
-    let Some(fleet) = Fleet::new("fleet_in_namespaces", "") else { return };
+    let Some(fleet) = fleet("fleet_in_namespaces", "") else { return };
     let checked = fleet.sesamec(&["check", "carts.sesame"]).expect(0);
     assert!(!checked.err.contains("W0013"), "each publishes for itself: {}", checked.err);
     let wiring = fleet.sesamec(&["explain", "wiring", "carts.sesame"]).expect(0).out;
@@ -104,7 +87,7 @@ fn each_cart_has_its_own_topics_one_of_them_is_disturbed_and_a_scene_drives_them
 
 #[test]
 fn a_start_says_what_it_waits_for() {
-    let Some(fleet) = Fleet::new("fleet_that_waits", "node ghost \"/ghost\" { subscribes place }") else { return };
+    let Some(fleet) = fleet("fleet_that_waits", "node ghost \"/ghost\" { subscribes place }") else { return };
     let run = fleet.sesamec(&["run", "carts.sesame"]);
     let said = "first: the system is not complete yet: 1 of 2 subscribe to `/r1/place`: `manager`, `ghost`; 1 of 2 \
                 subscribe to `/r2/place`: `manager`, `ghost`";

@@ -1,18 +1,16 @@
 //! A client that waits for its service and calls it once, while the server takes long to come up: its call is answered
 //! as without the runner, although the service is cut.
 
-use std::fs;
-
 use serde_json::Value;
-use sesame_tests::{command, done, fresh_folder, sesamec, workspace};
+use sesame_tests::workspace;
 
-use crate::environment::{Domain, Vendor};
+use crate::environment::{Domain, Space, Vendor};
 
 #[test]
 fn the_only_call_of_a_client_is_answered_however_late_the_server_comes() {
     let Some(python) = Vendor::Jazzy.python() else { return };
     let python = python.display().to_string();
-    let (folder, domain) = (fresh_folder("late_server"), Domain::free());
+    let domain = Domain::free();
     let program = workspace().join("tests/ros2/peers/gripper.py").display().to_string();
     let ready = "{ ready when line \"up\" within 120s }";
     let text = format!(
@@ -41,11 +39,12 @@ fn the_only_call_of_a_client_is_answered_however_late_the_server_comes() {
          }}\n",
         domain = domain.number,
     );
-    fs::write(folder.join("gripper.sesame"), text).expect("a space can be written");
-    let sesamec = |arguments: &[&str]| done(command(sesamec()).args(arguments).current_dir(&folder));
+    let gripper = Space::write("late_server", domain, "gripper.sesame", &text);
     // The call comes before the run begins, as soon as all nodes are there, so nothing is left to be late in it.
-    sesamec(&["run", "gripper.sesame", "--", "--allow-unheard", "--workers", "1", "--results", "one"]).expect(3);
-    let listed = sesamec(&["list", "gripper.sesame", "--results", "one/1", "--format", "json"]).expect(0);
+    gripper
+        .sesamec(&["run", "gripper.sesame", "--", "--allow-unheard", "--workers", "1", "--results", "one"])
+        .expect(3);
+    let listed = gripper.sesamec(&["list", "gripper.sesame", "--results", "one/1", "--format", "json"]).expect(0);
     let listed: Value = serde_json::from_str(&listed.out).expect("it is JSON");
     let finished = |test: &str| {
         let found = listed["tests"].as_array().expect("it lists tests").iter().find(|row| row["test"] == test);

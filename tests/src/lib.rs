@@ -184,6 +184,12 @@ impl Done {
         }
     }
 
+    /// What it said on standard output, which is JSON alone.
+    #[track_caller]
+    pub fn json(&self) -> serde_json::Value {
+        serde_json::from_str(&self.out).unwrap_or_else(|error| panic!("not JSON alone ({error}): {}", self.out))
+    }
+
     /// Insists on an exit code, and shows what was said otherwise.
     #[track_caller]
     pub fn expect(self, code: i32) -> Done {

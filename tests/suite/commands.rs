@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use sesame_record::{DATABASE, Origin, Repository, TestRow, Verdict};
-use sesame_tests::{Done, Project, Runner};
+use sesame_tests::{Project, Runner};
 
 /// A known test that does not come out as expected, in addition to the example's own.
 const MISTAKEN: &str = "
@@ -14,10 +14,6 @@ test mistaken {
   expect collision_occurrence == 999
 }
 ";
-
-fn json(said: &Done) -> serde_json::Value {
-    serde_json::from_str(&said.out).unwrap_or_else(|error| panic!("not JSON alone ({error}): {}", said.out))
-}
 
 fn sql(folder: &Path, statement: &str) {
     let connection = rusqlite::Connection::open(folder.join(DATABASE)).unwrap();
@@ -48,7 +44,7 @@ fn known_tests_are_held_to_what_they_expect() {
     assert!(messages.iter().any(|message| message.contains("expected is = 999")), "{messages:?}");
 
     let kept = runner.run(&["known", "known_jitter", "--results", "r", "--format", "json"]).expect(0);
-    let kept = json(&kept);
+    let kept = kept.json();
     assert_eq!(kept["expectations"][0]["verdict"], "satisfied");
     assert_eq!(kept["results"], "r/known-2");
     runner.run(&["known", "known_jitter", "--results", "r", "--fail-on", "violation"]).expect(3);
@@ -75,7 +71,7 @@ fn a_replay_is_the_same_bit_for_bit_or_says_what_differs() {
         assert!(same.out.contains("came out the same, bit for bit"), "{}", same.out);
     }
     let same = runner.run(&["replay", "T3", "--results", "r/5", "--format", "json"]).expect(0);
-    assert_eq!(json(&same)["same"], true);
+    assert_eq!(same.json()["same"], true);
     assert_eq!(fs::read(folder.join(DATABASE)).unwrap(), before, "a replay leaves results as they are");
 
     let changed = "UPDATE metric_values SET value = value + 1 WHERE test = 3 \
@@ -85,7 +81,7 @@ fn a_replay_is_the_same_bit_for_bit_or_says_what_differs() {
     assert!(differs.out.contains("T3 came out different"), "{}", differs.out);
     assert!(differs.out.contains("metric `fuzzing_time`"), "{}", differs.out);
     let differs = runner.run(&["replay", "T3", "--results", "r/5", "--format", "json"]).expect(3);
-    assert_eq!(json(&differs)["differences"].as_array().map(Vec::len), Some(1));
+    assert_eq!(differs.json()["differences"].as_array().map(Vec::len), Some(1));
     let missing = runner.run(&["replay", "T99", "--results", "r/5"]).expect(1);
     assert!(missing.err.contains("no test `T99`"), "{}", missing.err);
 }
@@ -94,7 +90,7 @@ fn a_replay_is_the_same_bit_for_bit_or_says_what_differs() {
 fn a_repetition_has_seeds_of_its_own_and_says_how_often_requirements_were_violated() {
     let (_, runner) = run_once("kuka_cell_repeated_by_hand");
     let found = runner.run(&["repeat", "T3", "4", "--results", "r/5", "--format", "json"]).expect(0);
-    let found = json(&found);
+    let found = found.json();
     assert_eq!(found["results"], "r/repeat-T3");
     assert_eq!(found["repetition"]["test"], "T3");
     assert_eq!(found["repetition"]["requirements"][0]["conclusive"], 4);
@@ -139,7 +135,7 @@ fn an_exported_test_reproduces_its_values_in_the_space_it_is_written_into() {
     let block = runner.run(&["export", &first_test, "--results", "r/5"]).expect(0).out;
     assert!(block.contains(&format!("test {first_name} {{")), "{block}");
     let named = runner.run(&["export", &second_test, "--results", "r/5", "--name", "five", "--format", "json"]);
-    let named = json(&named.expect(0));
+    let named = named.expect(0).json();
     assert_eq!((&named["name"], &named["test"]), (&"five".into(), &second_test.as_str().into()));
     runner.run(&["export", &second_test, "--results", "r/5", "--name", "5"]).expect(2);
 
@@ -182,7 +178,7 @@ fn a_report_is_made_anew_also_of_an_unfinished_run() {
 
     let told = runner.run(&["report", "--results", "r/5", "--output", "page.html", "--format", "json"]).expect(0);
     assert_eq!(fs::read(runner.folder.join("page.html")).unwrap(), page);
-    let told = json(&told);
+    let told = told.json();
     assert_eq!((&told["seed"], &told["digest"]), (&5.into(), &digest.trim().into()));
     let violated =
         told["requirements"].as_array().unwrap().iter().any(|requirement| requirement["violated"].as_u64() > Some(0));
@@ -196,7 +192,7 @@ fn a_report_is_made_anew_also_of_an_unfinished_run() {
         "{}",
         unfinished.out
     );
-    let resumed = json(&runner.run(&["resume", "r/5", "--format", "json"]).expect(0));
+    let resumed = runner.run(&["resume", "r/5", "--format", "json"]).expect(0).json();
     assert_eq!(resumed["digest"], digest.trim());
     let nowhere = runner.run(&["report", "--results", "r/5", "--output", "no/such/page.html"]).expect(1);
     assert!(nowhere.err.contains("cannot write the page"), "{}", nowhere.err);

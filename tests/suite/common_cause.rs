@@ -1,12 +1,8 @@
 //! One operation on several topics, before a robot with two sensors that survives the loss of either.
 
-use std::fs;
-
 use serde_json::Value;
 
-use sesame_tests::{Done, Project, fresh_folder};
-
-use crate::interpreted::without_cargo;
+use crate::interpreted::{in_python, without_cargo};
 
 const SPACE: &str = "lookout.sesame";
 
@@ -61,16 +57,9 @@ campaign find {
 }
 "#;
 
-fn json(said: &Done) -> Value {
-    serde_json::from_str(&said.out).unwrap()
-}
-
 #[test]
 fn a_cause_that_two_sensors_share_is_found_as_one_and_shrunk_to_messages_of_both() {
-    let folder = fresh_folder("common_cause");
-    fs::write(folder.join("sim.py"), SIMULATOR).unwrap();
-    fs::write(folder.join(SPACE), TEXT).unwrap();
-    let project = Project { space: folder.join(SPACE), runners: folder.join("runners"), folder };
+    let project = in_python("common_cause", SPACE, TEXT, SIMULATOR);
     let run = |into: &str, workers: &str| {
         without_cargo(&project, &["run", SPACE, "--", "--workers", workers, "--results", into]).expect(0)
     };
@@ -78,7 +67,7 @@ fn a_cause_that_two_sensors_share_is_found_as_one_and_shrunk_to_messages_of_both
     assert_eq!(first.digest(), run("two", "2").digest(), "the same for any number of workers");
 
     // Power alone blinds the cart. Each sensor alone does not, and blur does not matter.
-    let causes = json(&without_cargo(&project, &["causes", SPACE, "--results", "one/1", "--format", "json"]).expect(0));
+    let causes = without_cargo(&project, &["causes", SPACE, "--results", "one/1", "--format", "json"]).expect(0).json();
     let of = |cause: &Value| -> Vec<String> {
         cause["operations"].as_array().unwrap().iter().map(|name| name.as_str().unwrap().to_owned()).collect()
     };
@@ -93,7 +82,7 @@ fn a_cause_that_two_sensors_share_is_found_as_one_and_shrunk_to_messages_of_both
     let acting = &cause["acting"][0];
     assert_eq!((acting["topic"].as_str(), &acting["further_topics"]), (Some("left"), &serde_json::json!(["right"])));
     let shrink = ["shrink", SPACE, test, "--results", "one/1", "--messages", "--into", "small", "--format", "json"];
-    let shrunk = json(&without_cargo(&project, &shrink).expect(0));
+    let shrunk = without_cargo(&project, &shrink).expect(0).json();
     let left = shrunk["shrinking"]["messages"]["left"].as_array().unwrap_or_else(|| panic!("{shrunk:#}"));
     let topics: Vec<&str> = left.iter().map(|message| message["topic"].as_str().unwrap()).collect();
     assert!(topics.contains(&"left") && topics.contains(&"right"), "{topics:?}");

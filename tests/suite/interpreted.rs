@@ -16,6 +16,14 @@ pub(crate) fn two_robots(name: &str) -> Project {
     Project { space, runners: folder.join("runners"), folder }
 }
 
+/// A space, and its simulator in Python, `sim.py`.
+pub(crate) fn in_python(name: &str, space: &str, text: &str, simulator: &str) -> Project {
+    let folder = fresh_folder(name);
+    fs::write(folder.join("sim.py"), simulator).unwrap();
+    fs::write(folder.join(space), text).unwrap();
+    Project { space: folder.join(space), runners: folder.join("runners"), folder }
+}
+
 /// `sesamec` in the project's folder, where cargo is a program that fails.
 pub(crate) fn without_cargo(project: &Project, arguments: &[&str]) -> Done {
     let broken = project.folder.join("broken");

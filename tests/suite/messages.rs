@@ -4,8 +4,6 @@ use std::fmt::Write as _;
 use std::fs;
 use std::process::Stdio;
 
-use serde_json::Value;
-
 use sesame_patience as patience;
 use sesame_record::Repository;
 use sesame_tests::{Done, Project, command, sesamec};
@@ -16,10 +14,6 @@ const CAMPAIGN: [&str; 3] = ["two_robots.sesame", "-c", "crossing"];
 
 fn of(project: &Project, command: &str, more: &[&str]) -> Done {
     without_cargo(project, &[&[command], &CAMPAIGN[..], more].concat())
-}
-
-fn json(said: &Done) -> Value {
-    serde_json::from_str(&said.out).unwrap()
 }
 
 /// The two robots until they have met for the second time: nothing here takes longer, and each test is run hundreds of
@@ -53,7 +47,7 @@ fn a_violation_is_reduced_to_messages_of_which_none_can_be_left_out() {
     let shrunk = |into: &str, workers: &str| {
         let more = ["T1", "--results", "known", "--messages", "--into", into, "--workers", workers, "--format", "json"];
         let more = [&more[..], &["--evaluations", "400"]].concat();
-        json(&of(&project, "shrink", &more).expect(0))
+        of(&project, "shrink", &more).expect(0).json()
     };
     let said = shrunk("one", "1");
     let way = &said["shrinking"];
@@ -73,7 +67,7 @@ fn a_violation_is_reduced_to_messages_of_which_none_can_be_left_out() {
     let smallest = way["after"]["test"].as_str().unwrap();
     let results = project.folder.join("one/shrink-T1");
     let results = results.to_str().unwrap();
-    let shown = json(&of(&project, "show", &[smallest, "--results", results, "--format", "json"]).expect(0));
+    let shown = of(&project, "show", &[smallest, "--results", results, "--format", "json"]).expect(0).json();
     let listed = shown["operations"][0]["messages"].as_str().unwrap();
     of(&project, "replay", &[smallest, "--results", results]).expect(0);
     of(&project, "repeat", &[smallest, "1", "--results", results, "--into", "again"]).expect(0);
@@ -113,7 +107,7 @@ fn when_an_operation_has_to_act_is_described_and_held_against_fresh_windows() {
         let arguments = ["T1", "--results", "known", "--when", "--into", into];
         of(&project, "shrink", &[&arguments[..], more].concat()).expect(0)
     };
-    let said = json(&shrunk("one", &["--workers", "1", "--format", "json"]));
+    let said = shrunk("one", &["--workers", "1", "--format", "json"]).json();
     let when = &said["shrinking"]["when"][0];
     assert_eq!(when["operation"], "cut_east", "{said}");
     let count = |of: &str, what: &str| when[of][what].as_u64().unwrap();
@@ -135,7 +129,7 @@ fn when_an_operation_has_to_act_is_described_and_held_against_fresh_windows() {
 fn every_cause_is_shrunk_within_one_budget_and_the_same_for_any_number_of_workers() {
     let project = two_meetings("causes_shrunk");
     of(&project, "run", &[]).expect(0);
-    let causes = json(&of(&project, "causes", &["--format", "json"]).expect(0));
+    let causes = of(&project, "causes", &["--format", "json"]).expect(0).json();
     let causes = causes["causes"].as_array().unwrap().clone();
     assert!(causes.len() > 1, "{causes:?}");
     let arguments = |into: &str, workers: &str| -> Vec<String> {
@@ -146,7 +140,7 @@ fn every_cause_is_shrunk_within_one_budget_and_the_same_for_any_number_of_worker
     };
     let shrunk = |into: &str, workers: &str| {
         let arguments = arguments(into, workers);
-        json(&without_cargo(&project, &arguments.iter().map(String::as_str).collect::<Vec<_>>()).expect(0))
+        without_cargo(&project, &arguments.iter().map(String::as_str).collect::<Vec<_>>()).expect(0).json()
     };
     let said = shrunk("one", "1");
     let shrinkings = said["shrinkings"].as_array().unwrap();
@@ -179,7 +173,7 @@ fn every_cause_is_shrunk_within_one_budget_and_the_same_for_any_number_of_worker
     process.kill().unwrap();
     process.wait().unwrap();
     let folder = folder.to_str().unwrap();
-    let resumed = json(&of(&project, "resume", &[folder, "--format", "json"]).expect(0));
+    let resumed = of(&project, "resume", &[folder, "--format", "json"]).expect(0).json();
     assert_eq!(resumed["digest"], said["digest"]);
     assert_eq!(resumed["shrinkings"], said["shrinkings"]);
 

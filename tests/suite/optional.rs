@@ -1,13 +1,9 @@
 //! States of vehicles as two vendors fill them in, in the shape of VDA 5050: what one leaves out, or writes as `null`,
 //! the other has.
 
-use std::fs;
-
 use serde_json::Value;
 
-use sesame_tests::{Project, fresh_folder};
-
-use crate::interpreted::without_cargo;
+use crate::interpreted::{in_python, without_cargo};
 
 const SPACE: &str = "vendors.sesame";
 
@@ -89,22 +85,18 @@ campaign c {
 
 #[test]
 fn what_a_message_lacks_is_as_if_it_had_not_come_and_operations_on_messages_act_on_all() {
-    let folder = fresh_folder("optional");
-    fs::write(folder.join("sim.py"), SIMULATOR).unwrap();
-    fs::write(folder.join(SPACE), TEXT).unwrap();
-    let project = Project { space: folder.join(SPACE), runners: folder.join("runners"), folder };
+    let project = in_python("optional", SPACE, TEXT, SIMULATOR);
     let known = without_cargo(&project, &["known", SPACE, "--format", "json"]);
-    let found: Value = serde_json::from_str(&known.out).unwrap_or_else(|_| panic!("{}\n{}", known.out, known.err));
+    assert!(known.json().is_object(), "{}", known.err);
     let show = |test: &str| -> Value {
         let shown = without_cargo(&project, &["show", SPACE, test, "--results", "known", "--format", "json"]).expect(0);
-        serde_json::from_str(&shown.out).unwrap()
+        shown.json()
     };
     let metric = |test: &Value, name: &str| -> f64 {
         let metrics = test["metrics"].as_array().unwrap_or_else(|| panic!("{test:#}"));
         let metric = metrics.iter().find(|metric| metric["metric"] == name).unwrap_or_else(|| panic!("{test:#}"));
         metric["value"].as_f64().unwrap_or_else(|| panic!("{test:#}"))
     };
-    assert!(found.is_object(), "{found:#}");
     let reference = show("T0");
     let states = metric(&reference, "states_of_bolt");
     // States are numbered from 0. The even ones have a position, and every fourth from 1 on has a speed.

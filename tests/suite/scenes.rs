@@ -3,9 +3,7 @@
 
 use std::fs;
 
-use serde_json::Value;
-
-use sesame_tests::{Done, Project, fresh_folder, workspace};
+use sesame_tests::{Project, fresh_folder, workspace};
 
 use crate::interpreted::without_cargo;
 
@@ -20,10 +18,6 @@ fn crossing_carts(name: &str) -> Project {
     Project { space: folder.join(SPACE), runners: folder.join("runners"), folder }
 }
 
-fn json(said: &Done) -> Value {
-    serde_json::from_str(&said.out).unwrap()
-}
-
 #[test]
 fn start_positions_and_the_fault_of_one_robot_are_found_together_and_shrunk_to_the_simplest_scene() {
     let project = crossing_carts("scenes");
@@ -35,7 +29,7 @@ fn start_positions_and_the_fault_of_one_robot_are_found_together_and_shrunk_to_t
     assert_eq!(first.digest(), run("three", "3").digest(), "the same for any number of workers");
 
     // Neither a scene nor a late pose alone is dangerous, and only the poses of `b` are.
-    let causes = json(&without_cargo(&project, &["causes", SPACE, "--results", "one/1", "--format", "json"]).expect(0));
+    let causes = without_cargo(&project, &["causes", SPACE, "--results", "one/1", "--format", "json"]).expect(0).json();
     let found: Vec<Vec<&str>> = causes["causes"]
         .as_array()
         .unwrap()
@@ -51,7 +45,7 @@ fn start_positions_and_the_fault_of_one_robot_are_found_together_and_shrunk_to_t
 
     let smallest = causes["causes"][0]["test"].as_str().unwrap().to_owned();
     let shrunk = ["shrink", SPACE, &smallest, "--results", "one/1", "--into", "small", "--format", "json"];
-    let shrunk = json(&without_cargo(&project, &shrunk).expect(0));
+    let shrunk = without_cargo(&project, &shrunk).expect(0).json();
     let way = &shrunk["shrinking"];
     assert_eq!(way["minimal"], true, "{way}");
     // The simplest scene is the one nearest to the usual one: they still meet, and a hundredth nearer they do not.

@@ -153,6 +153,13 @@ impl<'a> Resolver<'a> {
         by: Comparison,
         right: &'a ast::Expression,
     ) -> Option<u32> {
+        for side in [left, right] {
+            if let ExpressionKind::Field(path) = &side.kind
+                && let Some(constant) = self.constant_of(path)
+            {
+                constant?;
+            }
+        }
         let (of, text) = match [left, right].map(|side| self.written_text(side)) {
             [_, Some(text)] => (left, text),
             [Some(text), None] => (right, text),

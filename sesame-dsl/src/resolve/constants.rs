@@ -43,9 +43,7 @@ impl<'a> Resolver<'a> {
         if !known.is_empty() {
             return known;
         }
-        let written: Vec<String> =
-            self.ast_types().iter().flat_map(|(_, folders)| folders.iter().map(|folder| folder.text.clone())).collect();
-        let file = self.ast_types().first().map_or("", |(span, _)| self.sources.file(span.file).name());
+        let (written, file) = self.folders();
         self.interfaces.constants(Folders { written: &written, file, dialect: self.dialect() }, interface)
     }
 
@@ -76,10 +74,12 @@ impl<'a> Resolver<'a> {
         !self.constants_named(path).is_empty()
     }
 
-    /// The value of a constant that is a text. Reports nothing.
+    /// The text that a constant is in all messages that may be meant. Reports nothing.
     pub(super) fn text_constant(&self, path: &Path) -> Option<String> {
-        match self.constants_named(path).first()? {
-            (_, ConstantValue::Text(text)) => Some(text.clone()),
+        let found = self.constants_named(path);
+        let (_, first) = found.first()?;
+        match first {
+            ConstantValue::Text(text) if found.iter().all(|(_, value)| value == first) => Some(text.clone()),
             _ => None,
         }
     }

@@ -130,17 +130,20 @@ impl<'a> Resolver<'a> {
         name
     }
 
+    /// The folders with definitions, as written, and the name of the file that names the first of them.
+    pub(super) fn folders(&self) -> (Vec<String>, &'a str) {
+        let types = self.ast_types().iter();
+        let types = types.flat_map(|(span, folders)| folders.iter().map(move |folder| (*span, folder.text.clone())));
+        let (spans, written): (Vec<Span>, Vec<String>) = types.unzip();
+        (written, spans.first().map_or("", |span| self.sources.file(span.file).name()))
+    }
+
     /// The layout of an interface, last after those it contains; `None` if no folder has it. Mistakes are reported.
     pub(super) fn layout(&mut self, name: &str, at: Span) -> Result<Option<Vec<Interface>>, ()> {
         if let Some(known) = interfaces::known(name) {
             return Ok(Some(known));
         }
-        let types = self
-            .ast_types()
-            .iter()
-            .flat_map(|(span, folders)| folders.iter().map(move |folder| (*span, folder.text.clone())));
-        let (spans, written): (Vec<Span>, Vec<String>) = types.unzip();
-        let file = spans.first().map_or("", |span| self.sources.file(span.file).name());
+        let (written, file) = self.folders();
         match self.interfaces.find(Folders { written: &written, file, dialect: self.dialect() }, name) {
             Ok(Some(found)) if found.last().is_some_and(|last| last.name == name) => Ok(Some(found)),
             Ok(_) => Ok(None),

@@ -63,7 +63,8 @@ impl<'a> Resolver<'a> {
                 let paths = paths.as_ref().map(|(paths, members)| {
                     (paths.iter().map(|path| part.path_of(path)).collect::<Vec<_>>(), members.clone())
                 });
-                // Both directions of a service have its path. If two actions are equal, one of their parts says so for all.
+                // Both directions of a service have its path. If two actions are equal, one of their parts says so for
+                // all.
                 if free && part.channel != Channel::Reply {
                     for path in paths.iter().flat_map(|(paths, _)| paths) {
                         free &= self.take_path(taken, part.channel, path, action.path.span);
@@ -98,15 +99,21 @@ impl<'a> Resolver<'a> {
         self.system.topics.push(topic);
     }
 
+    /// Reports what a kind of simulator does not have.
+    fn report_missing_in(&mut self, (kind, simulator): (&str, Span), what: &str, at: Span, label: &str) {
+        let title = format!("simulator kind `{kind}` has no {what}");
+        let diagnostic = Diagnostic::new(Code::NOT_ROS, at, title)
+            .label(label)
+            .secondary(simulator, "the simulator is declared here");
+        self.report(diagnostic);
+    }
+
     /// The messages of a service: its requests, then its replies.
     fn types_of_service(&mut self, service: &'a ast::Service) -> Option<Vec<Type>> {
         let name = self.ros_type(&service.ros_type, "srv");
-        if let Some((kind, simulator)) = self.other_than_ros() {
-            let title = format!("simulator kind `{kind}` has no services");
-            let diagnostic = Diagnostic::new(Code::NOT_ROS, service.head.name.span, title)
-                .label("only a simulator of ROS has services; declare a topic instead")
-                .secondary(simulator, "the simulator is declared here");
-            self.report(diagnostic);
+        if let Some(other) = self.other_than_ros() {
+            let label = "only a simulator of ROS has services; declare a topic instead";
+            self.report_missing_in(other, "services", service.head.name.span, label);
             return None;
         }
         let (name, at) = (name?, service.ros_type.span);
@@ -118,12 +125,9 @@ impl<'a> Resolver<'a> {
     /// The messages of an action, in the order of its parts.
     fn types_of_action(&mut self, written: &'a ast::Action) -> Option<Vec<Type>> {
         let name = self.ros_type(&written.ros_type, "action");
-        if let Some((kind, simulator)) = self.without_actions() {
-            let title = format!("simulator kind `{kind}` has no actions");
-            let diagnostic = Diagnostic::new(Code::NOT_ROS, written.head.name.span, title)
-                .label("only a simulator of kind `ros2` has actions")
-                .secondary(simulator, "the simulator is declared here");
-            self.report(diagnostic);
+        if let Some(other) = self.without_actions() {
+            let label = "only a simulator of kind `ros2` has actions";
+            self.report_missing_in(other, "actions", written.head.name.span, label);
             return None;
         }
         let name = name?;

@@ -2,8 +2,8 @@
 
 import sys
 
+import common
 import rclpy
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from std_msgs.msg import Float64
 
@@ -49,10 +49,7 @@ def main() -> None:
     else:
         manager(node, own[1:])
     print("up", flush=True)
-    try:
-        rclpy.spin(node)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
+    common.spin(node)
 
 
 if __name__ == "__main__":

@@ -15,7 +15,18 @@ import json
 import sys
 import time
 
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+
+def spin(node: Node) -> None:
+    """Runs until it is ended."""
+    try:
+        rclpy.spin(node)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
 
 
 def add_topic(parser: argparse.ArgumentParser) -> None:

@@ -3,8 +3,8 @@
 import sys
 import time
 
+import common
 import rclpy
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool
@@ -47,10 +47,7 @@ def main() -> None:
     node = rclpy.create_node(role)
     print("up", flush=True)
     {"client": client, "server": server}[role](node)
-    try:
-        rclpy.spin(node)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
+    common.spin(node)
 
 
 if __name__ == "__main__":

@@ -53,6 +53,11 @@ pub struct Input {
 }
 
 impl Input {
+    /// The value that a field has in the last message, which is neither a list nor a text.
+    pub fn new(field: FieldRef, members: Members) -> Self {
+        Input { field, members, list: None, text: None, memory: Vec::new() }
+    }
+
     /// The most that is computed from successive messages, one from the other: that of acceleration is two, of jerk
     /// three.
     pub const DEEPEST_MEMORY: usize = 8;

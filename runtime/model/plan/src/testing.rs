@@ -211,13 +211,7 @@ pub fn evidence_above(name: &str, topic: u32, limit: f64) -> Evidence {
     Evidence {
         name: name.to_owned(),
         doc: String::new(),
-        inputs: vec![Input {
-            field: FieldRef { topic: TopicId(topic), path: Vec::new() },
-            members: Members::Min,
-            list: None,
-            text: None,
-            memory: Vec::new(),
-        }],
+        inputs: vec![Input::new(FieldRef { topic: TopicId(topic), path: Vec::new() }, Members::Min)],
         condition: formula::Condition::Compare {
             left: Expression::Input(0),
             by: Comparison::Above,

@@ -18,7 +18,7 @@ fn sampled(signal: &[(f64, f64)], eventually: bool) -> (CampaignPlan, TestRecord
         if eventually { Formula::Eventually { interval, of: above } } else { Formula::Always { interval, of: above } };
     let field = FieldRef { topic: TopicId(2), path: Vec::new() };
     let robustness = Robustness {
-        inputs: vec![Input { field, members: Members::Min, list: None, text: None, memory: Vec::new() }],
+        inputs: vec![Input::new(field, Members::Min)],
         signals: vec![Expression::Input(0)],
         formula,
         side: Side::Inbound,

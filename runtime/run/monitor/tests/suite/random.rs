@@ -81,13 +81,7 @@ fn evidence(held: i64, stale: Option<(i64, bool, bool)>) -> Evidence {
     Evidence {
         name: "evidence".into(),
         doc: String::new(),
-        inputs: vec![Input {
-            field: FieldRef { topic: TopicId(0), path: Vec::new() },
-            members: Members::Min,
-            list: None,
-            text: None,
-            memory: Vec::new(),
-        }],
+        inputs: vec![Input::new(FieldRef { topic: TopicId(0), path: Vec::new() }, Members::Min)],
         condition: Condition::Input(0),
         held: seconds(held),
         stale: stale.map(|(after, is_false, all)| Stale {

@@ -75,13 +75,7 @@ mod tests {
             spoke in prop::collection::vec(prop::collection::vec(any::<bool>(), 3), 1..8),
         ) {
             // `arm/command`, and both members of `zones`.
-            let input = |topic| Input {
-                field: FieldRef { topic: TopicId(topic), path: Vec::new() },
-                members: Members::Min,
-                list: None,
-                text: None,
-                memory: Vec::new(),
-            };
+            let input = |topic| Input::new(FieldRef { topic: TopicId(topic), path: Vec::new() }, Members::Min);
             let mut attendance = Attendance::new(&[input(1), input(0), input(1)], &plan(Vec::new()));
             let spoke: Vec<Vec<bool>> = spoke.into_iter().filter(|instant| instant.contains(&true)).collect();
             for (at, instant) in (0..).zip(&spoke) {

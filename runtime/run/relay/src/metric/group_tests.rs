@@ -43,7 +43,7 @@ fn payload(x: f64) -> Value {
 
 fn input(topic: TopicId, path: &[&str], members: Members) -> Input {
     let path = path.iter().map(|&name| name.to_owned()).collect();
-    Input { field: FieldRef { topic, path }, members, list: None, text: None, memory: Vec::new() }
+    Input::new(FieldRef { topic, path }, members)
 }
 
 fn mode(members: Members, test: TextTest) -> Input {

@@ -34,11 +34,11 @@ fn system() -> CampaignPlan {
 }
 
 fn input(topic: TopicId, members: Members) -> Input {
-    Input { field: FieldRef { topic, path: Vec::new() }, members, list: None, text: None, memory: Vec::new() }
+    Input::new(FieldRef { topic, path: Vec::new() }, members)
 }
 
 fn x_of(topic: TopicId, members: Members) -> Input {
-    Input { field: FieldRef { topic, path: vec!["x".to_owned()] }, members, list: None, text: None, memory: Vec::new() }
+    Input::new(FieldRef { topic, path: vec!["x".to_owned()] }, members)
 }
 
 fn apart() -> Expression {

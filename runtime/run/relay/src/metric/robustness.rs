@@ -373,23 +373,11 @@ mod tests {
     }
 
     fn command() -> Input {
-        Input {
-            field: FieldRef { topic: TopicId(0), path: Vec::new() },
-            members: Members::Min,
-            list: None,
-            text: None,
-            memory: Vec::new(),
-        }
+        Input::new(FieldRef { topic: TopicId(0), path: Vec::new() }, Members::Min)
     }
 
     fn level(members: Members) -> Input {
-        Input {
-            field: FieldRef { topic: TopicId(1), path: vec!["level".into()] },
-            members,
-            list: None,
-            text: None,
-            memory: Vec::new(),
-        }
+        Input::new(FieldRef { topic: TopicId(1), path: vec!["level".into()] }, members)
     }
 
     fn above(signal: u32) -> Formula {

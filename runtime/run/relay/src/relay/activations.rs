@@ -422,13 +422,7 @@ fn a_condition_over_the_fuzzing_time_sees_the_tail() {
 #[test]
 fn times_that_grow_are_compared_where_they_meet_and_not_at_every_nanosecond() {
     let always = Formula {
-        inputs: vec![Input {
-            field: FieldRef { topic: TopicId(0), path: Vec::new() },
-            members: Members::Min,
-            list: None,
-            text: None,
-            memory: Vec::new(),
-        }],
+        inputs: vec![Input::new(FieldRef { topic: TopicId(0), path: Vec::new() }, Members::Min)],
         aggregate: Aggregate::Duration { of: Holds::Constant(true) },
         when: None,
         every: None,
@@ -493,13 +487,7 @@ fn an_outbound_metric_hears_its_topic() {
     let mut plan = plan(vec![operation(0, OperationKind::Blackhole)]);
     plan.metrics[1].source = MetricSource::Formula {
         formula: Formula {
-            inputs: vec![Input {
-                field: FieldRef { topic: TopicId(0), path: Vec::new() },
-                members: Members::Min,
-                list: None,
-                text: None,
-                memory: Vec::new(),
-            }],
+            inputs: vec![Input::new(FieldRef { topic: TopicId(0), path: Vec::new() }, Members::Min)],
             aggregate: Aggregate::Count { of: Holds::Constant(true) },
             when: None,
             every: None,

@@ -474,7 +474,7 @@ fn the_hazard_of_a_temporal_formula_is_when_its_signal_lost_the_bound() {
     };
     plan.metrics[0].source = MetricSource::Robustness {
         robustness: Robustness {
-            inputs: vec![Input { field: gap, members: Members::Min, list: None, text: None, memory: Vec::new() }],
+            inputs: vec![Input::new(gap, Members::Min)],
             signals: vec![Expression::Input(0)],
             formula,
             side: Side::Inbound,

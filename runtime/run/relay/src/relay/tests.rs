@@ -287,13 +287,7 @@ proptest! {
 fn an_outbound_metric_hears_what_operations_made_of_a_message_and_an_inbound_one_what_was_sent() {
     let count = |side| MetricSource::Formula {
         formula: Formula {
-            inputs: vec![Input {
-                field: FieldRef { topic: TopicId(0), path: Vec::new() },
-                members: Members::Min,
-                list: None,
-                text: None,
-                memory: Vec::new(),
-            }],
+            inputs: vec![Input::new(FieldRef { topic: TopicId(0), path: Vec::new() }, Members::Min)],
             aggregate: Aggregate::Count { of: Condition::Constant(true) },
             when: None,
             every: None,
@@ -485,13 +479,7 @@ fn what_an_outbound_metric_shows_counts_once_its_message_is_through() {
     let mut plan = plan(vec![operation(0, OperationKind::Blackhole)]);
     plan.metrics[1].source = MetricSource::Formula {
         formula: Formula {
-            inputs: vec![Input {
-                field: FieldRef { topic: TopicId(0), path: Vec::new() },
-                members: Members::Min,
-                list: None,
-                text: None,
-                memory: Vec::new(),
-            }],
+            inputs: vec![Input::new(FieldRef { topic: TopicId(0), path: Vec::new() }, Members::Min)],
             aggregate: Aggregate::Count { of: Condition::Constant(true) },
             when: None,
             every: None,

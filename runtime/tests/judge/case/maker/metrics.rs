@@ -28,13 +28,7 @@ impl Maker {
             (true, false) => self.one(&[Members::Min, Members::Max, Members::Sum, Members::Each]),
         };
         let path: Vec<String> = path?.iter().map(|&name| name.to_owned()).collect();
-        Some(Input {
-            field: FieldRef { topic: TopicId(u32::try_from(topic).unwrap()), path },
-            members,
-            list: None,
-            text: None,
-            memory: Vec::new(),
-        })
+        Some(Input::new(FieldRef { topic: TopicId(u32::try_from(topic).unwrap()), path }, members))
     }
 
     /// Inputs of one or two topics, numbers first; how many are numbers. Always at least one number.
