@@ -38,6 +38,8 @@ mod latest;
 mod messages;
 mod monitor_alone;
 mod monitors;
+#[cfg(unix)]
+mod nodes;
 mod optimisers;
 mod optional;
 mod physical;

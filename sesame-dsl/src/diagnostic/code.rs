@@ -78,7 +78,7 @@ codes! {
     NOT_ROS = "E0217": "Something of ROS is used with another simulator, or is missing with one of ROS 2.",
     PLACEHOLDER = "E0218": "An argument of a launched program has a placeholder that nothing replaces.",
     NOTHING_TO_LAUNCH = "E0219": "A command is launched for a simulator that is part of the runner.",
-    NODE_OUT_OF_REACH = "E0220": "An operation on a node needs a launched node of a ROS 2 simulator, and `slow` a free-running one.",
+    NODE_OUT_OF_REACH = "E0220": "An operation acts on a node, or its parameter, that a runner does not reach.",
     BAD_ADDRESS = "E0221": "The address of a simulator or broker is malformed, or a secret would go there in plain text.",
     NOT_OPTIONAL = "E0222": "A field is optional where messages have all of their fields.",
     UNKNOWN_UNIT = "E0301": "There is no such unit.",

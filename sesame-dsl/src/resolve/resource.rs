@@ -1,6 +1,7 @@
 //! Operations on nodes and their parameters.
 
 use sesame_grammar::Rule;
+use sesame_plan::SimulatorProperties;
 
 use super::disturbance::number;
 use super::nodes::node_of_plans;
@@ -22,8 +23,8 @@ impl<'a> Resolver<'a> {
         resource: &'a ast::Resource,
         body: &'a ast::OperationBody,
     ) -> Option<(OperationKind, Vec<Parameter>)> {
-        let has_nodes = self.has_nodes(resource);
         let (rule, amounts) = self.kind_for(resource, body)?;
+        let has_nodes = self.has_nodes(resource, rule);
         let found = self.nodes_named(&resource.node);
         let parameters = match (rule, amounts) {
             (Rule::set_parameter, Some(ast::Amounts::Range(range))) => {
@@ -40,6 +41,7 @@ impl<'a> Resolver<'a> {
         }
         let can = match rule {
             Rule::set_parameter => true,
+            _ if self.orders_nodes() => true,
             rule => self.is_launched(resource, node, body.kind_word) & (rule != Rule::slow || self.runs_freely(body)),
         };
         if !can {
@@ -56,14 +58,34 @@ impl<'a> Resolver<'a> {
         Some((kind, parameters?))
     }
 
-    /// Reports a simulator whose nodes a runner does not reach.
-    fn has_nodes(&mut self, resource: &ast::Resource) -> bool {
-        let Some((word, simulator)) = self.without(|kind| kind.reaches_nodes) else { return true };
-        let title = format!("simulator kind `{word}` has no nodes that an operation could act on");
+    /// Whether the nodes are parts of the simulator, which does to them what operations want.
+    fn orders_nodes(&self) -> bool {
+        self.kind().is_some_and(|(kind, _)| kind.properties().orders_nodes)
+    }
+
+    /// Reports a simulator that cannot do to its nodes what an operation wants.
+    fn has_nodes(&mut self, resource: &ast::Resource, rule: Rule) -> bool {
+        let sets = rule == Rule::set_parameter;
+        let can = |kind: SimulatorProperties| kind.reaches_nodes || (kind.orders_nodes && !sets);
+        let Some((word, simulator)) = self.without(can) else { return true };
+        let (title, label, note) = if sets {
+            (
+                format!("nodes of a simulator of kind `{word}` have no parameters"),
+                "only nodes of a `ros2` simulator have parameters",
+                "a parameter of the whole simulator is a scene, as in `parameter gain: real in [0, 2]`; `process`, \
+                 `in_process` and `ros2` take it",
+            )
+        } else {
+            (
+                format!("simulator kind `{word}` has no nodes that an operation could act on"),
+                "only nodes of `ros2`, `process` and `in_process` simulators can be paused, slowed and killed",
+                "disturb the topics of the node instead, for example with `blackhole` or `latency`",
+            )
+        };
         let diagnostic = Diagnostic::new(Code::NODE_OUT_OF_REACH, resource.span, title)
-            .label("only nodes of a `ros2` simulator have parameters, and can be paused, slowed and killed")
+            .label(label)
             .secondary(simulator, "the simulator is declared here")
-            .note("disturb the topics of the node instead, for example with `blackhole` or `latency`");
+            .note(note);
         self.report(diagnostic);
         false
     }

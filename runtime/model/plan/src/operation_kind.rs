@@ -93,19 +93,20 @@ pub enum OperationKind {
         /// The name of the parameter in the node.
         parameter: String,
     },
-    /// Stops all processes of a node while it is active. No parameters.
+    /// A node, or all of its processes, stands still while it is active. No parameters.
     Pause {
-        /// The node, which the runner launches.
+        /// The node, which the runner launches, or which is a part of the simulator.
         node: NodeId,
     },
     /// Leaves a node only a share of the time while it is active. One parameter `share`, between 0 and 1.
     Slow {
-        /// The node, which the runner launches.
+        /// The node, which the runner launches, or which is a part of the simulator.
         node: NodeId,
     },
-    /// Kills all processes of a node when it becomes active, and starts the node again when it ends. No parameters.
+    /// Kills a node, or all of its processes, when it becomes active, and starts the node again when it ends. No
+    /// parameters.
     Kill {
-        /// The node, which the runner launches.
+        /// The node, which the runner launches, or which is a part of the simulator.
         node: NodeId,
     },
     /// Sets a parameter of the simulator for the whole run, when that begins anew: what the scenario is. One parameter

@@ -323,6 +323,8 @@ pub struct SimulatorProperties {
     /// Whether the runner reaches its nodes themselves: it sets their parameters, pauses, slows and kills them, and
     /// asks them for a step.
     pub reaches_nodes: bool,
+    /// Whether its nodes are parts of the simulator, which pauses, slows and kills them itself when the runner says so.
+    pub orders_nodes: bool,
     /// Whether a run can begin with other values of the simulator's parameters.
     pub takes_parameters: bool,
     /// Whether its messages may lack fields, as those in JSON may.
@@ -352,13 +354,17 @@ impl SimulatorKind {
         match self {
             SimulatorKind::InProcess => SimulatorProperties {
                 in_runner: true,
+                orders_nodes: true,
                 takes_parameters: true,
                 optional_fields: true,
                 ..properties("in_process")
             },
-            SimulatorKind::Process => {
-                SimulatorProperties { takes_parameters: true, optional_fields: true, ..properties("process") }
-            }
+            SimulatorKind::Process => SimulatorProperties {
+                orders_nodes: true,
+                takes_parameters: true,
+                optional_fields: true,
+                ..properties("process")
+            },
             SimulatorKind::Ros2 => SimulatorProperties {
                 feature: Some("ros2"),
                 bus: Some("as a node of ROS 2"),
@@ -438,6 +444,7 @@ const fn properties(keyword: &'static str) -> SimulatorProperties {
         renames: false,
         named_messages: false,
         reaches_nodes: false,
+        orders_nodes: false,
         takes_parameters: false,
         optional_fields: false,
     }

@@ -4,12 +4,17 @@
 //! only. The relay is part of the bus. A message of one part is disturbed if the test says so, and reaches its
 //! subscribers in the same step: a relay without operations adds no delay.
 
+mod nodes;
+
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 
 use sesame_base::time::SimTime;
 
 use crate::value::Value;
+
+pub(crate) use nodes::Offered;
+pub use nodes::{NodeFault, NodeOrder, Offers, OrderToNode};
 
 /// A simulator that is stepped in lock-step with the relay.
 ///
@@ -150,6 +155,37 @@ impl Bus<'_> {
         self.wires.receive(port)
     }
 
+    /// Offers to do this to a node of the space that is a part of the simulator; called when it starts. Operations on
+    /// nodes need it, and give [orders](Bus::order) in later steps.
+    ///
+    /// ```
+    /// # use sesame_relay::simulator::{Bus, NodeFault, NodeOrder, Port};
+    /// struct Planner { target: Port, stands: bool }
+    ///
+    /// impl Planner {
+    ///     fn open(bus: &mut Bus<'_>) -> Planner {
+    ///         bus.offer("planner", &[NodeFault::Pause]);
+    ///         Planner { target: bus.open("cart/target"), stands: false }
+    ///     }
+    ///     fn step(&mut self, bus: &mut Bus<'_>) {
+    ///         while let Some(order) = bus.order("planner") {
+    ///             self.stands = order == NodeOrder::Pause;
+    ///         }
+    ///         if !self.stands {
+    ///             bus.publish(self.target, 1.0);
+    ///         }
+    ///     }
+    /// }
+    /// ```
+    pub fn offer(&mut self, node: &str, faults: &[NodeFault]) {
+        self.wires.nodes().offer(node, faults);
+    }
+
+    /// The next order of this step for a node that was [offered](Bus::offer).
+    pub fn order(&mut self, node: &str) -> Option<NodeOrder> {
+        self.wires.nodes().take(node)
+    }
+
     /// The current time: the end of the current step.
     pub fn now(&self) -> SimTime {
         self.now
@@ -162,6 +198,8 @@ pub(crate) trait Wires {
     fn subscribe(&mut self, port: Port);
     fn publish(&mut self, now: SimTime, port: Port, value: Value);
     fn receive(&mut self, port: Port) -> Option<Value>;
+    /// The nodes that the simulator does itself.
+    fn nodes(&mut self) -> &mut Offered;
 }
 
 pub mod bench;

@@ -9,11 +9,14 @@ pub mod bus;
 pub mod clock;
 #[cfg(feature = "in-process")]
 mod in_process;
+#[cfg(feature = "in-process")]
+mod node_orders;
 #[cfg(feature = "process")]
 mod process;
 pub mod relay_latency;
 pub mod round;
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -26,7 +29,7 @@ use sesame_plan::CampaignPlan;
 use sesame_lifecycle::launch::LaunchError;
 
 use crate::relay::Exchange;
-use crate::simulator::Progress;
+use crate::simulator::{NodeFault, Offers, Progress};
 use crate::transport::relay_latency::AddedOnWire;
 
 #[cfg(feature = "in-process")]
@@ -121,6 +124,21 @@ pub enum TransportError {
         near: Option<String>,
         /// All the simulator's topics.
         known: Vec<String>,
+    },
+    /// An operation wants something done to a node that the simulator does not offer.
+    #[error(
+        "the simulator does not offer to {fault} node `{node}`, as operation `{operation}` needs; {}",
+        offered(offers)
+    )]
+    NotOffered {
+        /// The operation.
+        operation: String,
+        /// What it does to the node, in the word of the language.
+        fault: &'static str,
+        /// The node in the space.
+        node: String,
+        /// What the simulator offers.
+        offers: Offers,
     },
     /// A message is not of the type that the space declares for its topic.
     #[error("a message on `{path}` is not of its declared type: {reason}")]
@@ -237,6 +255,7 @@ impl TransportError {
             // A simulator that cannot be started is the space's mistake; running the test again does not help.
             TransportError::Simulator(_)
             | TransportError::UnknownTopic { .. }
+            | TransportError::NotOffered { .. }
             | TransportError::WrongType { .. }
             | TransportError::NotStarted { .. }
             | TransportError::Disconnected { .. }
@@ -248,6 +267,18 @@ impl TransportError {
 
 fn quoted(last_lines: &str) -> String {
     if last_lines.is_empty() { String::new() } else { format!("; the last lines of its standard error:\n{last_lines}") }
+}
+
+/// What a simulator offers for its nodes, and how it would offer more.
+fn offered(offers: &Offers) -> String {
+    let node = |(node, faults): (&String, &BTreeSet<NodeFault>)| {
+        let faults: Vec<&str> = faults.iter().map(|fault| fault.word()).collect();
+        format!("`{node}` ({})", faults.join(", "))
+    };
+    let nodes: Vec<String> = offers.iter().map(node).collect();
+    let known =
+        if nodes.is_empty() { "it offers nothing".to_owned() } else { format!("it offers {}", nodes.join(", ")) };
+    format!("{known}: name the node and what can be done to it in `nodes` of `ready`, or in Rust with `Bus::offer`")
 }
 
 fn hint(near: Option<&str>, known: &[String]) -> String {

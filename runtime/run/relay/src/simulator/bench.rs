@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use sesame_base::time::SimTime;
 
-use crate::simulator::{Bus, Port, Progress, Setup, Simulator, SimulatorError, Wires};
+use crate::simulator::{Bus, NodeOrder, Offered, OrderToNode, Port, Progress, Setup, Simulator, SimulatorError, Wires};
 use crate::value::Value;
 
 /// A message on the bench.
@@ -34,6 +34,7 @@ struct Loopback {
     inboxes: Vec<Option<VecDeque<Value>>>,
     published: Vec<Vec<Published>>,
     tamper: Option<Tamper>,
+    nodes: Offered,
 }
 
 impl<S: Simulator> Bench<S> {
@@ -58,6 +59,11 @@ impl<S: Simulator> Bench<S> {
             }
         }
         Ok(Progress::Running)
+    }
+
+    /// Gives an order for a node that the simulator offers; it has it in its next step.
+    pub fn order(&mut self, node: &str, order: NodeOrder) {
+        self.wires.nodes.give(OrderToNode { node: node.to_owned(), order });
     }
 
     /// The simulator itself.
@@ -105,5 +111,9 @@ impl Wires for Loopback {
 
     fn receive(&mut self, port: Port) -> Option<Value> {
         self.inboxes[port.0].as_mut()?.pop_front()
+    }
+
+    fn nodes(&mut self) -> &mut Offered {
+        &mut self.nodes
     }
 }

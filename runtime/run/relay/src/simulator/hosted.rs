@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use sesame_base::time::SimTime;
 
-use crate::simulator::{Bus, Port, Progress, Setup, Simulator, SimulatorError, Wires};
+use crate::simulator::{Bus, Offered, Port, Progress, Setup, Simulator, SimulatorError, Wires};
 use crate::value::Value;
 
 /// What one step may publish; a simulator that publishes more has lost its way.
@@ -38,6 +38,8 @@ struct Topics {
     published: Vec<Message>,
     /// Whether something was not kept, since too much was published at once.
     flooded: bool,
+    /// What is offered; nobody under another protocol gives orders.
+    nodes: Offered,
 }
 
 #[derive(Debug)]
@@ -151,6 +153,10 @@ impl Wires for Topics {
 
     fn receive(&mut self, port: Port) -> Option<Value> {
         self.opened[port.0].inbox.as_mut()?.pop_front()
+    }
+
+    fn nodes(&mut self) -> &mut Offered {
+        &mut self.nodes
     }
 }
 

@@ -14,7 +14,7 @@ use serde_json::value::RawValue;
 use sesame_base::time::SimTime;
 
 use crate::json;
-use crate::simulator::{Bus, Port, Progress, Setup, Simulator, SimulatorError, Wires};
+use crate::simulator::{Bus, Offered, OrderToNode, Port, Progress, Setup, Simulator, SimulatorError, Wires};
 use crate::value::{Fields, Record, Value};
 
 /// The longest line that is read, in bytes; the runner's own limit.
@@ -52,7 +52,7 @@ pub fn serve<S: Simulator>(
             }
             Request::Step(step) => {
                 let Some(running) = &mut world else { return Err(wrong("a step before a reset")) };
-                if let Err(error) = running.step(step.messages, &mut lines)? {
+                if let Err(error) = running.step(step, &mut lines)? {
                     lines.answer(&failed(&error))?;
                     world = None;
                 }
@@ -84,6 +84,8 @@ struct Reset {
 
 #[derive(Deserialize)]
 struct Step {
+    #[serde(default)]
+    orders: Vec<OrderToNode>,
     #[serde(default)]
     messages: Vec<Message>,
 }
@@ -166,6 +168,11 @@ impl<S: Simulator> World<S> {
             line.extend_from_slice(b",\"parameters\":");
             list(parameters.iter().map(String::as_str), &mut line);
         }
+        let offers = topics.nodes.offers();
+        if !offers.is_empty() {
+            line.extend_from_slice(b",\"nodes\":");
+            line.extend(serde_json::to_vec(offers).expect("names are plain data"));
+        }
         line.extend_from_slice(b",\"resets\":true,\"messages\":[");
         line.append(&mut topics.pending);
         line.extend_from_slice(b"]}}");
@@ -173,13 +180,14 @@ impl<S: Simulator> World<S> {
         Ok(Ok(World { simulator, topics, now: SimTime::ZERO, step: setup.step }))
     }
 
-    /// Advances by one step, with what has been delivered since the last one, and says that it is over.
+    /// Advances by one step, with what has been ordered and delivered since the last one, and says that it is over.
     fn step<R: BufRead, W: Write>(
         &mut self,
-        delivered: Vec<Message>,
+        Step { orders, messages }: Step,
         lines: &mut Lines<R, W>,
     ) -> io::Result<Result<(), SimulatorError>> {
-        self.topics.deliver(delivered)?;
+        orders.into_iter().for_each(|order| self.topics.nodes.give(order));
+        self.topics.deliver(messages)?;
         self.now = self.now + self.step;
         let turn = Turn { lines, fault: None };
         let mut wires = Remote { topics: &mut self.topics, turn: Some(turn) };
@@ -221,6 +229,7 @@ struct Topics {
     opened: Vec<Topic>,
     /// What was published since the runner was last told, as the items of a list in JSON.
     pending: Vec<u8>,
+    nodes: Offered,
 }
 
 struct Topic {
@@ -310,6 +319,10 @@ impl<R: BufRead, W: Write> Wires for Remote<'_, '_, R, W> {
         self.exchange();
         self.topics.opened[port.0].inbox.as_mut()?.pop_front()
     }
+
+    fn nodes(&mut self) -> &mut Offered {
+        &mut self.topics.nodes
+    }
 }
 
 /// Reads a value of the kind of another; without one, as JSON has it. `None` if it is none of this kind.
@@ -365,6 +378,7 @@ fn untyped(json: serde_json::Value) -> Option<Value> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simulator::NodeFault;
 
     /// A controller and a cart that moves by what it hears, until it has arrived.
     struct Cart {
@@ -422,6 +436,46 @@ mod tests {
             )
         };
         let expected = [ready, publish, &done("0.0", "0.5", false), publish, &done("3.0", "1.0", true), ready];
+        assert_eq!(said.lines().collect::<Vec<_>>(), expected);
+    }
+
+    #[test]
+    fn orders_to_nodes_come_with_their_step() {
+        /// A node that says what it is told.
+        struct Told(Port);
+
+        impl Simulator for Told {
+            fn start(_: &Setup, bus: &mut Bus<'_>) -> Result<Self, SimulatorError> {
+                bus.offer("arm", &[NodeFault::Slow, NodeFault::Pause]);
+                Ok(Told(bus.open("told")))
+            }
+
+            fn step(&mut self, bus: &mut Bus<'_>) -> Result<Progress, SimulatorError> {
+                while let Some(order) = bus.order("arm") {
+                    bus.publish(self.0, Value::from(format!("{order:?}").as_str()));
+                }
+                Ok(Progress::Running)
+            }
+        }
+
+        let requests = [
+            r#"{"reset":{"seed":1,"step":0.5}}"#,
+            r#"{"step":{"time":0.5,"orders":[{"node":"arm","order":"pause"},{"node":"gate","order":"kill"}]}}"#,
+            r#"{"step":{"time":1.0,"orders":[{"node":"arm","order":"slow","share":0.5}]}}"#,
+            r#"{"step":{"time":1.5}}"#,
+        ];
+        let mut output = Vec::new();
+        serve(requests.join("\n").as_bytes(), &mut output, Told::start).unwrap();
+        let said = String::from_utf8(output).unwrap();
+        let told = |what: &str| {
+            format!("{{\"done\":{{\"messages\":[{{\"topic\":\"told\",\"value\":\"{what}\"}}],\"ended\":false}}}}")
+        };
+        let expected = [
+            r#"{"ready":{"publishes":["told"],"subscribes":[],"nodes":{"arm":["pause","slow"]},"resets":true,"messages":[]}}"#,
+            &told("Pause"),
+            &told("Slow { share: 0.5 }"),
+            r#"{"done":{"messages":[],"ended":false}}"#,
+        ];
         assert_eq!(said.lines().collect::<Vec<_>>(), expected);
     }
 

@@ -8,7 +8,8 @@ use sesame_plan::CampaignPlan;
 
 use crate::message;
 use crate::relay::{Delivery, Exchange};
-use crate::simulator::{Bus, Port, Progress, Setup, Simulator, SimulatorError, Wires};
+use crate::simulator::{Bus, Offered, Port, Progress, Setup, Simulator, SimulatorError, Wires};
+use crate::transport::node_orders::NodeOrders;
 use crate::transport::{Capabilities, Connect, Transport, TransportError, unknown_topic};
 use crate::value::Value;
 use crate::wire::Wire;
@@ -25,6 +26,7 @@ fn connect<S: Simulator + 'static>(plan: &CampaignPlan, _: &Path) -> Box<dyn Tra
     Box::new(InProcess::<S> {
         simulator: None,
         bus: InProcessBus::default(),
+        orders: NodeOrders::default(),
         plan: plan.clone(),
         now: SimTime::ZERO,
         step: SimTime::from_nanos(i64::try_from(step_ns).unwrap_or(i64::MAX)),
@@ -37,6 +39,7 @@ const STEP_LIMIT: u64 = 100_000;
 struct InProcess<S> {
     simulator: Option<S>,
     bus: InProcessBus,
+    orders: NodeOrders,
     plan: CampaignPlan,
     now: SimTime,
     step: SimTime,
@@ -51,12 +54,14 @@ impl<S: Simulator> Transport for InProcess<S> {
         self.simulator = None;
         self.now = SimTime::ZERO;
         self.bus = InProcessBus::new(relay.wires().len());
+        self.orders = NodeOrders::default();
         let setup = Setup::new(seed, self.step).with_parameters(relay.parameters().iter().cloned());
         let mut linked = RelayedBus { board: &mut self.bus, plan: &self.plan, relay };
         let started = S::start(&setup, &mut Bus { now: SimTime::ZERO, wires: &mut linked });
         self.simulator = Some(started.map_err(failed)?);
         setup.unknown_parameter().map_or(Ok(()), |unknown| Err(failed(unknown)))?;
         self.bus.every_wire_is_open(&self.plan, relay)?;
+        NodeOrders::are_offered(&self.plan, self.bus.nodes.offers())?;
         self.bus.every_message_fits()
     }
 
@@ -71,6 +76,9 @@ impl<S: Simulator> Transport for InProcess<S> {
         self.bus.published = 0;
         relay.advance(self.now, &mut self.bus.deliveries);
         self.bus.deliver();
+        for order in self.orders.take(&self.plan, self.now, relay) {
+            self.bus.nodes.give(order);
+        }
         let mut linked = RelayedBus { board: &mut self.bus, plan: &self.plan, relay };
         let progress = simulator.step(&mut Bus { now: self.now, wires: &mut linked });
         self.bus.every_message_fits()?;
@@ -102,6 +110,7 @@ struct InProcessBus {
     mismatch: Option<TransportError>,
     /// Messages since the last step began.
     published: u64,
+    nodes: Offered,
 }
 
 /// One topic of the simulator.
@@ -203,20 +212,28 @@ impl Wires for RelayedBus<'_> {
     fn receive(&mut self, port: Port) -> Option<Value> {
         self.board.lines[port.0].inbox.as_mut()?.pop_front()
     }
+
+    fn nodes(&mut self) -> &mut Offered {
+        &mut self.board.nodes
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use sesame_base::observation::Outcome;
     use sesame_plan::testing::{
-        evidence_above, guarantee, in_process as simulator, metric, minimal, monitor, test_of, topic,
+        evidence_above, guarantee, in_process as simulator, metric, minimal, monitor, node, operation, test_of, topic,
+        use_of,
     };
     use sesame_plan::{
-        FieldRef, Gate, MetricSource, Mitigation, MitigationValue, Monitor, MonitorState, SafeState, TopicId, Type,
+        FieldRef, Gate, MetricSource, Mitigation, MitigationValue, Monitor, MonitorState, NodeId, OperationKind,
+        SafeState, TopicId, Type,
     };
 
     use super::*;
     use crate::evaluate::{Custom, evaluate};
     use crate::metric::MetricTable;
+    use crate::simulator::{NodeFault, NodeOrder};
     use crate::wire::WireTable;
 
     /// It comes nearer by one in each step, until it is told to stop. It does not know the topic of the monitor.
@@ -277,5 +294,64 @@ mod tests {
         assert_eq!(decisions, [(0.0, MonitorState::Otherwise), (0.1, moves), (0.5, MonitorState::Otherwise)]);
         assert_eq!(observed[0].metrics[0].value, Some(5.0), "it stops in the step after it is told to");
         assert_eq!((&observed[1].monitors, observed[1].messages), (&observed[0].monitors, observed[0].messages));
+    }
+
+    /// A counter that stands still, or begins anew, as it is told.
+    struct Counter {
+        count: i64,
+        runs: bool,
+        port: Port,
+    }
+
+    impl Simulator for Counter {
+        fn start(_: &Setup, bus: &mut Bus<'_>) -> Result<Self, SimulatorError> {
+            bus.offer("counter", &[NodeFault::Pause, NodeFault::Kill]);
+            Ok(Counter { count: 0, runs: true, port: bus.open("count") })
+        }
+
+        fn step(&mut self, bus: &mut Bus<'_>) -> Result<Progress, SimulatorError> {
+            while let Some(order) = bus.order("counter") {
+                self.runs = matches!(order, NodeOrder::Resume | NodeOrder::Restart);
+                if order == NodeOrder::Kill {
+                    self.count = 0;
+                }
+            }
+            self.count += i64::from(self.runs);
+            bus.publish(self.port, self.count);
+            Ok(Progress::Running)
+        }
+    }
+
+    #[test]
+    fn a_simulator_does_to_its_nodes_what_operations_want() {
+        let on = |kind| operation(0, kind);
+        let node_of_plan = NodeId(0);
+        let count = FieldRef { topic: TopicId(0), path: Vec::new() };
+        let mut plan = CampaignPlan {
+            simulator: simulator("counter", "counter::Counter", 100_000_000),
+            topics: vec![topic("count", &["count"], Type::Int { unit: None })],
+            nodes: vec![node("counter")],
+            metrics: vec![metric("count", MetricSource::Last { input: count })],
+            operations: vec![
+                on(OperationKind::Pause { node: node_of_plan }),
+                on(OperationKind::Kill { node: node_of_plan }),
+            ],
+            ..minimal()
+        };
+        plan.campaign.end_after = 1.0;
+        let counts = |plan: &CampaignPlan, uses| {
+            let (wires, test) = (WireTable::new(plan), test_of(uses));
+            let metrics = MetricTable::new(plan, &wires, &[]).unwrap();
+            let mut transport = in_process::<Counter>().transport(plan);
+            evaluate(plan, &wires, &metrics, &mut *transport, &test, 1, &mut Custom::none()).unwrap()
+        };
+        let last = |uses| counts(&plan, uses).metrics[0].value;
+        assert_eq!(last(vec![]), Some(10.0));
+        assert_eq!(last(vec![use_of(0, 0.2, 0.5, vec![], 1)]), Some(7.0), "it stands still at 0.2, 0.3 and 0.4 s");
+        assert_eq!(last(vec![use_of(1, 0.2, 0.5, vec![], 1)]), Some(6.0), "and begins anew at 0.5 s");
+
+        plan.operations.push(on(OperationKind::Slow { node: node_of_plan }));
+        let Outcome::Crash { message } = counts(&plan, vec![]).outcome else { panic!("it starts") };
+        assert!(message.starts_with("the simulator does not offer to slow node `counter`"), "{message}");
     }
 }

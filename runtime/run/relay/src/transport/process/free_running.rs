@@ -21,6 +21,7 @@ use sesame_plan::CampaignPlan;
 use crate::relay::Exchange;
 use crate::simulator::Progress;
 use crate::transport::clock::Ticks;
+use crate::transport::node_orders::NodeOrders;
 use crate::transport::process::fault::{explain, note_restart};
 use crate::transport::process::launched::health;
 use crate::transport::process::protocol::{LINE_LIMIT, Line, Read, SimulatorMessage, read_line, request};
@@ -60,6 +61,7 @@ struct Connection {
     /// When the line came.
     arrived: Instant,
     topics: Topics,
+    orders: NodeOrders,
     /// How long messages were kept.
     added: Added,
     clock: Clock,
@@ -156,6 +158,7 @@ impl Connection {
             line: Line::default(),
             arrived: Instant::now(),
             topics,
+            orders: NodeOrders::default(),
             added: Added::default(),
             clock: Clock::Simulator,
             ticks: Ticks::default(),
@@ -206,6 +209,7 @@ impl Connection {
     fn reset(&mut self, plan: &CampaignPlan, seed: u64, was_used: bool, relay: &mut dyn Exchange) -> Result<(), Fault> {
         const AWAITED: &str = "its answer to `reset`";
         self.topics.clear();
+        self.orders = NodeOrders::default();
         let (mut line, wires) = (Vec::new(), relay.wires());
         request::reset(&mut line, seed, None, relay.parameters(), wires.iter().map(|wire| wires.path(wire)));
         send(&mut self.input, &line);
@@ -241,6 +245,16 @@ impl Connection {
         }
     }
 
+    /// Sends what operations want done to nodes since the last call.
+    fn give_orders(&mut self, plan: &CampaignPlan, now: SimTime, relay: &mut dyn Exchange) {
+        let orders = self.orders.take(plan, now, relay);
+        if !orders.is_empty() {
+            let mut line = Vec::new();
+            request::orders(&mut line, &orders);
+            send(&mut self.input, &line);
+        }
+    }
+
     /// Simulation time by the wall clock, or the latest time that the simulator sent.
     fn time(&self, latest: SimTime) -> SimTime {
         match self.clock {
@@ -249,9 +263,10 @@ impl Connection {
         }
     }
 
-    /// Advances the relay, and sends what is due.
-    fn advance_to(&mut self, now: SimTime, relay: &mut dyn Exchange) {
+    /// Advances the relay, and sends what operations want done to nodes, then what is due.
+    fn advance_to(&mut self, plan: &CampaignPlan, now: SimTime, relay: &mut dyn Exchange) {
         relay.advance(now, &mut self.topics.deliveries);
+        self.give_orders(plan, now, relay);
         self.topics.deliver(relay, None);
         self.deliver();
     }
@@ -307,6 +322,7 @@ impl Connection {
             }
         };
         self.topics.published = 0;
+        self.give_orders(plan, now, relay);
         self.deliver();
         for wire in self.topics.passed.iter_mut().flat_map(|passed| passed.drain(..)) {
             self.added.record(wire, self.arrived.elapsed());
@@ -344,7 +360,7 @@ impl Transport for FreeRunning {
             return Err(self.explain(ended.into()));
         }
         self.now = connection.time(self.now).min(until);
-        connection.advance_to(self.now, relay);
+        connection.advance_to(&self.plan, self.now, relay);
         if self.now >= until {
             return Ok(Progress::Ended);
         }

@@ -11,7 +11,7 @@ use serde_json::value::RawValue;
 use sesame_base::time::SimTime;
 
 use crate::json::{number, quoted};
-use crate::simulator::no_such_parameter;
+use crate::simulator::{Offers, no_such_parameter};
 use crate::transport::TransportError;
 
 /// The longest line either side may write, in bytes.
@@ -62,6 +62,9 @@ pub(super) struct Ready<'a> {
     /// Parameters that it takes with `reset`.
     #[serde(default)]
     pub(super) parameters: Vec<String>,
+    /// Nodes that it does itself, and what it can do to each of them.
+    #[serde(default)]
+    pub(super) nodes: Offers,
     /// Whether it can be reset again; if not, it is restarted for each test.
     #[serde(default)]
     pub(super) resets: bool,
@@ -255,6 +258,7 @@ fn shown(text: &str) -> String {
 /// The runner's requests, written to a line.
 pub(super) mod request {
     use super::{SimTime, number, quoted};
+    use crate::simulator::OrderToNode;
 
     /// `{"reset":{"seed":1,"step":0.02,"parameters":{"gain":0.9},"topics":["a"]}}`, without `step` for a free-running
     /// simulator, and without `parameters` if there are none.
@@ -293,10 +297,15 @@ pub(super) mod request {
         line.extend_from_slice(b"]}}\n");
     }
 
-    /// `{"step":{"time":0.02,"messages":[…]}}`, with messages as [`message`] wrote them.
-    pub(in super::super) fn step(line: &mut Vec<u8>, time: SimTime, messages: &[u8]) {
+    /// `{"step":{"time":0.02,"orders":[{"node":"arm","order":"pause"}],"messages":[…]}}`, with messages as [`message`]
+    /// wrote them, and without `orders` if there are none.
+    pub(in super::super) fn step(line: &mut Vec<u8>, time: SimTime, orders: &[OrderToNode], messages: &[u8]) {
         line.extend_from_slice(b"{\"step\":{\"time\":");
         number(time.seconds(), line);
+        if !orders.is_empty() {
+            line.extend_from_slice(b",\"orders\":");
+            list_of_orders(line, orders);
+        }
         line.extend_from_slice(b",\"messages\":[");
         line.extend_from_slice(messages);
         line.extend_from_slice(b"]}}\n");
@@ -307,6 +316,18 @@ pub(super) mod request {
         line.extend_from_slice(b"{\"deliver\":[");
         line.extend_from_slice(messages);
         line.extend_from_slice(b"]}\n");
+    }
+
+    /// `{"orders":[{"node":"arm","order":"slow","share":0.25}]}`, to a simulator that runs freely.
+    pub(in super::super) fn orders(line: &mut Vec<u8>, orders: &[OrderToNode]) {
+        line.extend_from_slice(b"{\"orders\":");
+        list_of_orders(line, orders);
+        line.extend_from_slice(b"}\n");
+    }
+
+    fn list_of_orders(line: &mut Vec<u8>, orders: &[OrderToNode]) {
+        let list = serde_json::to_vec(orders).expect("names and numbers are plain data");
+        line.extend_from_slice(&list);
     }
 
     /// Adds `{"topic":"a","value":…}` to messages, or `{"topic":"a","time":0.02,"value":…}` if its time is to be there.

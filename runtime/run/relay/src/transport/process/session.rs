@@ -14,6 +14,7 @@ use crate::json::{self, Shapes};
 use crate::message::Mismatch;
 use crate::relay::{Delivery, Exchange};
 use crate::simulator::Progress;
+use crate::transport::node_orders::NodeOrders;
 use crate::transport::process::protocol::{LINE_LIMIT, Line, Lines, Message, Ready, SimulatorMessage, request};
 use crate::transport::{TransportError, unknown_topic};
 use crate::wire::Wire;
@@ -45,6 +46,7 @@ pub(super) struct Session<R, W> {
     output: W,
     line: Vec<u8>,
     topics: Topics,
+    orders: NodeOrders,
     resets: bool,
     ready: bool,
 }
@@ -82,7 +84,15 @@ impl<R: BufRead, W: Write> Session<R, W> {
 
     fn with_limit(input: R, output: W, limit: usize) -> Self {
         let lines = Lines::new(input, limit);
-        Session { lines, output, line: Vec::new(), topics: Topics::default(), resets: false, ready: false }
+        Session {
+            lines,
+            output,
+            line: Vec::new(),
+            topics: Topics::default(),
+            orders: NodeOrders::default(),
+            resets: false,
+            ready: false,
+        }
     }
 
     /// The stream of the simulator's lines.
@@ -123,6 +133,7 @@ impl<R: BufRead, W: Write> Session<R, W> {
         self.lines.recount();
         self.ready = false;
         self.topics.clear();
+        self.orders = NodeOrders::default();
         let wires = relay.wires();
         request::reset(&mut self.line, seed, Some(step), relay.parameters(), wires.iter().map(|wire| wires.path(wire)));
         self.send();
@@ -163,7 +174,8 @@ impl<R: BufRead, W: Write> Session<R, W> {
         self.topics.published = 0;
         relay.advance(now, &mut self.topics.deliveries);
         self.topics.deliver(relay, None);
-        request::step(&mut self.line, now, &self.topics.outbox);
+        let orders = self.orders.take(plan, now, relay);
+        request::step(&mut self.line, now, &orders, &self.topics.outbox);
         self.topics.outbox.clear();
         self.send();
         let awaited = || format!("the end of its step to {now}");
@@ -205,8 +217,8 @@ impl Topics {
         *self = Topics { shapes: mem::take(&mut self.shapes), passed, ..Topics::default() };
     }
 
-    /// Takes the simulator's topics; all topics of the space must be among them, but for states of monitors. Tells the
-    /// relay which have subscribers.
+    /// Takes the simulator's topics; all topics of the space must be among them, but for states of monitors, and what
+    /// operations do to nodes among what it offers. Tells the relay which topics have subscribers.
     pub(super) fn open(
         &mut self,
         plan: &CampaignPlan,
@@ -234,6 +246,7 @@ impl Topics {
         if let Some(missing) = needed.find(|&wire| !self.by_path.contains_key(wires.path(wire))) {
             return Err(unknown_topic(wires.path(missing), self.by_path.keys()));
         }
+        NodeOrders::are_offered(plan, &ready.nodes)?;
         for wire in wires.iter().filter(|wire| self.subscribed[wire.index()]) {
             relay.subscribed(wire);
         }

@@ -10,8 +10,11 @@ use std::time::{Duration, Instant};
 use sesame_base::observation::{Observation, Outcome};
 use sesame_patience as patience;
 use sesame_plan::condition::{Comparison, Condition, Operand};
-use sesame_plan::testing::{latency, operation, plan, test_of, use_of};
-use sesame_plan::{CampaignPlan, Choice, Distribution, Drain, Span, Transport as Declared};
+use sesame_plan::testing::{latency, node, operation, plan, test_of, use_of};
+use sesame_plan::{
+    CampaignPlan, Choice, Distribution, Drain, NodeId, Operation, OperationKind, Span, Test, TestOperation,
+    Transport as Declared,
+};
 
 use super::*;
 use crate::evaluate::{Custom, Run, evaluate, evaluate_tapped};
@@ -80,10 +83,14 @@ fn program_of(plan: &CampaignPlan, folder: PathBuf) -> Program {
 }
 
 fn run(transport: &mut LockStepped, seed: u64) -> Observation {
+    run_of(transport, &test_of(Vec::new()), seed)
+}
+
+fn run_of(transport: &mut LockStepped, test: &Test, seed: u64) -> Observation {
     let plan = transport.plan.clone();
     let wires = WireTable::new(&plan);
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
-    evaluate(&plan, &wires, &metrics, transport, &test_of(Vec::new()), seed, &mut Custom::none()).unwrap()
+    evaluate(&plan, &wires, &metrics, transport, test, seed, &mut Custom::none()).unwrap()
 }
 
 /// A Python program as the simulator, in a folder of its own.
@@ -146,6 +153,31 @@ fn the_example_of_the_documentation_is_a_simulator() {
     let position = (0..10).fold(0.0, |position: f64, _| position + (1.0 - position) * 0.1);
     assert_eq!(first.metrics[1].value, Some(position));
     assert_eq!(run(&mut transport, 1).metrics, first.metrics, "it begins anew");
+}
+
+#[test]
+fn the_example_of_the_documentation_does_to_its_node_what_operations_want() {
+    if !python() {
+        return;
+    }
+    let node = NodeId(0);
+    let mut plan = cart("nodes.py");
+    plan.nodes = vec![sesame_plan::testing::node("controller")];
+    plan.operations = [OperationKind::Pause { node }, OperationKind::Slow { node }, OperationKind::Kill { node }]
+        .map(|kind| operation(0, kind))
+        .to_vec();
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/transport/process");
+    let mut transport = stepped(&plan, folder);
+    // A run has ten steps, and the controller counts its own.
+    let mut ticks = |uses| {
+        let observed = run_of(&mut transport, &test_of(uses), 1);
+        assert_eq!(observed.outcome, Outcome::Completed);
+        observed.metrics[1].value.map(|position| (position * 10.0).round())
+    };
+    assert_eq!(ticks(vec![]), Some(10.0));
+    assert_eq!(ticks(vec![use_of(0, 0.2, 0.6, vec![], 1)]), Some(6.0));
+    assert_eq!(ticks(vec![use_of(1, 0.2, 0.6, vec![Choice::Value { value: 0.25 }], 1)]), Some(7.0));
+    assert_eq!(ticks(vec![use_of(2, 0.2, 0.6, vec![], 1)]), Some(5.0));
 }
 
 #[test]
@@ -382,6 +414,17 @@ fn connections_of_several_threads_do_not_meet() {
 /// A simulator that runs freely and does this after its answer to `reset`, in a run of at most an hour in which `lag`
 /// holds commands back for 0.3 s; what its run showed.
 fn free_running(ready: &str, after: &str) -> Option<(Observation, f64)> {
+    let lag = operation(0, latency(Distribution::Fixed, Drain::Finish));
+    free_running_in(vec![lag], vec![use_of(0, 0.0, 3600.0, vec![Choice::Value { value: 0.3 }], 1)], ready, after)
+}
+
+/// The same with other operations, on a node `arm` too, in a test of these uses.
+fn free_running_in(
+    operations: Vec<Operation>,
+    uses: Vec<TestOperation>,
+    ready: &str,
+    after: &str,
+) -> Option<(Observation, f64)> {
     if !python() {
         return None;
     }
@@ -402,15 +445,16 @@ say({{"ready": {{"publishes": TOPICS, "subscribes": TOPICS {ready}}}}})
     std::fs::write(folder.path().join("sim.py"), program).unwrap();
     let mut plan = plan_of("python3", &["sim.py"]);
     plan.campaign.end_after = 3600.0;
-    plan.operations = vec![operation(0, latency(Distribution::Fixed, Drain::Finish))];
-    plan.operations[0].within = Span { start: 0.0, end: 3600.0 };
+    plan.nodes = vec![node("arm")];
+    plan.operations = operations;
+    plan.operations.iter_mut().for_each(|operation| operation.within = Span { start: 0.0, end: 3600.0 });
     let Declared::Process { step_ns, .. } = &mut plan.simulator.transport else { unreachable!() };
     *step_ns = None;
     let mut transport = transport(&plan, folder.path().to_owned(), false);
     assert!(!transport.capabilities().lock_stepped);
     let wires = WireTable::new(&plan);
     let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
-    let test = test_of(vec![use_of(0, 0.0, 3600.0, vec![Choice::Value { value: 0.3 }], 1)]);
+    let test = test_of(uses);
     let started = Instant::now();
     let observed = evaluate(&plan, &wires, &metrics, transport.as_mut(), &test, 1, &mut Custom::none()).unwrap();
     Some((observed, started.elapsed().as_secs_f64()))
@@ -451,6 +495,28 @@ sys.stdin.readline()
     assert!(took < 120.0, "{took} s");
     assert_eq!(observed.end, 3600.0);
     assert_eq!(observed.metrics[1].series, [(0.1, 7.0)]);
+}
+
+#[test]
+fn a_free_running_simulator_is_told_what_its_nodes_are_to_do_also_while_it_is_silent() {
+    let after = r#"
+def orders(*expected):
+    heard = hear()["orders"]
+    assert heard == list(expected), heard
+command(1.0)
+assert hear()["deliver"]
+orders({"node": "arm", "order": "pause"})
+orders({"node": "arm", "order": "resume"})
+say({"done": {"ended": True}})
+"#;
+    let pause = operation(0, OperationKind::Pause { node: NodeId(0) });
+    let uses = vec![use_of(0, 0.1, 0.3, vec![], 1)];
+    let Some((observed, took)) = free_running_in(vec![pause], uses, r#", "nodes": {"arm": ["pause"]}"#, after) else {
+        return;
+    };
+    assert_eq!(observed.outcome, Outcome::Completed);
+    assert_eq!(observed.operations[0].counters.side_effects, 1);
+    assert!(took >= 0.3, "{took}");
 }
 
 #[test]

@@ -36,6 +36,11 @@ pub(super) fn run(between: &mut Between<'_>, mut hearing: Hearing<'_, '_>) -> Re
                         between.say_to_simulator(line.trim_ascii_end());
                     }
                 }
+                Request::Orders(orders) => {
+                    line.clear();
+                    request::orders(&mut line, &orders);
+                    between.say_to_simulator(line.trim_ascii_end());
+                }
                 Request::Reset(_) => return Ok(Some(said)),
                 Request::Step(_) => {
                     return Err(BesideError::Runner { problem: "a step in a run that nobody steps".to_owned() });

@@ -77,10 +77,11 @@ impl<'p, 't> Hearing<'p, 't> {
         let publishes = names(&ready.publishes, &|wire| self.plan.is_published_by_monitor(self.wires.topic(wire)));
         let subscribes = names(&ready.subscribes, &|wire| self.plan.is_read_by_monitor(self.wires.topic(wire)));
         let parameters = serde_json::to_string(&ready.parameters).expect("texts are plain data");
+        let nodes = serde_json::to_string(&ready.nodes).expect("texts are plain data");
         let Ready { resets, clock, .. } = ready;
         let mut line = format!(
             "{{\"ready\":{{\"publishes\":{publishes},\"subscribes\":{subscribes},\"parameters\":{parameters},\
-             \"resets\":{resets},\"clock\":{clock},\"times\":true,\"messages\":["
+             \"nodes\":{nodes},\"resets\":{resets},\"clock\":{clock},\"times\":true,\"messages\":["
         )
         .into_bytes();
         line.append(&mut messages);

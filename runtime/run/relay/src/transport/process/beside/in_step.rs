@@ -28,6 +28,9 @@ pub(super) fn run(between: &mut Between<'_>, mut hearing: Hearing<'_, '_>) -> Re
             Request::Deliver(_) => {
                 return Err(BesideError::Runner { problem: "messages that nothing was published for".to_owned() });
             }
+            Request::Orders(_) => {
+                return Err(BesideError::Runner { problem: "orders outside of a step".to_owned() });
+            }
         }
     }
 }
@@ -47,7 +50,7 @@ impl Run<'_, '_, '_, '_> {
         self.hearing.pass_to(time);
         self.publish(&mut delivered)?;
         let mut line = Vec::new();
-        request::step(&mut line, time, &delivered);
+        request::step(&mut line, time, &step.orders, &delivered);
         self.between.say_to_simulator(line.trim_ascii_end());
         loop {
             if !self.between.simulator("the end of its step")? {

@@ -6,6 +6,7 @@ use serde::Deserialize;
 use serde_json::value::RawValue;
 
 use super::error::BesideError;
+use crate::simulator::OrderToNode;
 
 /// A line of the runner.
 #[derive(Debug, Deserialize)]
@@ -16,6 +17,7 @@ pub(super) enum Request<'a> {
     Step(Step<'a>),
     #[serde(borrow)]
     Deliver(Vec<Delivered<'a>>),
+    Orders(Vec<OrderToNode>),
 }
 
 #[derive(Debug, Deserialize)]
@@ -28,6 +30,9 @@ pub(super) struct Reset {
 pub(super) struct Step<'a> {
     /// Its end, in seconds.
     pub(super) time: f64,
+    /// For nodes that the simulator does itself.
+    #[serde(default)]
+    pub(super) orders: Vec<OrderToNode>,
     #[serde(default, borrow)]
     pub(super) messages: Vec<Delivered<'a>>,
 }

@@ -4,10 +4,12 @@ use std::thread;
 
 use serde_json::{Value as Json, json};
 use sesame_base::time::SimTime;
-use sesame_plan::testing::{evidence_above, guarantee, latency, minimal, monitor, operation, test_of, topic, use_of};
+use sesame_plan::testing::{
+    evidence_above, guarantee, latency, minimal, monitor, node, operation, test_of, topic, use_of,
+};
 use sesame_plan::{
     CampaignPlan, Choice, Distribution, Drain, Evidence, FieldRef, Gate, Mitigation, MitigationValue, Monitor,
-    MonitorId, Stale, StaleIs, Test, TopicId, Type,
+    MonitorId, NodeId, OperationKind, Stale, StaleIs, Test, TopicId, Type,
 };
 
 use super::request::Delivered;
@@ -39,15 +41,20 @@ fn plans() -> [CampaignPlan; 2] {
         monitor("cell", 1, vec![high, evidence_above("top", 0, 2.5)], vec![guarantee("ok", 1, gate)]);
     let field = FieldRef { topic: TopicId(2), path: Vec::new() };
     cell.otherwise.mitigation = Some(Mitigation { field, value: MitigationValue::Bool(true) });
-    plan.operations = vec![operation(0, latency(Distribution::Fixed, Drain::Flush))];
+    plan.nodes = vec![node("cell")];
+    plan.operations = vec![
+        operation(0, latency(Distribution::Fixed, Drain::Flush)),
+        operation(0, OperationKind::Slow { node: NodeId(0) }),
+    ];
     let without = plan.clone();
     plan.monitors = vec![cell];
     [plan, without]
 }
 
-/// Levels are late by 130 ms from 1 s to 3 s, so that they are due between steps.
+/// Levels are late by 130 ms from 1 s to 3 s, so that they are due between steps. Meanwhile the cell is told to be slow.
 fn late() -> Test {
-    test_of(vec![use_of(0, 1.0, 3.0, vec![Choice::Value { value: 0.13 }], 1)])
+    let value = |value| vec![Choice::Value { value }];
+    test_of(vec![use_of(0, 1.0, 3.0, value(0.13), 1), use_of(1, 1.5, 2.5, value(0.5), 2)])
 }
 
 /// The cell: it publishes levels at the start, in the middle and at the end of steps, and is silent for a while. What
@@ -61,6 +68,7 @@ fn cell(requests: PipeReader, mut answers: PipeWriter, heard: &Mutex<Vec<Json>>)
         if order["reset"].is_object() {
             assert!(order["reset"]["topics"].as_array().unwrap().len() == 3);
             answer(json!({"ready": {"publishes": ["level", "stop"], "subscribes": ["level", "stop"], "resets": true,
+                                    "nodes": {"cell": ["slow"]},
                                     "messages": [level(3)]}}));
             continue;
         }
@@ -74,7 +82,7 @@ fn cell(requests: PipeReader, mut answers: PipeWriter, heard: &Mutex<Vec<Json>>)
             all.extend(delivered["deliver"].as_array().unwrap().clone());
         }
         all.retain(|message| message["topic"] == "stop");
-        heard.lock().unwrap().push(json!([time, all]));
+        heard.lock().unwrap().push(json!([time, all, order["step"]["orders"]]));
         answer(json!({"done": {"messages": if at % 3 == 0 { vec![level(at + 2)] } else { vec![] }}}));
     }
 }
@@ -152,6 +160,9 @@ fn a_monitor_beside_the_cell_decides_what_one_in_the_runner_decides_to_the_nanos
     let between_steps = |decisions: &[String]| decisions.iter().any(|decision| !decision.contains("00000000 "));
     assert!(between_steps(&disturbed.0) && disturbed.0.len() > 20, "{:#?}", disturbed.0);
     assert!(disturbed.1.iter().any(|step| !step[1].as_array().unwrap().is_empty()), "mitigation is sent");
+    let orders: Vec<&Json> = disturbed.1.iter().map(|step| &step[2]).filter(|orders| !orders.is_null()).collect();
+    let slow = json!([{"node": "cell", "order": "slow", "share": 0.5}]);
+    assert_eq!(orders, [&slow, &json!([{"node": "cell", "order": "resume"}])]);
     assert_eq!(decided(true, &Test { operations: Vec::new() }), undisturbed);
     assert_eq!(decided(true, &late), disturbed, "decisions, and what the cell hears in each step");
 }

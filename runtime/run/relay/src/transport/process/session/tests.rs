@@ -1,8 +1,8 @@
 //! The protocol against a simulator whose lines are given: since both sides take turns, its whole part can be written
 //! down before.
 
-use sesame_plan::testing::{latency, operation, plan, test_of, use_of};
-use sesame_plan::{Choice, Distribution, Drain, Operation, OperationKind, Test, Type};
+use sesame_plan::testing::{latency, node, operation, plan, test_of, use_of};
+use sesame_plan::{Choice, Distribution, Drain, NodeId, Operation, OperationKind, Test, Type};
 
 use super::*;
 use crate::metric::MetricTable;
@@ -33,18 +33,22 @@ impl Talk {
 
 /// Resets, takes steps, and gives what was said.
 fn talk_about(operations: Vec<Operation>, test: &Test, steps: u32, said: &str) -> Talk {
-    let plan = plan(operations);
-    let wires = WireTable::new(&plan);
-    let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
-    let mut relay = Relay::new(&plan, &wires, test, metrics.start(), &[]).unwrap();
+    talk_with(&plan(operations), test, steps, said)
+}
+
+/// The same with another plan.
+fn talk_with(plan: &CampaignPlan, test: &Test, steps: u32, said: &str) -> Talk {
+    let wires = WireTable::new(plan);
+    let metrics = MetricTable::new(plan, &wires, &[]).unwrap();
+    let mut relay = Relay::new(plan, &wires, test, metrics.start(), &[]).unwrap();
     let mut session = Session::with_limit(said.as_bytes(), Vec::new(), 1000);
     let mut now = SimTime::ZERO;
     let end = (|| {
-        session.reset(&plan, 7, STEP, &mut relay)?;
+        session.reset(plan, 7, STEP, &mut relay)?;
         let mut progress = Progress::Running;
         for _ in 0..steps {
             now = now + STEP;
-            progress = session.step(&plan, now, &mut relay)?;
+            progress = session.step(plan, now, &mut relay)?;
         }
         Ok(progress)
     })();
@@ -129,6 +133,42 @@ fn an_operation_stands_between_publisher_and_subscriber() {
         ]
     );
     assert_eq!(talk.finished.operations[0].counters.dropped, 1);
+}
+
+#[test]
+fn what_operations_want_of_nodes_comes_with_the_step_in_which_they_begin_and_end() {
+    let mut plan = plan(vec![
+        operation(0, OperationKind::Slow { node: NodeId(0) }),
+        operation(0, OperationKind::Kill { node: NodeId(1) }),
+    ]);
+    plan.nodes = vec![node("arm"), node("gate")];
+    let share = vec![Choice::Value { value: 0.25 }];
+    // The first begins within the second step.
+    let test = test_of(vec![use_of(0, 0.13, 0.3, share, 1), use_of(1, 0.3, 0.4, vec![], 2)]);
+    let offers = |nodes: &str| READY.replace("\"publishes\"", &format!("\"nodes\":{nodes},\"publishes\""));
+    let said = |nodes: &str| format!("{}\n{}", offers(nodes), "{\"done\":{}}\n".repeat(5));
+    let talk = talk_with(&plan, &test, 5, &said(r#"{"arm":["pause","slow"],"gate":["kill"],"more":["slow"]}"#));
+    let lines: Vec<&str> = talk.orders[1..].iter().map(String::as_str).collect();
+    assert_eq!(
+        lines,
+        [
+            r#"{"step":{"time":0.1,"messages":[]}}"#,
+            r#"{"step":{"time":0.2,"orders":[{"node":"arm","order":"slow","share":0.25}],"messages":[]}}"#,
+            r#"{"step":{"time":0.3,"orders":[{"node":"arm","order":"resume"},{"node":"gate","order":"kill"}],"messages":[]}}"#,
+            r#"{"step":{"time":0.4,"orders":[{"node":"gate","order":"restart"}],"messages":[]}}"#,
+            r#"{"step":{"time":0.5,"messages":[]}}"#,
+        ]
+    );
+    assert!(talk.finished.operations.iter().all(|used| used.counters.side_effects == 1));
+
+    // It is refused in every run, also in those that do not use the operation.
+    let refused = talk_with(&plan, &test_of(vec![]), 5, &said(r#"{"arm":["pause","slow"]}"#)).error();
+    assert!(
+        refused.starts_with("the simulator does not offer to kill node `gate`, as operation `kill` needs"),
+        "{refused}"
+    );
+    let unknown = talk_with(&plan, &test, 5, &said(r#"{"arm":["stop"]}"#)).error();
+    assert!(unknown.contains("unknown variant `stop`, expected one of `pause`, `slow`, `kill`"), "{unknown}");
 }
 
 #[test]
