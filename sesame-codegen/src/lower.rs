@@ -300,7 +300,7 @@ pub(crate) mod tests {
         plan.validate().unwrap();
         let kinds: Vec<_> = plan.operations.iter().map(|operation| operation.kind.clone()).collect();
         let [arm, planner] = [0, 1].map(plan::NodeId);
-        let set = plan::OperationKind::Set { node: planner, parameter: "limits.payload".to_owned() };
+        let set = plan::OperationKind::Set { node: planner, parameter: "limits.payload".to_owned(), values: vec![] };
         let on_arm = [
             plan::OperationKind::Slow { node: arm },
             plan::OperationKind::Pause { node: arm },

@@ -18,6 +18,7 @@ mod fleet;
 mod late_server;
 mod links;
 mod lock_step;
+mod managed;
 mod monitor;
 mod prepared;
 mod proxies;

@@ -7,7 +7,6 @@ use sesame_grammar::Rule;
 use super::Resolver;
 use super::elements::Place;
 use super::quantity::is_of_times;
-use super::resource::acts_on_nodes;
 use super::words::type_in_words;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{
@@ -44,8 +43,8 @@ impl<'a> Resolver<'a> {
     /// An operation on messages, of any kind but a custom one.
     pub(super) fn disturbance(&mut self, target: &'a ast::Target, body: &'a ast::OperationBody) -> Option<Resolved> {
         match &body.kind {
-            ast::OperationKind::Plain { rule, .. } if acts_on_nodes(*rule) => {
-                self.needs_a_node(target, *rule, body.kind_word);
+            ast::OperationKind::OnNode(kind) => {
+                self.needs_a_node(target, kind, body.kind_word);
                 None
             }
             ast::OperationKind::Plain { rule: Rule::packet_loss, amounts: Some(ast::Amounts::Range(range)) }

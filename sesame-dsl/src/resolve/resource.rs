@@ -1,20 +1,16 @@
 //! Operations on nodes and their parameters.
 
-use sesame_grammar::Rule;
+use sesame_notation::quoted;
 use sesame_plan::SimulatorProperties;
 
 use super::disturbance::number;
 use super::nodes::node_of_plans;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{Id as _, NodeId, OperationKind, Parameter, Range};
+use crate::model::{Domain, Id as _, NewValue, NodeId, OperationKind, Parameter, Range, Transition};
+use crate::similar::most_similar;
 use crate::span::Span;
-use crate::syntax::ast;
-
-/// Whether a kind that is a rule of the grammar acts on nodes or their parameters instead of messages.
-pub(super) fn acts_on_nodes(rule: Rule) -> bool {
-    matches!(rule, Rule::set_parameter | Rule::pause | Rule::slow | Rule::kill)
-}
+use crate::syntax::ast::{self, Item, New, OnNode};
 
 impl<'a> Resolver<'a> {
     /// What an operation does to a node or a parameter.
@@ -23,39 +19,131 @@ impl<'a> Resolver<'a> {
         resource: &'a ast::Resource,
         body: &'a ast::OperationBody,
     ) -> Option<(OperationKind, Vec<Parameter>)> {
-        let (rule, amounts) = self.kind_for(resource, body)?;
-        let has_nodes = self.has_nodes(resource, rule);
+        let written = self.kind_for(resource, body)?;
+        let has_nodes = self.has_nodes(resource, written);
         let found = self.nodes_named(&resource.node);
-        let parameters = match (rule, amounts) {
-            (Rule::set_parameter, Some(ast::Amounts::Range(range))) => {
-                Some(vec![number("value", None, self.range(range, None, "the parameter")?)])
+        let transition = match written {
+            OnNode::Transition(name) => Some(self.transition(name)?),
+            _ => None,
+        };
+        let (values, parameter) = match written {
+            OnNode::Set(New::Range(range)) => {
+                (Some(Vec::new()), Some(number("value", None, self.range(range, None, "the parameter")?)))
             }
-            (Rule::slow, Some(ast::Amounts::Range(range))) => self.kept_share(range).map(|share| vec![share]),
-            (_, None) => Some(Vec::new()),
-            (rule, Some(_)) => unreachable!("the grammar has no operation on a node that is {rule:?} with this amount"),
+            OnNode::Set(New::Values(written)) => {
+                let (values, parameter) = self.new_values(written)?;
+                (Some(values), Some(parameter))
+            }
+            OnNode::Slow(range) => (None, Some(self.kept_share(range)?)),
+            OnNode::Transition(_) | OnNode::Pause | OnNode::Kill => (None, None),
         };
         // The members of a group follow each other.
         let node = *found?.first()?;
         if !has_nodes {
             return None;
         }
-        let can = match rule {
-            Rule::set_parameter => true,
-            _ if self.orders_nodes() => true,
-            rule => self.is_launched(resource, node, body.kind_word) & (rule != Rule::slow || self.runs_freely(body)),
+        let can = match written {
+            OnNode::Set(_) | OnNode::Transition(_) => true,
+            OnNode::Pause | OnNode::Kill | OnNode::Slow(_) if self.orders_nodes() => true,
+            OnNode::Slow(_) => self.is_launched(resource, node, body.kind_word) & self.runs_freely(body),
+            OnNode::Pause | OnNode::Kill => self.is_launched(resource, node, body.kind_word),
         };
         if !can {
             return None;
         }
         let node = node_of_plans(node);
-        let kind = match (rule, &resource.parameter) {
-            (Rule::set_parameter, Some(parameter)) => OperationKind::Set { node, parameter: parameter.text.clone() },
-            (Rule::pause, None) => OperationKind::Pause { node },
-            (Rule::slow, None) => OperationKind::Slow { node },
-            (Rule::kill, None) => OperationKind::Kill { node },
-            _ => unreachable!("the kind was found to be for what it acts on"),
+        let kind = match (written, values, &resource.parameter) {
+            (OnNode::Set(_), Some(values), Some(parameter)) => {
+                OperationKind::Set { node, parameter: parameter.text.clone(), values }
+            }
+            (OnNode::Transition(_), ..) => OperationKind::Transition { node, transition: transition? },
+            (OnNode::Pause, ..) => OperationKind::Pause { node },
+            (OnNode::Slow(_), ..) => OperationKind::Slow { node },
+            (OnNode::Kill, ..) => OperationKind::Kill { node },
+            (OnNode::Set(_), ..) => unreachable!("the kind was found to be for what it acts on"),
         };
-        Some((kind, parameters?))
+        Some((kind, parameter.into_iter().collect()))
+    }
+
+    /// The transition of this name.
+    fn transition(&mut self, name: &'a ast::Name) -> Option<Transition> {
+        if let Some(known) = Transition::ALL.into_iter().find(|known| known.word() == name.text) {
+            return Some(known);
+        }
+        let diagnostic = if name.text == "shutdown" {
+            Diagnostic::new(Code::UNKNOWN_NAME, name.span, "a node does not come back from `shutdown`")
+                .label("expected a transition that can be undone")
+                .note("to end a node for a while, use `kill`, which starts it again")
+        } else {
+            let words = Transition::ALL.map(Transition::word);
+            let title = format!("no transition named `{}`", name.text);
+            let label = "expected `configure`, `activate`, `deactivate` or `cleanup`";
+            let diagnostic = Diagnostic::new(Code::UNKNOWN_NAME, name.span, title).label(label);
+            match most_similar(&name.text, words) {
+                Some(similar) => diagnostic.did_you_mean(name.span, similar),
+                None => diagnostic,
+            }
+        };
+        self.report(diagnostic);
+        None
+    }
+
+    /// What a parameter is set to, and the choice of one of these values: all different, and of one type.
+    fn new_values(&mut self, written: &'a [ast::NewValue]) -> Option<(Vec<NewValue>, Parameter)> {
+        let mut values: Vec<NewValue> = Vec::new();
+        let mut texts: Vec<String> = Vec::new();
+        for new in written {
+            let value = self.new_value(new)?;
+            let text = in_choices(&value);
+            if let Some(before) = texts.iter().position(|known| *known == text) {
+                self.listed_twice(new.span(), written[before].span());
+                return None;
+            }
+            if let Some(other) = values.iter().position(|known| !are_alike(known, &value)) {
+                self.report_mixed((new.span(), value.is()), (written[other].span(), values[other].is()));
+                return None;
+            }
+            values.push(value);
+            texts.push(text);
+        }
+        let domain = Domain::Texts(texts);
+        Some((values, Parameter { name: "value".to_owned(), doc: String::new(), unit: None, domain }))
+    }
+
+    fn new_value(&mut self, written: &'a ast::NewValue) -> Option<NewValue> {
+        let items = match written {
+            ast::NewValue::Truth(truth, _) => return Some(NewValue::Bool(*truth)),
+            ast::NewValue::Text(text) => return Some(NewValue::Text(text.text.clone())),
+            ast::NewValue::List(items, _) => items,
+        };
+        let (mut numbers, mut truths, mut texts) = (Vec::new(), Vec::new(), Vec::new());
+        for item in items {
+            match item {
+                Item::Number(number) => numbers.push(self.value(number, None, "the parameter")?),
+                Item::Truth(truth, _) => truths.push(*truth),
+                Item::Text(text) => texts.push(text.text.clone()),
+            }
+            if let (Some(first), [numbers, truths, texts]) = (items.first(), [numbers.len(), truths.len(), texts.len()])
+                && ![numbers, truths, texts].contains(&(numbers + truths + texts))
+            {
+                self.report_mixed((item.span(), of_item(item)), (first.span(), of_item(first)));
+                return None;
+            }
+        }
+        Some(match (truths.is_empty(), texts.is_empty()) {
+            (false, _) => NewValue::Bools(truths),
+            (_, false) => NewValue::Texts(texts),
+            (true, true) => NewValue::Numbers(numbers),
+        })
+    }
+
+    /// Reports values of different types where they must be of one.
+    fn report_mixed(&mut self, (span, is): (Span, &str), (first, first_is): (Span, &str)) {
+        let title = format!("`{}` is {is}, but `{}` is {first_is}", self.text(span), self.text(first));
+        let diagnostic = Diagnostic::new(Code::WRONG_TYPE, span, title)
+            .label(format!("expected {first_is}: a parameter has one type"))
+            .secondary(first, "the other is here");
+        self.report(diagnostic);
     }
 
     /// Whether the nodes are parts of the simulator, which does to them what operations want.
@@ -64,23 +152,28 @@ impl<'a> Resolver<'a> {
     }
 
     /// Reports a simulator that cannot do to its nodes what an operation wants.
-    fn has_nodes(&mut self, resource: &ast::Resource, rule: Rule) -> bool {
-        let sets = rule == Rule::set_parameter;
-        let can = |kind: SimulatorProperties| kind.reaches_nodes || (kind.orders_nodes && !sets);
+    fn has_nodes(&mut self, resource: &ast::Resource, written: &OnNode) -> bool {
+        const INSTEAD: &str = "disturb the topics of the node instead, for example with `blackhole` or `latency`";
+        let of_ros = matches!(written, OnNode::Set(_) | OnNode::Transition(_));
+        let can = |kind: SimulatorProperties| kind.reaches_nodes || (kind.orders_nodes && !of_ros);
         let Some((word, simulator)) = self.without(can) else { return true };
-        let (title, label, note) = if sets {
-            (
+        let (title, label, note) = match written {
+            OnNode::Set(_) => (
                 format!("nodes of a simulator of kind `{word}` have no parameters"),
                 "only nodes of a `ros2` simulator have parameters",
                 "a parameter of the whole simulator is a scene, as in `parameter gain: real in [0, 2]`; `process`, \
                  `in_process` and `ros2` take it",
-            )
-        } else {
-            (
+            ),
+            OnNode::Transition(_) => (
+                format!("nodes of a simulator of kind `{word}` have no lifecycle"),
+                "only nodes of a `ros2` simulator take transitions",
+                INSTEAD,
+            ),
+            OnNode::Pause | OnNode::Slow(_) | OnNode::Kill => (
                 format!("simulator kind `{word}` has no nodes that an operation could act on"),
                 "only nodes of `ros2`, `process` and `in_process` simulators can be paused, slowed and killed",
-                "disturb the topics of the node instead, for example with `blackhole` or `latency`",
-            )
+                INSTEAD,
+            ),
         };
         let diagnostic = Diagnostic::new(Code::NODE_OUT_OF_REACH, resource.span, title)
             .label(label)
@@ -90,25 +183,21 @@ impl<'a> Resolver<'a> {
         false
     }
 
-    /// The rule and the amount of a kind that is for what the operation acts on; other kinds are reported.
-    fn kind_for(
-        &mut self,
-        resource: &ast::Resource,
-        body: &'a ast::OperationBody,
-    ) -> Option<(Rule, Option<&'a ast::Amounts>)> {
+    /// A kind that is for what the operation acts on; other kinds are reported.
+    fn kind_for(&mut self, resource: &ast::Resource, body: &'a ast::OperationBody) -> Option<&'a OnNode> {
         let node = &resource.node.name.text;
         let kind = match &body.kind {
-            ast::OperationKind::Plain { rule, amounts } if acts_on_nodes(*rule) => Some((*rule, amounts.as_ref())),
+            ast::OperationKind::OnNode(kind) => Some(kind),
             _ => None,
         };
         let word = self.text(body.kind_word);
         let (span, title, label) = match (kind, &resource.parameter) {
-            (Some((Rule::set_parameter, _)), None) => (
+            (Some(OnNode::Set(_)), None) => (
                 resource.span,
                 "`set` needs the parameter that it sets".to_owned(),
                 format!("expected a parameter, for example `parameter \"gain\" of {node}`"),
             ),
-            (Some((Rule::set_parameter, _)), Some(_)) | (Some(_), None) => return kind,
+            (Some(OnNode::Set(_)), Some(_)) | (Some(_), None) => return kind,
             (Some(_), Some(_)) => (
                 resource.span,
                 format!("`{word}` acts on a node, not on one of its parameters"),
@@ -117,7 +206,7 @@ impl<'a> Resolver<'a> {
             (None, None) => (
                 body.kind_word,
                 "this kind of operation acts on messages, not on a node".to_owned(),
-                "expected `pause`, `slow` or `kill`".to_owned(),
+                "expected `pause`, `slow`, `kill` or `transition`".to_owned(),
             ),
             (None, Some(_)) => (
                 body.kind_word,
@@ -137,11 +226,12 @@ impl<'a> Resolver<'a> {
     }
 
     /// Reports a kind that is for nodes on a topic.
-    pub(super) fn needs_a_node(&mut self, target: &'a ast::Target, rule: Rule, word: Span) {
+    pub(super) fn needs_a_node(&mut self, target: &'a ast::Target, kind: &OnNode, word: Span) {
         let word = self.text(word);
         let topic = &target.topic.text;
         let is_node = self.names.get(topic.as_str()).is_some_and(|named| named.kind == Kind::Node);
-        let (title, label) = if rule == Rule::set_parameter {
+        let sets = matches!(kind, OnNode::Set(_));
+        let (title, label) = if sets {
             let node = self.declared_or(Kind::Node, "controller");
             (
                 "`set` acts on a parameter of a node, not on messages".to_owned(),
@@ -152,7 +242,7 @@ impl<'a> Resolver<'a> {
             (format!("`{word}` acts on a node, not on messages"), label.to_owned())
         };
         let mut diagnostic = Diagnostic::new(Code::WRONG_TYPE, target.span, title).label(label);
-        if rule == Rule::set_parameter {
+        if sets {
             diagnostic = diagnostic.note("to replace values in messages, use `stuck at`");
         } else if is_node {
             diagnostic = diagnostic.suggest("write `node` before its name", target.span, format!("node {topic}"));
@@ -197,5 +287,36 @@ impl<'a> Resolver<'a> {
             .note("to delay what the node publishes, use `latency` on its topics");
         self.report(diagnostic);
         false
+    }
+}
+
+/// A value of a parameter as tests choose it: a text is itself, and anything else as it is written.
+fn in_choices(value: &NewValue) -> String {
+    fn list<T>(items: &[T], written: impl Fn(&T) -> String) -> String {
+        format!("list [{}]", items.iter().map(written).collect::<Vec<_>>().join(", "))
+    }
+    match value {
+        NewValue::Bool(truth) => truth.to_string(),
+        NewValue::Number(number) => number.to_string(),
+        NewValue::Text(text) => text.clone(),
+        NewValue::Numbers(numbers) => list(numbers, f64::to_string),
+        NewValue::Bools(truths) => list(truths, bool::to_string),
+        NewValue::Texts(texts) => list(texts, |text| quoted(text)),
+    }
+}
+
+/// Whether two values are of one type; an empty list is of that of any list.
+fn are_alike(one: &NewValue, other: &NewValue) -> bool {
+    let is_list = |value: &NewValue| matches!(value, NewValue::Numbers(_) | NewValue::Bools(_) | NewValue::Texts(_));
+    let is_empty = |value: &NewValue| matches!(value, NewValue::Numbers(numbers) if numbers.is_empty());
+    one.is() == other.is() || is_list(one) && is_list(other) && (is_empty(one) || is_empty(other))
+}
+
+/// What an item of a list is, in words.
+fn of_item(item: &Item) -> &'static str {
+    match item {
+        Item::Truth(..) => "a `bool`",
+        Item::Text(_) => "a text",
+        Item::Number(_) => "a number",
     }
 }

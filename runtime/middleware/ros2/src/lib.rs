@@ -5,7 +5,9 @@
 
 mod dds;
 mod graph;
+mod lifecycle;
 mod names;
+mod node_service;
 mod parameters;
 pub mod scan;
 mod transport;

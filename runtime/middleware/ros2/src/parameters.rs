@@ -2,37 +2,16 @@
 
 use std::sync::Arc;
 
-use rustdds::rpc::SampleIdentity;
-use rustdds::{GUID, SequenceNumber};
-use sesame_codec::cdr::Codec;
-use sesame_plan::{Interface, InterfaceField, Primitive, WireType};
+use sesame_plan::{Interface, InterfaceField, NewValue, Primitive, WireType};
 use sesame_relay::value::{Fields, Record, Text, Value};
-use sesame_relay::wire::Wanted;
 
-use crate::dds::{DdsError, Endpoint, Participant, ReaderId, Sample, WriterId, mirrored};
-use crate::names;
+use crate::dds::{DdsError, Endpoint, Participant};
+use crate::node_service::{Service, Ticket};
 
 /// The parameters of one node.
 pub(crate) struct Parameters {
     get: Service,
     set: Service,
-}
-
-/// A service with what encodes its requests and decodes its replies.
-pub(crate) struct Service {
-    path: String,
-    request: Codec,
-    reply: Codec,
-    writer: WriterId,
-    pub(crate) reader: ReaderId,
-    address: GUID,
-}
-
-/// What a call waits for.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Ticket {
-    pub(crate) reader: ReaderId,
-    pub(crate) number: SequenceNumber,
 }
 
 /// The value of a parameter as the node has it, to be given back as it is.
@@ -43,9 +22,20 @@ const VALUE: &str = "rcl_interfaces/msg/ParameterValue";
 const PARAMETER: &str = "rcl_interfaces/msg/Parameter";
 const RESULT: &str = "rcl_interfaces/msg/SetParametersResult";
 
-/// What a parameter is, by the numbers of ROS.
-const INTEGER: i64 = 2;
-const DOUBLE: i64 = 3;
+/// What parameters can be, by their numbers in ROS, the first of which is that of a parameter without a value: where
+/// the value is, and what it is in words.
+const TYPES: [(&str, &str); 10] = [
+    ("", "without a value"),
+    ("bool_value", "a `bool`"),
+    ("integer_value", "a number"),
+    ("double_value", "a number"),
+    ("string_value", "a text"),
+    ("byte_array_value", "a list of bytes"),
+    ("bool_array_value", "a list of `bool`"),
+    ("integer_array_value", "a list of numbers"),
+    ("double_array_value", "a list of numbers"),
+    ("string_array_value", "a list of texts"),
+];
 
 fn interfaces() -> Vec<Interface> {
     let field = |name: &str, ty| InterfaceField { name: name.to_owned(), ty };
@@ -78,48 +68,17 @@ fn interfaces() -> Vec<Interface> {
     ]
 }
 
-impl Service {
-    fn join(node: &str, service: &str, ty: &str, dds: &mut Participant) -> Result<Self, DdsError> {
-        let path = format!("{node}/{service}");
-        let codec = |part: &str| {
-            let name = format!("rcl_interfaces/srv/{ty}_{part}");
-            Codec::new(&interfaces(), &name, &Wanted::All).map_err(|error| DdsError(error.to_string()))
-        };
-        let type_name = |part: &str| names::type_name(&format!("rcl_interfaces/srv/{ty}_{part}"));
-        let qos = mirrored([]);
-        let reader = dds.read(&names::reply(&path), &type_name("Response"), &qos)?;
-        let writer = dds.publish(&names::request(&path), &type_name("Request"), &qos)?;
-        let address = dds.reader_guid(reader).unwrap_or(GUID::GUID_UNKNOWN);
-        Ok(Service { request: codec("Request")?, reply: codec("Response")?, path, writer, reader, address })
-    }
-
-    fn call(&self, request: &Value, dds: &Participant) -> Result<Ticket, DdsError> {
-        let sample = self.request.write(request).map_err(|error| DdsError(error.to_string()))?;
-        let related = SampleIdentity { writer_guid: self.address, sequence_number: SequenceNumber::UNKNOWN };
-        match dds.write(self.writer, Sample(sample), Some(related))? {
-            Some(sent) => Ok(Ticket { reader: self.reader, number: sent.sequence_number }),
-            None => Err(DdsError(format!("service `{}` takes no calls", self.path))),
-        }
-    }
-
-    fn is_served(&self, subscribers: &[Endpoint]) -> bool {
-        let topic = names::request(&self.path);
-        subscribers.iter().any(|endpoint| endpoint.topic == topic)
-    }
-}
-
 impl Parameters {
     pub(crate) fn join(node: &str, dds: &mut Participant) -> Result<Self, DdsError> {
         Ok(Parameters {
-            get: Service::join(node, "get_parameters", "GetParameters", dds)?,
-            set: Service::join(node, "set_parameters", "SetParameters", dds)?,
+            get: Service::join(node, "get_parameters", "rcl_interfaces/srv/GetParameters", &interfaces(), dds)?,
+            set: Service::join(node, "set_parameters", "rcl_interfaces/srv/SetParameters", &interfaces(), dds)?,
         })
     }
 
     /// What is missing before a run, in a phrase.
     pub(crate) fn missing(&self, subscribers: &[Endpoint]) -> Option<String> {
-        let unserved = [&self.get, &self.set].into_iter().find(|service| !service.is_served(subscribers))?;
-        Some(format!("nobody serves `{}`", unserved.path))
+        [&self.get, &self.set].into_iter().find_map(|service| service.missing(subscribers))
     }
 
     /// Asks for the value of a parameter.
@@ -130,7 +89,7 @@ impl Parameters {
 
     /// The value in the reply; `None` if the node has no such parameter.
     pub(crate) fn asked(&self, reply: Arc<[u8]>) -> Option<ParameterValue> {
-        let reply = self.get.reply.read(reply).ok()?;
+        let reply = self.get.read(reply).ok()?;
         let Value::List(values) = reply.at(&["values"])? else { return None };
         let value = values.first()?.clone();
         (value.number_at(&["type"])? != 0.0).then_some(ParameterValue(value))
@@ -147,7 +106,7 @@ impl Parameters {
     /// Whether a parameter was set; the error is the reason that the node gives.
     pub(crate) fn was_set(&self, reply: Arc<[u8]>) -> Result<(), String> {
         let unreadable = || "its answer cannot be read".to_owned();
-        let reply = self.set.reply.read(reply).map_err(|error| error.to_string())?;
+        let reply = self.set.read(reply)?;
         let Some(Value::List(results)) = reply.at(&["results"]) else { return Err(unreadable()) };
         let result = results.first().ok_or_else(unreadable)?;
         match (result.number_at(&["successful"]), result.at(&["reason"])) {
@@ -159,19 +118,51 @@ impl Parameters {
 }
 
 impl ParameterValue {
-    /// The same parameter with this number; an error if it is none.
-    pub(crate) fn with(&self, number: f64) -> Result<ParameterValue, String> {
-        let mut value = self.0.clone();
-        let (field, number) = match value.number_at(&["type"]) {
-            Some(kind) if kind == DOUBLE as f64 => ("double_value", Value::Real(number)),
-            #[expect(clippy::cast_possible_truncation, reason = "casts of reals saturate")]
-            Some(kind) if kind == INTEGER as f64 => ("integer_value", Value::Int(number.round() as i64)),
-            _ => return Err("it is not a number".to_owned()),
+    /// The same parameter with this value. Whole numbers are the nearest ones. An error if it is of another type.
+    pub(crate) fn with(&self, new: &NewValue) -> Result<ParameterValue, String> {
+        let (field, is) = self.ty();
+        let value = match (field, new) {
+            ("bool_value", NewValue::Bool(truth)) => Value::Bool(*truth),
+            ("integer_value", NewValue::Number(number)) => whole(*number),
+            ("double_value", NewValue::Number(number)) => Value::Real(*number),
+            ("string_value", NewValue::Text(text)) => Value::Text(Text::from(text.as_str())),
+            ("byte_array_value", NewValue::Numbers(numbers)) => {
+                if !numbers.iter().all(|number| (0.0..=255.0).contains(&number.round())) {
+                    return Err("it is a list of bytes, which are from 0 to 255".to_owned());
+                }
+                listed(numbers, |number| whole(*number))
+            }
+            ("bool_array_value", NewValue::Bools(truths)) => listed(truths, |truth| Value::Bool(*truth)),
+            ("integer_array_value", NewValue::Numbers(numbers)) => listed(numbers, |number| whole(*number)),
+            ("double_array_value", NewValue::Numbers(numbers)) => listed(numbers, |number| Value::Real(*number)),
+            ("string_array_value", NewValue::Texts(texts)) => {
+                listed(texts, |text| Value::Text(Text::from(text.as_str())))
+            }
+            ("bool_array_value" | "string_array_value", NewValue::Numbers(none)) if none.is_empty() => {
+                Value::List(Vec::new())
+            }
+            _ => return Err(format!("it is {is}, not {}", new.is())),
         };
-        match value.at_mut(&[field]) {
-            Some(place) => *place = number,
-            None => return Err("it is not a number".to_owned()),
+        let mut with = self.0.clone();
+        if let Some(place) = with.at_mut(&[field]) {
+            *place = value;
         }
-        Ok(ParameterValue(value))
+        Ok(ParameterValue(with))
     }
+
+    /// Where its value is, and what it is in words.
+    fn ty(&self) -> (&'static str, &'static str) {
+        let number = self.0.number_at(&["type"]).unwrap_or_default();
+        let found = (0u8..).zip(TYPES).find(|(known, _)| f64::from(*known) == number);
+        found.map_or(("", "of an unknown type"), |(_, ty)| ty)
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "casts of reals saturate")]
+fn whole(number: f64) -> Value {
+    Value::Int(number.round() as i64)
+}
+
+fn listed<T>(items: &[T], value: impl Fn(&T) -> Value) -> Value {
+    Value::List(items.iter().map(value).collect())
 }

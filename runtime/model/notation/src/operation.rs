@@ -2,8 +2,8 @@
 
 use sesame_plan::condition::{Constraint, Integers};
 use sesame_plan::{
-    CampaignPlan, Counted, Distribution, Domain, Drain, FieldRef, Lengths, MembersOf, Metric, Operation, OperationKind,
-    Parameter, Span, TargetRef, Topic, value_path_in_words, without_member,
+    CampaignPlan, Counted, Distribution, Domain, Drain, FieldRef, Lengths, MembersOf, Metric, NewValue, Operation,
+    OperationKind, Parameter, Span, TargetRef, Topic, value_path_in_words, without_member,
 };
 
 use crate::monitor::unit_in;
@@ -190,6 +190,15 @@ fn disturbance(operation: &Operation) -> String {
         OperationKind::StuckAtConstant { .. } => {
             let names = operation.parameters.first().and_then(|value| value.domain.items()).unwrap_or_default();
             format!("{words} {}{}", if names.len() > 1 { "one of " } else { "" }, names.join(", "))
+        }
+        OperationKind::Set { values, .. } if !values.is_empty() => {
+            let texts = operation.parameters.first().and_then(|value| value.domain.items()).unwrap_or_default();
+            let written = values.iter().zip(texts).map(|(value, text)| match value {
+                NewValue::Text(text) => quoted(text),
+                _ => text.clone(),
+            });
+            let written: Vec<String> = written.collect();
+            format!("{words} {}{}", if written.len() > 1 { "one of " } else { "" }, written.join(", "))
         }
         OperationKind::BurstLoss => {
             let clauses =

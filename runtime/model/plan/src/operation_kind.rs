@@ -86,12 +86,24 @@ pub enum OperationKind {
     Duplicate,
     /// Drops every message. No parameters.
     Blackhole,
-    /// Sets a parameter of a node while it is active, and then to what it was before. One parameter `value`: a number.
+    /// Sets a parameter of a node while it is active, and then to what it was before. One parameter `value`: a number,
+    /// or where there are values, a text for one of them.
     Set {
         /// The node.
         node: NodeId,
         /// The name of the parameter in the node.
         parameter: String,
+        /// One for each text that the parameter `value` permits, in their order; none where it is a number.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        values: Vec<NewValue>,
+    },
+    /// Takes a node through a transition of its lifecycle when it becomes active, and back to the state in which the
+    /// node was when it ends. No parameters.
+    Transition {
+        /// The node.
+        node: NodeId,
+        /// Which transition; those before it are made too where they have to be.
+        transition: Transition,
     },
     /// A node, or all of its processes, stands still while it is active. No parameters.
     Pause {
@@ -122,6 +134,74 @@ pub enum OperationKind {
         /// When it is called.
         moment: Moment,
     },
+}
+
+/// A transition in the lifecycle of a node of ROS 2 that can be undone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Transition {
+    /// From unconfigured to inactive.
+    Configure,
+    /// From inactive to active.
+    Activate,
+    /// From active to inactive.
+    Deactivate,
+    /// From inactive to unconfigured.
+    Cleanup,
+}
+
+impl Transition {
+    /// All of them.
+    pub const ALL: [Transition; 4] =
+        [Transition::Configure, Transition::Activate, Transition::Deactivate, Transition::Cleanup];
+
+    /// Its name in ROS.
+    pub fn word(self) -> &'static str {
+        self.words().strip_prefix("transition ").unwrap_or_default()
+    }
+
+    /// An operation with this transition, in words.
+    fn words(self) -> &'static str {
+        match self {
+            Transition::Configure => "transition configure",
+            Transition::Activate => "transition activate",
+            Transition::Deactivate => "transition deactivate",
+            Transition::Cleanup => "transition cleanup",
+        }
+    }
+}
+
+/// A value that is given to a parameter of a node.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum NewValue {
+    /// A truth value.
+    Bool(bool),
+    /// A number; finite.
+    Number(f64),
+    /// A text.
+    Text(String),
+    /// Numbers, or an empty list for a parameter that is a list of anything.
+    Numbers(Vec<f64>),
+    /// Truth values; at least one.
+    Bools(Vec<bool>),
+    /// Texts; at least one.
+    Texts(Vec<String>),
+}
+
+impl NewValue {
+    /// What it is, in words.
+    pub fn is(&self) -> &'static str {
+        match self {
+            NewValue::Bool(_) => "a `bool`",
+            NewValue::Number(_) => "a number",
+            NewValue::Text(_) => "a text",
+            NewValue::Numbers(numbers) if numbers.is_empty() => "an empty list",
+            NewValue::Numbers(_) => "a list of numbers",
+            NewValue::Bools(_) => "a list of `bool`",
+            NewValue::Texts(_) => "a list of texts",
+        }
+    }
 }
 
 /// A value that is not a finite number.
@@ -164,6 +244,7 @@ impl OperationKind {
     pub fn node(&self) -> Option<NodeId> {
         match self {
             OperationKind::Set { node, .. }
+            | OperationKind::Transition { node, .. }
             | OperationKind::Pause { node }
             | OperationKind::Slow { node }
             | OperationKind::Kill { node } => Some(*node),
@@ -219,6 +300,7 @@ impl OperationKind {
             | OperationKind::Duplicate
             | OperationKind::Blackhole
             | OperationKind::Set { .. }
+            | OperationKind::Transition { .. }
             | OperationKind::Pause { .. }
             | OperationKind::Slow { .. }
             | OperationKind::Kill { .. }
@@ -247,14 +329,19 @@ impl OperationKind {
             | OperationKind::BurstLoss
             | OperationKind::RateLimit
             | OperationKind::Blackhole
+            | OperationKind::Transition { transition: Transition::Deactivate | Transition::Cleanup, .. }
             | OperationKind::Kill { .. } => Class::Loss,
             OperationKind::Latency { .. }
             | OperationKind::Reorder { .. }
             | OperationKind::Stale
             | OperationKind::Pause { .. }
             | OperationKind::Slow { .. } => Class::Delay,
-            // What the user's code does is not known, and a scene does nothing to messages.
-            OperationKind::Custom { .. } | OperationKind::Scene { .. } => Class::Other,
+            // What the user's code or a node that becomes active does is not known, and a scene does nothing to messages.
+            OperationKind::Custom { .. }
+            | OperationKind::Scene { .. }
+            | OperationKind::Transition { transition: Transition::Configure | Transition::Activate, .. } => {
+                Class::Other
+            }
         }
     }
 
@@ -284,6 +371,7 @@ impl OperationKind {
             | OperationKind::Freeze
             | OperationKind::Blackhole
             | OperationKind::Set { .. }
+            | OperationKind::Transition { .. }
             | OperationKind::Pause { .. }
             | OperationKind::Kill { .. } => None,
             OperationKind::Scale | OperationKind::Duplicate | OperationKind::Slow { .. } => Some(1.0),
@@ -332,6 +420,7 @@ impl OperationKind {
             OperationKind::Duplicate => "duplicate",
             OperationKind::Blackhole => "blackhole",
             OperationKind::Set { .. } => "set",
+            OperationKind::Transition { transition, .. } => transition.words(),
             OperationKind::Pause { .. } => "pause",
             OperationKind::Slow { .. } => "slow",
             OperationKind::Kill { .. } => "kill",

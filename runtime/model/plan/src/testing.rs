@@ -319,6 +319,10 @@ pub fn operation(topic: u32, kind: OperationKind) -> Operation {
         OperationKind::Latency { .. } => vec![range("delay", 0.0, 5.0)],
         OperationKind::Bias => vec![value("bias", -9.0, 9.0)],
         OperationKind::ClockSkew => vec![value("skew", -9.0, 9.0)],
+        OperationKind::Set { values, .. } if !values.is_empty() => {
+            let texts = (0..values.len()).map(|at| format!("value {at}")).collect();
+            vec![parameter("value", Domain::Texts { texts })]
+        }
         OperationKind::StuckAt { truth: None } | OperationKind::Set { .. } | OperationKind::Scene { .. } => {
             vec![value("value", -9.0, 9.0)]
         }
@@ -340,6 +344,7 @@ pub fn operation(topic: u32, kind: OperationKind) -> Operation {
         | OperationKind::NotFinite { .. }
         | OperationKind::Freeze
         | OperationKind::Blackhole
+        | OperationKind::Transition { .. }
         | OperationKind::Pause { .. }
         | OperationKind::Kill { .. }
         | OperationKind::Custom { .. } => Vec::new(),

@@ -20,8 +20,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use crate::condition::{Condition, Constraint, Operand};
 use crate::{
     Activation, Bound, CampaignPlan, Choice, ChoiceKind, Domain, Failing, FieldRef, KnownTest, KnownTestId, LabTask,
-    MembersOf, MessageId, Messages, Metric, MetricId, MetricSource, NamedNumber, Operation, OperationId, OperationKind,
-    RequirementId, SCHEMA, Shrinking, Span, Target, Task, Test, TopicId, Type, Undisturbed, Variations,
+    MembersOf, MessageId, Messages, Metric, MetricId, MetricSource, NamedNumber, NewValue, Operation, OperationId,
+    OperationKind, RequirementId, SCHEMA, Shrinking, Span, Target, Task, Test, TopicId, Type, Undisturbed, Variations,
 };
 
 use check::{
@@ -200,6 +200,16 @@ impl CampaignPlan {
             let names = operation.parameters.first().and_then(|value| value.domain.items());
             let fits = names.is_some_and(|names| names.len() == numbers.len());
             at("kind.numbers", require(fits, || "there is not one for each name of a constant".to_owned()))?;
+        }
+        if let OperationKind::Set { values, .. } = &operation.kind {
+            each("kind.values", values, |value| match value {
+                NewValue::Number(number) => finite(*number),
+                NewValue::Numbers(numbers) => numbers.iter().try_for_each(|&number| finite(number)),
+                NewValue::Bool(_) | NewValue::Text(_) | NewValue::Bools(_) | NewValue::Texts(_) => Ok(()),
+            })?;
+            let texts = operation.parameters.first().and_then(|value| value.domain.items());
+            let fits = texts.map_or(0, <[String]>::len) == values.len();
+            at("kind.values", require(fits, || "there is not one for each text".to_owned()))?;
         }
         at("parameters", distinct(operation.parameters.iter().map(|parameter| &parameter.name)))?;
         each("parameters", &operation.parameters, |parameter| {

@@ -109,7 +109,7 @@ fn what_acts_on_nodes_is_shown_with_the_node_or_the_parameter() {
     plan.nodes = vec![sesame_plan::testing::node("cell_node")];
     let node = NodeId(0);
     let kinds = [
-        OperationKind::Set { node, parameter: "limits.payload".to_owned() },
+        OperationKind::Set { node, parameter: "limits.payload".to_owned(), values: vec![] },
         OperationKind::Pause { node },
         OperationKind::Slow { node },
         OperationKind::Kill { node },

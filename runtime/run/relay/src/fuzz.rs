@@ -30,7 +30,7 @@ mod stuck_at;
 
 use sesame_base::time::SimTime;
 use sesame_plan::{
-    Activation, Choice, ChoiceKind, Domain, Drain, NodeId, Operation, OperationKind, TestOperation, ValueMode,
+    Activation, Choice, ChoiceKind, Domain, Drain, NewValue, NodeId, Operation, OperationKind, TestOperation, ValueMode,
 };
 
 use crate::value::{Text, Value};
@@ -147,6 +147,11 @@ impl Disturbance {
             _ => Err(lacks(name)),
         };
         let amount = |name: &str| chosen(name).and_then(Amount::from_choice).ok_or_else(|| lacks(name));
+        // Which of the texts of a parameter `value` is chosen.
+        let listed = || match (operation.parameters.first()?.domain.items(), chosen("value")) {
+            (Some(texts), Some(Choice::Text { text })) => texts.iter().position(|listed| listed == text),
+            _ => None,
+        };
         let places = Places::new(operation.targets().map(|target| target.places)).within(operation.wrapped);
         Ok(match &operation.kind {
             OperationKind::RandomValue { mode, integer } => {
@@ -170,12 +175,7 @@ impl Disturbance {
                 Disturbance::StuckAt(StuckAt { places, at })
             }
             OperationKind::StuckAtConstant { numbers } => {
-                let names = operation.parameters.first().and_then(|value| value.domain.items());
-                let number = match (names, chosen("value")) {
-                    (Some(names), Some(Choice::Text { text })) => names.iter().position(|name| name == text),
-                    _ => None,
-                };
-                let number = number.and_then(|at| numbers.get(at)).ok_or_else(|| lacks("value"))?;
+                let number = listed().and_then(|at| numbers.get(at)).ok_or_else(|| lacks("value"))?;
                 Disturbance::StuckAt(StuckAt { places, at: Stuck::Amount(Amount::Number(*number)) })
             }
             OperationKind::Bias => Disturbance::Bias(Bias { places, bias: amount("bias")? }),
@@ -207,9 +207,15 @@ impl Disturbance {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` clamps")]
             OperationKind::Duplicate => Disturbance::Duplicate(number("copies")? as u32),
             OperationKind::Blackhole => Disturbance::Blackhole,
-            OperationKind::Set { parameter, .. } => {
-                let value = number("value")?;
-                on_nodes(&|node| Resource::Set { node, parameter: parameter.clone(), value })
+            OperationKind::Set { parameter, values, .. } => {
+                let value = match values.as_slice() {
+                    [] => NewValue::Number(number("value")?),
+                    values => listed().and_then(|at| values.get(at)).ok_or_else(|| lacks("value"))?.clone(),
+                };
+                on_nodes(&|node| Resource::Set { node, parameter: parameter.clone(), value: value.clone() })
+            }
+            OperationKind::Transition { transition, .. } => {
+                on_nodes(&|node| Resource::Transition { node, transition: *transition })
             }
             OperationKind::Pause { .. } => on_nodes(&|node| Resource::Pause { node }),
             OperationKind::Slow { .. } => {

@@ -99,13 +99,15 @@ pub(crate) enum Contained {
 
 #[derive(Debug)]
 pub(crate) enum OperationKind {
-    /// Words of the language with at most one amount after them: `blackhole`, `noise [0m, 1m]`, or
+    /// On messages, words of the language with at most one amount after them: `blackhole`, `noise [0m, 1m]`, or
     /// `bias [(0, 0, 0)m, (1, 1, 1)m]`. Which kind it is, and whether it has an amount, is as the rule of the grammar
     /// says.
     Plain {
         rule: Rule,
         amounts: Option<Amounts>,
     },
+    /// A kind that acts on nodes or their parameters instead of messages.
+    OnNode(OnNode),
     Random {
         absolute: bool,
         amounts: Amounts,
@@ -150,6 +152,10 @@ impl OperationKind {
     pub(crate) fn written(&self, parameter: &str) -> Option<Span> {
         match self {
             OperationKind::Plain { amounts, .. } => amounts.as_ref().map(Amounts::span),
+            OperationKind::OnNode(OnNode::Set(New::Range(range)) | OnNode::Slow(range)) => Some(range.span),
+            OperationKind::OnNode(OnNode::Set(New::Values(values))) => {
+                Some(values.first()?.span().to(values.last()?.span()))
+            }
             OperationKind::Random { amounts, .. } | OperationKind::StuckAt(Stuck::Amounts(amounts)) => {
                 Some(amounts.span())
             }
@@ -169,7 +175,63 @@ impl OperationKind {
             OperationKind::StuckAt(Stuck::Truth(..))
             | OperationKind::RandomText(_)
             | OperationKind::NotFinite(_)
+            | OperationKind::OnNode(OnNode::Transition(_) | OnNode::Pause | OnNode::Kill)
             | OperationKind::Custom(_) => None,
+        }
+    }
+}
+
+/// What is done to a node or to one of its parameters.
+#[derive(Debug)]
+pub(crate) enum OnNode {
+    Set(New),
+    /// A transition of its lifecycle, by its name.
+    Transition(Name),
+    Pause,
+    Slow(Range),
+    Kill,
+}
+
+/// What a parameter of a node is set to.
+#[derive(Debug)]
+pub(crate) enum New {
+    /// A number.
+    Range(Range),
+    /// One of these; at least one.
+    Values(Vec<NewValue>),
+}
+
+/// A value that is given to a parameter of a node.
+#[derive(Debug)]
+pub(crate) enum NewValue {
+    Truth(bool, Span),
+    Text(Text),
+    List(Vec<Item>, Span),
+}
+
+impl NewValue {
+    pub(crate) fn span(&self) -> Span {
+        match self {
+            NewValue::Truth(_, span) | NewValue::List(_, span) => *span,
+            NewValue::Text(text) => text.span,
+        }
+    }
+}
+
+/// An item of a list.
+#[derive(Debug)]
+pub(crate) enum Item {
+    Truth(bool, Span),
+    Text(Text),
+    Number(Quantity),
+}
+
+impl Item {
+    pub(crate) fn span(&self) -> Span {
+        match self {
+            Item::Truth(_, span) => *span,
+            Item::Text(text) => text.span,
+            Item::Number(number) => number.span,
         }
     }
 }

@@ -7,8 +7,9 @@ use super::reader::{Pair, Reader, child, children, expect_child, first_of};
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::span::Span;
 use crate::syntax::ast::{
-    Amounts, Chosen, Contained, Count, Custom, CustomParameter, Distribution, Domain, Drain, Moment, NotFinite,
-    Operation, OperationBody, OperationKind, Point, Range, Resource, Scene, Stuck, Target, Text, UnitName,
+    Amounts, Chosen, Contained, Count, Custom, CustomParameter, Distribution, Domain, Drain, Item, Moment, New,
+    NewValue, NotFinite, OnNode, Operation, OperationBody, OperationKind, Point, Range, Resource, Scene, Stuck, Target,
+    Text, UnitName,
 };
 
 impl Reader<'_> {
@@ -170,7 +171,40 @@ impl Reader<'_> {
             },
             Rule::reorder => OperationKind::Reorder { range: self.only_range(kind), drain: self.drains(kind) },
             Rule::custom => OperationKind::Custom(self.custom(kind)),
+            Rule::set_parameter => {
+                let values = children(kind, Rule::new_value).map(|value| self.new_value(&value)).collect();
+                OperationKind::OnNode(OnNode::Set(match child(kind, Rule::range) {
+                    Some(range) => New::Range(self.range(&range)),
+                    None => New::Values(values),
+                }))
+            }
+            Rule::transition => {
+                let name = self.name(&expect_child(kind, Rule::transition_name));
+                OperationKind::OnNode(OnNode::Transition(name))
+            }
+            Rule::pause => OperationKind::OnNode(OnNode::Pause),
+            Rule::slow => OperationKind::OnNode(OnNode::Slow(self.only_range(kind))),
+            Rule::kill => OperationKind::OnNode(OnNode::Kill),
             rule => OperationKind::Plain { rule, amounts: self.amounts(kind) },
+        }
+    }
+
+    fn new_value(&mut self, pair: &Pair<'_>) -> NewValue {
+        let found = first_of(pair, &[Rule::truth, Rule::text, Rule::value_list]).expect("it has a value");
+        let span = self.span(&found);
+        match found.as_rule() {
+            Rule::truth => NewValue::Truth(child(&found, Rule::k_true).is_some(), span),
+            Rule::text => NewValue::Text(self.any_text(&found)),
+            _ => NewValue::List(children(&found, Rule::list_item).map(|item| self.item(&item)).collect(), span),
+        }
+    }
+
+    fn item(&mut self, pair: &Pair<'_>) -> Item {
+        let found = first_of(pair, &[Rule::truth, Rule::text, Rule::signed]).expect("an item has a value");
+        match found.as_rule() {
+            Rule::truth => Item::Truth(child(&found, Rule::k_true).is_some(), self.span(&found)),
+            Rule::text => Item::Text(self.any_text(&found)),
+            _ => Item::Number(self.signed(&found)),
         }
     }
 

@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use sesame_plan::NodeId;
 
+use crate::lifecycle::State;
 use crate::parameters::ParameterValue;
 
 /// What is not as it was before the run.
@@ -15,7 +16,17 @@ pub(super) struct Change {
 
 #[derive(Debug)]
 pub(super) enum Changed {
-    Parameter { node: NodeId, name: String, before: ParameterValue },
+    Parameter {
+        node: NodeId,
+        name: String,
+        before: ParameterValue,
+    },
+    /// A transition took a node from one state to another.
+    State {
+        node: NodeId,
+        before: State,
+        after: State,
+    },
     Paused(NodeId),
     Slowed(Slowed),
     Killed(NodeId),

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use sesame_plan::NodeId;
+use sesame_plan::{NewValue, NodeId, Transition};
 use sesame_relay::fuzz::{Order, Resource};
 use sesame_relay::relay::Exchange;
 use sesame_relay::transport::TransportError;
@@ -11,10 +11,14 @@ use super::change::{Change, Changed, Slowed};
 use super::session::{Session, parameter_of_node};
 use super::wall_clock::now;
 use super::{COMPLETE_WITHIN, System};
+use crate::lifecycle::State;
 use crate::parameters::ParameterValue;
 
 /// How long a node may take to tell or set a parameter.
 const ANSWER: Duration = Duration::from_secs(2);
+
+/// How long a node may take for a transition.
+const TRANSITION: Duration = Duration::from_secs(10);
 
 /// How long it takes until a slowed node has had its share and its pause.
 const PERIOD: Duration = Duration::from_millis(50);
@@ -31,7 +35,8 @@ impl System {
                 continue;
             }
             let what = match resource {
-                Resource::Set { node, parameter, value } => self.set_parameter(node, parameter, value)?,
+                Resource::Set { node, parameter, value } => self.set_parameter(node, parameter, &value)?,
+                Resource::Transition { node, transition } => self.take_through(node, transition)?,
                 Resource::Pause { node } => {
                     let done = self.launched.pause(node);
                     self.running(node, done).then_some(Changed::Paused(node))
@@ -76,7 +81,7 @@ impl System {
                 )));
             };
             let notes = self.incidents.notes.len();
-            let what = self.set_parameter(node, parameter.to_owned(), *value)?;
+            let what = self.set_parameter(node, parameter.to_owned(), &NewValue::Number(*value))?;
             // A run without it would be that of another simulation.
             if let Some(note) = self.incidents.notes.drain(notes..).next() {
                 return Err(TransportError::Wiring(note));
@@ -87,7 +92,12 @@ impl System {
     }
 
     /// Sets a parameter; `None` if it already has that value.
-    fn set_parameter(&mut self, node: NodeId, name: String, value: f64) -> Result<Option<Changed>, TransportError> {
+    fn set_parameter(
+        &mut self,
+        node: NodeId,
+        name: String,
+        value: &NewValue,
+    ) -> Result<Option<Changed>, TransportError> {
         let Some(session) = &mut self.session else { return Ok(None) };
         let set = session.set_parameter(node, &name, value)?;
         match set {
@@ -99,6 +109,47 @@ impl System {
                 Ok(None)
             }
         }
+    }
+
+    /// Takes a node through a transition, and through those that have to come before it; `None` if nothing changed.
+    fn take_through(&mut self, node: NodeId, transition: Transition) -> Result<Option<Changed>, TransportError> {
+        let Some(session) = &mut self.session else { return Ok(None) };
+        let word = transition.word();
+        let reason = match session.state(node)? {
+            Err(reason) => reason,
+            Ok(before) => match before.after(transition) {
+                None => format!("it is {}", before.name()),
+                Some(after) => match session.go(node, before, after)? {
+                    Ok(()) => return Ok(Some(Changed::State { node, before, after })),
+                    Err(reason) => {
+                        // It may have come a part of the way.
+                        self.bring_back(node, before)?;
+                        reason
+                    }
+                },
+            },
+        };
+        let node = &self.plan.node(node).name;
+        self.incidents.notes.push(format!("node `{node}` cannot `{word}`: {reason}"));
+        Ok(None)
+    }
+
+    /// Brings a node back to a state in which it was, from the one in which it is.
+    fn bring_back(&mut self, node: NodeId, before: State) -> Result<(), TransportError> {
+        // What it was told meanwhile it does not answer any more.
+        self.restarted.insert(node);
+        let Some(session) = &mut self.session else { return Ok(()) };
+        let back = match session.state(node)? {
+            Ok(state) => session.go(node, state, before)?,
+            Err(reason) => Err(reason),
+        };
+        if let Err(reason) = back {
+            let (node, before) = (&self.plan.node(node).name, before.name());
+            self.incidents.notes.push(format!("node `{node}` cannot be made {before} again: {reason}"));
+            // The next run starts with new processes.
+            self.spoilt = true;
+        }
+        Ok(())
     }
 
     /// Makes undone what an operation did, or all operations for `None`.
@@ -118,6 +169,7 @@ impl System {
                         self.spoilt = true;
                     }
                 }
+                Changed::State { node, before, .. } => self.bring_back(node, before)?,
                 Changed::Paused(node) => {
                     self.launched.resume(node);
                 }
@@ -162,23 +214,24 @@ impl System {
         next
     }
 
-    /// Whether a node is stopped or dead, so that it answers nothing.
+    /// Whether a node is stopped, dead or not active any more, so that it answers nothing.
     pub(super) fn is_absent(&self, node: NodeId) -> bool {
         self.changes.iter().any(|change| match change.what {
             Changed::Paused(absent) | Changed::Killed(absent) => absent == node,
+            Changed::State { node: changed, before, after } => changed == node && after < before,
             Changed::Parameter { .. } | Changed::Slowed(_) => false,
         })
     }
 }
 
 impl Session {
-    /// Sets a parameter to a number. Gives what it was before; nothing if it was that number; an error for the user if
+    /// Sets a parameter to a value. Gives what it was before; nothing if it was that value; an error for the user if
     /// the node refuses.
     fn set_parameter(
         &mut self,
         node: NodeId,
         name: &str,
-        value: f64,
+        value: &NewValue,
     ) -> Result<Result<Option<ParameterValue>, String>, TransportError> {
         let Some(parameters) = self.parameters.get(&node) else { return Ok(Err("it has no parameters".to_owned())) };
         let ticket = parameters.ask(name, &self.dds)?;
@@ -194,6 +247,31 @@ impl Session {
             return Ok(Ok(None));
         }
         Ok(self.restore_parameter(node, name, &after)?.map(|()| Some(before)))
+    }
+
+    /// The state of a node; an error for the user if it says none.
+    fn state(&mut self, node: NodeId) -> Result<Result<State, String>, TransportError> {
+        let Some(lifecycle) = self.lifecycles.get(&node) else { return Ok(Err("it has no lifecycle".to_owned())) };
+        let ticket = lifecycle.ask(&self.dds)?;
+        let Some(reply) = self.reply(ticket, ANSWER)? else { return Ok(Err("the node does not answer".to_owned())) };
+        Ok(self.lifecycles.get(&node).map_or_else(|| Err("it has no lifecycle".to_owned()), |of| of.asked(reply)))
+    }
+
+    /// Takes a node from one state to another; an error for the user if it refuses.
+    fn go(&mut self, node: NodeId, from: State, to: State) -> Result<Result<(), String>, TransportError> {
+        for transition in from.to(to) {
+            let Some(lifecycle) = self.lifecycles.get(&node) else { break };
+            let ticket = lifecycle.change(transition, &self.dds)?;
+            let Some(reply) = self.reply(ticket, TRANSITION)? else {
+                return Ok(Err(format!("it does not answer to `{}`", transition.word())));
+            };
+            match self.lifecycles.get(&node).map_or(Ok(true), |lifecycle| lifecycle.was_changed(reply)) {
+                Ok(true) => {}
+                Ok(false) => return Ok(Err(format!("it refuses to `{}`", transition.word()))),
+                Err(reason) => return Ok(Err(reason)),
+            }
+        }
+        Ok(Ok(()))
     }
 
     /// Sets a parameter to a value that the node had.

@@ -177,6 +177,7 @@ impl Session {
             }
         }
         missing.extend(self.parameters.values().filter_map(|parameters| parameters.missing(&subscribers)));
+        missing.extend(self.lifecycles.values().filter_map(|lifecycle| lifecycle.missing(&subscribers)));
         missing.extend(self.services.iter().filter_map(|service| service.missing(&subscribers)));
         if let ClockReader::Topic { path, reader: None } = &self.clock {
             missing.push(format!("nobody publishes the clock `{path}`"));

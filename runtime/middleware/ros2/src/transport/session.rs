@@ -14,6 +14,7 @@ use sesame_relay::wire::{Line, Wire, WireTable, wanted};
 
 use crate::dds::{DdsError, Endpoint, Participant, ReaderId, Received, Sample, WriterId, mirrored};
 use crate::graph::{DISCOVERY_TOPIC, DISCOVERY_TYPE, Gid, NodeInfo, Nodes};
+use crate::lifecycle::Lifecycle;
 use crate::names;
 use crate::parameters::Parameters;
 use crate::transport::served::{Direction, Served, services};
@@ -40,6 +41,8 @@ pub(super) struct Session {
     pub(super) services: Vec<Served>,
     /// The parameters of nodes on whose parameters operations act.
     pub(super) parameters: BTreeMap<NodeId, Parameters>,
+    /// The lifecycles of nodes on which operations act by transitions.
+    pub(super) lifecycles: BTreeMap<NodeId, Lifecycle>,
     /// Participants whose processes were killed.
     dead: Vec<[u8; PREFIX]>,
     /// What came in while something else was awaited.
@@ -168,6 +171,7 @@ impl Session {
             info_writer,
             services: services(plan, &ros.interfaces, wires, &mut dds)?,
             parameters: parameters(plan, &mut dds)?,
+            lifecycles: lifecycles(plan, &mut dds)?,
             backlog: Vec::new(),
             dead: Vec::new(),
             dds,
@@ -279,4 +283,11 @@ fn parameters(plan: &CampaignPlan, dds: &mut Participant) -> Result<BTreeMap<Nod
         }
     }
     Ok(found)
+}
+
+/// What changes the states of the nodes on which operations act by transitions.
+fn lifecycles(plan: &CampaignPlan, dds: &mut Participant) -> Result<BTreeMap<NodeId, Lifecycle>, DdsError> {
+    let acting = plan.operations.iter().filter(|operation| matches!(operation.kind, OperationKind::Transition { .. }));
+    let nodes: BTreeSet<NodeId> = acting.flat_map(Operation::nodes).collect();
+    nodes.into_iter().map(|node| Ok((node, Lifecycle::join(&in_ros(plan, node), dds)?))).collect()
 }

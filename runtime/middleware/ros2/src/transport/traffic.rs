@@ -13,7 +13,7 @@ use super::session::{Caller, ClockReader, Connected, Incoming, Message, Origin, 
 use super::wall_clock::now;
 use crate::dds::{DdsError, Received, Sample};
 use crate::names;
-use crate::parameters::Ticket;
+use crate::node_service::Ticket;
 
 impl Session {
     /// Passes a message on that belongs to no run.

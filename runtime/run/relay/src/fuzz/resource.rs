@@ -1,7 +1,7 @@
 //! Operations on nodes and their parameters instead of messages: the relay says what is to be done, and the transport
 //! does it.
 
-use sesame_plan::NodeId;
+use sesame_plan::{NewValue, NodeId, Transition};
 
 /// What an operation does to a node while it is active.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,7 +13,14 @@ pub enum Resource {
         /// The name of the parameter.
         parameter: String,
         /// Its value meanwhile.
-        value: f64,
+        value: NewValue,
+    },
+    /// It has gone through a transition of its lifecycle.
+    Transition {
+        /// The node.
+        node: NodeId,
+        /// Which.
+        transition: Transition,
     },
     /// It is stopped.
     Pause {
