@@ -4,6 +4,7 @@
 //! text, and reports one mistake once.
 
 mod check;
+mod clocks;
 pub mod diagnostic;
 pub mod format;
 pub mod groups;

@@ -183,7 +183,8 @@ fn value(of: &Expression, at: &Computed) -> f64 {
     match of {
         Expression::Constant(value) => *value,
         Expression::Input(input) => at.values[*input as usize],
-        Expression::Time => at.time as f64 / 1e9,
+        // Stamps of a simulator inside are in simulation time.
+        Expression::Time | Expression::Now => at.time as f64 / 1e9,
         Expression::Negate(of) => -value(of, at),
         Expression::Sum(of) => all(of).reduce(|a, b| a + b).unwrap(),
         Expression::Product(of) => all(of).reduce(|a, b| a * b).unwrap(),

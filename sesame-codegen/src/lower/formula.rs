@@ -60,6 +60,7 @@ mod tests {
             Expression::SignedDistance(Box::new(SignedDistance { from, to })),
             Expression::Distance(Box::new(Distance { from, to: Point::Input(3), scale: 1.0 })),
             Expression::Time,
+            Expression::Now,
         ] {
             let text = serde_json::to_string(&of).unwrap();
             assert_eq!(serde_json::from_str::<Expression>(&text).unwrap(), of, "{text}");

@@ -5,6 +5,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Definition, DefinitionId, Index, Kind, Reference};
+use crate::clocks::clock_of;
 use crate::import::Merged;
 use crate::span::{FileId, Span};
 use crate::syntax::ast::eddi::{Eddi, State};
@@ -379,11 +380,11 @@ impl<'a> Indexer<'a> {
             ExpressionKind::Field(path) if path.is_name() => {
                 // Inside of a monitor its own names come first.
                 let own = self.members.get(&(within, path.topic.text.as_str())).copied();
-                // The simulation time is a word of the language, unless something is named like it.
-                let time = path.topic.text == "time" && !self.names.contains_key("time");
+                // The time is a word of the language, unless something is named like it.
+                let is_clock = clock_of(path).is_some_and(|clock| !self.names.contains_key(clock.word));
                 match own {
                     Some(own) => self.refer(path.topic.span, Some(own), within),
-                    None if time => {}
+                    None if is_clock => {}
                     None => self.path(path, within),
                 }
             }

@@ -2,6 +2,7 @@
 
 use super::words::list;
 use super::{Kind, Resolver};
+use crate::clocks::clock_of;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::interfaces::ConstantValue;
 use crate::model::condition::{Comparison, Condition, ConditionSpace, Integers, Operand, ValueRange, Variable};
@@ -215,7 +216,7 @@ impl<'a> Resolver<'a> {
             ExpressionKind::Field(path) if path.is_name() => {
                 let before = self.diagnostics.len();
                 let found = self.find(&path.topic, Kind::Metric);
-                if path.topic.text == "time"
+                if clock_of(path).is_some()
                     && let Some(diagnostic) = self.diagnostics.get_mut(before)
                 {
                     let note = "to act from a time on, write a window such as `from 5s to 10s` instead of a condition";

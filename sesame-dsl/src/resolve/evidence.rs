@@ -84,7 +84,7 @@ impl<'a> Resolver<'a> {
         }
         if condition.reads_time() {
             let time = first_part(written, &|part| match &part.kind {
-                ExpressionKind::Field(path) if self.is_time(path) => Some((path.span, false)),
+                ExpressionKind::Field(path) if self.named_clock(path).is_some() => Some((path.span, false)),
                 ExpressionKind::Call(name, _) if memory_named(&name.text) == Some(Remembers::Integral) => {
                     Some((part.span, true))
                 }

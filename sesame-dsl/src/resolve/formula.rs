@@ -5,6 +5,7 @@ use super::depth;
 use super::function::is_function;
 use super::parts::first_part;
 use super::score::scores;
+use crate::clocks::{Clock, clock_of};
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::interfaces::ConstantValue;
 use crate::model::{Aggregate, Condition, Expression, FieldPath, Formula, Id as _, Input, Members};
@@ -294,8 +295,10 @@ impl<'a> Resolver<'a> {
                 let unit = self.unit_in_formula(quantity)?;
                 (!quantity.value.is_nan()).then_some((Expression::Constant(quantity.value), unit))
             }
-            ExpressionKind::Field(path) if self.is_time(path) => Some((Expression::Time, Some(Unit::seconds()))),
-            ExpressionKind::Field(path) => self.numeric_input(inputs, path, None),
+            ExpressionKind::Field(path) => match self.named_clock(path) {
+                Some(clock) => Some((clock.expression.clone(), Some(Unit::seconds()))),
+                None => self.numeric_input(inputs, path, None),
+            },
             ExpressionKind::Members(members, word, path) => self.numeric_input(inputs, path, Some((*members, *word))),
             ExpressionKind::Negate(of) => {
                 let (of, unit) = self.number(inputs, of)?;
@@ -331,9 +334,9 @@ impl<'a> Resolver<'a> {
         None
     }
 
-    /// Whether a path is the simulation time, and not something that the space declares.
-    pub(super) fn is_time(&self, path: &Path) -> bool {
-        path.topic.text == "time" && path.is_name() && !self.names.contains_key("time")
+    /// The word for the time that a path is, if it is none of what the space declares.
+    pub(super) fn named_clock(&self, path: &Path) -> Option<&'static Clock> {
+        clock_of(path).filter(|clock| path.is_name() && !self.names.contains_key(clock.word))
     }
 
     /// The unit of a number in a formula, where `2rad*link0` is a likely mistake.
@@ -358,11 +361,10 @@ impl<'a> Resolver<'a> {
     ) -> Option<Number> {
         let before = self.diagnostics.len();
         let read = self.number_read(path, members);
-        if path.topic.text == "time"
+        if let Some(Clock { word, means, .. }) = clock_of(path)
             && let Some(diagnostic) = self.diagnostics.get_mut(before)
         {
-            let note = "`time` is the simulation time unless something in the space is named `time`";
-            diagnostic.notes.push(note.to_owned());
+            diagnostic.notes.push(format!("`{word}` is {means} unless something in the space is named `{word}`"));
         }
         let (read, unit) = read?;
         Some((Expression::Input(position(inputs, read.input(None))), unit))

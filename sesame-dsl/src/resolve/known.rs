@@ -49,6 +49,7 @@ fn never_negative(expression: &Expression) -> bool {
         Expression::Absolute(_)
         | Expression::Distance(_)
         | Expression::Time
+        | Expression::Now
         | Expression::Unary { function: UnaryFunction::Sqrt | UnaryFunction::Exp | UnaryFunction::Acos, .. }
         | Expression::Binary { function: BinaryFunction::Hypot, .. } => true,
         Expression::Sum(of) | Expression::Product(of) | Expression::Min(of) => of.iter().all(never_negative),

@@ -20,7 +20,7 @@ impl<'a> Resolver<'a> {
     /// The number that one of these functions computes.
     pub(super) fn remembered(&mut self, inputs: &mut Vec<Input>, call: &'a ast::Expression) -> Option<Number> {
         let (memory, of) = computed(call);
-        let read = read_in(call).filter(|read| !self.is_time(read.path));
+        let read = read_in(call).filter(|read| self.named_clock(read.path).is_none());
         let Some(read) = read else {
             let innermost = memory.first().map_or("previous", |(_, name)| name.text.as_str());
             self.calculated(innermost, of);

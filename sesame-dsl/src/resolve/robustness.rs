@@ -357,7 +357,7 @@ fn open_end(expression: &ast::Expression) -> Option<(Span, Span, Span)> {
 
 /// Whether a number may change during a run.
 fn varies(of: &Expression) -> bool {
-    matches!(of, Expression::Input(_) | Expression::Integral(_) | Expression::Time)
+    matches!(of, Expression::Input(_) | Expression::Integral(_) | Expression::Time | Expression::Now)
         || of.points().iter().any(|point| matches!(point, Point::Input(_)))
         || of.parts().into_iter().any(varies)
 }

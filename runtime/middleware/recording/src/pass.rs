@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
@@ -18,7 +19,7 @@ use crate::error::RecordingError;
 use crate::layout::Unreadable;
 use crate::order::Order;
 use crate::payload::{Payloads, Reads};
-use crate::trace::{ROLE, ROLE_DELIVERED, ROLE_PUBLISHED, RUN, SUBJECT, TOPIC};
+use crate::trace::{CLOCK, ROLE, ROLE_DELIVERED, ROLE_PUBLISHED, RUN, SUBJECT, TOPIC, ZERO};
 
 /// The run that a trace is of.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -91,6 +92,7 @@ pub(crate) fn pass(
         counted: vec![0; wires.len()],
         shapes: Shapes::default(),
         start: None,
+        zero: None,
         now: SimTime::ZERO,
         messages: 0,
         subject: None,
@@ -171,6 +173,8 @@ struct Reader<'a> {
     shapes: Shapes,
     /// Log time of the start of the run, in nanoseconds: zero in a trace, that of the first message elsewhere.
     start: Option<u64>,
+    /// What the clock of the stamps showed at that time, in seconds, if a trace says so.
+    zero: Option<f64>,
     now: SimTime,
     messages: u64,
     subject: Option<BTreeMap<String, String>>,
@@ -193,6 +197,10 @@ impl Reader<'_> {
                 self.start = Some(0);
             }
             Entry::Metadata(name, metadata) if name == RUN => self.ending = Some(metadata),
+            Entry::Metadata(name, metadata) if name == CLOCK => {
+                let zero = metadata.get(ZERO).and_then(|zero| zero.parse().ok());
+                self.zero = Some(zero.ok_or_else(|| self.damaged("its clock cannot be read"))?);
+            }
             Entry::Metadata(..) => {}
             Entry::Channel(channel) => self.channel(&channel)?,
             Entry::Message(Message { channel, sequence, time, data }) => {
@@ -283,12 +291,18 @@ impl Reader<'_> {
         *counted += 1;
         each(&Passing {
             time,
+            // The clock of other recorders is that of their messages.
+            zero: self.zero.unwrap_or_else(|| Duration::from_nanos(start).as_secs_f64()),
             wire,
             published: !delivered,
             delivered: delivered || !self.delivered_apart[wire.index()],
             index,
             value: &value,
         })
+    }
+
+    fn damaged(&self, problem: &str) -> RecordingError {
+        RecordingError::Damaged { problem: problem.to_owned(), path: self.path.to_owned() }
     }
 
     fn finish(self, damage: Option<(String, RecordingError)>) -> Result<Ending, RecordingError> {
@@ -298,8 +312,7 @@ impl Reader<'_> {
                 path: self.path.to_owned(),
             });
         }
-        let damaged =
-            |problem: &str| RecordingError::Damaged { problem: problem.to_owned(), path: self.path.to_owned() };
+        let damaged = |problem: &str| self.damaged(problem);
         let missing = self.wires.iter().filter(|wire| !self.heard.contains(wire)).map(|wire| self.wires.path(wire));
         let mut warnings: Vec<String> = missing.map(|path| format!("topic `{path}` is not in the recording")).collect();
         let (what, damage) = damage.unzip();

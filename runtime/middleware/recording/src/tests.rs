@@ -11,11 +11,14 @@ use mcap::{WriteOptions, Writer};
 use sesame_base::observation::{Observation, Outcome};
 use sesame_base::time::SimTime;
 use sesame_plan::testing::{latency, offset, operation, plan, test_of, use_of};
-use sesame_plan::{CampaignPlan, Choice, Distribution, Drain, OperationKind, Test, ValueMode};
+use sesame_plan::{
+    Aggregate, CampaignPlan, Choice, Distribution, Drain, Expression, Formula, Input, Members, Metric, MetricSource,
+    OperationKind, Side, Test, ValueMode,
+};
 use sesame_rng::Stream;
 
 use super::*;
-use crate::trace::{RUN, SUBJECT};
+use crate::trace::{CLOCK, RUN, SUBJECT};
 use sesame_relay::evaluate::{Custom, Run, evaluate_tapped};
 use sesame_relay::files::NoFiles;
 use sesame_relay::metric::MetricTable;
@@ -34,6 +37,7 @@ impl Transport for Awkward {
     }
     fn reset(&mut self, _: u64, relay: &mut dyn Exchange) -> Result<(), TransportError> {
         self.0 = SimTime::ZERO;
+        relay.clock_at_zero(1.7e9);
         for wire in relay.wires().iter() {
             relay.subscribed(wire);
         }
@@ -151,7 +155,7 @@ fn a_trace_holds_every_message_and_what_each_operation_did_to_it() {
     let bytes = fs::read(folder.path().join("T1.mcap")).unwrap();
     let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
     let metadata: Vec<_> = summary.metadata_indexes.iter().map(|index| index.name.as_str()).collect();
-    assert_eq!(metadata, [SUBJECT, RUN]);
+    assert_eq!(metadata, [SUBJECT, CLOCK, RUN]);
 }
 
 #[test]
@@ -160,8 +164,11 @@ fn a_recording_gives_metrics_their_values_again() {
     let (plan, test) = awkward_plan();
     let mut plan = plan;
     plan.operations[1].timed = false;
+    plan.metrics.push(age(&plan));
     let observed = traced(folder.path(), &plan, &test);
     assert_eq!(observed.metrics[0].value, Some(2.0), "two of three operations count");
+    let oldest = observed.metrics.last().and_then(|metric| metric.value).unwrap();
+    assert!(oldest > 1.7e9, "stamps are by the clock of the simulator: {oldest}");
     let fed = fed(&folder.path().join("T1.mcap"), &plan).unwrap();
     assert_eq!(fed.metrics, observed.metrics, "series and fuzzing time as well");
     assert_eq!((fed.messages, &fed.warnings), (observed.messages, &observed.warnings));
@@ -169,6 +176,21 @@ fn a_recording_gives_metrics_their_values_again() {
     assert_eq!((run.test.as_str(), run.outcome.as_str()), ("T1", "completed"));
     let values: Vec<Option<f64>> = run.metrics.iter().map(|metric| metric.value).collect();
     assert_eq!(values, observed.metrics.iter().map(|metric| metric.value).collect::<Vec<_>>());
+}
+
+/// The greatest age of a command, as if it were its stamp.
+fn age(plan: &CampaignPlan) -> Metric {
+    let MetricSource::Last { input } = &plan.metrics[1].source else { panic!("it is the last command") };
+    let stamp = Expression::Negate(Box::new(Expression::Input(0)));
+    let formula = Formula {
+        inputs: vec![Input::new(input.clone(), Members::Min)],
+        aggregate: Aggregate::Max { of: Expression::Sum(vec![Expression::Now, stamp]) },
+        when: None,
+        every: None,
+        per: None,
+        side: Side::Inbound,
+    };
+    Metric { name: "age".to_owned(), source: MetricSource::Formula { formula }, ..plan.metrics[1].clone() }
 }
 
 #[test]
@@ -223,7 +245,8 @@ fn foreign(file: &Path, messages: &[(&str, &str, u64, &str)]) {
 fn a_recording_of_another_program_is_fed_where_topic_and_payload_match() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("foreign.mcap");
-    let plan = awkward_plan().0;
+    let mut plan = awkward_plan().0;
+    plan.metrics.push(age(&plan));
     let epoch = 1_700_000_000_000_000_000;
     foreign(
         &file,
@@ -237,6 +260,11 @@ fn a_recording_of_another_program_is_fed_where_topic_and_payload_match() {
     assert_eq!((fed.run, fed.messages), (None, 2));
     assert_eq!(fed.metrics[1].series, [(0.0, 2.5), (0.5, 3.0)], "time begins with the first message that counts");
     assert_eq!(fed.metrics[0].value, None, "nobody knows what was fuzzed");
+    let oldest = fed.metrics.last().and_then(|metric| metric.value).unwrap();
+    assert!(
+        (oldest - (1.7e9 + 0.4 - 2.5)).abs() < 1e-6,
+        "at the last step before it is renewed, by the clock: {oldest}"
+    );
     assert_eq!(fed.warnings, ["topic `zones/Z1` is not in the recording", "topic `zones/Z2` is not in the recording"]);
 }
 

@@ -34,6 +34,12 @@ pub use writer::TraceWriter;
 /// Name of the metadata record that identifies the run of a trace.
 pub(crate) const SUBJECT: &str = "sesame";
 
+/// Name of the metadata record that says what the clock of the simulator's stamps showed at time zero; it is missing if
+/// stamps are in simulation time.
+pub(crate) const CLOCK: &str = "sesame.clock";
+/// Its key for that, in seconds.
+pub(crate) const ZERO: &str = "zero_s";
+
 /// Name of the metadata record that says how the run ended.
 pub(crate) const RUN: &str = "sesame.run";
 

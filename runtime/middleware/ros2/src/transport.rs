@@ -30,7 +30,9 @@ use sesame_relay::simulator::Progress;
 use sesame_relay::transport::clock::Ticks;
 use sesame_relay::transport::relay_latency::{AddedOnWire, join, objections};
 use sesame_relay::transport::round::Promises;
-use sesame_relay::transport::{Capabilities, Connect, Incidents, Transport, TransportError, wall_time_since};
+use sesame_relay::transport::{
+    Capabilities, Connect, Incidents, Transport, TransportError, wall_clock, wall_time_since,
+};
 use sesame_relay::wire::{Wire, WireTable};
 
 use self::change::Change;
@@ -171,6 +173,11 @@ impl System {
             (sesame_plan::Clock::Wall, None) => Zero::Wall(now()),
             (sesame_plan::Clock::Topic { .. }, None) => Zero::Clock(session.tick(&mut self.launched, now() + SILENCE)?),
         };
+        match self.zero {
+            Zero::Wall(_) => relay.clock_at_zero(wall_clock()),
+            Zero::Clock(nanos) => relay.clock_at_zero(SimTime::from_nanos(nanos).seconds()),
+            Zero::Steps => {}
+        }
         self.ticked = now();
         self.set_parameters(relay.parameters())
     }

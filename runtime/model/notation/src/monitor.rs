@@ -137,6 +137,7 @@ impl<'a> Names<'a> {
                 format!("signed_distance({}, {})", self.point(of.from), self.region(&of.to, of.from))
             }
             Expression::Time => "time".to_owned(),
+            Expression::Now => "now".to_owned(),
             Expression::Unary { function, of } => {
                 format!("{}({})", function.name(), self.expression(of, Unit::None))
             }

@@ -274,6 +274,8 @@ pub enum Expression {
     SignedDistance(Box<SignedDistance>),
     /// The simulation time since the beginning of the run, in seconds.
     Time,
+    /// What the clock of the simulator's stamps shows, in seconds: as [`Expression::Time`], from where that clock counts.
+    Now,
     /// A function of one number.
     Unary {
         /// Which.
@@ -295,7 +297,7 @@ pub enum Expression {
 impl Expression {
     /// Whether it contains the simulation time or an integral, so that its value changes without a message.
     pub fn reads_time(&self) -> bool {
-        matches!(self, Expression::Time | Expression::Integral(_))
+        matches!(self, Expression::Time | Expression::Now | Expression::Integral(_))
             || self.parts().into_iter().any(Expression::reads_time)
     }
 
@@ -312,7 +314,8 @@ impl Expression {
             | Expression::Integral(_)
             | Expression::Distance(_)
             | Expression::SignedDistance(_)
-            | Expression::Time => Vec::new(),
+            | Expression::Time
+            | Expression::Now => Vec::new(),
             Expression::Negate(of) | Expression::Absolute(of) | Expression::Unary { of, .. } => vec![of],
             Expression::Divide { value: left, by: right } | Expression::Binary { left, right, .. } => vec![left, right],
             Expression::Sum(of) | Expression::Product(of) | Expression::Min(of) | Expression::Max(of) => {

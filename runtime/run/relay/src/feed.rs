@@ -17,6 +17,8 @@ use fuzzing_time::{FuzzingTime, scored_bounds};
 pub struct Passing<'v> {
     /// Simulation time.
     pub time: SimTime,
+    /// What the clock of the stamps showed at time zero, in seconds.
+    pub zero: f64,
     /// Its wire.
     pub wire: Wire,
     /// Whether this is the message as it was published.
@@ -98,7 +100,8 @@ impl<'a, 'd> Feeder<'a, 'd> {
 
     /// The next message, which is not earlier than the one before.
     pub fn message(&mut self, message: &Passing<'_>) {
-        let &Passing { time, wire, published, delivered, index, value } = message;
+        let &Passing { time, zero, wire, published, delivered, index, value } = message;
+        self.metrics.clock_at_zero(zero);
         self.pass_to(time);
         self.now = time;
         if published {

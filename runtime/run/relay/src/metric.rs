@@ -32,7 +32,7 @@ mod tests;
 
 pub use engine::{MetricError, MetricTable, Metrics};
 pub(crate) use engine::{Shown, next_mark};
-pub(crate) use expression::{Moment, holds};
+pub(crate) use expression::{Clocks, Moment, holds};
 pub(crate) use held::{HeardValues, HeldInputs, Optional, hear};
 pub(crate) use memory::Memories;
 pub(crate) use probe::sample;
@@ -62,6 +62,8 @@ pub struct HookEntry {
 #[derive(Debug, Default)]
 pub struct Context {
     now: SimTime,
+    /// What the clock of the simulator's stamps showed at time zero, in seconds.
+    zero: f64,
     topic: Text,
     value: Option<f64>,
     series: Vec<(f64, f64)>,
@@ -79,6 +81,11 @@ impl Context {
     /// Simulation time in seconds.
     pub fn now(&self) -> f64 {
         self.now.seconds()
+    }
+
+    /// When a formula is computed.
+    fn clocks(&self) -> Clocks {
+        Clocks { now: self.now, zero: self.zero }
     }
 
     /// Name on the wire of the message's topic; if the input is a group, the name of the member.

@@ -519,6 +519,11 @@ impl Exchange for Relay<'_> {
         }
     }
 
+    fn clock_at_zero(&mut self, seconds: f64) {
+        self.metrics.clock_at_zero(seconds);
+        self.taps.iter_mut().for_each(|tap| tap.clock_at_zero(seconds));
+    }
+
     fn advance(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>) {
         self.copies = 0;
         self.begin_time();

@@ -18,7 +18,7 @@ pub mod round;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 
@@ -44,6 +44,11 @@ pub use process::{become_simulator, keep_simulator};
 /// Simulation time where it is wall time since the start of a run.
 pub fn wall_time_since(start: Instant) -> SimTime {
     SimTime::from_nanos(i64::try_from(start.elapsed().as_nanos()).unwrap_or(i64::MAX))
+}
+
+/// What the wall clock shows, in seconds since 1970.
+pub fn wall_clock() -> f64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64()
 }
 
 /// A connection to a simulator.

@@ -8,7 +8,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use mcap::records::MessageHeader;
+use mcap::records::{MessageHeader, Metadata};
 use mcap::{McapError, McapResult, WriteOptions, Writer};
 
 use sesame_base::observation::Observation;
@@ -22,8 +22,8 @@ use sesame_relay::wire::{Wire, WireTable};
 
 use crate::trace::encoding::{Encoder, Encoding};
 use crate::trace::{
-    ROLE, ROLE_DELIVERED, ROLE_METRIC, ROLE_OPERATIONS, ROLE_PUBLISHED, Subject, TOPIC, TraceError, ending, owned,
-    publish,
+    CLOCK, ROLE, ROLE_DELIVERED, ROLE_METRIC, ROLE_OPERATIONS, ROLE_PUBLISHED, Subject, TOPIC, TraceError, ZERO,
+    ending, owned, publish,
 };
 
 /// How long written data may stay in memory: the trace of a test that hangs must contain its last messages.
@@ -306,6 +306,11 @@ impl Listener for TraceWriter<'_> {
     fn delivered(&mut self, now: SimTime, wire: Wire, index: u64, value: &Value) {
         let Some(channel) = self.channels.delivered[wire.index()] else { return };
         self.message(channel, now, wire, index, value);
+    }
+
+    fn clock_at_zero(&mut self, seconds: f64) {
+        let metadata = Metadata { name: CLOCK.to_owned(), metadata: owned([(ZERO, seconds.to_string())]) };
+        self.shared.lock().attempt(|writer| writer.write_metadata(&metadata));
     }
 
     fn operated(&mut self, now: SimTime, operation: usize, event: OperationEvent) {

@@ -56,6 +56,7 @@ impl Exchange for Recorder {
         self.subscribed.push(self.wires.path(wire).to_owned());
     }
 
+    fn clock_at_zero(&mut self, _: f64) {}
     fn advance(&mut self, _: SimTime, _: &mut Vec<Delivery>) {}
 
     fn message_from(

@@ -125,6 +125,7 @@ pub(super) fn number(of: &Expression, input: &dyn Fn(u32) -> Option<f64>) -> Opt
         Expression::Distance(_)
         | Expression::SignedDistance(_)
         | Expression::Time
+        | Expression::Now
         | Expression::Integral(_)
         | Expression::Unary { .. }
         | Expression::Binary { .. } => None,
@@ -134,7 +135,7 @@ pub(super) fn number(of: &Expression, input: &dyn Fn(u32) -> Option<f64>) -> Opt
 /// Whether an expression is a finite number for all inputs, which are finite.
 fn is_finite(of: &Expression) -> bool {
     match of {
-        Expression::Input(_) | Expression::Integral(_) | Expression::Time => true,
+        Expression::Input(_) | Expression::Integral(_) | Expression::Time | Expression::Now => true,
         Expression::Negate(of) | Expression::Absolute(of) => is_finite(of),
         Expression::Min(parts) | Expression::Max(parts) => parts.iter().all(is_finite),
         _ => constant(of).is_some_and(f64::is_finite),
@@ -176,6 +177,7 @@ pub(super) fn text(of: &Expression, input: &dyn Fn(u32) -> usize) -> String {
         Expression::SignedDistance(distance) => format!("{} {:?}", point(distance.from), distance.to),
         Expression::Integral(at) => format!("integral #{}", input(*at)),
         Expression::Time => "time".to_owned(),
+        Expression::Now => "now".to_owned(),
         Expression::Unary { function, .. } => function.name().to_owned(),
         Expression::Binary { function, .. } => function.name().to_owned(),
     };

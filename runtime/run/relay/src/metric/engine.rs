@@ -10,6 +10,7 @@ use sesame_plan::condition::Operand;
 use sesame_plan::{Bound, CampaignPlan, Members, MetricId, MetricSource, RequirementId, Side, Span, TopicId, Trend};
 
 use crate::metric::aggregate::FormulaState;
+use crate::metric::expression::Clocks;
 use crate::metric::robustness::RobustnessState;
 use crate::metric::{Context, Hook, HookEntry};
 use crate::relay::{beyond, reaching};
@@ -141,6 +142,7 @@ impl<'p> MetricTable<'p> {
         Metrics {
             table: self,
             now: SimTime::ZERO,
+            zero: 0.0,
             waiting: Vec::new(),
             timed,
             stepped: None,
@@ -157,6 +159,8 @@ pub struct Metrics<'p> {
     states: Vec<State<'p>>,
     /// The latest time.
     now: SimTime,
+    /// What the clock of the simulator's stamps showed at time zero, in seconds.
+    zero: f64,
     /// The metrics whose formulas wait for the end of the current instant.
     waiting: Vec<usize>,
     /// The metrics whose formulas change while time passes.
@@ -229,6 +233,13 @@ impl Metrics<'_> {
                 hook.on_start(context);
             }
         }
+    }
+
+    /// The clock of the simulator's stamps showed so many seconds at time zero. Until this is known, it shows the
+    /// simulation time.
+    pub fn clock_at_zero(&mut self, seconds: f64) {
+        self.zero = seconds;
+        self.states.iter_mut().for_each(|state| state.context.zero = seconds);
     }
 
     /// The value of this metric is compared with this in conditions.
@@ -308,8 +319,9 @@ impl Metrics<'_> {
         if self.table.step.is_some() || !formula.is_timed() {
             return mark;
         }
-        let crossings = numbers().filter_map(|number| formula.next_crossing(number, context.value, self.now));
-        mark.into_iter().chain(crossings).chain(formula.next_change(self.now)).min()
+        let clocks = Clocks { now: self.now, zero: self.zero };
+        let crossings = numbers().filter_map(|number| formula.next_crossing(number, context.value, clocks));
+        mark.into_iter().chain(crossings).chain(formula.next_change(clocks)).min()
     }
 
     fn number(&self, with: Operand) -> Option<f64> {

@@ -3,6 +3,7 @@
 use std::cell::Cell;
 use std::fmt;
 
+use sesame_base::time::SimTime;
 use sesame_plan::{BinaryFunction, Condition, Distance, Expression, Point, UnaryFunction};
 
 use crate::angle::wrapped;
@@ -12,18 +13,29 @@ use crate::metric::region::signed_distance;
 /// what it came to with the last message, the value by which it grows since, and the time of that message in seconds.
 pub(crate) type Held = [f64; 3];
 
+/// When a formula is computed.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Clocks {
+    /// The simulation time.
+    pub(crate) now: SimTime,
+    /// What the clock of the simulator's stamps showed at time zero, in seconds.
+    pub(crate) zero: f64,
+}
+
 /// What a formula is computed from at one moment.
 pub(crate) struct Moment<'a> {
     inputs: &'a [Held],
     /// The simulation time, in seconds.
     time: f64,
+    /// What the clock of the simulator's stamps showed at time zero, in seconds.
+    zero: f64,
     undefined: Cell<Option<Undefined>>,
 }
 
 impl<'a> Moment<'a> {
-    /// The values of a formula's inputs at a time, in seconds.
-    pub(crate) fn new(inputs: &'a [Held], time: f64) -> Self {
-        Moment { inputs, time, undefined: Cell::new(None) }
+    /// The values of a formula's inputs at a time.
+    pub(crate) fn new(inputs: &'a [Held], clocks: Clocks) -> Self {
+        Moment { inputs, time: clocks.now.seconds(), zero: clocks.zero, undefined: Cell::new(None) }
     }
 
     /// The first function that had no value, of all that was computed.
@@ -96,6 +108,7 @@ pub(super) fn number(of: &Expression, at: &Moment<'_>) -> f64 {
         }
         Expression::SignedDistance(distance) => signed_distance(at.point(distance.from), &distance.to),
         Expression::Time => at.time,
+        Expression::Now => at.zero + at.time,
         Expression::Unary { function, of } => {
             let of = number(of, at);
             at.checked(function.name(), (of, None), unary(*function, of))
@@ -164,12 +177,17 @@ mod tests {
 
     use super::*;
 
+    /// At so many seconds, where the clock of stamps showed 1000 s at time zero.
+    fn at(inputs: &[Held], seconds: f64) -> Moment<'_> {
+        Moment::new(inputs, Clocks { now: SimTime::from_seconds(seconds), zero: 1000.0 })
+    }
+
     fn number(of: &Expression, inputs: &[Held]) -> f64 {
-        super::number(of, &Moment::new(inputs, 0.0))
+        super::number(of, &at(inputs, 0.0))
     }
 
     fn holds(of: &Condition, inputs: &[Held]) -> bool {
-        super::holds(of, &Moment::new(inputs, 0.0))
+        super::holds(of, &at(inputs, 0.0))
     }
 
     const INPUTS: [Held; 3] = [[6.0, 0.0, 0.0], [3.0, 4.0, 12.0], [1.0, 0.0, 0.0]];
@@ -206,7 +224,8 @@ mod tests {
 
     #[test]
     fn time_is_that_of_the_moment() {
-        assert_eq!(super::number(&Expression::Time, &Moment::new(&[], 2.5)), 2.5);
+        assert_eq!(super::number(&Expression::Time, &at(&[], 2.5)), 2.5);
+        assert_eq!(super::number(&Expression::Now, &at(&[], 2.5)), 1002.5);
     }
 
     #[test]
@@ -245,7 +264,7 @@ mod tests {
     fn a_function_without_a_value_is_remembered_and_what_was_no_number_before_is_not() {
         let root = |of: f64| Expression::Unary { function: UnaryFunction::Sqrt, of: Box::new(constant(of)) };
         let said = |of: &Expression| {
-            let moment = Moment::new(&[], 0.0);
+            let moment = at(&[], 0.0);
             super::number(of, &moment);
             moment.undefined().map(|undefined| undefined.to_string())
         };

@@ -3,50 +3,50 @@
 use sesame_base::time::SimTime;
 use sesame_plan::{Aggregate, Comparison, Condition, Expression, Formula};
 
-use crate::metric::expression::{Held, Moment, number};
+use crate::metric::expression::{Clocks, Held, Moment, number};
 
-/// The first moment after `now` at which a comparison in a formula changes, with these values of its inputs. Only
+/// The first moment from now on at which a comparison in a formula changes, with these values of its inputs. Only
 /// comparisons are looked at whose two sides change evenly, by the same amount each second: what else time does to a
 /// formula is seen at messages. A comparison for equality holds for a moment only, which is not looked for.
-pub(super) fn next_change(formula: &Formula, inputs: &[Held], now: SimTime) -> Option<SimTime> {
+pub(super) fn next_change(formula: &Formula, inputs: &[Held], clocks: Clocks) -> Option<SimTime> {
     let of = match &formula.aggregate {
         Aggregate::Duration { of } | Aggregate::Count { of } => Some(of),
         Aggregate::Last { .. } | Aggregate::Min { .. } | Aggregate::Max { .. } | Aggregate::Mean { .. } => None,
     };
     let mut first = None;
     for condition in of.into_iter().chain(&formula.when) {
-        in_condition(condition, inputs, now, &mut first);
+        in_condition(condition, inputs, clocks, &mut first);
     }
     first
 }
 
-/// The first moment after `now` at which an expression is above or below a number and was not before.
-pub(super) fn next_crossing(of: &Expression, bound: f64, inputs: &[Held], now: SimTime) -> Option<SimTime> {
+/// The first moment from now on at which an expression is above or below a number and was not before.
+pub(super) fn next_crossing(of: &Expression, bound: f64, inputs: &[Held], clocks: Clocks) -> Option<SimTime> {
     let bound = Expression::Constant(bound);
-    let crossing = |by| change(&Compared { left: of, by, right: &bound }, inputs, now);
+    let crossing = |by| change(&Compared { left: of, by, right: &bound }, inputs, clocks);
     [Comparison::Above, Comparison::Below, Comparison::AtLeast, Comparison::AtMost]
         .into_iter()
         .filter_map(crossing)
         .min()
 }
 
-fn in_condition(condition: &Condition, inputs: &[Held], now: SimTime, first: &mut Option<SimTime>) {
+fn in_condition(condition: &Condition, inputs: &[Held], clocks: Clocks, first: &mut Option<SimTime>) {
     match condition {
         Condition::Constant(_) | Condition::Input(_) => {}
         Condition::Compare { left, by, right } => {
-            let found = change(&Compared { left, by: *by, right }, inputs, now);
+            let found = change(&Compared { left, by: *by, right }, inputs, clocks);
             *first = first.iter().copied().chain(found).min();
         }
         Condition::Same { left, right } => {
-            in_condition(left, inputs, now, first);
-            in_condition(right, inputs, now, first);
+            in_condition(left, inputs, clocks, first);
+            in_condition(right, inputs, clocks, first);
         }
         Condition::All(parts) | Condition::Any(parts) => {
             for part in parts {
-                in_condition(part, inputs, now, first);
+                in_condition(part, inputs, clocks, first);
             }
         }
-        Condition::Not(of) => in_condition(of, inputs, now, first),
+        Condition::Not(of) => in_condition(of, inputs, clocks, first),
     }
 }
 
@@ -56,7 +56,7 @@ struct Compared<'a> {
     right: &'a Expression,
 }
 
-fn change(compared: &Compared<'_>, inputs: &[Held], now: SimTime) -> Option<SimTime> {
+fn change(compared: &Compared<'_>, inputs: &[Held], clocks: Clocks) -> Option<SimTime> {
     /// More than rounding makes of a time in seconds, in nanoseconds.
     const MARGIN: i64 = 1 << 12;
     let Compared { left, by, right } = *compared;
@@ -64,11 +64,11 @@ fn change(compared: &Compared<'_>, inputs: &[Held], now: SimTime) -> Option<SimT
         return None;
     }
     let holds_at = |nanos: i64| {
-        let moment = Moment::new(inputs, SimTime::from_nanos(nanos).seconds());
+        let moment = Moment::new(inputs, Clocks { now: SimTime::from_nanos(nanos), ..clocks });
         by.holds(number(left, &moment), number(right, &moment))
     };
-    let now = now.nanos();
-    let moment = Moment::new(inputs, SimTime::from_nanos(now).seconds());
+    let now = clocks.now.nanos();
+    let moment = Moment::new(inputs, clocks);
     let pace = slope(left, &moment)? - slope(right, &moment)?;
     let away = number(right, &moment) - number(left, &moment);
     let seconds = away / pace;
@@ -92,7 +92,7 @@ fn change(compared: &Compared<'_>, inputs: &[Held], now: SimTime) -> Option<SimT
 /// By how much an expression changes each second; `None` if that is not the same at all times.
 fn slope(of: &Expression, at: &Moment<'_>) -> Option<f64> {
     match of {
-        Expression::Time => Some(1.0),
+        Expression::Time | Expression::Now => Some(1.0),
         Expression::Integral(input) => Some(at.pace(*input)),
         Expression::Negate(of) => slope(of, at).map(|slope| -slope),
         Expression::Sum(terms) => terms.iter().map(|term| slope(term, at)).sum(),
@@ -114,9 +114,9 @@ mod tests {
     use super::*;
     use crate::metric::expression::holds;
 
-    /// `time * factor - input` and a number.
-    fn compared(factor: f64, by: Comparison, bound: f64) -> Condition {
-        let grown = Expression::Product(vec![Expression::Time, Expression::Constant(factor)]);
+    /// `time * factor - input`, by one of both clocks, and a number.
+    fn compared(time: Expression, factor: f64, by: Comparison, bound: f64) -> Condition {
+        let grown = Expression::Product(vec![time, Expression::Constant(factor)]);
         let left = Expression::Sum(vec![grown, Expression::Negate(Box::new(Expression::Input(0)))]);
         Condition::Compare { left, by, right: Expression::Constant(bound) }
     }
@@ -125,17 +125,19 @@ mod tests {
         // Times are so small that every nanosecond can be looked at.
         #[test]
         fn a_change_is_found_at_its_nanosecond(
+            time in prop::sample::select(vec![Expression::Time, Expression::Now]), zero in -100..100i32,
             now in 0..200i64, factor in -3..4i32, input in -200..200i32, bound in -200..200i32,
             by in prop::sample::select(vec![
                 Comparison::Above, Comparison::AtLeast, Comparison::Below, Comparison::AtMost,
             ]),
         ) {
             let inputs = [[f64::from(input) * 1e-9, 0.0, 0.0]];
-            let condition = compared(f64::from(factor), by, f64::from(bound) * 1e-9);
-            let at = |nanos| holds(&condition, &Moment::new(&inputs, SimTime::from_nanos(nanos).seconds()));
+            let clocks = |nanos| Clocks { now: SimTime::from_nanos(nanos), zero: f64::from(zero) * 1e-9 };
+            let condition = compared(time, f64::from(factor), by, f64::from(bound) * 1e-9);
+            let at = |nanos| holds(&condition, &Moment::new(&inputs, clocks(nanos)));
             let expected = (now + 1..2_000).find(|&nanos| at(nanos) != at(now)).map(SimTime::from_nanos);
             let mut first = None;
-            in_condition(&condition, &inputs, SimTime::from_nanos(now), &mut first);
+            in_condition(&condition, &inputs, clocks(now), &mut first);
             prop_assert_eq!(first, expected);
         }
     }
@@ -143,7 +145,7 @@ mod tests {
     #[test]
     fn what_does_not_change_evenly_is_left_to_messages() {
         let square = Expression::Product(vec![Expression::Time, Expression::Time]);
-        let moment = Moment::new(&[], 0.0);
+        let moment = Moment::new(&[], Clocks { now: SimTime::ZERO, zero: 0.0 });
         assert_eq!(slope(&square, &moment), None);
         assert_eq!(
             slope(

@@ -99,7 +99,7 @@ impl Instance {
         let (Some(values), Some(monitor)) = (self.held.values(), &mut self.monitor) else { return };
         self.pushed = context.now;
         for (at, signal) in signals.iter().enumerate() {
-            let moment = Moment::new(values, context.now());
+            let moment = Moment::new(values, context.clocks());
             let value = number(signal, &moment);
             // As with other formulas: if arithmetic gives no number, the last value stays.
             if value.is_finite() {

@@ -15,7 +15,7 @@ pub(super) fn step(formula: &Formula, held: &HeldInputs, tally: &mut Tally, cont
         tally.stop(now);
         return None;
     };
-    let moment = Moment::new(inputs, now.seconds());
+    let moment = Moment::new(inputs, context.clocks());
     let counted = tally.take(formula, &moment, now, context);
     if let Some(undefined) = moment.undefined() {
         context.note(format!("{undefined} at {now}"));

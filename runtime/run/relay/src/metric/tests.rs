@@ -7,7 +7,7 @@ use sesame_base::time::SimTime;
 use sesame_plan::testing::{plan, requirement};
 use sesame_plan::{
     Aggregate, Bound, CampaignPlan, Comparison, Condition, Expression, FieldRef, Formula, Input, Members, Metric,
-    MetricId, MetricSource, Side, TopicId, Trend,
+    MetricId, MetricSource, Side, TopicId, Transport, Trend,
 };
 
 use crate::metric::{Context, Hook, HookEntry, MetricTable};
@@ -141,6 +141,29 @@ fn the_last_instant_before_a_crash_counts_if_all_spoke_who_always_did() {
     assert_eq!(broken(least(), &[(200, 0, 5.0)]).value, Some(1.0));
     let touching = Condition::Compare { left: difference(), by: Comparison::Below, right: Expression::Constant(0.0) };
     assert_eq!(broken(Aggregate::Count { of: touching }, &[(200, 1, -0.5), (200, 0, 0.0)]).value, Some(1.0));
+}
+
+#[test]
+fn the_age_of_a_stamp_is_by_the_clock_of_stamps_and_reaches_its_bound_in_time() {
+    let age = Expression::Sum(vec![Expression::Now, Expression::Negate(Box::new(Expression::Input(0)))]);
+    let mut plan = plan_with(formula(vec![command()], Aggregate::Max { of: age }));
+    plan.requirements = vec![requirement("young", 0, Bound::AtMost { value: 1.0 })];
+    plan.simulator.transport = Transport::Process { program: "sim".to_owned(), arguments: Vec::new(), step_ns: None };
+    let wires = WireTable::new(&plan);
+    let table = MetricTable::new(&plan, &wires, &[]).unwrap();
+    let at = |seconds: f64| SimTime::from_seconds(seconds);
+    let mut metrics = table.start();
+    metrics.begin();
+    // The run began when the wall clock showed 1,700,000,000 s, and a message was stamped 0.5 s later.
+    metrics.clock_at_zero(1.7e9);
+    metrics.message(at(0.75), wires.find(PATHS[0]).unwrap(), &payload(0, 1.7e9 + 0.5));
+    metrics.advance_to(at(0.8));
+    let reached = metrics.next_change().expect("the age grows").seconds();
+    assert!((reached - 1.5).abs() < 1e-5, "as exact as such a number of seconds is: {reached}");
+    metrics.advance_to(at(2.0));
+    metrics.end(at(3.0));
+    let oldest = metrics.finish(&[]).0.remove(0).value.unwrap();
+    assert!((oldest - 2.5).abs() < 1e-6, "{oldest}");
 }
 
 #[test]

@@ -35,6 +35,9 @@ pub trait Exchange {
     fn found(&mut self, wire: Wire) {
         self.subscribed(wire);
     }
+    /// The clock of the simulator's stamps showed so many seconds at time zero. A simulator whose transport does not
+    /// call this has stamps in simulation time.
+    fn clock_at_zero(&mut self, seconds: f64);
     /// Simulation time is `now` from here on; it never goes back.
     fn advance(&mut self, now: SimTime, deliveries: &mut Vec<Delivery>);
     /// A message was published at `now`, by this node if the transport can tell. It gets the next number of its wire,

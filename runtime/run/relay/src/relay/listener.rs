@@ -18,6 +18,10 @@ pub trait Listener {
     /// A message is delivered. It comes from the `index`th message published on this wire, and operations may have
     /// changed it.
     fn delivered(&mut self, now: SimTime, wire: Wire, index: u64, value: &Value);
+    /// The clock of the simulator's stamps showed so many seconds at time zero.
+    fn clock_at_zero(&mut self, seconds: f64) {
+        let _ = seconds;
+    }
     /// Simulation time is `now` from here on: all messages of earlier moments are known.
     fn advanced(&mut self, now: SimTime) {
         let _ = now;
@@ -39,6 +43,10 @@ impl Listener for Metrics<'_> {
 
     fn delivered(&mut self, now: SimTime, wire: Wire, _: u64, value: &Value) {
         self.delivery(now, wire, value);
+    }
+
+    fn clock_at_zero(&mut self, seconds: f64) {
+        Metrics::clock_at_zero(self, seconds);
     }
 
     fn advanced(&mut self, now: SimTime) {

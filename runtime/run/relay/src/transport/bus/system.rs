@@ -13,7 +13,7 @@ use crate::simulator::Progress;
 use crate::transport::bus::{Bus, Event, Settings};
 use crate::transport::clock::Ticks;
 use crate::transport::relay_latency::{Added, AddedOnWire, FEWEST, objections};
-use crate::transport::{Capabilities, Incidents, Transport, TransportError, wall_time_since};
+use crate::transport::{Capabilities, Incidents, Transport, TransportError, wall_clock, wall_time_since};
 use crate::wire::{Line, Wire, WireTable, lines, service_lines};
 use sesame_lifecycle::launch::{LaunchContext, LaunchError, Launched, Probe};
 
@@ -157,6 +157,10 @@ impl System {
             self.pass_on_all()?;
             Zero::Wall(Instant::now())
         };
+        relay.clock_at_zero(match self.zero {
+            Zero::Wall(_) => wall_clock(),
+            Zero::Clock(nanos) => SimTime::from_nanos(nanos).seconds(),
+        });
         self.ticked = Instant::now();
         match relay.parameters() {
             [] => Ok(()),
