@@ -23,7 +23,7 @@ from rclpy.action.server import ServerGoalHandle
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import SingleThreadedExecutor, TimeoutException
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header, String
@@ -36,6 +36,8 @@ from nav2_msgs.action import NavigateToPose  # noqa: E402
 from tf2_msgs.msg import TFMessage  # noqa: E402
 
 DEEP = QoSProfile(depth=200)  # a relay may release many delayed messages at once
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)  # reaches those who are found later, too
+LATCHED_BY_ALL = QoSProfile(depth=50, durability=DurabilityPolicy.TRANSIENT_LOCAL)  # from several nodes
 PASSES = 3  # of an executor until the end of a goal is sent: each runs what the one before has started
 RESULTS_FOR = 10  # seconds for which a server keeps the goals that have ended
 
@@ -62,12 +64,12 @@ class Ticked(Node):
 
     def __init__(self, name: str) -> None:
         super().__init__(name, enable_rosout=False)
-        self.due: list[Header | None] = []
+        self.due: list[Header | String] = []
         self.last: list[tuple] = []
         self.passes = 0
         self.create_subscription(Header, "/warehouse/tick", self.due.append, DEEP)
-        self.create_subscription(Header, "/warehouse/begin", lambda _: self.due.append(None), DEEP)
-        self.begun = self.create_publisher(String, "/warehouse/begun", DEEP)
+        self.create_subscription(String, "/warehouse/begin", self.due.append, LATCHED)
+        self.begun = self.create_publisher(String, "/warehouse/begun", LATCHED)
 
     def is_busy(self) -> bool:
         """Whether there is something to do when nothing more arrives."""
@@ -83,12 +85,12 @@ class Ticked(Node):
                 self.last = []
             return
         self.passes = 0
-        tick = self.due.pop(0)
-        if tick is None:
+        due = self.due.pop(0)
+        if isinstance(due, String):
             self.begin()
-            self.last = [(self.begun, String(data=self.get_fully_qualified_name()))]
+            self.last = [(self.begun, String(data=f"{due.data} {self.get_fully_qualified_name()}"))]
         else:
-            self.last = self.work(nanoseconds(tick))
+            self.last = self.work(nanoseconds(due))
 
 
 class FloorNode(Node):
@@ -101,16 +103,17 @@ class FloorNode(Node):
         self.tf = {robot: self.create_publisher(TFMessage, f"/{robot}/tf", DEEP) for robot in ROBOTS}
         self.truth = {robot: self.create_publisher(PointStamped, f"/{robot}/ground_truth", DEEP) for robot in ROBOTS}
         self.tick = self.create_publisher(Header, "/warehouse/tick", DEEP)
-        self.begin = self.create_publisher(Header, "/warehouse/begin", DEEP)
+        self.begin = self.create_publisher(String, "/warehouse/begin", LATCHED)
         self.velocities = {
             robot: self.create_subscription(
                 Twist, f"/{robot}/cmd_vel", lambda message, robot=robot: self.take(robot, message), DEEP
             )
             for robot in ROBOTS
         }
+        self.number = 0  # of resets
         self.begun: set[str] = set()
         self.all_begun = Future()
-        self.create_subscription(String, "/warehouse/begun", self.note, DEEP)
+        self.create_subscription(String, "/warehouse/begun", self.note, LATCHED_BY_ALL)
         self.create_service(Trigger, "/warehouse/step", self.step)
         # While it waits for the others, what they say is heard.
         self.create_service(Trigger, "/warehouse/reset", self.reset, callback_group=ReentrantCallbackGroup())
@@ -132,14 +135,17 @@ class FloorNode(Node):
 
     def note(self, message: String) -> None:
         """Notes that a node has begun anew."""
-        self.begun.add(message.data)
+        number, name = message.data.split()
+        if number == str(self.number):
+            self.begun.add(name)
         if len(self.begun) == len(ROBOTS) + 1 and not self.all_begun.done():
             self.all_begun.set_result(True)
 
     async def reset(self, _, response: Trigger.Response) -> Trigger.Response:
         """Sets everything to time zero. Velocities that are still on their way are those of the past."""
+        self.number += 1
         self.begun, self.all_begun = set(), Future()
-        self.begin.publish(header(0))
+        self.begin.publish(String(data=str(self.number)))
         await self.all_begun
         self.drain()
         self.floor.reset()

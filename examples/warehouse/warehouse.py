@@ -82,6 +82,25 @@ def crossings(robot: str) -> dict[str, Place]:
     return found
 
 
+def stop_before(robot: str, crossing: Place, goal: Place) -> Place:
+    """Where a robot stops on its way to one of its stations if it may not cross a crossing."""
+    first, second = LANES[robot].stations
+    start = second if goal == first else first
+    length = distance(start, goal)
+    return (
+        crossing[0] - (goal[0] - start[0]) / length * STOP,
+        crossing[1] - (goal[1] - start[1]) / length * STOP,
+    )
+
+
+def way(robot: str, goal: Place) -> list[Place]:
+    """The way of a robot to one of its stations: from the other one, over the stops before the crossings."""
+    first, second = LANES[robot].stations
+    start = second if goal == first else first
+    stops = [stop_before(robot, crossing, goal) for crossing in crossings(robot).values()]
+    return [start, *sorted(stops, key=lambda stop: distance(start, stop)), goal]
+
+
 def is_on_lane(robot: str, place: Place) -> bool:
     """Whether a place lies on the lane of a robot."""
     first, second = LANES[robot].stations
@@ -274,10 +293,5 @@ class Manager:
         goal = LANES[robot].stations[trip.station]
         for _, crossing in self._ahead(robot):
             if self.holders.get(crossing) != robot:
-                from_x, from_y = LANES[robot].stations[1 - trip.station]
-                length = distance((from_x, from_y), goal)
-                return (
-                    crossing[0] - (goal[0] - from_x) / length * STOP,
-                    crossing[1] - (goal[1] - from_y) / length * STOP,
-                )
+                return stop_before(robot, crossing, goal)
         return goal
