@@ -249,8 +249,8 @@ mod tests {
     #[test]
     fn the_examples_deserve_no_warning() {
         let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples");
-        for name in ["kuka_cell", "two_robots"] {
-            let file = examples.join(name).join(format!("{name}.sesame"));
+        for name in ["kuka_cell/kuka_cell", "two_robots/two_robots", "warehouse/vda5050"] {
+            let file = examples.join(format!("{name}.sesame"));
             let text = std::fs::read_to_string(&file).unwrap();
             let checked = check(file.to_str().unwrap(), &text, PLAIN);
             assert_eq!((checked.diagnostics.as_str(), checked.warnings), ("", 0));

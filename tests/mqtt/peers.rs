@@ -16,7 +16,17 @@ use sesame_tests::{Port, workspace};
 
 /// The folder of the peers' packages. Without one it prints that the test is skipped; with `CI=true` that is an error.
 pub(crate) fn packages() -> Option<PathBuf> {
-    let packages = named("SESAME_MQTT")?;
+    beside_mosquitto("SESAME_MQTT")
+}
+
+/// A Python with a client of MQTT, as [`packages`].
+pub(crate) fn python() -> Option<PathBuf> {
+    beside_mosquitto("SESAME_PAHO")
+}
+
+/// What a variable names, if there is a broker, too.
+fn beside_mosquitto(variable: &str) -> Option<PathBuf> {
+    let found = named(variable)?;
     let has_broker = Command::new("mosquitto").arg("-h").stdout(Stdio::null()).status().is_ok();
     let insists = std::env::var("CI").is_ok_and(|ci| ci == "true");
     assert!(has_broker || !insists, "mosquitto is not installed");
@@ -24,7 +34,7 @@ pub(crate) fn packages() -> Option<PathBuf> {
         eprintln!("skipped: mosquitto is not installed");
         return None;
     }
-    Some(packages)
+    Some(found)
 }
 
 /// A broker, which is ended when it is dropped.

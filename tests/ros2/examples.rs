@@ -286,6 +286,62 @@ fn robots_that_believe_old_poses_collide_in_the_fleet() {
     assert!(gap(first) <= 0.0, "{first}");
 }
 
+/// The warehouse, with what is compiled for it.
+fn warehouse(folder: &str, changes: &[(&str, &str)]) -> Option<Example> {
+    let built = sesame_peers::named("SESAME_ROS2_NAV2")?;
+    let changes: Vec<_> = changes.iter().copied().chain([("../fleet/venv", "venv")]).collect();
+    let example = Example::new("warehouse", Vendor::Fleet, folder, &changes)?;
+    let interfaces = workspace().join("examples/warehouse/interfaces");
+    for (folder, name) in [(built, "built"), (interfaces, "interfaces")] {
+        symlink(folder, example.folder().join(name)).expect("a folder can be linked");
+    }
+    Some(example)
+}
+
+#[test]
+fn a_robot_that_is_located_late_meets_another_one_in_the_warehouse_and_always_alike() {
+    let Some(warehouse) = warehouse("warehouse_repeated", &[("5 times", "2 times")]) else { return };
+    warehouse.sesamec("run", "repeated", &WORKERS).expect(0);
+    let tests = warehouse.tests("repeated");
+    let [reference, first, second, _] = &tests[..] else { panic!("{tests:?}") };
+    assert_eq!(measured(first), measured(second));
+    let value = |test: &Value, metric: &str| test["measured"][metric].as_f64().unwrap_or_else(|| panic!("{test}"));
+    // Undisturbed, two that meet at a crossing keep as far apart as the stop is before it, less what they slip.
+    assert!(value(reference, "closest") > 1.3, "{reference}");
+    assert_eq!(["reached", "aborted"].map(|metric| value(reference, metric)), [12.0, 0.0], "{reference}");
+    // Both touch, since their radius is 35 cm; nobody else comes close.
+    assert!(value(first, "r2_r5") <= 0.7, "{first}");
+    for others in ["r1_r4", "r1_r5", "r1_r6", "r2_r4", "r2_r6", "r3_r4", "r3_r5", "r3_r6"] {
+        assert!(value(first, others) > 0.8, "{others}: {first}");
+    }
+}
+
+/// The campaign that the example's page begins with.
+#[test]
+#[ignore = "takes five minutes"]
+fn a_search_finds_whose_localisation_has_to_be_late_for_which_collision_in_the_warehouse() {
+    let Some(warehouse) = warehouse("warehouse_collisions", &[]) else { return };
+    warehouse.sesamec("run", "collisions", &WORKERS).expect(0);
+    let said = warehouse.sesamec("causes", "collisions", &["--format", "json"]).expect(0).out;
+    let said: Value = serde_json::from_str(&said).expect("it is JSON");
+    let text = |value: &Value| value.as_str().unwrap_or_else(|| panic!("{said:#}")).to_owned();
+    let of = |cause: &Value| -> (String, Vec<String>) {
+        let operations = cause["operations"].as_array().unwrap_or_else(|| panic!("{said:#}"));
+        (text(&cause["requirement"]), operations.iter().map(text).collect())
+    };
+    let causes: Vec<(String, Vec<String>)> =
+        said["causes"].as_array().expect("causes are listed").iter().map(of).collect();
+    let collisions: Vec<_> = causes.iter().filter(|(requirement, _)| requirement != "R7").collect();
+    assert!(collisions.len() >= 4, "{causes:?}");
+    // Who is late is one of the two that collide: `R26` is about `r2` and `r6`.
+    for (requirement, operations) in collisions {
+        let [late] = &operations[..] else { panic!("one operation suffices: {causes:?}") };
+        let robot = late.strip_prefix("late[r").and_then(|late| late.strip_suffix(']'));
+        let robot = robot.unwrap_or_else(|| panic!("only what is late lets robots collide: {causes:?}"));
+        assert!(requirement[1..].contains(robot), "{causes:?}");
+    }
+}
+
 #[test]
 fn what_a_scan_of_the_running_cell_writes_is_run_with_a_campaign_below_it() {
     let Some(python) = Vendor::Kilted.python() else { return };

@@ -51,7 +51,7 @@ fn pages() -> Vec<(String, String)> {
         }
     }
     assert!(paths.len() >= 2, "guide and reference are there");
-    let examples = ["a50_cell", "kuka_cell", "transport", "two_drones", "two_robots"];
+    let examples = ["a50_cell", "kuka_cell", "transport", "two_drones", "two_robots", "warehouse"];
     paths.extend(examples.map(|example| format!("examples/{example}/README.md")));
     paths.push("README.md".to_owned());
     paths.sort();

@@ -23,6 +23,7 @@ fn files() -> Vec<(PathBuf, String)> {
         "../examples/transport",
         "../examples/two_drones",
         "../examples/two_robots",
+        "../examples/warehouse",
     ];
     let mut files = Vec::new();
     for folder in folders {
