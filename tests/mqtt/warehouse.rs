@@ -53,8 +53,8 @@ fn measured(test: &Value, metric: &str) -> f64 {
     test["measured"][metric].as_f64().unwrap_or_else(|| panic!("no `{metric}` in {test}"))
 }
 
-/// Nobody steps vehicles and control: on a busy machine all of them may be late. Undisturbed, the first order is finished
-/// after 17 s.
+/// Nobody steps vehicles and control: on a busy machine all of them may be late. Undisturbed, the first order is
+/// finished after 17 s.
 #[test]
 fn vehicles_finish_the_orders_of_their_control_and_one_of_them_is_located_late() {
     repeated("warehouse_vda5050", 24);
