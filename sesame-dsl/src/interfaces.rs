@@ -218,8 +218,8 @@ pub fn wire_type(written: &str, dialect: Dialect) -> Option<WireType> {
     let number =
         |digits: &str| digits.parse::<u32>().ok().filter(|_| digits.bytes().all(|digit| digit.is_ascii_digit()));
     let of = match base.split_once("<=") {
-        Some(("string", bound)) if number(bound).is_some() => WireType::String,
-        Some(("wstring", bound)) if number(bound).is_some() => WireType::WString,
+        Some(("string", bound)) => WireType::String { bound: Some(number(bound)?) },
+        Some(("wstring", bound)) => WireType::WString { bound: Some(number(bound)?) },
         Some(_) => return None,
         None => scalar(base, dialect)?,
     };
@@ -236,8 +236,8 @@ pub fn wire_type(written: &str, dialect: Dialect) -> Option<WireType> {
 
 fn scalar(name: &str, dialect: Dialect) -> Option<WireType> {
     match name {
-        "string" => Some(WireType::String),
-        "wstring" => Some(WireType::WString),
+        "string" => Some(WireType::STRING),
+        "wstring" => Some(WireType::WSTRING),
         _ => match Primitive::named(name) {
             Some(primitive) => Some(WireType::Primitive { primitive }),
             None => full_name(name, "msg", dialect).map(|name| WireType::Interface { name }),
@@ -278,8 +278,10 @@ pub fn innermost(ty: &WireType) -> &WireType {
 pub fn in_words(ty: &WireType) -> String {
     match ty {
         WireType::Primitive { primitive } => primitive.name().to_owned(),
-        WireType::String => "string".to_owned(),
-        WireType::WString => "wstring".to_owned(),
+        WireType::String { bound: None } => "string".to_owned(),
+        WireType::String { bound: Some(bound) } => format!("string<={bound}"),
+        WireType::WString { bound: None } => "wstring".to_owned(),
+        WireType::WString { bound: Some(bound) } => format!("wstring<={bound}"),
         WireType::Interface { name } => name.clone(),
         WireType::Array { of, length } => format!("{}[{length}]", in_words(of)),
         WireType::Sequence { of, bound: None } => format!("{}[]", in_words(of)),
@@ -337,7 +339,7 @@ mod tests {
             assert_eq!(in_words(&wire_type(text, Dialect::Ros2).unwrap()), text);
         }
         assert_eq!(wire_type("byte", Dialect::Ros2), wire_type("uint8", Dialect::Ros2));
-        assert_eq!(wire_type("string<=10", Dialect::Ros2), Some(WireType::String));
+        assert_eq!(wire_type("string<=10", Dialect::Ros2), Some(WireType::String { bound: Some(10) }));
         for wrong in ["uint", "float64[", "float64[-1]", "float64[<]", "int8<=5", "float64[+3]", "float64[3][3]", ""] {
             assert_eq!(wire_type(wrong, Dialect::Ros2), None, "{wrong}");
         }

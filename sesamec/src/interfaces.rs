@@ -288,7 +288,7 @@ fn contained(ty: &WireType) -> Option<&str> {
     match ty {
         WireType::Interface { name } => Some(name),
         WireType::Array { of, .. } | WireType::Sequence { of, .. } => contained(of),
-        WireType::Primitive { .. } | WireType::String | WireType::WString => None,
+        WireType::Primitive { .. } | WireType::String { .. } | WireType::WString { .. } => None,
     }
 }
 

@@ -109,7 +109,7 @@ impl Listed {
 fn parameters_of_every_type_are_set_and_have_their_old_values_again() {
     let Some(lidar) = managed("parameters_of_every_type", Vendor::Jazzy) else { return };
     lidar.sesamec(&["check", "lidars.sesame"]).expect(0);
-    lidar.sesamec(&["known", "lidars.sesame", "settings", "wrong"]).expect(0);
+    lidar.sesamec(&["known", "lidars.sesame", "settings", "wrong", "--workers", "1"]).expect(0);
     let listed = Listed::of(&lidar);
     for (name, ..) in PARAMETERS {
         let metric = format!("m_{name}");
@@ -131,7 +131,7 @@ fn parameters_of_every_type_are_set_and_have_their_old_values_again() {
 fn a_node_is_taken_through_a_transition_and_back() {
     for (name, vendor) in [("transitions_kilted", Vendor::Kilted), ("transitions_jazzy", Vendor::Jazzy)] {
         let Some(lidar) = managed(name, vendor) else { continue };
-        lidar.sesamec(&["known", "lidars.sesame", "stops", "cleans", "is_on", "refuses"]).expect(0);
+        lidar.sesamec(&["known", "lidars.sesame", "stops", "cleans", "is_on", "refuses", "--workers", "1"]).expect(0);
         let listed = Listed::of(&lidar);
         let [lowest, at_last, scans, inactive] = ["lowest", "at_last", "scans", "inactive"]
             .map(|metric| ["T0", "T1", "T2", "T3", "T4"].map(|test| listed.value(test, metric)));

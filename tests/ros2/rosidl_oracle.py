@@ -32,11 +32,13 @@ def actions(action):
 
 
 def words(ty):
-    """The type on the wire: there a byte is a number, and how long a text may be makes no difference."""
+    """The type on the wire: there a byte is a number."""
     if ty.type in ("time", "duration"):
         raise TypeError(f"{ty.type} is of ROS 1, and refused by what follows the parser")
     own = {"byte": "uint8", "char": "uint8"}.get(ty.type, ty.type)
     of = own if ty.is_primitive_type() else f"{ty.pkg_name}/msg/{ty.type}"
+    if ty.string_upper_bound is not None:
+        of = f"{of}<={ty.string_upper_bound}"
     if not ty.is_array:
         return of
     return f"{of}[{'<=' if ty.is_upper_bound else ''}{ty.array_size or ''}]"

@@ -299,7 +299,7 @@ fn arm() -> CampaignPlan {
         clock: Clock::Topic { path: path.clone() },
         step: Some(Stepping { step_ns: 1, by: StepBy::Topic { path } }),
         interfaces: vec![
-            interface("Inner", WireType::String),
+            interface("Inner", WireType::STRING),
             interface("Outer", WireType::Sequence { of: Box::new(inner), bound: None }),
         ],
         ..Ros::default()

@@ -58,8 +58,10 @@ impl<'a> Resolver<'a> {
             ast::OperationKind::Random { absolute, amounts } => self.random_value(target, *absolute, amounts),
             ast::OperationKind::RandomText(texts) => {
                 let found = self.values(target, "a random text", "a `text`", |ty| matches!(ty, Type::Text));
-                let texts = self.items(texts)?;
-                Some((found?.0, OperationKind::RandomText { texts }, Vec::new()))
+                let items = self.items(texts)?;
+                let (found, _) = found?;
+                let fit = self.texts_fit(&found, target, texts);
+                fit.then_some((found, OperationKind::RandomText { texts: items }, Vec::new()))
             }
             ast::OperationKind::StuckAt(at) => self.stuck_at(target, at),
             ast::OperationKind::NotFinite(written) => {
@@ -288,7 +290,9 @@ impl<'a> Resolver<'a> {
                 let found = self.values(target, "`stuck at` texts", "a `text`", |ty| matches!(ty, Type::Text));
                 let domain = Domain::Texts(self.items(texts)?);
                 let parameter = Parameter { name: "value".to_owned(), doc: String::new(), unit: None, domain };
-                Some((found?.0, OperationKind::StuckAt { truth: None }, vec![parameter]))
+                let (found, _) = found?;
+                let fit = self.texts_fit(&found, target, texts);
+                fit.then_some((found, OperationKind::StuckAt { truth: None }, vec![parameter]))
             }
             ast::Stuck::Constants(names) => {
                 let is = |ty: &Type| matches!(ty, Type::Int(None) | Type::Real(None));

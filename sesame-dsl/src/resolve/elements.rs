@@ -7,7 +7,7 @@ use super::words::type_in_words;
 use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::interfaces::{self, ConstantValue};
-use crate::model::{Comparison, FieldPath, Id as _, Input, Members, Memory, TextTest, TopicId, Type};
+use crate::model::{Comparison, FieldPath, Id as _, Input, Members, Memory, Target, TextTest, TopicId, Type};
 use crate::similar::most_similar;
 use crate::span::Span;
 use crate::syntax::ast::{self, ComparedWith, Name, Path};
@@ -295,21 +295,61 @@ impl<'a> Resolver<'a> {
 
     /// How many elements the list at hand can have, and its type on the wire, if that says so.
     fn longest(&self, walk: &Walk) -> Option<(u32, String)> {
-        let Type::Message(id) = walk.outer.as_ref()? else { return None };
-        let message = self.system.messages.get(id.index())?.as_ref()?;
-        let interface = message.interface.as_ref()?;
-        let layout = self.system.ros.interfaces.iter().find(|layout| layout.name == *interface)?;
         let name = match walk.place.steps.last() {
             Some(Step::Field(name)) => name,
             Some(_) => return None,
             None => walk.place.fields.last()?,
         };
-        let ty = &layout.fields.iter().find(|field| field.name == *name)?.ty;
+        let ty = self.on_wire(walk.outer.as_ref()?, name)?;
         match ty {
             WireType::Array { length, .. } => Some((*length, interfaces::in_words(ty))),
             WireType::Sequence { bound: Some(bound), .. } => Some((*bound, interfaces::in_words(ty))),
             _ => None,
         }
+    }
+
+    /// The type on the wire of a field of a message, if the message has a layout.
+    fn on_wire(&self, message: &Type, field: &str) -> Option<&WireType> {
+        let Type::Message(id) = message else { return None };
+        let interface = self.system.messages.get(id.index())?.as_ref()?.interface.as_ref()?;
+        let layout = self.system.ros.interfaces.iter().find(|layout| layout.name == *interface)?;
+        Some(&layout.fields.iter().find(|known| known.name == field)?.ty)
+    }
+
+    /// The type on the wire of the text at a place in the messages of a topic, if a layout says it.
+    fn text_on_wire(&self, topic: TopicId, place: &[Step]) -> Option<&WireType> {
+        let mut ty = &self.system.topics.get(topic.index())?.as_ref()?.ty;
+        let mut wire = None;
+        for step in place {
+            match (step, ty) {
+                (Step::Field(name), Type::Message(id)) => {
+                    wire = self.on_wire(ty, name);
+                    let fields = &self.system.messages.get(id.index())?.as_ref()?.fields;
+                    ty = &fields.iter().find(|field| field.declaration.name == *name)?.ty;
+                }
+                (_, Type::List(of)) => ty = of,
+                _ => return None,
+            }
+        }
+        wire.map(interfaces::innermost)
+    }
+
+    /// Whether texts are no longer than the type at each of their places permits; reported if not.
+    pub(super) fn texts_fit(&mut self, target: &Target, written: &'a ast::Target, texts: &'a [ast::Text]) -> bool {
+        let mut fit = true;
+        for text in texts {
+            let wires = target.places.iter().filter_map(|place| self.text_on_wire(target.topic, place));
+            let exceeded = |wire: &WireType| wire.exceeded_by(&text.text).map(|found| (found, wire.clone()));
+            let Some(((length, bound), wire)) = wires.into_iter().find_map(exceeded) else { continue };
+            fit = false;
+            let units = if matches!(wire, WireType::WString { .. }) { "units of UTF-16" } else { "bytes" };
+            let (of, wire) = (self.text(written.span), interfaces::in_words(&wire));
+            let title = format!("`{}` is too long for `{of}`: it is `{wire}`", self.text(text.span));
+            let diagnostic = Diagnostic::new(Code::OUT_OF_RANGE, text.span, title)
+                .label(format!("expected at most {bound} {units}, not {length}"));
+            self.report(diagnostic);
+        }
+        fit
     }
 
     /// A filter for a list whose elements have this type, in a message of the type `outer`.

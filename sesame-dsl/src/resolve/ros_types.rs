@@ -291,7 +291,7 @@ impl<'a> Resolver<'a> {
             Type::Bool => WireType::Primitive { primitive: Primitive::Bool },
             Type::Int(_) => WireType::Primitive { primitive: Primitive::Int32 },
             Type::Real(_) => WireType::Primitive { primitive: Primitive::Float64 },
-            Type::Text => WireType::String,
+            Type::Text => WireType::STRING,
             Type::Point(_) => {
                 let name = "geometry_msgs/msg/Point".to_owned();
                 self.keep(&interfaces::known(&name).unwrap_or_default());
@@ -382,7 +382,7 @@ impl<'a> Resolver<'a> {
             WireType::Primitive { primitive: Primitive::Bool } => Type::Bool,
             WireType::Primitive { primitive: Primitive::Float32 | Primitive::Float64 } => Type::Real(None),
             WireType::Primitive { .. } => Type::Int(None),
-            WireType::String | WireType::WString => Type::Text,
+            WireType::String { .. } | WireType::WString { .. } => Type::Text,
             WireType::Array { of, .. } | WireType::Sequence { of, .. } => {
                 Type::List(Box::new(self.language_type(of, all, at)))
             }

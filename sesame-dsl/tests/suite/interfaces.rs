@@ -34,7 +34,7 @@ fn header() -> Vec<Interface> {
         interface("builtin_interfaces/msg/Time", &time),
         interface(
             "cell_msgs/msg/Header",
-            &[("stamp", inner("builtin_interfaces/msg/Time")), ("frame", WireType::String)],
+            &[("stamp", inner("builtin_interfaces/msg/Time")), ("frame", WireType::STRING)],
         ),
     ]
 }
@@ -59,7 +59,7 @@ impl Interfaces for Memory {
                     ("zones", zones),
                     ("count", of(Primitive::Uint64)),
                     ("ok", of(Primitive::Bool)),
-                    ("name", WireType::WString),
+                    ("name", WireType::WSTRING),
                 ];
                 found.push(interface(name, &fields));
             }

@@ -130,7 +130,7 @@ fn language_type(types: &Types, names: &BTreeMap<&str, String>, ty: &WireType) -
         WireType::Primitive { primitive: Primitive::Bool } => "bool".to_owned(),
         WireType::Primitive { primitive: Primitive::Float32 | Primitive::Float64 } => "real".to_owned(),
         WireType::Primitive { .. } => "int".to_owned(),
-        WireType::String | WireType::WString => "text".to_owned(),
+        WireType::String { .. } | WireType::WString { .. } => "text".to_owned(),
         WireType::Array { of, .. } | WireType::Sequence { of, .. } => {
             format!("list of {}", language_type(types, names, of))
         }
@@ -147,7 +147,7 @@ fn is_usual(ty: &WireType) -> bool {
         WireType::Primitive { primitive } => {
             matches!(primitive, Primitive::Bool | Primitive::Int32 | Primitive::Float64)
         }
-        WireType::String => true,
+        WireType::String { bound: None } => true,
         WireType::Sequence { of, bound: None } => is_usual(of),
         _ => false,
     }

@@ -51,11 +51,11 @@ fn written(ty: &Ty) -> String {
         // A `byte` has a sign in ROS 1, and none in ROS 2.
         Ty::Primitive(Primitive::Int8 | Primitive::Uint8) => "int8".to_owned(),
         Ty::Primitive(primitive) => primitive.name().to_owned(),
-        Ty::String => "string".to_owned(),
-        Ty::WString => "wstring".to_owned(),
+        // How long a text may be, or how many elements there may be, makes no difference on the wire.
+        Ty::String(_) => "string".to_owned(),
+        Ty::WString(_) => "wstring".to_owned(),
         Ty::Structure(_) => "message".to_owned(),
         Ty::Array(of, length) => format!("{}[{length}]", written(of)),
-        // At most how many elements there are makes no difference on the wire.
         Ty::Sequence(of, _) => format!("{}[]", written(of)),
     }
 }
@@ -65,6 +65,6 @@ fn innermost(ty: &Ty) -> Option<usize> {
     match ty {
         Ty::Structure(at) => Some(*at),
         Ty::Array(of, _) | Ty::Sequence(of, _) => innermost(of),
-        Ty::Primitive(_) | Ty::String | Ty::WString => None,
+        Ty::Primitive(_) | Ty::String(_) | Ty::WString(_) => None,
     }
 }

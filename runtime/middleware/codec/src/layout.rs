@@ -45,8 +45,10 @@ pub(crate) enum Meaning {
 #[derive(Debug)]
 pub(crate) enum Ty {
     Primitive(Primitive),
-    String,
-    WString,
+    /// With at most so many bytes.
+    String(Option<u32>),
+    /// With at most so many units of two bytes.
+    WString(Option<u32>),
     /// Position in [`Layout::structures`].
     Structure(usize),
     Array(Box<Ty>, usize),
@@ -123,7 +125,7 @@ impl Size {
     pub(crate) fn of<D: Dialect>(ty: &Ty, structures: &[Structure]) -> Self {
         match ty {
             Ty::Primitive(primitive) => Size::fixed(Run::number::<D>(primitive.size())),
-            Ty::String | Ty::WString | Ty::Sequence(..) => Size { least: LENGTH, work: LENGTH, run: None },
+            Ty::String(_) | Ty::WString(_) | Ty::Sequence(..) => Size { least: LENGTH, work: LENGTH, run: None },
             Ty::Structure(at) => structures[*at].size,
             Ty::Array(of, length) => Size::of::<D>(of, structures).times(*length),
         }
@@ -189,9 +191,9 @@ fn ty<D: Dialect>(
 ) -> Result<Ty, LayoutError> {
     Ok(match of {
         WireType::Primitive { primitive } => Ty::Primitive(*primitive),
-        WireType::String => Ty::String,
-        WireType::WString if D::WIDE => Ty::WString,
-        WireType::WString => {
+        WireType::String { bound } => Ty::String(*bound),
+        WireType::WString { bound } if D::WIDE => Ty::WString(*bound),
+        WireType::WString { .. } => {
             return Err(LayoutError::Wide { name: interface.name.clone(), field: field.name.clone() });
         }
         WireType::Interface { name } => Ty::Structure(position(name)?),

@@ -140,11 +140,11 @@ impl<'a, D: Dialect> Input<'a, D> {
     pub(crate) fn skip(&mut self, layout: &Layout, ty: &Ty) -> Result<(), CodecError> {
         match ty {
             Ty::Primitive(primitive) => self.take(Run::number::<D>(primitive.size())).map(drop),
-            Ty::String => {
+            Ty::String(_) => {
                 let run = self.string()?;
                 self.take(run).map(drop)
             }
-            Ty::WString => {
+            Ty::WString(_) => {
                 let units = self.wide_string()?;
                 self.take(Run::number::<D>(WIDE).times(units)).map(drop)
             }
@@ -221,8 +221,8 @@ fn value<D: Dialect>(
             let bits = input.bits(primitive.size())?;
             value_of(*primitive, bits).ok_or(CodecError::TooLarge { path: String::new(), number: bits })
         }
-        Ty::String => input.text().map(Value::Text),
-        Ty::WString => input.wide_text().map(Value::Text),
+        Ty::String(_) => input.text().map(Value::Text),
+        Ty::WString(_) => input.wide_text().map(Value::Text),
         Ty::Array(of, length) => list(*length, of, input),
         Ty::Sequence(of, bound) => {
             let length = input.length(Size::of::<D>(of, &layout.structures).least, *bound)?;

@@ -90,9 +90,9 @@ fn interfaces() -> impl Strategy<Value = Vec<Interface>> {
     fn ty(drawn: &AnyType, before: &[Interface]) -> WireType {
         match drawn {
             AnyType::Primitive(at) => WireType::Primitive { primitive: PRIMITIVES[*at] },
-            AnyType::String => WireType::String,
-            AnyType::WString => WireType::WString,
-            AnyType::Before(_) if before.is_empty() => WireType::String,
+            AnyType::String => WireType::STRING,
+            AnyType::WString => WireType::WSTRING,
+            AnyType::Before(_) if before.is_empty() => WireType::STRING,
             AnyType::Before(at) => WireType::Interface { name: at.get(before).name.clone() },
             AnyType::Array(of, length) => WireType::Array { of: Box::new(ty(of, before)), length: *length },
             AnyType::Sequence(of) => WireType::Sequence { of: Box::new(ty(of, before)), bound: None },
@@ -124,7 +124,7 @@ fn interfaces() -> impl Strategy<Value = Vec<Interface>> {
 fn without_wide(all: &[Interface]) -> Vec<Interface> {
     fn narrow(ty: &WireType) -> WireType {
         match ty {
-            WireType::WString => WireType::String,
+            WireType::WString { .. } => WireType::STRING,
             WireType::Array { of, length } => WireType::Array { of: Box::new(narrow(of)), length: *length },
             WireType::Sequence { of, bound } => WireType::Sequence { of: Box::new(narrow(of)), bound: *bound },
             other => other.clone(),
@@ -149,7 +149,7 @@ fn raw(ty: &WireType, all: &[Interface], draw: &mut impl FnMut() -> u64) -> Raw 
                 _ => bits,
             })
         }
-        WireType::String | WireType::WString => {
+        WireType::String { .. } | WireType::WString { .. } => {
             let length = draw() % 5;
             Raw::Text((0..length).map(|_| ['a', 'ß', '€', '𝄞', 'z'][(draw() % 5) as usize]).collect())
         }
@@ -178,12 +178,12 @@ fn encode(naive: Naive, ty: &WireType, raw: &Raw, all: &[Interface], little: boo
     };
     match (ty, raw) {
         (WireType::Primitive { primitive }, Raw::Bits(bits)) => number(*bits, primitive.size()),
-        (WireType::String, Raw::Text(text)) => {
+        (WireType::String { .. }, Raw::Text(text)) => {
             let zero: &[u8] = if naive.terminated { &[0] } else { &[] };
             number((text.len() + zero.len()) as u64, 4);
             out.extend([text.as_bytes(), zero].concat());
         }
-        (WireType::WString, Raw::Text(text)) => {
+        (WireType::WString { .. }, Raw::Text(text)) => {
             number(text.encode_utf16().count() as u64, 4);
             text.encode_utf16().for_each(|unit| number(u64::from(unit), 4));
         }
@@ -381,7 +381,7 @@ fn errors_in_cdr_say_where() {
         (of(Primitive::Int8), &[0]),
         (of(Primitive::Int8), &[0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0]),
         (sequence(of(Primitive::Int8), Some(2)), &[0, 1, 0, 0, 3, 0, 0, 0, 1, 2, 3]),
-        (sequence(WireType::String, Some(2)), &[0, 1, 0, 0, 2, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 255, 255, 255, 255],),
+        (sequence(WireType::STRING, Some(2)), &[0, 1, 0, 0, 2, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 255, 255, 255, 255],),
         (sequence(of(Primitive::Float64), None), &[0, 1, 0, 0, 255, 255, 255, 127]),
     ]));
 }
@@ -393,7 +393,7 @@ fn errors_in_ros_1_say_where() {
         (of(Primitive::Uint64), &[255, 255, 255, 255, 255, 255, 255, 255]),
         (of(Primitive::Int8), &[1, 0]),
         (sequence(of(Primitive::Int8), Some(2)), &[3, 0, 0, 0, 1, 2, 3]),
-        (sequence(WireType::String, None), &[2, 0, 0, 0, 1, 0, 0, 0, 0, 255, 255, 255]),
+        (sequence(WireType::STRING, None), &[2, 0, 0, 0, 1, 0, 0, 0, 0, 255, 255, 255]),
         (sequence(of(Primitive::Float64), None), &[255, 255, 255, 127]),
     ]));
 }

@@ -83,7 +83,7 @@ impl<'a, D: Dialect> Output<'a, D> {
             return self.copy_unchanged(ty, input);
         };
         match ty {
-            Ty::Primitive(_) | Ty::String | Ty::WString => self.replace(ty, now, input),
+            Ty::Primitive(_) | Ty::String(_) | Ty::WString(_) => self.replace(ty, now, input),
             Ty::Structure(at) => {
                 let structure = &layout.structures[*at];
                 if matches!(structure.meaning, Meaning::Time(_)) {
@@ -141,12 +141,12 @@ impl<'a, D: Dialect> Output<'a, D> {
         }
         match ty {
             Ty::Primitive(primitive) => self.copy_run(Run::number::<D>(primitive.size()), input),
-            Ty::String => {
+            Ty::String(_) => {
                 let run = input.string()?;
                 self.length(run.size);
                 self.copy_run(run, input)
             }
-            Ty::WString => {
+            Ty::WString(_) => {
                 let units = input.wide_string()?;
                 self.length(units);
                 self.copy_run(Run::number::<D>(WIDE).times(units), input)
@@ -209,16 +209,16 @@ impl<'a, D: Dialect> Output<'a, D> {
     fn value(&mut self, ty: &Ty, value: Option<&Value>) {
         match ty {
             Ty::Primitive(primitive) => self.bits(bits_of(*primitive, value), primitive.size()),
-            Ty::String => {
-                let text = text(value);
+            Ty::String(bound) => {
+                let text = fitting(text(value), *bound, char::len_utf8);
                 self.length(text.len() + usize::from(D::TERMINATED));
                 self.bytes.extend_from_slice(text.as_bytes());
                 if D::TERMINATED {
                     self.bytes.push(0);
                 }
             }
-            Ty::WString => {
-                let text = text(value);
+            Ty::WString(bound) => {
+                let text = fitting(text(value), *bound, char::len_utf16);
                 self.length(text.encode_utf16().count());
                 text.encode_utf16().for_each(|unit| self.bits(u64::from(unit), WIDE));
             }
@@ -255,6 +255,20 @@ impl<'a, D: Dialect> Output<'a, D> {
 
 fn text(value: Option<&Value>) -> &str {
     if let Some(Value::Text(text)) = value { Text::as_str(text) } else { "" }
+}
+
+/// The first characters of a text, as many as a type may have units of this length.
+fn fitting(text: &str, bound: Option<u32>, length: impl Fn(char) -> usize) -> &str {
+    let Some(bound) = bound else { return text };
+    let mut left = bound as usize;
+    let too_far = text.char_indices().find(|(_, character)| match left.checked_sub(length(*character)) {
+        Some(after) => {
+            left = after;
+            false
+        }
+        None => true,
+    });
+    too_far.map_or(text, |(at, _)| &text[..at])
 }
 
 fn items(value: Option<&Value>) -> &[Value] {

@@ -78,11 +78,11 @@ impl Canonical<'_> {
             WireType::Primitive { primitive } => {
                 self.copy(primitive.size(), primitive.size());
             }
-            WireType::String => {
+            WireType::String { .. } => {
                 let length = self.length();
                 self.copy(1, length);
             }
-            WireType::WString => {
+            WireType::WString { .. } => {
                 let length = self.length();
                 (0..length).for_each(|_| self.value(&WireType::Primitive { primitive: Primitive::Uint32 }));
             }

@@ -200,8 +200,10 @@ fn of_ros2(interface: &Interface) -> String {
 fn type_in_ros2(ty: &WireType) -> String {
     match ty {
         WireType::Primitive { primitive } => primitive.name().to_owned(),
-        WireType::String => "string".to_owned(),
-        WireType::WString => "wstring".to_owned(),
+        WireType::String { bound: None } => "string".to_owned(),
+        WireType::String { bound: Some(bound) } => format!("string<={bound}"),
+        WireType::WString { bound: None } => "wstring".to_owned(),
+        WireType::WString { bound: Some(bound) } => format!("wstring<={bound}"),
         WireType::Interface { name } => short(name),
         WireType::Array { of, length } => format!("{}[{length}]", type_in_ros2(of)),
         WireType::Sequence { of, bound: None } => format!("{}[]", type_in_ros2(of)),

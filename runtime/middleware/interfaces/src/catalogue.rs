@@ -115,6 +115,6 @@ fn nested(ty: &WireType) -> Option<&str> {
     match ty {
         WireType::Interface { name } => Some(name),
         WireType::Array { of, .. } | WireType::Sequence { of, .. } => nested(of),
-        WireType::Primitive { .. } | WireType::String | WireType::WString => None,
+        WireType::Primitive { .. } | WireType::String { .. } | WireType::WString { .. } => None,
     }
 }

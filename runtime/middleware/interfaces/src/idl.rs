@@ -339,11 +339,14 @@ impl Parser {
                 _ => self.wrong("expected `short` or `long`"),
             },
             "string" | "wstring" => {
-                if self.takes('<') {
-                    self.length()?;
+                let bound = if self.takes('<') {
+                    let bound = self.length()?;
                     self.sign('>')?;
-                }
-                Ok(if word == "string" { WireType::String } else { WireType::WString })
+                    Some(bound)
+                } else {
+                    None
+                };
+                Ok(if word == "string" { WireType::String { bound } } else { WireType::WString { bound } })
             }
             "sequence" => {
                 self.sign('<')?;

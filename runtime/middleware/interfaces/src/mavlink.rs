@@ -101,7 +101,7 @@ impl FieldKind {
 impl Field {
     /// Its type, as a type of ROS would be: an array of characters is a text.
     pub fn wire_type(&self) -> WireType {
-        let FieldKind::Number(primitive) = self.kind else { return WireType::String };
+        let FieldKind::Number(primitive) = self.kind else { return WireType::STRING };
         let number = WireType::Primitive { primitive };
         match self.elements.and_then(|elements| u32::try_from(elements).ok()) {
             Some(length) => WireType::Array { of: Box::new(number), length },

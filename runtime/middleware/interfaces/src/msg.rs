@@ -108,19 +108,20 @@ pub(crate) fn array(written: &str, element: &dyn Fn(&str) -> Result<WireType, St
 }
 
 fn element(package: &str, written: &str) -> Result<WireType, String> {
-    // How long a text may be makes no difference on the wire.
-    let (name, bound) = written.split_once("<=").map_or((written, None), |(name, bound)| (name, Some(bound)));
-    if let Some(bound) = bound
-        && (!matches!(name, "string" | "wstring") || bound.parse::<u32>().is_err())
-    {
-        return Err(format!("`{written}` is not a bounded text"));
+    if let Some((name, bound)) = written.split_once("<=") {
+        return match (name, bound.parse()) {
+            ("string", Ok(bound)) => Ok(WireType::String { bound: Some(bound) }),
+            ("wstring", Ok(bound)) => Ok(WireType::WString { bound: Some(bound) }),
+            _ => Err(format!("`{written}` is not a bounded text")),
+        };
     }
+    let name = written;
     if let Some(primitive) = Primitive::named(name) {
         return Ok(WireType::Primitive { primitive });
     }
     let name = match name {
-        "string" => return Ok(WireType::String),
-        "wstring" => return Ok(WireType::WString),
+        "string" => return Ok(WireType::STRING),
+        "wstring" => return Ok(WireType::WSTRING),
         "time" | "duration" => {
             return Err(format!("`{name}` is of ROS 1; in ROS 2 it is `builtin_interfaces/{}`", capital(name)));
         }

@@ -89,7 +89,7 @@ pub fn text(interface: &Interface) -> String {
 fn written(ty: &WireType) -> String {
     match ty {
         WireType::Primitive { primitive } => primitive.name().to_owned(),
-        WireType::String | WireType::WString => "string".to_owned(),
+        WireType::String { .. } | WireType::WString { .. } => "string".to_owned(),
         WireType::Interface { name } => {
             let time = TIMES.iter().find(|(_, interface)| interface == name);
             time.map_or_else(|| type_name(name), |(word, _)| (*word).to_owned())
@@ -197,7 +197,7 @@ fn wire_type(package: &str, written: &str) -> Result<WireType, String> {
             return Ok(WireType::Primitive { primitive });
         }
         if element == "string" {
-            return Ok(WireType::String);
+            return Ok(WireType::STRING);
         }
         if let Some((_, name)) = TIMES.iter().find(|(time, _)| *time == element) {
             return Ok(WireType::Interface { name: (*name).to_owned() });
@@ -239,7 +239,7 @@ mod tests {
         let field = |&(ty, name): &(&str, &str)| InterfaceField {
             name: name.to_owned(),
             ty: match ty {
-                "string" => WireType::String,
+                "string" => WireType::STRING,
                 "uint32" => WireType::Primitive { primitive: Primitive::Uint32 },
                 _ => WireType::Interface { name: ty.to_owned() },
             },

@@ -29,8 +29,10 @@ bool[] flags [true, false]
 fn words(ty: &WireType) -> String {
     match ty {
         WireType::Primitive { primitive } => format!("{primitive:?}").to_lowercase(),
-        WireType::String => "string".into(),
-        WireType::WString => "wstring".into(),
+        WireType::String { bound: None } => "string".into(),
+        WireType::String { bound: Some(bound) } => format!("string<={bound}"),
+        WireType::WString { bound: None } => "wstring".into(),
+        WireType::WString { bound: Some(bound) } => format!("wstring<={bound}"),
         WireType::Interface { name } => name.clone(),
         WireType::Array { of, length } => format!("{}[{length}]", words(of)),
         WireType::Sequence { of, bound: None } => format!("{}[]", words(of)),

@@ -51,8 +51,8 @@ fn interfaces() -> [Interface; 3] {
         Interface {
             name: ENTITIES.to_owned(),
             fields: vec![
-                field("node_namespace", WireType::String),
-                field("node_name", WireType::String),
+                field("node_namespace", WireType::STRING),
+                field("node_name", WireType::STRING),
                 field("reader_gid_seq", sequence(GID)),
                 field("writer_gid_seq", sequence(GID)),
             ],

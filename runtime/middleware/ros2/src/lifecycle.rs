@@ -46,7 +46,7 @@ fn interfaces() -> Vec<Interface> {
     let truth = |name: &str| field(name, WireType::Primitive { primitive: Primitive::Bool });
     let nested = |name: &str, of: &str| field(name, WireType::Interface { name: of.to_owned() });
     let interface = |name: &str, fields| Interface { name: name.to_owned(), fields };
-    let named = || vec![number("id"), field("label", WireType::String)];
+    let named = || vec![number("id"), field("label", WireType::STRING)];
     vec![
         interface(STATE, named()),
         interface(TRANSITION, named()),

@@ -183,7 +183,7 @@ fn blank(ty: &WireType, dialect: Dialect, known: &BTreeMap<String, Json>) -> Jso
         WireType::Primitive { primitive: Primitive::Bool } => Json::from(false),
         WireType::Primitive { primitive: Primitive::Float32 | Primitive::Float64 } => Json::from(0.0),
         WireType::Primitive { .. } => Json::from(0),
-        WireType::String | WireType::WString => Json::from(""),
+        WireType::String { .. } | WireType::WString { .. } => Json::from(""),
         WireType::Interface { name } => match name.as_str() {
             "builtin_interfaces/msg/Time" | "builtin_interfaces/msg/Duration" => time(0.0, names_of(dialect)),
             name => known.get(name).cloned().unwrap_or_else(|| json!({})),

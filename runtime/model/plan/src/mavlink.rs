@@ -37,7 +37,7 @@ fn words(field: &WireType) -> &'static [&'static str] {
     match field {
         WireType::Primitive { primitive: Primitive::Float32 | Primitive::Float64 } => &["real"],
         WireType::Primitive { .. } => &["int", "real", "bool"],
-        WireType::String => &["text"],
+        WireType::String { .. } => &["text"],
         _ => &[],
     }
 }
@@ -100,6 +100,6 @@ mod tests {
         assert_eq!(nearest_type(&of(Primitive::Int64), "real").as_deref(), Some("real"));
         assert_eq!(types_in_words(&array), "a `list of` `real`, of 4 elements");
         assert_eq!(types_in_words(&of(Primitive::Int8)), "`int`, `real` or `bool`");
-        assert_eq!(types_in_words(&WireType::String), "`text`");
+        assert_eq!(types_in_words(&WireType::STRING), "`text`");
     }
 }

@@ -230,7 +230,7 @@ fn in_interface(ty: &WireType) -> Option<&str> {
     match ty {
         WireType::Interface { name } => Some(name),
         WireType::Array { of, .. } | WireType::Sequence { of, .. } => in_interface(of),
-        WireType::Primitive { .. } | WireType::String | WireType::WString => None,
+        WireType::Primitive { .. } | WireType::String { .. } | WireType::WString { .. } => None,
     }
 }
 

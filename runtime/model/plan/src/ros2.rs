@@ -105,6 +105,25 @@ pub struct InterfaceField {
     pub ty: WireType,
 }
 
+impl WireType {
+    /// UTF-8 text of any length.
+    pub const STRING: WireType = WireType::String { bound: None };
+
+    /// UTF-16 text of any length.
+    pub const WSTRING: WireType = WireType::WString { bound: None };
+
+    /// The length of a text that is too long for this type, with the longest that is not: in bytes of UTF-8, or in
+    /// units of UTF-16. `None` for a text that fits, and for types that are no texts.
+    pub fn exceeded_by(&self, text: &str) -> Option<(usize, u32)> {
+        let (bound, length) = match self {
+            WireType::String { bound } => ((*bound)?, text.len()),
+            WireType::WString { bound } => ((*bound)?, text.encode_utf16().count()),
+            _ => return None,
+        };
+        (length > bound as usize).then_some((length, bound))
+    }
+}
+
 /// A type as it is on the wire.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
@@ -115,9 +134,17 @@ pub enum WireType {
         primitive: Primitive,
     },
     /// UTF-8 text.
-    String,
+    String {
+        /// At most how many bytes; `None` for any number.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        bound: Option<u32>,
+    },
     /// UTF-16 text.
-    WString,
+    WString {
+        /// At most how many units of two bytes; `None` for any number.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        bound: Option<u32>,
+    },
     /// Another message.
     Interface {
         /// Its name.

@@ -9,7 +9,7 @@ use crate::tests::{codec, field, nested, number, single};
 
 #[test]
 fn wide_text_is_as_the_nodes_of_ros_write_it() {
-    let codec = codec::<Cdr>(&single(WireType::WString), &Wanted::All);
+    let codec = codec::<Cdr>(&single(WireType::WSTRING), &Wanted::All);
     for (text, units) in [
         // The first field of `test_msgs/msg/WStrings`, as rclpy serialises it.
         ("aß𝄞", &[4, 0x61, 0xdf, 0xd834, 0xdd1e][..]),
@@ -27,10 +27,34 @@ fn wide_text_is_as_the_nodes_of_ros_write_it() {
 
 #[test]
 fn a_changed_message_does_not_announce_the_padding_of_its_sample() {
-    let codec = codec::<Cdr>(&single(WireType::String), &Wanted::All);
+    let codec = codec::<Cdr>(&single(WireType::STRING), &Wanted::All);
     let mut value = codec.read([0, 1, 0, 2, 2, 0, 0, 0, b'a', 0, 0, 0][..].into()).unwrap();
     *value.at_mut(&["f0"]).unwrap() = Value::Text("abc".into());
     assert_eq!(&*codec.write(&value).unwrap(), &[0, 1, 0, 0, 4, 0, 0, 0, b'a', b'b', b'c', 0]);
+}
+
+#[test]
+fn a_text_is_written_no_longer_than_its_type_permits() {
+    let written = |ty: WireType, text: &str| {
+        let codec = codec::<Cdr>(&single(ty), &Wanted::All);
+        let before = codec.write(&Record::new(&Fields::new(["f0"]), vec![Value::Text("".into())]).into()).unwrap();
+        let mut changed = codec.read(before).unwrap();
+        *changed.at_mut(&["f0"]).unwrap() = Value::Text(text.into());
+        let anew = Record::new(&Fields::new(["f0"]), vec![Value::Text(text.into())]).into();
+        let [changed, anew] = [changed, anew].map(|message| {
+            let read = codec.read(codec.write(&message).unwrap()).unwrap();
+            let Some(Value::Text(text)) = read.at(&["f0"]) else { panic!("{read:?} has no text") };
+            text.to_string()
+        });
+        assert_eq!(changed, anew);
+        anew
+    };
+    assert_eq!(written(WireType::STRING, "as long as it is"), "as long as it is");
+    assert_eq!(written(WireType::String { bound: Some(5) }, "five5"), "five5");
+    assert_eq!(written(WireType::String { bound: Some(5) }, "sixsix"), "sixsi");
+    assert_eq!(written(WireType::String { bound: Some(2) }, "aä"), "a", "two bytes for the last character");
+    assert_eq!(written(WireType::WString { bound: Some(2) }, "aäö"), "aä");
+    assert_eq!(written(WireType::WString { bound: Some(2) }, "a𝄞"), "a", "two units for the last character");
 }
 
 #[test]

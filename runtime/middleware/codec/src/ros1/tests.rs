@@ -15,7 +15,7 @@ fn stamped(seq: bool) -> Vec<Interface> {
         fields: vec![number("sec", sec), number("nanosec", Primitive::Uint32)],
     };
     let seq = seq.then(|| number("seq", Primitive::Uint32));
-    let rest = [nested("stamp", "builtin_interfaces/msg/Time"), field(1, WireType::String)];
+    let rest = [nested("stamp", "builtin_interfaces/msg/Time"), field(1, WireType::STRING)];
     let real = |name: &str| number(name, Primitive::Float32);
     let fields = vec![
         nested("header", "std_msgs/msg/Header"),
@@ -80,7 +80,7 @@ fn what_is_one_byte_in_ros_2_because_it_has_no_fields_has_none() {
 
 #[test]
 fn wide_text_is_refused_and_an_interface_is_found_without_the_middle_of_its_name() {
-    let wide = Codec::new(&single(WireType::WString), "p/M", &Wanted::All).unwrap_err();
+    let wide = Codec::new(&single(WireType::WSTRING), "p/M", &Wanted::All).unwrap_err();
     assert_eq!(wide, LayoutError::Wide { name: "p/msg/M".into(), field: "f0".into() });
-    assert!(Codec::new(&single(WireType::String), "p/M", &Wanted::All).is_ok());
+    assert!(Codec::new(&single(WireType::STRING), "p/M", &Wanted::All).is_ok());
 }

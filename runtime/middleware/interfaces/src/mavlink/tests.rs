@@ -104,7 +104,7 @@ fn fields_have_the_types_of_other_interfaces() {
     let ty = |name: &str| fields.iter().find(|field| field.name == name).unwrap().ty.clone();
     let of = |primitive| WireType::Primitive { primitive };
     assert_eq!(ty("wide"), of(Primitive::Float64));
-    assert_eq!((ty("name"), ty("letter")), (WireType::String, WireType::String));
+    assert_eq!((ty("name"), ty("letter")), (WireType::STRING, WireType::STRING));
     assert_eq!(ty("row"), WireType::Array { of: Box::new(of(Primitive::Int16)), length: 3 });
 }
 

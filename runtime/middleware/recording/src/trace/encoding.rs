@@ -73,7 +73,7 @@ impl Encoding {
     /// What operations did: texts in JSON.
     pub(super) fn operations(self) -> Encoder {
         if self.is_of_ros() {
-            return self.simple("String", WireType::String);
+            return self.simple("String", WireType::STRING);
         }
         let (name, text) = schema::of_operations();
         Encoder::json(name, text, true)
@@ -118,7 +118,7 @@ fn contained(known: &[Interface], name: &str) -> Vec<Interface> {
         match ty {
             WireType::Interface { name } => Some(name),
             WireType::Array { of, .. } | WireType::Sequence { of, .. } => nested(of),
-            WireType::Primitive { .. } | WireType::String | WireType::WString => None,
+            WireType::Primitive { .. } | WireType::String { .. } | WireType::WString { .. } => None,
         }
     }
     let mut needed = vec![name];

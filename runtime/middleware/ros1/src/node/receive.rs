@@ -236,7 +236,7 @@ mod tests {
         let nested = |name: &str| WireType::Interface { name: name.to_owned() };
         let interface = |name: &str, fields| Interface { name: name.to_owned(), fields };
         let time = vec![field("sec", number(Primitive::Int32)), field("nanosec", number(Primitive::Uint32))];
-        let stamped = vec![field("stamp", nested("builtin_interfaces/msg/Time")), field("frame_id", WireType::String)];
+        let stamped = vec![field("stamp", nested("builtin_interfaces/msg/Time")), field("frame_id", WireType::STRING)];
         let many = WireType::Sequence { of: Box::new(number(primitive)), bound: None };
         let all = [
             interface("builtin_interfaces/msg/Time", time),

@@ -25,7 +25,7 @@ fn plan() -> CampaignPlan {
         Node { publishes: sesame_plan::testing::topics(&[0]), ..node("publisher") },
         Node { subscribes: sesame_plan::testing::topics(&[0]), ..node("subscriber") },
     ];
-    let data = InterfaceField { name: "data".to_owned(), ty: WireType::String };
+    let data = InterfaceField { name: "data".to_owned(), ty: WireType::STRING };
     let interfaces = vec![Interface { name: string.to_owned(), fields: vec![data] }];
     plan.simulator.transport = sesame_plan::Transport::Ros1(Ros1 { master: MASTER.to_owned() });
     plan.simulator.ros = Some(Ros { interfaces, ..Ros::default() });

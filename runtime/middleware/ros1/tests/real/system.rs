@@ -20,7 +20,7 @@ fn interface(name: &str, fields: &[(&str, &str)]) -> Interface {
     let ty = |written: &str| {
         let (of, is_list) = written.strip_suffix("[]").map_or((written, false), |of| (of, true));
         let of = match of {
-            "string" => WireType::String,
+            "string" => WireType::STRING,
             "float64" => WireType::Primitive { primitive: Primitive::Float64 },
             "int32" => WireType::Primitive { primitive: Primitive::Int32 },
             "uint32" => WireType::Primitive { primitive: Primitive::Uint32 },

@@ -44,7 +44,7 @@ fn layouts() -> Vec<Interface> {
     let ty = |written: &str| {
         let (of, many) = written.strip_suffix("[]").map_or((written, false), |of| (of, true));
         let of = match of {
-            "string" => WireType::String,
+            "string" => WireType::STRING,
             "bool" => WireType::Primitive { primitive: Primitive::Bool },
             "uint8" => WireType::Primitive { primitive: Primitive::Uint8 },
             "uint64" => WireType::Primitive { primitive: Primitive::Uint64 },
@@ -88,9 +88,10 @@ impl Descriptions {
 
 fn individual(value: &Value) -> Option<Interface> {
     let field = |field: &Value| {
-        let [id, capacity] = ["type_id", "capacity"].map(|name| number(field.at(&["type", name])));
+        let [id, capacity, of_text] =
+            ["type_id", "capacity", "string_capacity"].map(|name| number(field.at(&["type", name])));
         let nested = text(field.at(&["type", "nested_type_name"])?)?;
-        let ty = wire_type(id?, capacity?, nested)?;
+        let ty = wire_type(id?, capacity?, of_text?, nested)?;
         Some(InterfaceField { name: text(field.at(&["name"])?)?.to_owned(), ty })
     };
     let fields = list(value.at(&["fields"])?)?.iter().map(field).collect::<Option<_>>()?;
@@ -98,8 +99,8 @@ fn individual(value: &Value) -> Option<Interface> {
 }
 
 /// The type of an id of `type_description_interfaces/msg/FieldType`.
-fn wire_type(id: i64, capacity: i64, nested: &str) -> Option<WireType> {
-    let of = Box::new(scalar(id % 48, nested)?);
+fn wire_type(id: i64, capacity: i64, of_text: i64, nested: &str) -> Option<WireType> {
+    let of = Box::new(scalar(id % 48, of_text, nested)?);
     let length = u32::try_from(capacity).ok();
     match id / 48 {
         0 => Some(*of),
@@ -110,7 +111,7 @@ fn wire_type(id: i64, capacity: i64, nested: &str) -> Option<WireType> {
     }
 }
 
-fn scalar(id: i64, nested: &str) -> Option<WireType> {
+fn scalar(id: i64, of_text: i64, nested: &str) -> Option<WireType> {
     let primitive = match id {
         1 => return Some(WireType::Interface { name: nested.to_owned() }),
         2 => Primitive::Int8,
@@ -125,8 +126,10 @@ fn scalar(id: i64, nested: &str) -> Option<WireType> {
         10 => Primitive::Float32,
         11 => Primitive::Float64,
         15 => Primitive::Bool,
-        17 | 21 => return Some(WireType::String),
-        18 | 22 => return Some(WireType::WString),
+        17 => return Some(WireType::STRING),
+        18 => return Some(WireType::WSTRING),
+        21 => return Some(WireType::String { bound: Some(u32::try_from(of_text).ok()?) }),
+        22 => return Some(WireType::WString { bound: Some(u32::try_from(of_text).ok()?) }),
         _ => return None,
     };
     Some(WireType::Primitive { primitive })

@@ -19,8 +19,8 @@ mod in_words {
     fn ty(ty: &WireType) -> String {
         match ty {
             WireType::Primitive { primitive } => format!("{primitive:?}").to_lowercase(),
-            WireType::String => "string".to_owned(),
-            WireType::WString => "wstring".to_owned(),
+            WireType::String { .. } => "string".to_owned(),
+            WireType::WString { .. } => "wstring".to_owned(),
             WireType::Interface { name } => name.clone(),
             WireType::Array { of, length } => format!("{}[{length}]", self::ty(of)),
             WireType::Sequence { of, .. } => format!("{}[]", self::ty(of)),

@@ -189,6 +189,6 @@ fn interface_of(ty: &WireType) -> Option<&str> {
     match ty {
         WireType::Interface { name } => Some(name),
         WireType::Array { of, .. } | WireType::Sequence { of, .. } => interface_of(of),
-        WireType::Primitive { .. } | WireType::String | WireType::WString => None,
+        WireType::Primitive { .. } | WireType::String { .. } | WireType::WString { .. } => None,
     }
 }

@@ -116,10 +116,11 @@ fn fault(kind: &OperationKind) -> Option<NodeFault> {
     }
 }
 
-/// What an operation does to which node; nothing for the parameter of a node, which such a simulator does not have.
+/// What an operation does to which node; nothing for its parameters and its lifecycle, which nodes of such a simulator do
+/// not have.
 fn wanted(resource: &Resource) -> Option<(NodeId, Condition)> {
     match *resource {
-        Resource::Set { .. } => None,
+        Resource::Set { .. } | Resource::Transition { .. } => None,
         Resource::Pause { node } => Some((node, Condition::Paused)),
         Resource::Slow { node, share } => Some((node, Condition::Slow(share))),
         Resource::Kill { node } => Some((node, Condition::Dead)),
