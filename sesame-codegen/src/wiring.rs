@@ -22,6 +22,7 @@ pub fn text(plan: &CampaignPlan) -> String {
         }
         writeln!(out, "# node {}", node.name).expect(STRING);
         writeln!(out, "ros2 run … {}", arguments.join(" ")).expect(STRING);
+        out.push_str(&heard_undisturbed(plan, id));
     }
     for (channel, remapping) in plan.unclaimed() {
         let programs = match channel {
@@ -49,6 +50,7 @@ fn names(plan: &CampaignPlan) -> String {
         for Remapping { from, to } in remappings {
             writeln!(out, "{from} → {to}").expect(STRING);
         }
+        out.push_str(&heard_undisturbed(plan, id));
     }
     for (_, Remapping { from, to }) in plan.unclaimed() {
         writeln!(out, "# every program that publishes or offers {from}\n{from} → {to}").expect(STRING);
@@ -57,6 +59,14 @@ fn names(plan: &CampaignPlan) -> String {
         out.push_str("# no operation acts on a topic: nothing is remapped\n");
     }
     out
+}
+
+/// That a node hears nothing of what operations do on paths that it both publishes and subscribes to.
+fn heard_undisturbed(plan: &CampaignPlan, id: NodeId) -> String {
+    let line = |path: String| {
+        format!("# it also subscribes to {path}, under the same new name: operations do not reach it there\n")
+    };
+    plan.heard_undisturbed(id).into_iter().map(line).collect()
 }
 
 /// Where clients of a bridge connect that are one node each: the proxies change their names.
@@ -94,6 +104,26 @@ mod tests {
     #[test]
     fn each_node_gets_a_line_to_paste() {
         insta::assert_snapshot!(text(&plan(ARMS)));
+    }
+
+    #[test]
+    fn a_node_that_subscribes_to_what_it_publishes_is_told_that_operations_do_not_reach_it_there() {
+        let filter = "space filter\n\
+            system {\n\
+              simulator robots = ros2\n\
+              message Level = \"std_msgs/msg/Float64\"\n\
+              topic level = \"/{r1,r2}/level\" : Level\n\
+              node filter \"/{r1,r2}/filter\" { publishes level  subscribes level[*] }\n\
+            }\n\
+            metric highest maximise default 0 = max(level.data)\n\
+            operation cut on level = blackhole\n\
+            campaign delays {\n\
+              objectives highest\n\
+              operations cut 1 per test\n\
+              search     random { evaluations 10 }\n\
+              end        after 5s\n\
+            }\n";
+        insta::assert_snapshot!(text(&plan(filter)));
     }
 
     #[test]

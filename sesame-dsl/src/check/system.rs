@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use sesame_plan::without_member;
 
 use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{Channel, Declaration, MetricSource, Operation, Space, TopicId};
+use crate::model::{Channel, Declaration, MetricSource, Node, Operation, Space, TopicId, TopicMembers};
 use crate::resolve::list;
 
 /// Operations whose name ends with the name of a topic that they do not disturb.
@@ -36,11 +36,12 @@ pub(super) fn misnamed_operations(space: &Space, diagnostics: &mut Vec<Diagnosti
 /// Operations on topics without a subscriber, if nodes say what they subscribe to: no node subscribes to the topic, no
 /// monitor needs it, and no outbound metric reads it.
 pub(super) fn unheard_operations(space: &Space, diagnostics: &mut Vec<Diagnostic>) {
-    let subscribed = space.nodes.values().flat_map(|node| &node.subscribes).map(|used| used.topic);
-    let mut heard: BTreeSet<TopicId> = subscribed.collect();
-    if heard.is_empty() {
+    let subscribed = space.nodes.values().flat_map(|node| node.subscribes.iter().map(move |used| (node, used)));
+    if subscribed.clone().next().is_none() {
         return;
     }
+    let others = subscribed.filter(|(node, used)| !hears_itself_alone(space, node, used));
+    let mut heard: BTreeSet<TopicId> = others.map(|(_, used)| used.topic).collect();
     for metric in space.metrics.values() {
         match &metric.source {
             MetricSource::Robustness(robustness) if robustness.outbound => {
@@ -61,11 +62,11 @@ pub(super) fn unheard_operations(space: &Space, diagnostics: &mut Vec<Diagnostic
         let unheard: Vec<&Declaration> = unheard.map(|topic| &space.topics[topic].declaration).collect();
         let Some(topic) = unheard.first() else { continue };
         if unheard.len() < operation.targets.len() {
-            diagnostics.extend(unheard.iter().map(|topic| partly_unheard(operation, topic)));
+            diagnostics.extend(unheard.iter().map(|topic| partly_unheard(space, operation, topic)));
             continue;
         }
-        let title =
-            format!("operation `{}` has no effect: no node subscribes to `{}`", operation.declaration.name, topic.name);
+        let name = &operation.declaration.name;
+        let title = format!("operation `{name}` has no effect: {} to `{}`", who_subscribes(space, topic), topic.name);
         diagnostics.push(
             Diagnostic::new(Code::NOBODY_HEARS, operation.declaration.span, title)
                 .label("no monitor and no outbound metric reads its topic either")
@@ -75,10 +76,32 @@ pub(super) fn unheard_operations(space: &Space, diagnostics: &mut Vec<Diagnostic
     }
 }
 
+/// Whether a node of ROS subscribes only to paths of a topic that it publishes itself. One rule renames both, so that
+/// what operations do on these paths does not reach it.
+fn hears_itself_alone(space: &Space, node: &Node, used: &TopicMembers) -> bool {
+    let topic = &space.topics[used.topic];
+    let one_rule = space.simulator.ros.is_some() && space.simulator.proxies.is_empty();
+    let own = node.publishes.iter().find(|own| own.topic == used.topic);
+    let count = u32::try_from(topic.paths.len()).unwrap_or(u32::MAX);
+    let publishes = |member: u32| own.is_some_and(|own| own.has(member));
+    one_rule && topic.channel == Channel::Topic && (0..count).all(|member| !used.has(member) || publishes(member))
+}
+
+/// Who subscribes to a topic that nobody hears as operations change it, as the subject and verb of a sentence.
+fn who_subscribes(space: &Space, topic: &Declaration) -> &'static str {
+    let mut used = space.nodes.values().flat_map(|node| &node.subscribes);
+    let subscribes = used.any(|used| space.topics[used.topic].declaration.name == topic.name);
+    if subscribes {
+        "only nodes that publish on it, and so hear it undisturbed, subscribe"
+    } else {
+        "no node subscribes"
+    }
+}
+
 /// An operation on several topics, one of which nobody hears.
-fn partly_unheard(operation: &Operation, topic: &Declaration) -> Diagnostic {
+fn partly_unheard(space: &Space, operation: &Operation, topic: &Declaration) -> Diagnostic {
     let name = &operation.declaration.name;
-    let title = format!("operation `{name}` has no effect on `{}`: no node subscribes to it", topic.name);
+    let title = format!("operation `{name}` has no effect on `{}`: {} to it", topic.name, who_subscribes(space, topic));
     Diagnostic::new(Code::NOBODY_HEARS, operation.declaration.span, title)
         .label("no monitor and no outbound metric reads this topic either")
         .secondary(topic.span, "the topic is declared here")

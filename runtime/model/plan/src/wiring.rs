@@ -57,6 +57,24 @@ impl CampaignPlan {
         remappings
     }
 
+    /// The paths on which a node of ROS hears nothing that operations do: it publishes and subscribes there, and one
+    /// rule renames both.
+    pub fn heard_undisturbed(&self, id: NodeId) -> Vec<String> {
+        let node = &self.nodes[id.index()];
+        if self.simulator.properties().ros.is_none() {
+            return Vec::new();
+        }
+        let subscribes = |path: &String| {
+            let mut topics = (0..).map(TopicId).zip(&self.topics);
+            topics.any(|(id, topic)| {
+                let member = topic.paths.iter().position(|own| own == path);
+                topic.channel == Channel::Topic
+                    && member.is_some_and(|member| node.publishes_on(id, member) && node.subscribes_to(id, member))
+            })
+        };
+        self.remappings(id).into_iter().map(|remapping| remapping.from).filter(subscribes).collect()
+    }
+
     /// The names of the wires that an operation may act on, in the order of the plan's topics: those of its topics, or
     /// of the ways to the subscribers that it names. Each with its topic.
     pub fn wires_of(&self, operation: &Operation) -> Vec<(TopicId, String)> {

@@ -51,7 +51,8 @@ fn plans() -> [CampaignPlan; 2] {
     [plan, without]
 }
 
-/// Levels are late by 130 ms from 1 s to 3 s, so that they are due between steps. Meanwhile the cell is told to be slow.
+/// Levels are late by 130 ms from 1 s to 3 s, so that they are due between steps. Meanwhile the cell is told to be
+/// slow.
 fn late() -> Test {
     let value = |value| vec![Choice::Value { value }];
     test_of(vec![use_of(0, 1.0, 3.0, value(0.13), 1), use_of(1, 1.5, 2.5, value(0.5), 2)])
