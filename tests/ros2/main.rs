@@ -15,6 +15,7 @@ mod codec;
 mod examples;
 mod faults;
 mod fleet;
+mod latched;
 mod late_server;
 mod links;
 mod lock_step;

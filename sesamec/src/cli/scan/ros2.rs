@@ -36,7 +36,11 @@ pub(super) fn scan(shell: Shell, language: &Language, arguments: &Ros2) -> anyho
         types.add_described(&described, &definitions.files, definitions.folders(Dialect::Ros2));
     }
     drop(scanner);
-    let network = if arguments.network { "" } else { ", and nodes on other machines are heard with `--network` only" };
+    let network = if arguments.network {
+        ""
+    } else {
+        ", and nodes on other machines, or of Cyclone DDS on a network interface, are heard with `--network` only"
+    };
     let nothing = format!("nothing runs in domain {domain}; the domain of a node is its ROS_DOMAIN_ID{network}");
     tell(shell, &facts, &nothing);
     let services = definitions.services(&facts);

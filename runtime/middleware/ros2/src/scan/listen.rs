@@ -52,7 +52,7 @@ impl Scanner {
     /// Joins a domain: of this machine only, unless `network` says otherwise.
     pub fn join(domain: u16, network: bool) -> Result<Self, ScanError> {
         let mut dds = Participant::join(domain, network)?;
-        let info_reader = dds.read(DISCOVERY_TOPIC, DISCOVERY_TYPE, &nodes_qos())?;
+        let info_reader = dds.read(DISCOVERY_TOPIC, DISCOVERY_TYPE, &kept_qos())?;
         Ok(Scanner {
             domain,
             listened: Duration::ZERO,
@@ -100,9 +100,10 @@ impl Scanner {
 
     /// Subscribes to topics that have appeared.
     fn count_new_topics(&mut self) -> Result<(), DdsError> {
-        for publisher in self.dds.publishers() {
+        let publishers = self.dds.publishers();
+        for publisher in &publishers {
             let is_topic = matches!(names::in_ros(&publisher.topic), Some((Kind::Topic, _)));
-            let key = (publisher.topic, publisher.type_name);
+            let key = (publisher.topic.clone(), publisher.type_name.clone());
             if !is_topic || self.counted.len() >= MOST_COUNTED || self.counted.contains_key(&key) {
                 continue;
             }
@@ -110,7 +111,8 @@ impl Scanner {
             if self.counted.keys().any(|(topic, _)| *topic == key.0) {
                 continue;
             }
-            let reader = self.dds.read(&key.0, &key.1, &counting_qos())?;
+            let all_keep = publishers.iter().filter(|other| other.topic == key.0).all(|other| keeps(&other.qos));
+            let reader = self.dds.read(&key.0, &key.1, &if all_keep { kept_qos() } else { counting_qos() })?;
             self.counted.insert(key, reader);
         }
         Ok(())
@@ -159,8 +161,14 @@ impl Scanner {
     }
 }
 
-/// What is asked for of those who say what nodes they have.
-fn nodes_qos() -> QosPolicies {
+/// Whether a publisher keeps messages for those who subscribe later, and sends them again until they have come.
+fn keeps(qos: &QosPolicies) -> bool {
+    matches!(qos.reliability(), Some(Reliability::Reliable { .. }))
+        && !matches!(qos.durability(), None | Some(Durability::Volatile))
+}
+
+/// What is asked for of those who keep what they have said, such as which nodes they have, or `/tf_static`.
+fn kept_qos() -> QosPolicies {
     rustdds::QosPolicyBuilder::new()
         .reliability(Reliability::Reliable { max_blocking_time: rustdds::Duration::ZERO })
         .durability(Durability::TransientLocal)
