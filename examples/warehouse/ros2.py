@@ -1,8 +1,8 @@
 """The warehouse in ROS 2: `ros2.py floor`, `ros2.py navigator` in the namespace of each robot, and `ros2.py manager`.
 
 The floor moves the robots as their velocity commands say, and publishes where each is: what is true, and, on the
-robot's own `tf`, what its localisation says. A navigator serves `navigate_to_pose`, as that of Nav2 does, and drives no further than its way is clear. The manager sends goals,
-and says up to where each way is clear.
+robot's own `tf`, what its localisation says. A navigator serves `navigate_to_pose`, as that of Nav2 does, and drives no
+further than its way is clear. The manager sends goals, and says up to where each way is clear.
 
 The service `/warehouse/step` advances by one period, with what was received so far, and answers after all messages of
 that period are published, the tick last. For each tick a navigator sends exactly one velocity, and the manager exactly
@@ -28,7 +28,7 @@ from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header, String
 from std_srvs.srv import Trigger
-from warehouse import LANES, ROBOTS, SECOND, START_AFTER, Floor, Manager, Navigator, is_on_lane
+from warehouse import ROBOTS, SECOND, START_AFTER, Floor, Manager, Navigator, is_on_lane
 
 # What `interfaces.py` has compiled.
 sys.path.insert(0, str(pathlib.Path(__file__).parent / "built"))

@@ -130,6 +130,8 @@ class Vehicle:
         """Takes an order, or an update of the one that it has, which begins with the last node that was released."""
         nodes = order["nodes"]
         if order["orderId"] != self.order["orderId"]:
+            if order["orderUpdateId"] != 0:
+                return  # of an order that never came
             self.last, self.nodes = nodes[0], []
             self.navigator.starts = now + START_AFTER
         elif order["orderUpdateId"] <= self.order["orderUpdateId"]:
@@ -331,7 +333,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="A part of the warehouse over MQTT.")
     parser.add_argument("part", choices=parts)
     parser.add_argument("port", type=int, help="of the broker on this machine")
-    parser.add_argument("--undisturbed", action="append", default=[], metavar="NAME", help="names of topics that are cut")
+    parser.add_argument("--undisturbed", action="append", default=[], metavar="NAME", help="topics that are cut")
     options = parser.parse_args()
     try:
         parts[options.part](options)
