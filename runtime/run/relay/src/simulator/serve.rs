@@ -186,7 +186,9 @@ impl<S: Simulator> World<S> {
         Step { orders, messages }: Step,
         lines: &mut Lines<R, W>,
     ) -> io::Result<Result<(), SimulatorError>> {
-        orders.into_iter().for_each(|order| self.topics.nodes.give(order));
+        for order in orders {
+            self.topics.nodes.give(order);
+        }
         self.topics.deliver(messages)?;
         self.now = self.now + self.step;
         let turn = Turn { lines, fault: None };
