@@ -20,9 +20,30 @@ pub trait Interfaces {
 
     /// The messages that these files define, and those that they include. The files are relative to the folder of the
     /// `.sesame` file `beside`. `None` where no files are read, so that nothing is known of any message.
-    fn dialect(&self, files: &[String], beside: &str) -> Result<Option<Vec<Interface>>, Vec<UnusableFile>> {
+    fn dialect(&self, files: &[String], beside: &str) -> Result<Option<Vec<DialectMessage>>, Vec<UnusableFile>> {
         let _ = (files, beside);
         Ok(None)
+    }
+}
+
+/// A message of a dialect of MAVLink.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DialectMessage {
+    /// Its fields.
+    pub interface: Interface,
+    /// The values that a field may have by name, with the name of that field.
+    pub constants: Vec<(String, Constant)>,
+}
+
+impl DialectMessage {
+    /// A message with these fields; `entries` are the names of fields, with a name and the number of a value of each.
+    pub fn new<'e>(interface: Interface, entries: impl Iterator<Item = (&'e str, &'e str, u64)>) -> Self {
+        let constants = entries.map(|(field, name, number)| {
+            #[expect(clippy::cast_precision_loss, reason = "large values are bits of masks, which are powers of two")]
+            let value = ConstantValue::Number(number as f64);
+            (field.to_owned(), Constant { name: name.to_owned(), value })
+        });
+        DialectMessage { interface, constants: constants.collect() }
     }
 }
 

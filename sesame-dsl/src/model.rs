@@ -32,7 +32,7 @@ pub use sesame_plan::stl::Interval;
 pub use sesame_plan::{
     Aggregate, Averaging, BinaryFunction, BoostedChildren, Bound, Channel, Choice, ChoiceKind, Clock, Comparison,
     Condition, Confirmation, Copies, Counted, Dimension, Direction, Distance, Distribution, Drain, Exploration,
-    Expression, Interface, Members, MembersOf, Memory, MessageRun, Messages, Moment, NewValue, NotFinite,
+    Expression, Interface, Members, MembersOf, Memory, MessageRun, Messages, Moment, NamedNumber, NewValue, NotFinite,
     OperationKind, OwnSetting, Point, Recorded, Region, Ros, Setting, SignedDistance, Statistic, Step, StepBy,
     Stepping, StopRule, Strategy, StrategyKind, StrategyProperties, TextTest, Transition, Transport, Trend, Turn,
     UnaryFunction, ValueMode,

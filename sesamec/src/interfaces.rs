@@ -13,7 +13,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use sesame_codegen::input::{self, Unreadable};
-use sesame_dsl::interfaces::{Constant, ConstantValue, Folders, Interfaces, UnusableFile, defined_in, known};
+use sesame_dsl::interfaces::{
+    Constant, ConstantValue, DialectMessage, Folders, Interfaces, UnusableFile, defined_in, known,
+};
 use sesame_interfaces::mavlink::{self, Definitions};
 use sesame_plan::{Dialect, Interface, InterfaceField, WireType};
 
@@ -58,7 +60,7 @@ pub(crate) type Parse = fn(name: &str, definition: &Definition) -> Result<Vec<In
 type Read = Result<Option<Vec<Interface>>, String>;
 
 /// The messages of a dialect.
-type Dialects = Result<Vec<Interface>, Vec<UnusableFile>>;
+type Dialects = Result<Vec<DialectMessage>, Vec<UnusableFile>>;
 
 /// Layouts from files.
 pub(crate) struct Files {
@@ -249,7 +251,7 @@ impl Interfaces for Files {
         of.flat_map(|definition| &definition.constants).filter_map(constant).collect()
     }
 
-    fn dialect(&self, files: &[String], beside: &str) -> Result<Option<Vec<Interface>>, Vec<UnusableFile>> {
+    fn dialect(&self, files: &[String], beside: &str) -> Result<Option<Vec<DialectMessage>>, Vec<UnusableFile>> {
         let mut dialects = self.dialects.borrow_mut();
         let read = dialects.entry((files.to_vec(), beside.to_owned()));
         read.or_insert_with(|| dialect(files, beside)).clone().map(Some)
@@ -263,7 +265,12 @@ fn dialect(files: &[String], beside: &str) -> Dialects {
         let of = |it: mavlink::Unusable| UnusableFile { named: it.named, why: it.why() };
         unusable.into_iter().map(of).collect::<Vec<_>>()
     })?;
-    Ok(definitions.iter().map(mavlink::Definition::interface).collect())
+    let message = |definition: &mavlink::Definition| {
+        let entries = definitions.entries(definition);
+        let entries = entries.map(|(field, entry)| (field.name.as_str(), entry.name.as_str(), entry.value));
+        DialectMessage::new(definition.interface(), entries)
+    };
+    Ok(definitions.iter().map(message).collect())
 }
 
 /// Whether a message or service needs no file.
@@ -387,7 +394,8 @@ mod tests {
         let number = WireType::Primitive { primitive: sesame_plan::Primitive::Float32 };
         let level =
             InterfaceField { name: "level".to_owned(), ty: WireType::Array { of: Box::new(number), length: 3 } };
-        assert_eq!(found, [Interface { name: "LEVEL".to_owned(), fields: vec![level] }]);
+        let layout = Interface { name: "LEVEL".to_owned(), fields: vec![level] };
+        assert_eq!(found, [DialectMessage { interface: layout, constants: Vec::new() }]);
         let unusable = read(&["own.xml", ".", "bad.xml"]).unwrap_err();
         assert_eq!((unusable[0].named, unusable[0].why.as_str()), (1, "it is a folder, not a regular file"));
         assert_eq!(unusable[1].named, 2);

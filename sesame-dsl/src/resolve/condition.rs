@@ -290,7 +290,7 @@ impl<'a> Resolver<'a> {
     }
 
     /// Reports a metric with a unit that is compared with a constant, which has none.
-    fn is_plain(&mut self, metric: MetricId, span: Span, constant: Span) -> Option<()> {
+    pub(super) fn is_plain(&mut self, metric: MetricId, span: Span, constant: Span) -> Option<()> {
         let Some(unit) = self.metric_of(metric).unit.clone() else { return Some(()) };
         let [name, constant_name] = [span, constant].map(|span| self.text(span));
         let title = format!("`{constant_name}` is a plain number, but `{name}` is in `{}`", unit.text());

@@ -118,25 +118,27 @@ impl<'a> Resolver<'a> {
 
     /// The numbers of constants that are written with their names; reports what is none.
     pub(super) fn numbers_of_constants(&mut self, names: &'a [Path]) -> Option<Vec<f64>> {
-        let mut numbers = Vec::new();
-        let mut complete = true;
-        for name in names {
-            match self.constant_of(name) {
-                Some(Some(ConstantValue::Number(number))) => numbers.push(number),
-                Some(None) => complete = false,
-                Some(Some(ConstantValue::Text(text))) => {
-                    let title = format!("`{}` is the text \"{text}\"", self.text(name.span));
-                    let label = "expected a constant that is a number; write texts in quotes";
-                    self.report(Diagnostic::new(Code::WRONG_TYPE, name.span, title).label(label));
-                    complete = false;
-                }
-                None => {
-                    self.no_constant(name, "a range such as `[0, 1]`, `true`, `false`");
-                    complete = false;
-                }
+        let numbers: Vec<Option<f64>> = names
+            .iter()
+            .map(|name| self.number_of_constant(name, "a range such as `[0, 1]`, `true`, `false`"))
+            .collect();
+        numbers.into_iter().collect()
+    }
+
+    /// The number of a constant that is written with its name; reports what is none. `expected` is what else may stand
+    /// there.
+    pub(super) fn number_of_constant(&mut self, name: &'a Path, expected: &str) -> Option<f64> {
+        match self.constant_of(name) {
+            Some(Some(ConstantValue::Number(number))) => return Some(number),
+            Some(None) => {}
+            Some(Some(ConstantValue::Text(text))) => {
+                let title = format!("`{}` is the text \"{text}\"", self.text(name.span));
+                let label = "expected a constant that is a number; write texts in quotes";
+                self.report(Diagnostic::new(Code::WRONG_TYPE, name.span, title).label(label));
             }
+            None => self.no_constant(name, expected),
         }
-        complete.then_some(numbers)
+        None
     }
 
     /// The value of a constant that a filter of a list names. `None` was reported.

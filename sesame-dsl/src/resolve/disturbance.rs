@@ -10,8 +10,8 @@ use super::quantity::is_of_times;
 use super::words::type_in_words;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{
-    ChoiceKind, Distribution, Domain, Drain, Id as _, MembersOf, NotFinite, OperationKind, Parameter, Range, Step,
-    Target, TopicId, Type, ValueMode,
+    ChoiceKind, Distribution, Domain, Drain, Id as _, MembersOf, NamedNumber, NotFinite, OperationKind, Parameter,
+    Range, Step, Target, TopicId, Type, ValueMode,
 };
 use crate::span::Span;
 use crate::syntax::ast;
@@ -62,6 +62,10 @@ impl<'a> Resolver<'a> {
                 let (found, _) = found?;
                 let fit = self.texts_fit(&found, target, texts);
                 fit.then_some((found, OperationKind::RandomText { texts: items }, Vec::new()))
+            }
+            ast::OperationKind::RandomConstant(names) => {
+                let (target, constants) = self.constants_put(target, "a random constant", names)?;
+                Some((target, OperationKind::RandomConstant { constants }, Vec::new()))
             }
             ast::OperationKind::StuckAt(at) => self.stuck_at(target, at),
             ast::OperationKind::NotFinite(written) => {
@@ -295,13 +299,11 @@ impl<'a> Resolver<'a> {
                 fit.then_some((found, OperationKind::StuckAt { truth: None }, vec![parameter]))
             }
             ast::Stuck::Constants(names) => {
-                let is = |ty: &Type| matches!(ty, Type::Int(None) | Type::Real(None));
-                let found = self.values(target, "`stuck at` a constant", "a number without a unit", is);
-                let numbers = self.numbers_of_constants(names)?;
-                let texts = names.iter().map(|name| self.text(name.span).to_owned()).collect();
+                let (target, constants) = self.constants_put(target, "`stuck at` a constant", names)?;
+                let (texts, numbers) = constants.into_iter().map(|constant| (constant.name, constant.number)).unzip();
                 let domain = Domain::Texts(texts);
                 let parameter = Parameter { name: "value".to_owned(), doc: String::new(), unit: None, domain };
-                Some((found?.0, OperationKind::StuckAtConstant { numbers }, vec![parameter]))
+                Some((target, OperationKind::StuckAtConstant { numbers }, vec![parameter]))
             }
             ast::Stuck::Truth(truth, span) => {
                 let user = format!("`stuck at {}`", self.text(*span));
@@ -309,6 +311,27 @@ impl<'a> Resolver<'a> {
                 Some((target, OperationKind::StuckAt { truth: Some(*truth) }, Vec::new()))
             }
         }
+    }
+
+    /// The values in whose place constants are put, with these constants.
+    fn constants_put(
+        &mut self,
+        target: &'a ast::Target,
+        user: &str,
+        names: &'a [ast::Path],
+    ) -> Option<(Target, Vec<NamedNumber>)> {
+        let is = |ty: &Type| matches!(ty, Type::Int(None) | Type::Real(None));
+        let found = self.values(target, user, "a number without a unit", is);
+        let numbers = self.numbers_of_constants(names)?;
+        let mut first: BTreeMap<&str, Span> = BTreeMap::new();
+        for name in names {
+            if let Some(before) = first.insert(self.text(name.span), name.span) {
+                self.listed_twice(name.span, before);
+                return None;
+            }
+        }
+        let named = |(name, number): (&ast::Path, f64)| NamedNumber { name: self.text(name.span).to_owned(), number };
+        Some((found?.0, names.iter().zip(numbers).map(named).collect()))
     }
 
     fn clock_skew(&mut self, target: &'a ast::Target, range: &ast::Range) -> Option<Resolved> {

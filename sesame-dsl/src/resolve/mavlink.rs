@@ -8,12 +8,13 @@ use sesame_plan::mavlink::{self, TopicName};
 use super::Resolver;
 use super::words::{list, type_in_words};
 use crate::diagnostic::{Code, Diagnostic};
+use crate::interfaces::DialectMessage;
 use crate::model::{Id as _, MessageId, Type};
 use crate::similar::most_similar;
 use crate::syntax::ast::{self, Name, Text, TypeKind};
 
 /// The messages that files define, by their names; `None` where no files are read.
-type Defined = Option<BTreeMap<String, Interface>>;
+type Defined = Option<BTreeMap<String, DialectMessage>>;
 
 impl<'a> Resolver<'a> {
     /// Compares all topics with the definitions that their simulator names, and those that a lab's names. What has a
@@ -40,9 +41,12 @@ impl<'a> Resolver<'a> {
         }
         let written: Vec<String> = files.iter().map(|file| file.text.clone()).collect();
         match self.interfaces.dialect(&written, self.sources.file(self.root).name()) {
-            Ok(defined) => {
-                Some(defined?.into_iter().map(|message| (message.name.clone(), message)).collect::<BTreeMap<_, _>>())
-            }
+            Ok(defined) => Some(
+                defined?
+                    .into_iter()
+                    .map(|message| (message.interface.name.clone(), message))
+                    .collect::<BTreeMap<_, _>>(),
+            ),
             Err(mistakes) => {
                 for mistake in mistakes {
                     let Some(file) = files.get(mistake.named) else { continue };
@@ -85,7 +89,7 @@ impl<'a> Resolver<'a> {
                     continue;
                 };
                 let Type::Message(id) = ty else {
-                    self.not_a_message(topic, &ty, message);
+                    self.not_a_message(topic, &ty, &message.interface);
                     correct = false;
                     break;
                 };
@@ -99,7 +103,7 @@ impl<'a> Resolver<'a> {
     }
 
     /// Reports a topic with messages that no file defines.
-    fn not_defined(&mut self, topic: &ast::Topic, name: &str, defined: &BTreeMap<String, Interface>) {
+    fn not_defined(&mut self, topic: &ast::Topic, name: &str, defined: &BTreeMap<String, DialectMessage>) {
         let title = format!("the definitions have no message `{name}`");
         let mut diagnostic = Diagnostic::new(Code::NO_LAYOUT, topic.path.span, title)
             .label("not in the files that the simulator names with `types`");
@@ -134,8 +138,10 @@ impl<'a> Resolver<'a> {
         self.report(diagnostic);
     }
 
-    /// Whether all fields of a message are those of a definition.
-    fn as_defined(&mut self, topic: &ast::Topic, id: MessageId, defined: &Interface) -> bool {
+    /// Whether all fields of a message are those of a definition. The message then has the constants of their
+    /// enumerations.
+    fn as_defined(&mut self, topic: &ast::Topic, id: MessageId, defined: &DialectMessage) -> bool {
+        let DialectMessage { interface: defined, constants } = defined;
         let declared = self.system.message_ids.iter().position(|of| *of == id);
         let Some(message) = declared.and_then(|at| self.ast_messages().nth(at)) else { return true };
         if self.system.messages[id.index()].is_none() {
@@ -153,6 +159,16 @@ impl<'a> Resolver<'a> {
                 None => {
                     self.no_such_field(topic, name, defined);
                     correct = false;
+                }
+            }
+        }
+        if let Some(own) = &mut self.system.messages[id.index()] {
+            let fields = message.fields.iter().map(|field| &field.head.name.text);
+            for name in fields {
+                for (_, constant) in constants.iter().filter(|(field, _)| field == name) {
+                    if own.constants.iter().all(|known| known.name != constant.name) {
+                        own.constants.push(constant.clone());
+                    }
                 }
             }
         }

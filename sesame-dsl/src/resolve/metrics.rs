@@ -166,16 +166,24 @@ impl<'a> Resolver<'a> {
                 Bound::Within { low, high }
             }
             ast::Bound::Compare(comparison, quantity) => {
-                let value = self.value(quantity, unit.as_ref(), &what)?;
-                match comparison {
-                    Comparison::AtMost => Bound::AtMost { value },
-                    Comparison::Below => Bound::Below { value },
-                    Comparison::AtLeast => Bound::AtLeast { value },
-                    Comparison::Above => Bound::Above { value },
-                    Comparison::Equal => Bound::Equal { value },
-                }
+                compared(*comparison, self.value(quantity, unit.as_ref(), &what)?)
+            }
+            ast::Bound::Constant(comparison, constant) => {
+                let value = self.number_of_constant(constant, "a number")?;
+                self.is_plain(MetricId::from_index(index), name.span, constant.span)?;
+                compared(*comparison, value)
             }
         };
         Some((MetricId::from_index(index), bound))
+    }
+}
+
+fn compared(by: Comparison, value: f64) -> Bound {
+    match by {
+        Comparison::AtMost => Bound::AtMost { value },
+        Comparison::Below => Bound::Below { value },
+        Comparison::AtLeast => Bound::AtLeast { value },
+        Comparison::Above => Bound::Above { value },
+        Comparison::Equal => Bound::Equal { value },
     }
 }

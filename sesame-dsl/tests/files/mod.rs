@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use sesame_dsl::interfaces::{Folders, Interfaces, UnusableFile};
+use sesame_dsl::interfaces::{DialectMessage, Folders, Interfaces, UnusableFile};
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::{Analysis, analyse_with};
 use sesame_interfaces::mavlink::{Definition, Definitions};
@@ -41,7 +41,7 @@ impl Interfaces for Dialects {
     }
 
     #[expect(clippy::disallowed_methods, reason = "the crate is pure; its tests read their corpus")]
-    fn dialect(&self, files: &[String], _: &str) -> Result<Option<Vec<Interface>>, Vec<UnusableFile>> {
+    fn dialect(&self, files: &[String], _: &str) -> Result<Option<Vec<DialectMessage>>, Vec<UnusableFile>> {
         if files.iter().any(|file| !file.starts_with("../dialects/")) {
             return Ok(None);
         }
@@ -50,6 +50,11 @@ impl Interfaces for Dialects {
             let why = unusable.into_iter().map(|file| UnusableFile { named: file.named, why: file.why() });
             why.collect::<Vec<_>>()
         })?;
-        Ok(Some(definitions.iter().map(Definition::interface).collect()))
+        let message = |definition: &Definition| {
+            let entries = definitions.entries(definition);
+            let entries = entries.map(|(field, entry)| (field.name.as_str(), entry.name.as_str(), entry.value));
+            DialectMessage::new(definition.interface(), entries)
+        };
+        Ok(Some(definitions.iter().map(message).collect()))
     }
 }

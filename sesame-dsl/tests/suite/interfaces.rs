@@ -3,11 +3,13 @@
 use std::cell::RefCell;
 
 use sesame_dsl::diagnostic::render;
-use sesame_dsl::interfaces::{Folders, Interfaces};
-use sesame_dsl::model::{Space, Type};
+use sesame_dsl::interfaces::{ConstantValue, Folders, Interfaces};
+use sesame_dsl::model::{Bound, OperationKind, Space, Type};
 use sesame_dsl::source::SourceMap;
 use sesame_dsl::{Analysis, analyse_with};
-use sesame_plan::{Interface, InterfaceField, Primitive, WireType};
+use sesame_plan::{Interface, InterfaceField, NamedNumber, Primitive, WireType};
+
+use crate::files::analyse_text;
 
 /// A folder in memory: for each name, its fields and what it contains before it.
 #[derive(Default)]
@@ -218,4 +220,69 @@ fn fields_of_a_layout_can_be_disturbed_and_measured() {
            test known { odd from 1s to 2s"#,
     );
     assert_eq!(space.operations.len(), 4);
+}
+
+/// Entries of the enumerations of a dialect are constants of the messages with such fields.
+const FLIGHT: &str = r#"
+space flight
+system {
+  simulator airspace = mavlink "udp://127.0.0.1:14550" {
+    types "../dialects/small.xml"
+    proxy drone "udp://127.0.0.1:14551"
+  }
+  // An own constant with the name of an entry counts.
+  message Heartbeat { constant FLAG_SAFE = 64  type: int  custom_mode: int }
+  topic heartbeat = "1/HEARTBEAT" : Heartbeat
+  node drone { publishes heartbeat }
+}
+metric turned  maximise default 0s = duration(heartbeat.type == KIND_COAXIAL)
+metric armed   maximise default 0s = duration(heartbeat.custom_mode == FLAG_ARMED or heartbeat.custom_mode == FLAG_SAFE)
+metric kind                        = last(heartbeat.type)
+requirement R1 "it stays what it is" = kind == KIND_QUADROTOR
+requirement R2 "it is no aeroplane"  = kind > Heartbeat.KIND_FIXED_WING
+operation lie on heartbeat.type = stuck at one of KIND_FIXED_WING, KIND_COAXIAL
+operation turn on heartbeat.type = random one of KIND_QUADROTOR, Heartbeat.KIND_COAXIAL
+test lies {
+  lie value "KIND_COAXIAL" when kind == KIND_QUADROTOR for 1s
+  expect kind == KIND_COAXIAL
+}
+campaign c {
+  objectives turned, armed
+  observes   kind
+  operations lie, turn 1 per test
+  search     random { evaluations 10 }
+  end        after 5s
+}
+"#;
+
+#[test]
+fn entries_of_enumerations_of_a_dialect_are_constants() {
+    let (sources, analysis) = analyse_text("flight", FLIGHT);
+    let said = render::human(&analysis.diagnostics, &sources, false);
+    let space = analysis.model.unwrap_or_else(|| panic!("{said}"));
+    let bounds: Vec<Bound> = space.requirements.values().map(|requirement| requirement.bound).collect();
+    assert_eq!(bounds, [Bound::Equal { value: 2.0 }, Bound::Above { value: 0.0 }]);
+    let named = |name: &str, number| NamedNumber { name: name.to_owned(), number };
+    let kinds: Vec<OperationKind> = space.operations.values().map(|operation| operation.kind.clone()).collect();
+    let drawn = vec![named("KIND_QUADROTOR", 2.0), named("Heartbeat.KIND_COAXIAL", 3.0)];
+    assert_eq!(
+        kinds,
+        [
+            OperationKind::StuckAtConstant { numbers: vec![0.0, 3.0] },
+            OperationKind::RandomConstant { constants: drawn }
+        ]
+    );
+    let heartbeat =
+        space.messages.values().find(|message| message.declaration.name == "Heartbeat").expect("it is there");
+    let constants: Vec<(&str, &ConstantValue)> =
+        heartbeat.constants.iter().map(|constant| (constant.name.as_str(), &constant.value)).collect();
+    let expected = [
+        ("FLAG_SAFE", 64.0),
+        ("KIND_FIXED_WING", 0.0),
+        ("KIND_QUADROTOR", 2.0),
+        ("KIND_COAXIAL", 3.0),
+        ("FLAG_ARMED", 1.0),
+    ];
+    let expected = expected.map(|(name, number)| (name, ConstantValue::Number(number)));
+    assert_eq!(constants, expected.each_ref().map(|(name, value)| (*name, value)), "an own constant counts");
 }

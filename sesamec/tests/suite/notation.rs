@@ -639,6 +639,31 @@ fn what_operations_on_nodes_do_is_written_and_read_back() {
 }
 
 #[test]
+fn what_a_node_is_set_to_its_transitions_and_drawn_constants_read_back() {
+    let (system, _) = nodes();
+    let system = system.replace("{ data: real[mm] }", "{ constant LOW = 1  constant HIGH = 9  data: real }");
+    let system = system.replace("<= 0mm", "<= LOW");
+    let text = format!(
+        r#"{system} operation mode on parameter "mode" of b = set one of "by \"hand\"", "", "true"
+           operation blind on parameter "on" of b = set false
+           operation gains on parameter "gains" of a = set one of list [0.5, -1e300], list []
+           operation words on parameter "words" of a = set list ["a, b", "\\"]
+           operation flags on parameter "flags" of a = set one of list [true, false], list [false]
+           operation off on node a = transition deactivate
+           operation on_again on node b = transition activate
+           operation drawn on level.data = random one of LOW, Level.HIGH
+           operation held on level.data = stuck at one of LOW, Level.HIGH
+           test t {{ mode value "by \"hand\"" from 1s to 2s  words value "list [\"a, b\", \"\\\\\"]" from 1s to 2s }}
+           campaign look {{ objectives m0, m1
+                           operations mode, blind, gains, words, flags, off, on_again, drawn, held 1 per test
+                           search random {{ evaluations 1 }}  end after 5s }}"#
+    );
+    let like = plan(&text);
+    like.validate().unwrap();
+    reads_back(&system, &like).unwrap();
+}
+
+#[test]
 fn each_kind_of_operation_reads_back_in_every_unit() {
     let (system, like) = everything();
     let kinds: BTreeSet<&str> = like.operations.iter().map(|operation| operation.kind.words()).collect();

@@ -56,6 +56,17 @@ pub struct Field {
     pub offset: usize,
     /// Its unit, as the file has it, such as `m/s`.
     pub unit: Option<String>,
+    /// The name of the enumeration whose entries are its values.
+    pub enumeration: Option<String>,
+}
+
+/// A value of an enumeration with its name.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Entry {
+    /// Its name, such as `MAV_STATE_ACTIVE`.
+    pub name: String,
+    /// Its number.
+    pub value: u64,
 }
 
 /// What a field, or an element of an array, is.
@@ -127,7 +138,10 @@ impl Definition {
             // A sender puts the version of the protocol here.
             let word = if word == "uint8_t_mavlink_version" { "uint8_t" } else { word };
             let kind = FieldKind::named(word).ok_or_else(|| format!("field `{name}` has the unknown type `{ty}`"))?;
-            Ok((word.to_owned(), Field { name: name.to_owned(), kind, elements, offset: 0, unit: None }))
+            Ok((
+                word.to_owned(),
+                Field { name: name.to_owned(), kind, elements, offset: 0, unit: None, enumeration: None },
+            ))
         };
         let mut base = written.iter().map(read).collect::<Result<Vec<(String, Field)>, String>>()?;
         // Large fields come first, which aligns all of them; fields of equal size keep their order.
@@ -214,6 +228,8 @@ impl Unusable {
 pub struct Definitions {
     by_name: BTreeMap<String, Definition>,
     names: BTreeMap<u32, String>,
+    /// The entries of each enumeration, of all files that define it.
+    enumerations: BTreeMap<String, Vec<Entry>>,
 }
 
 impl Definitions {
@@ -265,6 +281,9 @@ impl Definitions {
         }
         let includes = children(root, "include").filter_map(|include| include.text());
         let includes = includes.map(|file| file.trim().to_owned()).collect();
+        for enumeration in children(root, "enums").flat_map(|enums| children(enums, "enum")) {
+            self.enumerate(enumeration)?;
+        }
         for message in children(root, "messages").flat_map(|messages| children(messages, "message")) {
             self.insert(definition(message)?)?;
         }
@@ -281,6 +300,41 @@ impl Definitions {
         self.names.insert(*id, name.clone());
         self.by_name.insert(name.clone(), definition);
         Ok(())
+    }
+
+    /// Adds the entries of an enumeration, which other files may extend. An error says that an entry has no number, or
+    /// that another one has its name.
+    fn enumerate(&mut self, enumeration: Node<'_, '_>) -> Result<(), String> {
+        let of = enumeration.attribute("name").unwrap_or_default();
+        let known = self.enumerations.entry(of.to_owned()).or_default();
+        let mut next = Some(0);
+        for entry in children(enumeration, "entry") {
+            let name = entry.attribute("name").unwrap_or_default();
+            // An entry without a number has the one after that of the entry before.
+            let value = entry.attribute("value").map_or(next, number);
+            let (Some(value), false) = (value, name.is_empty()) else {
+                return Err(format!("entry `{name}` of the enumeration `{of}` has no name, or no number"));
+            };
+            next = value.checked_add(1);
+            match known.iter().find(|entry| entry.name == name) {
+                Some(entry) if entry.value == value => {}
+                Some(_) => {
+                    return Err(format!(
+                        "entry `{name}` of the enumeration `{of}` is defined twice, with different numbers"
+                    ));
+                }
+                None => known.push(Entry { name: name.to_owned(), value }),
+            }
+        }
+        Ok(())
+    }
+
+    /// The fields of a message that are enumerations, each with every value that it may have by name.
+    pub fn entries<'d>(&'d self, of: &'d Definition) -> impl Iterator<Item = (&'d Field, &'d Entry)> {
+        of.fields.iter().flat_map(|field| {
+            let entries = field.enumeration.as_ref().and_then(|name| self.enumerations.get(name));
+            entries.into_iter().flatten().map(move |entry| (field, entry))
+        })
     }
 
     /// The message with this name.
@@ -325,7 +379,7 @@ fn definition(message: Node<'_, '_>) -> Result<Definition, String> {
         return Err(format!("message `{name}` has no name, or no number below {BEYOND_IDS}"));
     };
     let mut fields = [Vec::new(), Vec::new()];
-    let mut units = BTreeMap::new();
+    let (mut units, mut enumerations) = (BTreeMap::new(), BTreeMap::new());
     let mut extended = false;
     for child in message.children() {
         extended |= child.has_tag_name("extensions");
@@ -333,6 +387,7 @@ fn definition(message: Node<'_, '_>) -> Result<Definition, String> {
             let attribute = |name| child.attribute(name).unwrap_or_default();
             fields[usize::from(extended)].push((attribute("type"), attribute("name")));
             units.extend(child.attribute("units").map(|unit| (attribute("name"), unit.to_owned())));
+            enumerations.extend(child.attribute("enum").map(|of| (attribute("name"), of.to_owned())));
         }
     }
     let [base, extensions] = fields;
@@ -340,8 +395,22 @@ fn definition(message: Node<'_, '_>) -> Result<Definition, String> {
     let mut definition = definition.map_err(|problem| format!("message `{name}`: {problem}"))?;
     for field in &mut definition.fields {
         field.unit = units.remove(field.name.as_str());
+        field.enumeration = enumerations.remove(field.name.as_str());
     }
     Ok(definition)
+}
+
+/// The number of an entry, as files write it: `16`, `0x10`, `0b10000` or `2**4`.
+fn number(written: &str) -> Option<u64> {
+    let written = written.trim();
+    if let Some(power) = written.strip_prefix("2**") {
+        return 1u64.checked_shl(power.parse().ok()?);
+    }
+    match (written.strip_prefix("0x"), written.strip_prefix("0b")) {
+        (Some(digits), _) => u64::from_str_radix(digits, 16).ok(),
+        (_, Some(digits)) => u64::from_str_radix(digits, 2).ok(),
+        (None, None) => written.parse().ok(),
+    }
 }
 
 #[cfg(test)]

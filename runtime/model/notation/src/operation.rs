@@ -186,6 +186,10 @@ fn disturbance(operation: &Operation) -> String {
             format!("{words} {{ {}}}", parameters.collect::<String>())
         }
         OperationKind::RandomText { texts } => format!("{words} {}", list(texts)),
+        OperationKind::RandomConstant { constants } => {
+            let names: Vec<&str> = constants.iter().map(|constant| constant.name.as_str()).collect();
+            format!("{words} {}", names.join(", "))
+        }
         // Names of constants stand without quotes.
         OperationKind::StuckAtConstant { .. } => {
             let names = operation.parameters.first().and_then(|value| value.domain.items()).unwrap_or_default();

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::NodeId;
+use crate::{NamedNumber, NodeId};
 
 /// What an operation does to the messages of its topic, with the parameters that a test chooses for it.
 ///
@@ -24,6 +24,11 @@ pub enum OperationKind {
     RandomText {
         /// What is drawn from, each alike: at least one, none twice.
         texts: Vec<String>,
+    },
+    /// Replaces numbers by those of constants, a fresh draw per message. No parameters.
+    RandomConstant {
+        /// What is drawn from, each alike: at least one, no name twice.
+        constants: Vec<NamedNumber>,
     },
     /// Replaces values by one and the same. One parameter `value`: a number, a point or a text; of truth values none.
     StuckAt {
@@ -280,6 +285,7 @@ impl OperationKind {
         match self {
             OperationKind::RandomValue { .. }
             | OperationKind::RandomText { .. }
+            | OperationKind::RandomConstant { .. }
             | OperationKind::Noise
             | OperationKind::RandomWalk
             | OperationKind::PacketLoss
@@ -313,6 +319,7 @@ impl OperationKind {
         match self {
             OperationKind::RandomValue { .. }
             | OperationKind::RandomText { .. }
+            | OperationKind::RandomConstant { .. }
             | OperationKind::StuckAt { .. }
             | OperationKind::StuckAtConstant { .. }
             | OperationKind::Bias
@@ -367,6 +374,7 @@ impl OperationKind {
             | OperationKind::StuckAt { .. }
             | OperationKind::StuckAtConstant { .. }
             | OperationKind::RandomText { .. }
+            | OperationKind::RandomConstant { .. }
             | OperationKind::NotFinite { .. }
             | OperationKind::Freeze
             | OperationKind::Blackhole
@@ -397,7 +405,7 @@ impl OperationKind {
         match self {
             OperationKind::RandomValue { mode: ValueMode::Absolute, .. } => "random absolute",
             OperationKind::RandomValue { mode: ValueMode::Offset, .. } => "random offset",
-            OperationKind::RandomText { .. } => "random one of",
+            OperationKind::RandomText { .. } | OperationKind::RandomConstant { .. } => "random one of",
             OperationKind::StuckAt { truth: None } | OperationKind::StuckAtConstant { .. } => "stuck at",
             OperationKind::StuckAt { truth: Some(true) } => "stuck at true",
             OperationKind::StuckAt { truth: Some(false) } => "stuck at false",

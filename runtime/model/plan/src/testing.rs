@@ -340,6 +340,7 @@ pub fn operation(topic: u32, kind: OperationKind) -> Operation {
             vec![parameter("value", Domain::Texts { texts })]
         }
         OperationKind::RandomText { .. }
+        | OperationKind::RandomConstant { .. }
         | OperationKind::StuckAt { truth: Some(_) }
         | OperationKind::NotFinite { .. }
         | OperationKind::Freeze

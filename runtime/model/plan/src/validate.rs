@@ -195,6 +195,11 @@ impl CampaignPlan {
         if let OperationKind::RandomText { texts } = &operation.kind {
             at("kind.texts", filled(texts))?;
         }
+        if let OperationKind::RandomConstant { constants } = &operation.kind {
+            at("kind.constants", require(!constants.is_empty(), || "there is none".to_owned()))?;
+            at("kind.constants", distinct(constants.iter().map(|constant| &constant.name)))?;
+            each("kind.constants", constants, |constant| finite(constant.number))?;
+        }
         if let OperationKind::StuckAtConstant { numbers } = &operation.kind {
             each("kind.numbers", numbers, |number| finite(*number))?;
             let names = operation.parameters.first().and_then(|value| value.domain.items());

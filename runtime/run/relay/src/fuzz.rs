@@ -30,7 +30,8 @@ mod stuck_at;
 
 use sesame_base::time::SimTime;
 use sesame_plan::{
-    Activation, Choice, ChoiceKind, Domain, Drain, NewValue, NodeId, Operation, OperationKind, TestOperation, ValueMode,
+    Activation, Choice, ChoiceKind, Domain, Drain, NamedNumber, NewValue, NodeId, Operation, OperationKind,
+    TestOperation, ValueMode,
 };
 
 use crate::value::{Text, Value};
@@ -53,7 +54,7 @@ pub use packet_loss::PacketLoss;
 pub use per_wire::PerWire;
 pub use places::Places;
 pub use probe::unimplemented_operations;
-pub use random_value::{RandomText, RandomValue};
+pub use random_value::{RandomItem, RandomValue};
 pub use random_walk::RandomWalk;
 pub use rate_limit::RateLimit;
 pub use reorder::Reorder;
@@ -67,8 +68,8 @@ pub use stuck_at::{Stuck, StuckAt};
 pub enum Disturbance {
     /// Replaces or shifts numbers and points by random numbers.
     RandomValue(RandomValue),
-    /// Replaces texts by random ones.
-    RandomText(RandomText),
+    /// Replaces values by random ones of a list.
+    RandomItem(RandomItem),
     /// Replaces values by a constant.
     StuckAt(StuckAt),
     /// Adds a constant.
@@ -163,8 +164,12 @@ impl Disturbance {
                 Disturbance::RandomValue(RandomValue { places, mode: *mode, integer: *integer, ranges })
             }
             OperationKind::RandomText { texts } => {
-                let texts = texts.iter().map(|text| Text::from(text.as_str())).collect();
-                Disturbance::RandomText(RandomText { places, texts })
+                let items = texts.iter().map(|text| Stuck::Text(Text::from(text.as_str()))).collect();
+                Disturbance::RandomItem(RandomItem { places, items })
+            }
+            OperationKind::RandomConstant { constants } => {
+                let number = |constant: &NamedNumber| Stuck::Amount(Amount::Number(constant.number));
+                Disturbance::RandomItem(RandomItem { places, items: constants.iter().map(number).collect() })
             }
             OperationKind::StuckAt { truth } => {
                 let at = match (truth, chosen("value")) {
@@ -274,7 +279,7 @@ impl Disturbance {
     pub fn apply(&mut self, at: MessageContext, message: &mut Value) -> Action {
         match self {
             Disturbance::RandomValue(operation) => operation.apply(at, message),
-            Disturbance::RandomText(operation) => operation.apply(at, message),
+            Disturbance::RandomItem(operation) => operation.apply(at, message),
             Disturbance::StuckAt(operation) => operation.apply(at, message),
             Disturbance::Bias(operation) => operation.apply(at, message),
             Disturbance::Drift(operation) => operation.apply(at, message),

@@ -113,6 +113,8 @@ pub(crate) enum OperationKind {
         amounts: Amounts,
     },
     RandomText(Vec<Text>),
+    /// Names of constants of messages; at least one.
+    RandomConstant(Vec<Path>),
     StuckAt(Stuck),
     NotFinite(NotFinite),
     /// The words `burst loss`, and the clauses as written.
@@ -174,6 +176,7 @@ impl OperationKind {
             }
             OperationKind::StuckAt(Stuck::Truth(..))
             | OperationKind::RandomText(_)
+            | OperationKind::RandomConstant(_)
             | OperationKind::NotFinite(_)
             | OperationKind::OnNode(OnNode::Transition(_) | OnNode::Pause | OnNode::Kill)
             | OperationKind::Custom(_) => None,

@@ -161,6 +161,8 @@ pub(crate) struct Path {
 #[derive(Debug)]
 pub(crate) enum Bound {
     Compare(Comparison, Quantity),
+    /// With the number of a constant.
+    Constant(Comparison, Path),
     Within(Range),
 }
 

@@ -59,6 +59,9 @@ impl Reader<'_> {
             return Bound::Within(self.range(&expect_child(&within, Rule::range)));
         }
         let comparison = comparison(pair).expect("a bound compares or encloses");
-        Bound::Compare(comparison, self.signed(&expect_child(pair, Rule::signed)))
+        match child(pair, Rule::constant_name) {
+            Some(constant) => Bound::Constant(comparison, self.path(&constant)),
+            None => Bound::Compare(comparison, self.signed(&expect_child(pair, Rule::signed))),
+        }
     }
 }

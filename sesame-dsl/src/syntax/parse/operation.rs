@@ -8,8 +8,8 @@ use crate::diagnostic::{Code, Diagnostic, Suggestion};
 use crate::span::Span;
 use crate::syntax::ast::{
     Amounts, Chosen, Contained, Count, Custom, CustomParameter, Distribution, Domain, Drain, Item, Moment, New,
-    NewValue, NotFinite, OnNode, Operation, OperationBody, OperationKind, Point, Range, Resource, Scene, Stuck, Target,
-    Text, UnitName,
+    NewValue, NotFinite, OnNode, Operation, OperationBody, OperationKind, Path, Point, Range, Resource, Scene, Stuck,
+    Target, Text, UnitName,
 };
 
 impl Reader<'_> {
@@ -123,12 +123,13 @@ impl Reader<'_> {
 
     fn operation_kind(&mut self, kind: &Pair<'_>) -> OperationKind {
         match kind.as_rule() {
-            Rule::random_value => match child(kind, Rule::value_mode) {
-                Some(mode) => OperationKind::Random {
+            Rule::random_value => match (child(kind, Rule::value_mode), child(kind, Rule::constants)) {
+                (Some(mode), _) => OperationKind::Random {
                     absolute: child(&mode, Rule::k_absolute).is_some(),
                     amounts: self.amounts(kind).expect("a random value says what is drawn from"),
                 },
-                None => OperationKind::RandomText(self.listed(&expect_child(kind, Rule::text_domain))),
+                (None, Some(constants)) => OperationKind::RandomConstant(self.constants(&constants)),
+                (None, None) => OperationKind::RandomText(self.listed(&expect_child(kind, Rule::text_domain))),
             },
             Rule::stuck_at => {
                 let [texts, truth, constants] =
@@ -136,10 +137,7 @@ impl Reader<'_> {
                 OperationKind::StuckAt(match (texts, truth, constants) {
                     (Some(texts), ..) => Stuck::Texts(self.listed(&texts)),
                     (_, Some(truth), _) => Stuck::Truth(child(&truth, Rule::k_true).is_some(), self.span(&truth)),
-                    (.., Some(constants)) => {
-                        let names = children(&constants, Rule::constant_name).map(|name| self.path(&name));
-                        Stuck::Constants(names.collect())
-                    }
+                    (.., Some(constants)) => Stuck::Constants(self.constants(&constants)),
                     _ => Stuck::Amounts(self.amounts(kind).expect("a value is stuck at something")),
                 })
             }
@@ -247,6 +245,10 @@ impl Reader<'_> {
         edits.sort_by_key(|(span, _)| span.lo);
         diagnostic.suggestions.push(Suggestion::possible(message, edits));
         self.report(diagnostic);
+    }
+
+    fn constants(&mut self, pair: &Pair<'_>) -> Vec<Path> {
+        children(pair, Rule::constant_name).map(|name| self.path(&name)).collect()
     }
 
     fn listed(&mut self, pair: &Pair<'_>) -> Vec<Text> {

@@ -109,6 +109,37 @@ fn fields_have_the_types_of_other_interfaces() {
 }
 
 #[test]
+fn entries_of_enumerations_are_values_of_fields_by_name() {
+    let dialect = |entries: &str| {
+        format!(
+            "<mavlink><enums><enum name=\"STATE\">{entries}</enum></enums><messages>\
+             <message id=\"1\" name=\"STATUS\"><field type=\"uint8_t\" name=\"state\" enum=\"STATE\"/>\
+             <field type=\"uint8_t\" name=\"load\"/></message></messages></mavlink>"
+        )
+    };
+    let mut definitions = Definitions::default();
+    let first = "<entry value=\"4\" name=\"FOUR\"/><entry name=\"FIVE\"/><entry value=\"0x10\" name=\"SIXTEEN\"/>";
+    definitions.add(&dialect(first)).unwrap();
+    // Another file may have more entries.
+    definitions.add(&dialect("<entry value=\"2**7\" name=\"BIT\"/><entry value=\"4\" name=\"FOUR\"/>")).unwrap();
+    let status = definitions.named("STATUS").unwrap();
+    let entries = definitions.entries(status);
+    let entries: Vec<_> =
+        entries.map(|(field, entry)| (field.name.as_str(), entry.name.as_str(), entry.value)).collect();
+    let expected = [("FOUR", 4), ("FIVE", 5), ("SIXTEEN", 16), ("BIT", 128)];
+    assert_eq!(entries, expected.map(|(name, value)| ("state", name, value)));
+    let problem = |entries: &str| definitions.clone().add(&dialect(entries)).unwrap_err();
+    assert_eq!(
+        problem("<entry value=\"5\" name=\"FOUR\"/>"),
+        "entry `FOUR` of the enumeration `STATE` is defined twice, with different numbers"
+    );
+    assert_eq!(
+        problem("<entry value=\"many\" name=\"MORE\"/>"),
+        "entry `MORE` of the enumeration `STATE` has no name, or no number"
+    );
+}
+
+#[test]
 fn the_checksum_is_that_of_the_standard() {
     let mut crc = Crc::default();
     crc.add(b"123456789");

@@ -4,9 +4,10 @@
 use sesame_plan::ValueMode;
 
 use crate::fuzz::action::{Action, MessageContext};
-use crate::fuzz::change::{add, map, put};
+use crate::fuzz::change::{add, map};
 use crate::fuzz::places::Places;
-use crate::value::{Text, Value};
+use crate::fuzz::stuck_at::Stuck;
+use crate::value::Value;
 
 /// A random value operation on numbers or points, with its sub-ranges.
 #[derive(Debug, Clone)]
@@ -41,25 +42,22 @@ impl RandomValue {
     }
 }
 
-/// A random value operation on texts.
+/// A random value operation that draws from a list.
 #[derive(Debug, Clone)]
-pub struct RandomText {
+pub struct RandomItem {
     /// The values to change.
     pub places: Places,
-    /// The texts, all equally likely; at least one.
-    pub texts: Vec<Text>,
+    /// What is drawn from, all equally likely; at least one.
+    pub items: Vec<Stuck>,
 }
 
-impl RandomText {
-    /// Replaces the texts.
+impl RandomItem {
+    /// Replaces the values that are of the type of the items.
     pub fn apply(&self, at: MessageContext, message: &mut Value) -> Action {
         self.places.change(at.on, message, |value, first| {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it is below their number")]
-            let drawn = (at.draws.unit(first) * self.texts.len() as f64) as usize;
-            match (value, self.texts.get(drawn)) {
-                (Value::Text(text), Some(drawn)) => put(text, drawn.clone()),
-                _ => false,
-            }
+            let drawn = (at.draws.unit(first) * self.items.len() as f64) as usize;
+            self.items.get(drawn).is_some_and(|item| item.put(value))
         })
     }
 }

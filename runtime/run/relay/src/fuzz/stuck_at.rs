@@ -25,14 +25,21 @@ pub enum Stuck {
     Truth(bool),
 }
 
-impl StuckAt {
-    /// Replaces the values that the message has as declared.
-    pub fn apply(&self, at: MessageContext, message: &mut Value) -> Action {
-        self.places.change(at.on, message, |value, _| match (&self.at, value) {
+impl Stuck {
+    /// Puts it in the place of a value of its type; whether that changes it.
+    pub(super) fn put(&self, value: &mut Value) -> bool {
+        match (self, value) {
             (Stuck::Amount(amount), value) => map(value, |axis, _| amount.on(axis)),
             (Stuck::Text(constant), Value::Text(text)) => put(text, constant.clone()),
             (Stuck::Truth(constant), Value::Bool(truth)) => put(truth, *constant),
             _ => false,
-        })
+        }
+    }
+}
+
+impl StuckAt {
+    /// Replaces the values that the message has as declared.
+    pub fn apply(&self, at: MessageContext, message: &mut Value) -> Action {
+        self.places.change(at.on, message, |value, _| self.at.put(value))
     }
 }
