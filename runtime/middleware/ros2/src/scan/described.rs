@@ -154,15 +154,17 @@ mod tests {
     #[test]
     fn ids_of_types_are_those_of_ros() {
         let double = WireType::Primitive { primitive: Primitive::Float64 };
-        assert_eq!(wire_type(11, 0, ""), Some(double.clone()));
-        assert_eq!(wire_type(59, 3, ""), Some(WireType::Array { of: Box::new(double.clone()), length: 3 }));
-        assert_eq!(wire_type(107, 9, ""), Some(WireType::Sequence { of: Box::new(double.clone()), bound: Some(9) }));
-        assert_eq!(wire_type(155, 0, ""), Some(WireType::Sequence { of: Box::new(double), bound: None }));
-        assert_eq!(wire_type(1, 0, "a/msg/B"), Some(WireType::Interface { name: "a/msg/B".to_owned() }));
+        assert_eq!(wire_type(11, 0, 0, ""), Some(double.clone()));
+        assert_eq!(wire_type(59, 3, 0, ""), Some(WireType::Array { of: Box::new(double.clone()), length: 3 }));
+        assert_eq!(wire_type(107, 9, 0, ""), Some(WireType::Sequence { of: Box::new(double.clone()), bound: Some(9) }));
+        assert_eq!(wire_type(155, 0, 0, ""), Some(WireType::Sequence { of: Box::new(double), bound: None }));
+        assert_eq!(wire_type(1, 0, 0, "a/msg/B"), Some(WireType::Interface { name: "a/msg/B".to_owned() }));
+        assert_eq!(wire_type(21, 0, 5, ""), Some(WireType::String { bound: Some(5) }));
+        assert_eq!(wire_type(22, 0, 3, ""), Some(WireType::WString { bound: Some(3) }));
         for wrong in [-1, 0, 12, 14, 48, 203, 255] {
-            assert_eq!(wire_type(wrong, 0, ""), None, "{wrong}");
+            assert_eq!(wire_type(wrong, 0, 0, ""), None, "{wrong}");
         }
-        assert_eq!(wire_type(59, i64::MAX, ""), None);
+        assert_eq!(wire_type(59, i64::MAX, 0, ""), None);
     }
 
     #[test]
