@@ -10,6 +10,7 @@ mod common_cause;
 mod compensation;
 mod conditions;
 mod confirm;
+mod constants;
 mod coverage;
 mod custom;
 mod declarative;

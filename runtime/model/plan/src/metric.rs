@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::stl::Robustness;
-use crate::{FieldRef, Formula, Input, MetricId, MonitorId, Score, Source, TopicId};
+use crate::{Aggregate, Expression, FieldRef, Formula, Input, Members, MetricId, MonitorId, Score, Source, TopicId};
 
 /// Which end of a metric is of interest to a tester.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -90,6 +90,21 @@ pub enum MetricSource {
 }
 
 impl MetricSource {
+    /// The field whose values its own are, unchanged: its last one, its least or its greatest.
+    pub fn field(&self) -> Option<&FieldRef> {
+        let formula = match self {
+            MetricSource::Last { input } => return Some(input),
+            MetricSource::Formula { formula } => formula,
+            _ => return None,
+        };
+        let (Aggregate::Last { of } | Aggregate::Min { of } | Aggregate::Max { of }) = &formula.aggregate else {
+            return None;
+        };
+        let Expression::Input(at) = of else { return None };
+        let input = &formula.inputs[*at as usize];
+        (input.list.is_none() && input.memory.is_empty() && input.members != Members::Sum).then_some(&input.field)
+    }
+
     /// What it reads itself. A topic may be there several times.
     pub fn sources(&self) -> Vec<Source> {
         match self {
@@ -141,6 +156,18 @@ pub enum Bound {
 }
 
 impl Bound {
+    /// The number with which values are compared, if it is one.
+    pub fn number(self) -> Option<f64> {
+        match self {
+            Bound::AtMost { value }
+            | Bound::Below { value }
+            | Bound::AtLeast { value }
+            | Bound::Above { value }
+            | Bound::Equal { value } => Some(value),
+            Bound::Within { .. } => None,
+        }
+    }
+
     /// Whether a value keeps the bound. A NaN keeps none.
     pub fn holds(self, x: f64) -> bool {
         match self {

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{CampaignPlan, Launch, MessageId, TopicId};
+use crate::{CampaignPlan, Launch, MessageId, MetricId, TopicId};
 
 /// A named message type.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -303,6 +303,13 @@ impl CampaignPlan {
         }
     }
 
+    /// The name of a metric's value, if that is one of a field, such as the last or the greatest one, and if it is clear
+    /// which constant is meant, as in [`CampaignPlan::constant`].
+    pub fn constant_of(&self, metric: MetricId, value: f64) -> Option<&str> {
+        let FieldRef { topic, path } = self.metric(metric).source.field()?;
+        self.constant(*topic, &path.iter().map(String::as_str).collect::<Vec<_>>(), value)
+    }
+
     /// Whether a message of its type may lack a value: a field on the way to it is optional.
     pub fn may_lack(&self, value: &FieldRef) -> bool {
         self.fields_to(value.topic, &value.path).any(|(_, field)| field.optional)
@@ -312,8 +319,10 @@ impl CampaignPlan {
 #[cfg(test)]
 mod tests {
     use super::{NamedNumber, Type, in_brackets, with_member, without_member};
-    use crate::testing::{field, message, plan, topic};
-    use crate::{FieldRef, MessageId, TopicId};
+    use crate::testing::{field, message, metric, plan, topic};
+    use crate::{
+        Aggregate, Expression, FieldRef, Formula, Input, Members, MessageId, MetricId, MetricSource, Side, TopicId,
+    };
 
     const INT: Type = Type::Int { unit: None };
 
@@ -336,6 +345,27 @@ mod tests {
         assert_eq!(name(1, "mode", 1.0), Some("DRIVING"), "the message has one number");
         assert_eq!(name(1, "name", 1.0), None, "a text is no number");
         assert_eq!((name(1, "none", 1.0), plan.constant(TopicId(1), &[], 1.0)), (None, None));
+
+        // A metric has it if its values are those of the field.
+        let status = FieldRef { topic: TopicId(0), path: vec!["status".to_owned()] };
+        let formula = |aggregate| Formula {
+            inputs: vec![Input::new(status.clone(), Members::Min)],
+            aggregate,
+            when: None,
+            every: None,
+            per: None,
+            side: Side::Inbound,
+        };
+        let mut of = |source| {
+            plan.metrics = vec![metric("metric", source)];
+            plan.constant_of(MetricId(0), 2.0).map(str::to_owned)
+        };
+        assert_eq!(of(MetricSource::Last { input: status.clone() }).as_deref(), Some("STATUS_BAD"));
+        let worst = formula(Aggregate::Max { of: Expression::Input(0) });
+        assert_eq!(of(MetricSource::Formula { formula: worst }).as_deref(), Some("STATUS_BAD"));
+        let further = Expression::Sum(vec![Expression::Input(0), Expression::Constant(1.0)]);
+        let computed = formula(Aggregate::Max { of: further });
+        assert_eq!(of(MetricSource::Formula { formula: computed }), None);
     }
 
     #[test]

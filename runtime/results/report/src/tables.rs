@@ -295,7 +295,7 @@ pub(super) fn metrics(metrics: &[MetricReport]) -> Table {
     let mut table = Table::with([Column::heading("metric"), Column::words("value"), Column::number("changes")]);
     for metric in metrics {
         let shown = MetricValue::whole(metric.value, metric.set);
-        let value = value_text(shown, metric.unit.as_deref(), &[]);
+        let value = value_text(shown, metric.unit.as_deref(), metric.constant.as_deref(), &[]);
         table.row([Datum::text(&metric.metric), Datum::Text(value), Datum::count(metric.changes)]);
     }
     table
@@ -486,7 +486,7 @@ pub(super) fn differences(differences: &[Difference]) -> Table {
 pub(super) fn fed_metrics(metrics: &[FedMetric]) -> Table {
     let mut table = Table::with(["metric", "value", "recorded", ""].map(Column::words));
     for FedMetric { metric, unit, now, recorded, sameness } in metrics {
-        let value = |value: MetricValue| Datum::Text(value_text(value, unit.as_deref(), &[]));
+        let value = |value: MetricValue| Datum::Text(value_text(value, unit.as_deref(), None, &[]));
         let recorded = || value(MetricValue::whole(*recorded, true));
         let (recorded, word) = match sameness {
             Sameness::Equal => (recorded(), "equal"),

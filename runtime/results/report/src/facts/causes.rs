@@ -6,7 +6,6 @@ use sesame_analysis::causes::{Cause, Causes, Fewer, Unseen, causes_in};
 use sesame_analysis::confirmed::FindingAgain;
 use sesame_base::test_number::TestNumber;
 use sesame_plan::{Bound, CampaignPlan, Task};
-use sesame_present::number;
 use sesame_record::{Judge, RecordError, Repository, TestRow, verdict};
 
 use crate::facts::show::{OperationReport, acting};
@@ -111,7 +110,7 @@ fn summarise(
     let metric = plan.metric(requirement.metric);
     let record = repository.test(cause.smallest)?;
     let shown = record.observation.value(requirement.metric);
-    let value = wording::value_text(shown, metric.unit.as_deref(), &[requirement.bound]);
+    let value = wording::value_of(plan, requirement.metric, shown, &[requirement.bound]);
     let first = verdict(requirement.bound, &record.observation.outcome, shown);
     let was_run_again = !judge.runs(cause.smallest).is_empty();
     let again = FindingAgain::of(&requirement.name, judge.tally(cause.smallest, requirement), first);
@@ -124,7 +123,7 @@ fn summarise(
         metric: metric.name.clone(),
         value,
         outside: shown.value.map_or(0.0, |value| distance_outside(requirement.bound, value)),
-        bound: number::bound(requirement.bound, metric.unit.as_deref()),
+        bound: wording::bound_of(plan, requirement),
         first: TestNumber(cause.violating.first().copied().unwrap_or(cause.smallest)),
         violating: cause.violating.len(),
         held: cause.held as usize,

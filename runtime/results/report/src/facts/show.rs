@@ -12,7 +12,7 @@ use sesame_base::test_number::TestNumber;
 use sesame_gap::proportion::wilson;
 use sesame_notation as notation;
 use sesame_plan::stl::Formula;
-use sesame_plan::{Activation, Bound, CampaignPlan, Choice, Metric, MetricSource, Span, Task};
+use sesame_plan::{Activation, Bound, CampaignPlan, Choice, Metric, MetricId, MetricSource, Span, Task};
 use sesame_present::number;
 use sesame_record::{
     EventKind, Judge, MetricValue, Origin, RecordError, Repetition, Repository, Tally, TestRecord, TestRow, Verdict,
@@ -203,6 +203,9 @@ pub struct MetricReport {
     pub unit: Option<String>,
     /// Its value.
     pub value: Option<f64>,
+    /// The name of the constant that its value is, if it is clear which one is meant.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub constant: Option<String>,
     /// Whether the value was set; otherwise it is the default.
     pub set: bool,
     /// How often it changed.
@@ -344,16 +347,18 @@ pub(crate) fn report_on(
         front,
         operations: operations(plan, record),
         stacked: stacked_in(plan, record),
-        metrics: plan
-            .metrics
-            .iter()
-            .enumerate()
+        metrics: (0..)
+            .map(MetricId)
+            .zip(&plan.metrics)
             .map(|(id, metric)| {
-                let shown = observation.metrics.get(id);
+                let shown = observation.metrics.get(id.index());
+                let value = shown.and_then(|shown| shown.value);
+                let constant = value.and_then(|value| plan.constant_of(id, value));
                 MetricReport {
                     metric: metric.name.clone(),
                     unit: metric.unit.clone(),
-                    value: shown.and_then(|shown| shown.value),
+                    value,
+                    constant: constant.map(str::to_owned),
                     set: shown.is_some_and(|shown| shown.set),
                     changes: shown.map_or(0, |shown| shown.series.len()),
                     robustness: shown.map_or_else(Vec::new, |shown| shown.robustness.clone()),
@@ -433,11 +438,11 @@ fn verdicts(plan: &CampaignPlan, record: &TestRecord, fresh: &[Repetition]) -> V
             requirement: requirement.name.clone(),
             text: requirement.text.clone(),
             metric: metric.name.clone(),
-            bound: number::bound(requirement.bound, metric.unit.as_deref()),
+            bound: wording::bound_of(plan, requirement),
             verdict: tally.verdict(first),
             first,
             fresh: (!fresh.is_empty()).then_some(FreshVerdicts { tally, interval }),
-            value: wording::value_text(value, metric.unit.as_deref(), &[requirement.bound]),
+            value: wording::value_of(plan, requirement.metric, value, &[requirement.bound]),
             unrecorded: first == Verdict::Violated && outside.is_empty() && formula_of(metric).is_some(),
             outside,
             decided_at: shown.and_then(|shown| decided_at(metric, shown)),

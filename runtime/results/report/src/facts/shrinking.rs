@@ -20,7 +20,7 @@ use sesame_search::{Strategy as _, sspr};
 
 use crate::export::shrunk_block;
 use crate::facts::show::{OperationReport, operations as operation_reports};
-use crate::facts::wording::{bounds_on, counted, operations, value_text};
+use crate::facts::wording::{bounds_on, counted, operations, value_of};
 
 pub use triggers::ShrinkTrigger;
 use triggers::triggers;
@@ -412,7 +412,7 @@ fn values(plan: &CampaignPlan, metrics: &[MetricId], value: impl Fn(MetricId) ->
     let named = |&id: &MetricId| {
         let metric = plan.metric(id);
         let shown = value(id);
-        let text = value_text(shown, metric.unit.as_deref(), &bounds_on(plan, id));
+        let text = value_of(plan, id, shown, &bounds_on(plan, id));
         NamedValue { metric: metric.name.clone(), value: shown.value, text }
     };
     metrics.iter().map(named).collect()

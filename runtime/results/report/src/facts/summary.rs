@@ -27,7 +27,7 @@ use crate::facts::repetition::{Repetition, repetition};
 use crate::facts::show::{OperationReport, acting};
 use crate::facts::shrinking::{Shrinking, shrinkings};
 use crate::facts::stacked::{Stacked, stacked_in};
-use crate::facts::wording::{operations, tests_not_imported, value_text, violated};
+use crate::facts::wording::{bound_of, operations, tests_not_imported, value_of, violated};
 
 /// How the warning begins that the reference run after a campaign is not like the one before it.
 pub const CLOSING_RUN_DIFFERS: &str = "the reference run after the campaign differs from the one before it:";
@@ -499,12 +499,11 @@ fn summarise_requirement(
 ) -> Result<RequirementSummary, RecordError> {
     let plan = repository.plan();
     let metric = plan.metric(requirement.metric);
-    let unit = metric.unit.as_deref();
     let mut found = RequirementSummary {
         requirement: requirement.name.clone(),
         text: requirement.text.clone(),
         metric: metric.name.clone(),
-        bound: number::bound(requirement.bound, unit),
+        bound: bound_of(plan, requirement),
         satisfied: 0,
         violated: 0,
         confirmed: 0,
@@ -546,7 +545,7 @@ fn summarise_requirement(
         && let Some(value) = shown.value
     {
         let acting = acting(plan, &repository.test(row.number)?);
-        let text = value_text(shown, unit, &[requirement.bound]);
+        let text = value_of(plan, requirement.metric, shown, &[requirement.bound]);
         found.worst = Some(Worst { test: TestNumber(row.number), value, text, acting });
     }
     Ok(found)

@@ -1,6 +1,6 @@
 //! Tests and values in words, as several facts have them.
 
-use sesame_plan::{Bound, CampaignPlan, MetricId};
+use sesame_plan::{Bound, CampaignPlan, MetricId, Requirement};
 use sesame_present::number;
 use sesame_record::{Judge, MetricValue, TestRow, Verdict, not_imported};
 
@@ -56,14 +56,31 @@ pub(crate) fn tests_not_imported(rows: &[TestRow]) -> Option<String> {
     Some(format!("{held} that were not imported: more was disturbed than is shown, and such a test has no point"))
 }
 
-/// A metric's value with its unit, next to bounds to which it is compared; `(never set)` follows where it is the
-/// default.
-pub(crate) fn value_text(shown: MetricValue, unit: Option<&str>, bounds: &[Bound]) -> String {
-    match shown.value {
-        None => "unmeasured".to_owned(),
-        Some(value) if shown.set => number::beside(value, bounds, unit),
-        Some(value) => format!("{} (never set)", number::beside(value, bounds, unit)),
+/// A metric's value with its unit, next to bounds to which it is compared. The name of the constant that it is follows,
+/// if there is one, and `(never set)` where it is the default.
+pub(crate) fn value_text(shown: MetricValue, unit: Option<&str>, constant: Option<&str>, bounds: &[Bound]) -> String {
+    let Some(value) = shown.value else { return "unmeasured".to_owned() };
+    let mut text = number::beside(value, bounds, unit);
+    if let Some(constant) = constant {
+        text.push_str(&format!(" ({constant})"));
     }
+    if !shown.set {
+        text.push_str(" (never set)");
+    }
+    text
+}
+
+/// As [`value_text`], of a metric of a plan.
+pub(crate) fn value_of(plan: &CampaignPlan, metric: MetricId, shown: MetricValue, bounds: &[Bound]) -> String {
+    let constant = shown.value.and_then(|value| plan.constant_of(metric, value));
+    value_text(shown, plan.metric(metric).unit.as_deref(), constant, bounds)
+}
+
+/// The bound of a requirement with its unit. The name of the constant that it is follows, if there is one.
+pub(crate) fn bound_of(plan: &CampaignPlan, requirement: &Requirement) -> String {
+    let text = number::bound(requirement.bound, plan.metric(requirement.metric).unit.as_deref());
+    let constant = requirement.bound.number().and_then(|number| plan.constant_of(requirement.metric, number));
+    constant.map_or(text.clone(), |constant| format!("{text} ({constant})"))
 }
 
 /// The bounds of a plan's requirements on a metric.

@@ -73,7 +73,11 @@ fn heading(body: &mut Markup, summary: &Summary, report: &TestReport) {
         .filter_map(|objective| {
             let metric = report.metrics.iter().find(|metric| metric.metric == objective.metric)?;
             let shown = MetricValue::whole(metric.value, metric.set);
-            Some(format!("{} {}", metric.metric, value_text(shown, metric.unit.as_deref(), &[])))
+            Some(format!(
+                "{} {}",
+                metric.metric,
+                value_text(shown, metric.unit.as_deref(), metric.constant.as_deref(), &[])
+            ))
         })
         .collect();
     body.element("p", &[("class", "values")], &values.join(" · "));

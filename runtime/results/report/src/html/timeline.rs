@@ -6,14 +6,14 @@ use std::fmt::Write as _;
 
 use sesame_base::observation::MetricObservation;
 use sesame_base::verdict::ends;
-use sesame_plan::{Bound, CampaignPlan, Metric, MetricSource, Span};
+use sesame_plan::{Bound, CampaignPlan, Metric, MetricId, MetricSource, Span};
 use sesame_present::axis::Axis;
 use sesame_present::markup::{Markup, coordinate, percent};
 use sesame_present::number;
 use sesame_record::{MetricValue, TestRecord};
 
 use crate::facts::show::{OperationReport, TestReport, decided_at, violated_when};
-use crate::facts::wording::value_text;
+use crate::facts::wording::value_of;
 use crate::html::certificate;
 use crate::sentences::{choices_text, effect_text, planned_text, spans_text};
 
@@ -41,7 +41,7 @@ pub(crate) fn timeline(markup: &mut Markup, plan: &CampaignPlan, record: &TestRe
     lanes(markup, &time, &report.operations, broke_off);
     certificate::lanes(markup, &time, &report.monitors, (end, broke_off));
     for id in shown_metrics(plan, record) {
-        series(markup, plan, &time, id, &record.observation.metrics[id], (end, broke_off));
+        series(markup, plan, &time, id, &record.observation.metrics[id.index()], (end, broke_off));
     }
     time_axis(markup, &time);
     if let Some(at) = broke_off {
@@ -137,15 +137,16 @@ fn lane(markup: &mut Markup, time: &Axis, operation: &OperationReport, broke_off
 }
 
 /// Metrics with something to draw: those that a requirement bounds, then the objectives, then the rest.
-fn shown_metrics(plan: &CampaignPlan, record: &TestRecord) -> Vec<usize> {
-    let bounded = plan.requirements.iter().map(|requirement| requirement.metric.index());
-    let objectives = plan.campaign.objectives.iter().map(|id| id.index());
-    let mut order: Vec<usize> = Vec::new();
-    for id in bounded.chain(objectives).chain(0..plan.metrics.len()) {
+fn shown_metrics(plan: &CampaignPlan, record: &TestRecord) -> Vec<MetricId> {
+    let bounded = plan.requirements.iter().map(|requirement| requirement.metric);
+    let objectives = plan.campaign.objectives.iter().copied();
+    let all = (0..).map(MetricId).take(plan.metrics.len());
+    let mut order: Vec<MetricId> = Vec::new();
+    for id in bounded.chain(objectives).chain(all) {
         // The time spent fuzzing is what the lanes above show.
-        let drawn = !matches!(plan.metrics[id].source, MetricSource::FuzzingTime)
-            && record.observation.metrics.get(id).is_some_and(|shown| {
-                let line = Line::of(&plan.metrics[id], shown, 0.0);
+        let drawn = !matches!(plan.metric(id).source, MetricSource::FuzzingTime)
+            && record.observation.metrics.get(id.index()).is_some_and(|shown| {
+                let line = Line::of(plan.metric(id), shown, 0.0);
                 !line.points.is_empty() || (record.observation.outcome.is_whole() && violates_unset(plan, id, shown))
             });
         if drawn && !order.contains(&id) {
@@ -156,8 +157,8 @@ fn shown_metrics(plan: &CampaignPlan, record: &TestRecord) -> Vec<usize> {
 }
 
 /// Whether a metric was never set, and a requirement is violated by its default.
-fn violates_unset(plan: &CampaignPlan, id: usize, shown: &MetricObservation) -> bool {
-    let mut bounds = plan.requirements.iter().filter(|requirement| requirement.metric.index() == id);
+fn violates_unset(plan: &CampaignPlan, id: MetricId, shown: &MetricObservation) -> bool {
+    let mut bounds = plan.requirements.iter().filter(|requirement| requirement.metric == id);
     !shown.set && shown.value.is_some_and(|value| bounds.any(|requirement| !requirement.bound.holds(value)))
 }
 
@@ -182,18 +183,18 @@ fn series(
     markup: &mut Markup,
     plan: &CampaignPlan,
     time: &Axis,
-    id: usize,
+    id: MetricId,
     shown: &MetricObservation,
     (end, broke_off): (f64, Option<f64>),
 ) {
-    let metric: &Metric = &plan.metrics[id];
+    let metric = plan.metric(id);
     let of_run = end;
     let Line { points, end } = Line::of(metric, shown, end);
     let unit = metric.unit.as_deref();
     let bounds: Vec<(&str, Bound)> = plan
         .requirements
         .iter()
-        .filter(|requirement| requirement.metric.index() == id)
+        .filter(|requirement| requirement.metric == id)
         .map(|requirement| (requirement.name.as_str(), requirement.bound))
         .collect();
     let lines: Vec<f64> = bounds
@@ -221,7 +222,7 @@ fn series(
 
     row(markup, |markup| {
         markup.element("b", &[], &metric.name);
-        let mut value = value_text(MetricValue::whole(shown.value, shown.set), unit, &[]);
+        let mut value = value_of(plan, id, MetricValue::whole(shown.value, shown.set), &[]);
         if let Some(at) = decided_at(metric, shown) {
             let _ = write!(value, " at {at:.2} s");
         }
