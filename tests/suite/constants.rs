@@ -64,8 +64,7 @@ fn values_and_bounds_that_are_constants_have_their_names_in_the_terminal_and_on_
     assert!(shown.contains("2 (STATUS_DISCHARGING)") && shown.contains("= 1 (STATUS_CHARGING)"), "{shown}");
     let json = sesamec(&["show", SPACE, "out", "--results", "known", "--format", "json"]);
     assert!(json.contains(r#""constant": "STATUS_DISCHARGING""#), "{json}");
-    sesamec(&["report", SPACE, "--results", "known"]);
-    let page = std::fs::read_to_string(project.runners.join("charger/known/report.html"));
-    let page = page.unwrap_or_else(|_| panic!("no page below {}", project.folder.display()));
+    sesamec(&["report", SPACE, "--results", "known", "--output", "page.html"]);
+    let page = std::fs::read_to_string(project.folder.join("page.html")).expect("the page is written");
     assert!(page.contains("2 (STATUS_DISCHARGING)"), "the page names the value");
 }

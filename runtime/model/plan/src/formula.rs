@@ -274,7 +274,7 @@ pub enum Expression {
     SignedDistance(Box<SignedDistance>),
     /// The simulation time since the beginning of the run, in seconds.
     Time,
-    /// What the clock of the simulator's stamps shows, in seconds: as [`Expression::Time`], from where that clock counts.
+    /// What the clock of the simulator's stamps shows, in seconds: the same time, from where that clock counts.
     Now,
     /// A function of one number.
     Unary {

@@ -343,7 +343,8 @@ impl OperationKind {
             | OperationKind::Stale
             | OperationKind::Pause { .. }
             | OperationKind::Slow { .. } => Class::Delay,
-            // What the user's code or a node that becomes active does is not known, and a scene does nothing to messages.
+            // What the user's code or a node that becomes active does is not known, and a scene does nothing to
+            // messages.
             OperationKind::Custom { .. }
             | OperationKind::Scene { .. }
             | OperationKind::Transition { transition: Transition::Configure | Transition::Activate, .. } => {

@@ -303,8 +303,8 @@ impl CampaignPlan {
         }
     }
 
-    /// The name of a metric's value, if that is one of a field, such as the last or the greatest one, and if it is clear
-    /// which constant is meant, as in [`CampaignPlan::constant`].
+    /// The name of a metric's value, if that is one of a field, such as the last or the greatest one, and if it is
+    /// clear which constant is meant, as in [`CampaignPlan::constant`].
     pub fn constant_of(&self, metric: MetricId, value: f64) -> Option<&str> {
         let FieldRef { topic, path } = self.metric(metric).source.field()?;
         self.constant(*topic, &path.iter().map(String::as_str).collect::<Vec<_>>(), value)

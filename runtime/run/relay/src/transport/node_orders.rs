@@ -116,8 +116,8 @@ fn fault(kind: &OperationKind) -> Option<NodeFault> {
     }
 }
 
-/// What an operation does to which node; nothing for its parameters and its lifecycle, which nodes of such a simulator do
-/// not have.
+/// What an operation does to which node; nothing for its parameters and its lifecycle, which nodes of such a simulator
+/// do not have.
 fn wanted(resource: &Resource) -> Option<(NodeId, Condition)> {
     match *resource {
         Resource::Set { .. } | Resource::Transition { .. } => None,
