@@ -41,16 +41,16 @@ fn fleet(name: &str, more: &str) -> Option<Space> {
              operation stop on node one of cart = pause\n\
              operation skid on parameter \"grip\" of one of cart = set [0, 1]\n\
              test slips {{ slip bias 9m from 1s to 2s }}\n\
-             test stands {{ stop member \"r1\" from 1s to 3s }}\n\
-             test hears_nothing {{ deaf value 0m/s member \"r2\" from 1s to 4s }}\n\
-             test skids {{ skid value 0 member \"r2\" from 1s to 4s }}\n\
+             test stands {{ stop member \"r1\" from 1s to 5s }}\n\
+             test hears_nothing {{ deaf value 0m/s member \"r2\" from 1s to 6s }}\n\
+             test skids {{ skid value 0 member \"r2\" from 1s to 6s }}\n\
              test races {{ pace value 4m/s before start }}\n\
              campaign first {{\n\
                objectives apart\n\
                observes   ahead, behind, far\n\
                operations slip, deaf, stop, skid, pace 1 per test\n\
                search     random {{ evaluations 2 }}\n\
-               end        after 4s\n\
+               end        after 6s\n\
              }}\n",
         domain = domain.number,
     );
@@ -76,12 +76,14 @@ fn each_cart_has_its_own_topics_one_of_them_is_disturbed_and_a_scene_drives_them
         let found = found.unwrap_or_else(|| panic!("no {test} in {listed:#}"));
         found["measured"][metric].as_f64().unwrap_or_else(|| panic!("no {metric} in {listed:#}"))
     };
-    // Undisturbed they drive side by side.
-    assert!(value("T0", "apart") < 0.5, "{listed:#}");
-    assert!(value("T1", "ahead") > 8.0 && value("T1", "behind") < 0.5, "only `r2` slips: {listed:#}");
-    assert!(value("T2", "ahead") > 1.5 && value("T2", "behind") < 0.5, "only `r1` stands: {listed:#}");
-    assert!(value("T3", "behind") > 2.0 && value("T3", "ahead") < 0.5, "only `r2` hears nothing: {listed:#}");
-    assert!(value("T4", "behind") > 2.0 && value("T4", "ahead") < 0.5, "only `r2` has no grip: {listed:#}");
+    // Undisturbed they drive side by side, but for what a busy machine does to one of them.
+    let beside = 1.5;
+    assert!(value("T0", "apart") < beside, "{listed:#}");
+    let (fore, aft) = (|test: &str| value(test, "ahead"), |test: &str| value(test, "behind"));
+    assert!(fore("T1") > 9.0 - beside && aft("T1") < beside, "only `r2` slips: {listed:#}");
+    assert!(fore("T2") > 4.0 - beside && aft("T2") < beside, "only `r1` stands: {listed:#}");
+    assert!(aft("T3") > 5.0 - beside && fore("T3") < beside, "only `r2` hears nothing: {listed:#}");
+    assert!(aft("T4") > 5.0 - beside && fore("T4") < beside, "only `r2` has no grip: {listed:#}");
     assert!(value("T5", "far") > 2.0 * value("T0", "far"), "the manager has another pace: {listed:#}");
 }
 
