@@ -118,6 +118,7 @@ pub(crate) fn resolve(
         compared: Compared::default(),
         eddis: Vec::new(),
         parts: BTreeMap::new(),
+        in_arguments: BTreeMap::new(),
     };
     resolver.collect();
     let simulator = resolver.system();
@@ -219,6 +220,8 @@ struct Resolver<'a> {
     eddis: Vec<Option<model::eddi::Eddi>>,
     /// The metrics of the parts of monitors.
     parts: BTreeMap<(usize, MonitorPart), usize>,
+    /// The scenes that launched programs have in their arguments, with the first of these places.
+    in_arguments: BTreeMap<String, Span>,
 }
 
 /// The most names that are compared with unknown ones in all.

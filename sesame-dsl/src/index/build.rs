@@ -9,12 +9,12 @@ use crate::clocks::clock_of;
 use crate::import::Merged;
 use crate::span::{FileId, Span};
 use crate::syntax::ast::eddi::{Eddi, State};
-use crate::syntax::ast::lifecycle::{Launch, ReadyWhen};
+use crate::syntax::ast::lifecycle::{Command, Launch, ReadyWhen};
 use crate::syntax::ast::physical::Physical;
 use crate::syntax::ast::{
     self, Activation, ActivationMode, Campaign, ComparedWith, Contained, Expression, ExpressionKind, Formula,
     FormulaKind, Head, Metric, MetricSource, Name, Operation, OperationBody, OperationKind, Path, Resource, Step,
-    System, Test, TriggerEnd, Type, TypeKind,
+    System, Test, Text, TriggerEnd, Type, TypeKind,
 };
 
 /// Makes the index of what was read.
@@ -102,6 +102,8 @@ struct Indexer<'a> {
     types: BTreeMap<DefinitionId, &'a Type>,
     /// Messages with a type of ROS.
     of_ros: BTreeSet<DefinitionId>,
+    /// The operations that are parameters of the space.
+    scenes: BTreeSet<DefinitionId>,
     /// The names of constants that messages declare.
     constants: BTreeSet<&'a str>,
     /// The names of the space, which are not settled before all are there.
@@ -184,6 +186,9 @@ impl<'a> Indexer<'a> {
 
     fn declare_operation(&mut self, operation: &'a Operation) -> DefinitionId {
         let id = self.declare(Kind::Operation, &operation.head);
+        if let OperationKind::Scene(_) = &operation.body.kind {
+            self.scenes.insert(id);
+        }
         if let OperationKind::Custom(custom) = &operation.body.kind {
             for parameter in &custom.parameters {
                 let full_span = parameter.name.span.to(parameter.span);
@@ -422,7 +427,7 @@ impl<'a> Indexer<'a> {
             actions: _,
             nodes,
             launches,
-            terminates: _,
+            terminates,
             relay_budgets: _,
             has_errors: _,
         } = system;
@@ -449,13 +454,25 @@ impl<'a> Indexer<'a> {
         // What is launched has no name of its own; it is the simulator's system.
         if let Some(&within) = ids.simulators.first() {
             self.launches(launches, within);
+            self.commands(terminates.iter().map(|(_, command)| command), within);
         }
     }
 
     fn launches(&mut self, launches: &'a [(Span, Launch)], within: DefinitionId) {
+        self.commands(launches.iter().map(|(_, launch)| &launch.command), within);
         for (_, ready) in launches.iter().flat_map(|(_, launch)| &launch.ready) {
             if let ReadyWhen::Topic(topic) = &ready.when {
                 self.mention(topic, within);
+            }
+        }
+    }
+
+    /// The scenes in the arguments of programs.
+    fn commands(&mut self, commands: impl Iterator<Item = &'a Command>, within: DefinitionId) {
+        for (word, place) in commands.flat_map(|command| &command.arguments).flat_map(Text::placeholders) {
+            let scene = self.names.get(word).filter(|id| self.scenes.contains(id)).copied();
+            if let (Some(scene), Some(place)) = (scene, place) {
+                self.refer(place, Some(scene), within);
             }
         }
     }

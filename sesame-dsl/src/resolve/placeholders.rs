@@ -1,11 +1,11 @@
-//! Placeholders in the arguments of launched programs.
+//! Placeholders in the arguments of launched programs: what a worker has of its own, and scenes, which tests choose.
 
-use super::Resolver;
 use super::words::list;
+use super::{Definition, Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::similar::most_similar;
 use crate::span::Span;
-use crate::syntax::ast::Text;
+use crate::syntax::ast::{OperationKind, Text};
 
 /// What a worker has of its own.
 const KNOWN: [&str; 6] = ["worker", "domain", "port", "folder", "seed", "ros-args"];
@@ -24,8 +24,8 @@ pub(super) enum Purpose {
     Port,
 }
 
-impl Resolver<'_> {
-    /// Reports placeholders that are not replaced; returns whether there is none of them.
+impl<'a> Resolver<'a> {
+    /// Reports placeholders that are not replaced; returns whether there is none of them. Notes which scenes are there.
     pub(super) fn placeholders(&mut self, text: &Text, purpose: Purpose) -> bool {
         let permitted = match purpose {
             Purpose::Argument => &KNOWN[..],
@@ -33,21 +33,26 @@ impl Resolver<'_> {
             Purpose::Port => &["worker", "port"],
         };
         let mut sound = true;
-        for word in words(&text.text) {
-            let span = self.inside_of(text, word);
-            if !permitted.contains(&word) {
-                let title = format!("there is no placeholder `{{{word}}}`");
-                let mut diagnostic = Diagnostic::new(Code::PLACEHOLDER, span, title).label("unknown placeholder");
-                diagnostic = if word == "member" {
-                    diagnostic.note("only a node that is a group, such as `\"/{r1,r2}/vehicle\"`, has members")
-                } else if let Some(similar) = most_similar(word, permitted.iter().copied()) {
-                    diagnostic.did_you_mean(span, format!("{{{similar}}}"))
-                } else {
-                    let braced: Vec<String> = permitted.iter().map(|word| format!("{{{word}}}")).collect();
-                    let braced: Vec<&str> = braced.iter().map(String::as_str).collect();
-                    diagnostic.note(format!("the placeholders are {}", list(&braced)))
-                };
+        for (word, place) in text.placeholders() {
+            // With its braces.
+            let span = place.map_or(text.span, |Span { file, lo, hi }| Span { file, lo: lo - 1, hi: hi + 1 });
+            let scene = self.scene_named(word).filter(|_| purpose != Purpose::Port);
+            if let (Some(declared), true) = (scene, permitted.contains(&word)) {
+                let title = format!("`{{{word}}}` could be the parameter `{word}` or what the worker has of its own");
+                let diagnostic = Diagnostic::new(Code::PLACEHOLDER, span, title)
+                    .label("two values have this name")
+                    .secondary(declared, "the parameter is declared here")
+                    .note(format!("rename the parameter, for example `start_{word}`"));
                 self.report(diagnostic);
+                sound = false;
+            } else if scene.is_some() {
+                self.in_arguments.entry(word.to_owned()).or_insert(span);
+            } else if !permitted.contains(&word) {
+                // An import that failed may have declared it.
+                if !self.file.incomplete && !self.silent.contains(word) {
+                    let diagnostic = self.no_placeholder(word, span, permitted, purpose);
+                    self.report(diagnostic);
+                }
                 sound = false;
             } else if word == "ros-args" && text.text != "{ros-args}" {
                 let diagnostic = Diagnostic::new(Code::PLACEHOLDER, span, "`{ros-args}` is not an argument of its own")
@@ -67,6 +72,40 @@ impl Resolver<'_> {
         sound
     }
 
+    /// Where the parameter of the space with this name is declared, if there is one.
+    fn scene_named(&self, name: &str) -> Option<Span> {
+        let Definition { kind, index, span } = *self.names.get(name)?;
+        let is_scene =
+            kind == Kind::Operation && matches!(self.file.operations.get(index)?.body.kind, OperationKind::Scene(_));
+        is_scene.then_some(span)
+    }
+
+    /// What to say of a word in braces that nothing replaces.
+    fn no_placeholder(&self, word: &str, span: Span, permitted: &[&'a str], purpose: Purpose) -> Diagnostic {
+        let title = format!("there is no placeholder `{{{word}}}`");
+        let diagnostic = Diagnostic::new(Code::PLACEHOLDER, span, title).label("unknown placeholder");
+        if word == "member" {
+            return diagnostic.note("only a node that is a group, such as `\"/{r1,r2}/vehicle\"`, has members");
+        }
+        let operation = self.names.get(word).filter(|definition| definition.kind == Kind::Operation);
+        if let (Some(operation), true) = (operation, purpose != Purpose::Port) {
+            return diagnostic
+                .secondary(operation.span, "this operation has no value before the start of a run")
+                .note("of what tests choose, only a `parameter` of the space is given to launched programs");
+        }
+        let mut known = permitted.to_vec();
+        if purpose != Purpose::Port {
+            let operations = self.names_of(Kind::Operation).into_iter();
+            known.extend(operations.filter(|name| self.scene_named(name).is_some() && !permitted.contains(name)));
+        }
+        if let Some(similar) = most_similar(word, known.iter().copied()) {
+            return diagnostic.did_you_mean(span, format!("{{{similar}}}"));
+        }
+        let braced: Vec<String> = known.iter().map(|word| format!("{{{word}}}")).collect();
+        let braced: Vec<&str> = braced.iter().map(String::as_str).collect();
+        diagnostic.note(format!("the placeholders are {}", list(&braced)))
+    }
+
     /// What a placeholder stands for, of which systems, and the simulator that has none of it.
     fn lacking(&self, word: &str) -> Option<(&'static str, &'static str, (&'static str, Span))> {
         match word {
@@ -74,35 +113,5 @@ impl Resolver<'_> {
             "domain" => Some(("domains", "ROS 2", self.other_than_ros_2()?)),
             _ => None,
         }
-    }
-
-    /// Where a part of a text stands, with its braces; the whole text if escapes move it.
-    fn inside_of(&self, text: &Text, word: &str) -> Span {
-        let braced = format!("{{{word}}}");
-        let found = self.text(text.span).find(&braced).and_then(|at| u32::try_from(at).ok());
-        match (found, u32::try_from(braced.len())) {
-            (Some(at), Ok(length)) => Span { lo: text.span.lo + at, hi: text.span.lo + at + length, ..text.span },
-            _ => text.span,
-        }
-    }
-}
-
-/// The words in braces that are made of letters and hyphens: other braces are the program's own.
-fn words(text: &str) -> impl Iterator<Item = &str> {
-    let parts = text.split('{').skip(1).filter_map(|rest| rest.split_once('}')).map(|(word, _)| word);
-    parts.filter(|word| {
-        word.starts_with(|first: char| first.is_ascii_alphabetic())
-            && word.bytes().all(|byte| byte.is_ascii_alphabetic() || byte == b'-')
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::words;
-
-    #[test]
-    fn braces_of_the_program_s_own_are_no_placeholders() {
-        let text = r#"{"a": 1} {worker} ${HOME}x{ros-args}{} {2} {a b} {{seed}} {open"#;
-        assert_eq!(words(text).collect::<Vec<_>>(), ["worker", "HOME", "ros-args", "seed"]);
     }
 }

@@ -1,4 +1,4 @@
-//! Parameters of the simulator: what a scenario is, and may vary from test to test.
+//! Parameters of the simulator or of launched programs: what a scenario is, and may vary from test to test.
 
 use super::Resolver;
 use crate::diagnostic::{Code, Diagnostic};
@@ -9,7 +9,11 @@ use crate::syntax::ast::{self, Name};
 impl<'a> Resolver<'a> {
     /// The operation that sets a parameter, and what a test may choose for it.
     pub(super) fn scene(&mut self, name: &'a Name, scene: &'a ast::Scene) -> Option<(OperationKind, Parameter)> {
-        let takes_parameters = self.takes_parameters(name.span);
+        let in_arguments = self.in_arguments.get(&name.text).copied();
+        let is_given = match in_arguments {
+            Some(place) => self.can_be_in_arguments(name, scene, place),
+            None => self.takes_parameters(name),
+        };
         let ends = [scene.range.low.unit.as_ref(), scene.range.high.unit.as_ref()];
         let unit = self.declared_unit([scene.unit.as_ref(), ends[0], ends[1]])?;
         let what = format!("`{}`", name.text);
@@ -35,16 +39,46 @@ impl<'a> Resolver<'a> {
         };
         let domain = Domain::Number { range: permitted, shape: ChoiceKind::Value, integer: scene.integer };
         let value = Parameter { name: "value".to_owned(), doc: String::new(), unit, domain };
-        (takes_parameters && whole).then_some((OperationKind::Scene { parameter: known_as, usual }, value))
+        let parameter = in_arguments.is_none().then_some(known_as);
+        (is_given && whole).then_some((OperationKind::Scene { parameter, usual }, value))
+    }
+
+    /// Reports a parameter that launched programs cannot have in their arguments.
+    fn can_be_in_arguments(&mut self, name: &Name, scene: &ast::Scene, place: Span) -> bool {
+        let (text, head) = (&name.text, "a launched program has it in its arguments");
+        let mut sound = true;
+        if let Some(known_as) = &scene.known_as {
+            let title = format!("`{text}` is given to launched programs, not to the simulator");
+            let diagnostic = Diagnostic::new(Code::PLACEHOLDER, known_as.span, title)
+                .label("the simulator is not asked for a parameter of this name; remove it")
+                .secondary(place, head);
+            self.report(diagnostic);
+            sound = false;
+        }
+        if scene.usual.is_none() {
+            let title = format!("`{text}` needs a `default`");
+            let end = scene.range.span.end();
+            let low = self.text(scene.range.low.span);
+            let diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, name.span, title)
+                .label("programs would be launched without its value in tests that do not choose it")
+                .secondary(place, head)
+                .suggest("add the value of the undisturbed run", end, format!(" default {low}"));
+            self.report(diagnostic);
+            sound = false;
+        }
+        sound
     }
 
     /// Reports a simulator that takes no parameters.
-    fn takes_parameters(&mut self, span: Span) -> bool {
+    fn takes_parameters(&mut self, Name { text: name, span }: &Name) -> bool {
         let Some((word, simulator)) = self.without(|kind| kind.takes_parameters) else { return true };
         let title = format!("simulator kind `{word}` takes no parameters");
-        let diagnostic = Diagnostic::new(Code::NODE_OUT_OF_REACH, span, title)
+        let diagnostic = Diagnostic::new(Code::NODE_OUT_OF_REACH, *span, title)
             .label("only `in_process`, `process` and `ros2` simulators begin a run with other values")
             .secondary(simulator, "the simulator is declared here")
+            .note(format!(
+                "programs that are launched can have it in their arguments, as in `launch \"./robot\" \"{{{name}}}\"`"
+            ))
             .note("a custom operation `before start` can change the files with which a system starts");
         self.report(diagnostic);
         false

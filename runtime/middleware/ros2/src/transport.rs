@@ -147,7 +147,9 @@ impl System {
         self.undo(None)?;
         self.postponed.clear();
         self.restarted.clear();
-        if self.session.is_none() || self.ros.reset.is_none() || std::mem::take(&mut self.spoilt) {
+        let is_of_another_scene = !self.launched.are_of(relay.arguments());
+        if std::mem::take(&mut self.spoilt) || self.session.is_none() || self.ros.reset.is_none() || is_of_another_scene
+        {
             self.launched.end();
             self.session = None;
             if self.domain > LAST_DOMAIN {
@@ -161,7 +163,7 @@ impl System {
             }
             let session = Session::join(&self.plan, &self.ros, relay.wires(), self.domain)?;
             let session = self.session.insert(session);
-            self.launched.start(seed)?;
+            self.launched.start(seed, relay.arguments())?;
             session.assemble(&self.plan, &mut self.launched, COMPLETE_WITHIN)?;
         }
         let Some(session) = &mut self.session else { return Ok(()) };

@@ -129,7 +129,7 @@ impl System {
             return Err(TransportError::Wiring(problem));
         }
         self.session = None;
-        self.launched.start_first(seed, "once it is connected")?;
+        self.launched.start_first(seed, relay.arguments(), "once it is connected")?;
         let mut client = Client::connect(&self.options()?).map_err(fault)?;
         client.set_step(milliseconds(self.settings.step_ns)).map_err(fault)?;
         let lines = Lines::open(&self.plan, &self.settings, relay.wires(), &mut client).map_err(fault)?;

@@ -13,7 +13,7 @@ use crate::unit::Unit;
 /// An operation of a plan in one line, with every clause that it can have: no default is left out.
 pub fn operation(plan: &CampaignPlan, operation: &Operation) -> String {
     if let OperationKind::Scene { parameter, usual } = &operation.kind {
-        return scene(operation, parameter, *usual);
+        return scene(operation, parameter.as_deref(), *usual);
     }
     let mut line = format!("operation {}", operation.name);
     let targets: Vec<String> =
@@ -60,8 +60,9 @@ fn unit_of_places<'a>(plan: &'a CampaignPlan, operation: &Operation) -> Unit<'a>
 }
 
 /// A parameter of the simulator that tests choose.
-fn scene(operation: &Operation, known_as: &str, usual: Option<f64>) -> String {
-    let known_as = if known_as == operation.name { String::new() } else { format!(" {}", quoted(known_as)) };
+fn scene(operation: &Operation, known_as: Option<&str>, usual: Option<f64>) -> String {
+    let known_as = known_as.filter(|&known_as| known_as != operation.name);
+    let known_as = known_as.map_or(String::new(), |known_as| format!(" {}", quoted(known_as)));
     let domain = operation.parameters.first().map(|value| {
         let unit = Unit::named(value.unit.as_deref());
         let Domain::Number { low, high, integer, .. } = &value.domain else { return String::new() };

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::TopicId;
+use crate::{CampaignPlan, Domain, Operation, OperationKind, TopicId};
 
 /// What a system says in addition to its simulator.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -43,6 +43,8 @@ pub struct Command {
     pub program: String,
     /// Its arguments, one by one. `{worker}`, `{domain}`, `{port}`, `{folder}` and `{seed}` in them are replaced by
     /// what the worker has of its own; an argument `{ros-args}` by the remappings that cut the topics of the node.
+    /// `{NAME}` of a [scene](crate::OperationKind::Scene) without a parameter of the simulator is replaced by its value
+    /// in the run.
     pub arguments: Vec<String>,
 }
 
@@ -87,4 +89,63 @@ pub struct RelayBudget {
     /// Difference of two delays at most; positive.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub jitter: Option<f64>,
+}
+
+impl CampaignPlan {
+    /// All commands that start or end programs of the system: that of the system as a whole, those of nodes, and the
+    /// one that ends it.
+    pub fn commands_mut(&mut self) -> impl Iterator<Item = &mut Command> {
+        let Lifecycle { launch, terminate, relay_budget: _ } = &mut self.simulator.lifecycle;
+        let launches = launch.iter_mut().chain(self.nodes.iter_mut().filter_map(|node| node.launch.as_mut()));
+        launches.map(|launch| &mut launch.command).chain(terminate)
+    }
+
+    /// The same to read.
+    pub fn commands(&self) -> impl Iterator<Item = &Command> {
+        let Lifecycle { launch, terminate, relay_budget: _ } = &self.simulator.lifecycle;
+        let launches = launch.iter().chain(self.nodes.iter().filter_map(|node| node.launch.as_ref()));
+        launches.map(|launch| &launch.command).chain(terminate)
+    }
+}
+
+impl Operation {
+    /// A value of a scene as an argument of a program: a whole number, or a number with a decimal point and without an
+    /// exponent, so that ROS takes it for one of floating point.
+    pub fn as_argument(&self, value: f64) -> String {
+        // There is no `-0`.
+        let written = (value + 0.0).to_string();
+        let integer =
+            self.parameters.iter().any(|parameter| matches!(parameter.domain, Domain::Number { integer: true, .. }));
+        if integer || written.contains('.') { written } else { format!("{written}.0") }
+    }
+
+    /// Whether it is a scene that launched programs have in their arguments.
+    pub fn is_in_arguments(&self) -> bool {
+        matches!(self.kind, OperationKind::Scene { parameter: None, .. })
+    }
+}
+
+/// A text with words in braces replaced by their values, each once: what is put in is not looked at again. Words that
+/// have no value stay as they are, with their braces.
+pub fn fill_placeholders(text: &str, value: impl Fn(&str) -> Option<String>) -> String {
+    let mut filled = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some((before, after)) = rest.split_once('{') {
+        filled.push_str(before);
+        rest = after;
+        match after.split_once('}').and_then(|(word, after)| Some((value(word)?, after))) {
+            Some((value, after)) => {
+                filled.push_str(&value);
+                rest = after;
+            }
+            None => filled.push('{'),
+        }
+    }
+    filled.push_str(rest);
+    filled
+}
+
+/// Whether a text has this word in braces.
+pub fn has_placeholder(text: &str, word: &str) -> bool {
+    text.contains(&format!("{{{word}}}"))
 }

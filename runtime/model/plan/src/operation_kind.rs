@@ -129,9 +129,12 @@ pub enum OperationKind {
     /// Sets a parameter of the simulator for the whole run, when that begins anew: what the scenario is. One parameter
     /// `value`.
     Scene {
-        /// The name of the parameter in the simulator.
-        parameter: String,
-        /// Its value in runs that do not set it; `None` where only the simulator knows it.
+        /// The name of the parameter in the simulator; `None` where launched programs have it in their arguments, as
+        /// `{NAME}` with the name of the operation, and the simulator is not asked for it.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        parameter: Option<String>,
+        /// Its value in runs that do not set it; `None` where only the simulator knows it, which is never so where
+        /// launched programs have it in their arguments.
         usual: Option<f64>,
     },
     /// The user's Rust code, with parameters as declared.

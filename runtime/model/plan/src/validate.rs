@@ -22,6 +22,7 @@ use crate::{
     Activation, Bound, CampaignPlan, Choice, ChoiceKind, Domain, Failing, FieldRef, KnownTest, KnownTestId, LabTask,
     MembersOf, MessageId, Messages, Metric, MetricId, MetricSource, NamedNumber, NewValue, Operation, OperationId,
     OperationKind, RequirementId, SCHEMA, Shrinking, Span, Target, Task, Test, TopicId, Type, Undisturbed, Variations,
+    has_placeholder,
 };
 
 use check::{
@@ -199,6 +200,26 @@ impl CampaignPlan {
             at("kind.constants", require(!constants.is_empty(), || "there is none".to_owned()))?;
             at("kind.constants", distinct(constants.iter().map(|constant| &constant.name)))?;
             each("kind.constants", constants, |constant| finite(constant.number))?;
+        }
+        if let OperationKind::Scene { parameter, usual } = &operation.kind {
+            let in_arguments = self
+                .commands()
+                .flat_map(|command| &command.arguments)
+                .any(|text| has_placeholder(text, &operation.name));
+            at("kind.usual", usual.map_or(Ok(()), finite))?;
+            at(
+                "kind.usual",
+                require(parameter.is_some() || usual.is_some(), || {
+                    "is not there, and programs are launched with it".to_owned()
+                }),
+            )?;
+            at(
+                "kind.parameter",
+                require(parameter.is_none() == in_arguments, || {
+                    let does = if in_arguments { "has" } else { "has neither this nor" };
+                    format!("`{}` {does} a place in the arguments of what is launched", operation.name)
+                }),
+            )?;
         }
         if let OperationKind::StuckAtConstant { numbers } = &operation.kind {
             each("kind.numbers", numbers, |number| finite(*number))?;

@@ -156,6 +156,8 @@ pub struct Launched {
     parts: Vec<(Part, Started)>,
     terminate: Option<Command>,
     seed: u64,
+    /// The values of scenes in arguments, by their names.
+    scene: Vec<(String, String)>,
     port: Option<Port>,
     /// To be run at the end; `None` while nothing is launched.
     pending: Option<Arc<Terminate>>,
@@ -186,6 +188,7 @@ impl Launched {
             parts: system.into_iter().chain(nodes).collect(),
             terminate: plan.simulator.lifecycle.terminate.clone(),
             seed: 0,
+            scene: Vec::new(),
             port: None,
             pending: None,
             ready: false,
@@ -218,10 +221,18 @@ impl Launched {
         self.begun > 0
     }
 
-    /// Ends what is running, and starts the programs for a run with this seed: what starts the system as a whole, or,
-    /// if there is no such program, all nodes. [`poll_ready`](Self::poll_ready) starts the others.
-    pub fn start(&mut self, seed: u64) -> Result<(), LaunchError> {
+    /// Whether the programs of a run with these values in their arguments are those of the last start. Otherwise they
+    /// have to be started anew, even where a simulator is reset between runs.
+    pub fn are_of(&self, scene: &[(String, String)]) -> bool {
+        self.scene == scene
+    }
+
+    /// Ends what is running, and starts the programs for a run with this seed and these values in their arguments, by
+    /// the names of placeholders: what starts the system as a whole, or, if there is no such program, all nodes.
+    /// [`poll_ready`](Self::poll_ready) starts the others.
+    pub fn start(&mut self, seed: u64, scene: &[(String, String)]) -> Result<(), LaunchError> {
         self.end();
+        scene.clone_into(&mut self.scene);
         if self.parts.is_empty() {
             self.ready = true;
             return Ok(());
@@ -238,8 +249,8 @@ impl Launched {
 
     /// Starts them and waits until all are ready, for a simulator that has neither topics nor a clock before
     /// `until_then`, a phrase: a program that awaits either would never be ready, so that is an error.
-    pub fn start_first(&mut self, seed: u64, until_then: &str) -> Result<(), LaunchError> {
-        self.start(seed)?;
+    pub fn start_first(&mut self, seed: u64, scene: &[(String, String)], until_then: &str) -> Result<(), LaunchError> {
+        self.start(seed, scene)?;
         let mut asked = false;
         self.await_ready(&mut |_| {
             asked = true;
@@ -448,6 +459,7 @@ impl Launched {
             port: self.port(),
             folder: self.context.folder.display().to_string(),
             seed: self.seed,
+            scene: self.scene.clone(),
         }
     }
 

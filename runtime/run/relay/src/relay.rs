@@ -106,6 +106,8 @@ pub struct Relay<'a> {
     orders: Vec<Order>,
     /// Parameters of the simulator that are not as it has them, by name.
     parameters: Vec<(String, f64)>,
+    /// What launched programs have in their arguments, by the names of placeholders.
+    arguments: Vec<(String, String)>,
     /// The listeners besides the metrics.
     taps: Vec<&'a mut dyn Listener>,
 }
@@ -200,10 +202,12 @@ impl<'a> Relay<'a> {
         let monitors = Monitors::new(&metrics, wires);
         let hears =
             |wire| metrics.delivers(wire) || monitors.as_ref().is_some_and(|monitors| monitors.hears_delivered(wire));
+        let Scene { parameters, arguments } = Scene::of(plan, &operations);
         Ok(Relay {
             wires,
             disturbed_by: pipelines.iter().map(Vec::len).collect(),
-            parameters: scene(plan, &operations),
+            parameters,
+            arguments,
             heard: wires.iter().map(hears).chain(wires.links().iter().map(|_| false)).collect(),
             acted_on: plan.operations.iter().flat_map(|operation| wires.acted_on(operation)).collect(),
             conditions: Conditions {
@@ -485,19 +489,33 @@ impl<'a> Relay<'a> {
     }
 }
 
-/// The values of the simulator's parameters with which a run begins: those that the test chooses, and the usual values
-/// of the others.
-fn scene(plan: &CampaignPlan, operations: &[Stage]) -> Vec<(String, f64)> {
-    let parameters = (0..).map(OperationId).zip(&plan.operations).filter_map(|(id, operation)| {
-        let OperationKind::Scene { parameter, usual } = &operation.kind else { return None };
-        let chosen =
-            operations.iter().filter(|stage| stage.operation == id).find_map(|stage| match stage.disturbance {
-                Disturbance::Scene(value) => Some(value),
-                _ => None,
-            });
-        Some((parameter.clone(), chosen.or(*usual)?))
-    });
-    parameters.collect()
+/// The values with which a run begins: those that the test chooses, and the usual values of the others.
+#[derive(Default)]
+struct Scene {
+    /// Of the simulator's parameters.
+    parameters: Vec<(String, f64)>,
+    /// Of what launched programs have in their arguments.
+    arguments: Vec<(String, String)>,
+}
+
+impl Scene {
+    fn of(plan: &CampaignPlan, operations: &[Stage]) -> Self {
+        let mut scene = Scene::default();
+        for (id, operation) in (0..).map(OperationId).zip(&plan.operations) {
+            let OperationKind::Scene { parameter, usual } = &operation.kind else { continue };
+            let chosen =
+                operations.iter().filter(|stage| stage.operation == id).find_map(|stage| match stage.disturbance {
+                    Disturbance::Scene(value) => Some(value),
+                    _ => None,
+                });
+            let Some(value) = chosen.or(*usual) else { continue };
+            match parameter {
+                Some(parameter) => scene.parameters.push((parameter.clone(), value)),
+                None => scene.arguments.push((operation.name.clone(), operation.as_argument(value))),
+            }
+        }
+        scene
+    }
 }
 
 impl Exchange for Relay<'_> {
@@ -556,6 +574,10 @@ impl Exchange for Relay<'_> {
 
     fn parameters(&self) -> &[(String, f64)] {
         &self.parameters
+    }
+
+    fn arguments(&self) -> &[(String, String)] {
+        &self.arguments
     }
 
     fn take_orders(&mut self) -> Vec<Order> {

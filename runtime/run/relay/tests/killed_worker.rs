@@ -88,7 +88,7 @@ mod linux {
     /// What a worker does: launches, says so, and then ends in some way.
     fn worker(folder: &Path, end: &str) -> ExitCode {
         let mut launched = Launched::new(&plan(end), LaunchContext::of_worker(folder.to_owned()));
-        launched.start(1).unwrap();
+        launched.start(1, &[]).unwrap();
         let ready = launched.await_ready(&mut |_| false);
         if end == "finds no program" {
             let error = ready.unwrap_err().to_string();

@@ -44,6 +44,33 @@ pub(crate) struct Text {
     pub(crate) span: Span,
 }
 
+impl Text {
+    /// The words in braces that are names, or made of words with hyphens, each with its place without the braces: other
+    /// braces are the text's own. No place is known in a text with unknown escapes.
+    pub(crate) fn placeholders(&self) -> impl Iterator<Item = (&str, Option<Span>)> {
+        let words = self.text.match_indices('{').filter_map(|(open, _)| {
+            let at = open + 1;
+            Some((at, self.text[at..].split_once('}')?.0))
+        });
+        let words = words.filter(|(_, word)| {
+            word.starts_with(|first: char| first.is_alphabetic() || first == '_')
+                && word.chars().all(|char| char.is_alphanumeric() || matches!(char, '-' | '_'))
+        });
+        words.map(|(at, word)| (word, self.part(at, word.len())))
+    }
+
+    /// Where a part of the text stands.
+    fn part(&self, at: usize, length: usize) -> Option<Span> {
+        // In the file, each of them has a backslash before it.
+        let in_file = |text: &str| text.len() + text.bytes().filter(|byte| matches!(byte, b'"' | b'\\')).count();
+        let Span { file, lo, hi } = self.span;
+        let inner = lo + u32::try_from("\"".len()).ok()?;
+        let is_all = usize::try_from(hi - lo).ok()? == in_file(&self.text) + "\"\"".len();
+        let lo = inner + u32::try_from(in_file(&self.text[..at])).ok()?;
+        is_all.then_some(Span { file, lo, hi: lo + u32::try_from(length).ok()? })
+    }
+}
+
 #[derive(Debug, Clone)]
 pub(crate) struct UnitName {
     pub(crate) text: String,
@@ -173,4 +200,25 @@ pub(crate) enum Comparison {
     AtLeast,
     Above,
     Equal,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::span::FileId;
+
+    #[test]
+    fn braces_of_the_program_s_own_are_no_placeholders() {
+        let text = r#"{"a": 1} {worker} ${HOME}x{ros-args}{} {2} {a b} {{seed}} {start_x2} {2x} {é} {open"#;
+        let file = format!("\"{}\"", text.replace('"', "\\\""));
+        let hi = u32::try_from(file.len()).unwrap();
+        let written = Text { text: text.to_owned(), span: Span { file: FileId(0), lo: 0, hi } };
+        let words: Vec<_> = written.placeholders().collect();
+        let names: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
+        assert_eq!(names, ["worker", "HOME", "ros-args", "seed", "start_x2", "é"]);
+        for (word, span) in words {
+            let Span { lo, hi, .. } = span.unwrap();
+            assert_eq!(&file[lo as usize..hi as usize], word);
+        }
+    }
 }

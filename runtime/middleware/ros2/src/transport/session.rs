@@ -265,7 +265,7 @@ fn parameters(plan: &CampaignPlan, dds: &mut Participant) -> Result<BTreeMap<Nod
     let set = plan.operations.iter().filter(|operation| matches!(operation.kind, OperationKind::Set { .. }));
     let operations = set.flat_map(Operation::nodes);
     let scenes = plan.operations.iter().filter_map(|operation| match &operation.kind {
-        OperationKind::Scene { parameter, .. } => Some(parameter),
+        OperationKind::Scene { parameter, .. } => parameter.as_ref(),
         _ => None,
     });
     let fitted = plan.labs.iter().flat_map(|lab| &lab.fits).map(|fit| &fit.what);

@@ -84,6 +84,10 @@ impl Exchange for Recorder {
         &[]
     }
 
+    fn arguments(&self) -> &[(String, String)] {
+        &[]
+    }
+
     fn take_orders(&mut self) -> Vec<Order> {
         Vec::new()
     }

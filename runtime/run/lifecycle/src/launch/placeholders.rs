@@ -1,9 +1,11 @@
-//! What stands in the arguments of a launched program for what its worker has of its own.
+//! What stands in the arguments of a launched program for what its worker and its run have of their own.
+
+use sesame_plan::{fill_placeholders, has_placeholder};
 
 /// An argument that is replaced by a list of arguments.
 const LIST: &str = "{ros-args}";
 
-/// What a worker has of its own.
+/// What a worker has of its own, and what its run does.
 #[derive(Debug, Clone)]
 pub(super) struct Own {
     pub(super) worker: u32,
@@ -12,27 +14,14 @@ pub(super) struct Own {
     pub(super) port: Option<u16>,
     pub(super) folder: String,
     pub(super) seed: u64,
+    /// The values of scenes, by their names.
+    pub(super) scene: Vec<(String, String)>,
 }
 
 impl Own {
     /// A text with its placeholders replaced, each once: what is put in is not looked at again.
     pub(super) fn fill(&self, text: &str) -> String {
-        let mut filled = String::with_capacity(text.len());
-        let mut rest = text;
-        while let Some(open) = rest.find('{') {
-            filled.push_str(&rest[..open]);
-            rest = &rest[open..];
-            let end = rest.find('}').map_or(rest.len(), |close| close + 1);
-            if let Some(value) = self.value(&rest[..end]) {
-                filled.push_str(&value);
-                rest = &rest[end..];
-            } else {
-                filled.push('{');
-                rest = &rest[1..];
-            }
-        }
-        filled.push_str(rest);
-        filled
+        fill_placeholders(text, |word| self.value(word))
     }
 
     /// Arguments with their placeholders replaced; `list` stands for `{ros-args}`.
@@ -50,19 +39,19 @@ impl Own {
 
     fn value(&self, placeholder: &str) -> Option<String> {
         match placeholder {
-            "{worker}" => Some(self.worker.to_string()),
-            "{domain}" => Some(self.domain.to_string()),
-            "{port}" => self.port.map(|port| port.to_string()),
-            "{folder}" => Some(self.folder.clone()),
-            "{seed}" => Some(self.seed.to_string()),
-            _ => None,
+            "worker" => Some(self.worker.to_string()),
+            "domain" => Some(self.domain.to_string()),
+            "port" => self.port.map(|port| port.to_string()),
+            "folder" => Some(self.folder.clone()),
+            "seed" => Some(self.seed.to_string()),
+            _ => self.scene.iter().find(|(name, _)| name == placeholder).map(|(_, value)| value.clone()),
         }
     }
 }
 
 /// Whether a text asks for a port.
 pub(super) fn asks_for_port(text: &str) -> bool {
-    text.contains("{port}")
+    has_placeholder(text, "port")
 }
 
 #[cfg(test)]
@@ -75,7 +64,14 @@ mod tests {
 
     #[test]
     fn placeholders_are_replaced_wherever_they_stand_and_nothing_else_is() {
-        let own = Own { worker: 3, domain: 43, port: Some(20_020), folder: "/run/{seed}".to_owned(), seed: 7 };
+        let own = Own {
+            worker: 3,
+            domain: 43,
+            port: Some(20_020),
+            folder: "/run/{seed}".to_owned(),
+            seed: 7,
+            scene: vec![("start_x".to_owned(), "-1.5".to_owned()), ("robots".to_owned(), "{worker}".to_owned())],
+        };
         let arguments = texts(&[
             "--port={port}",
             "{worker}{domain}",
@@ -83,6 +79,8 @@ mod tests {
             "{ros-args}",
             "a {ros-args}",
             "{x: {seed}}",
+            "start_x:={start_x}",
+            "{robots}{start_y}",
             "{",
         ]);
         assert_eq!(
@@ -96,6 +94,8 @@ mod tests {
                 "a:={port}",
                 "a {ros-args}",
                 "{x: 7}",
+                "start_x:=-1.5",
+                "{worker}{start_y}",
                 "{"
             ])
         );

@@ -97,7 +97,7 @@ impl System {
     }
 
     fn started(&mut self) -> Result<(), LaunchError> {
-        self.launched.start(5)?;
+        self.launched.start(5, &[])?;
         self.launched.await_ready(&mut |_| false)
     }
 }
@@ -162,7 +162,7 @@ fn the_system_is_ready_before_nodes_are_launched_and_each_readiness_is_awaited()
         ],
         None,
     );
-    system.launched.start(1).unwrap();
+    system.launched.start(1, &[]).unwrap();
     system.becomes("order", "s");
     assert!(!system.launched.poll_ready(&mut |_| true).unwrap());
     assert_eq!((system.launched.begun, system.file("order").as_str()), (1, "s"), "no node before the system is ready");
@@ -195,7 +195,7 @@ fn a_failed_launch_says_which_program_what_was_awaited_for_how_long_and_its_last
     }
     let failed = |says: &str, launch: Launch| {
         let mut system = system(None, vec![launch], None);
-        let error = system.launched.start(5).and_then(|()| {
+        let error = system.launched.start(5, &[]).and_then(|()| {
             // What it says is heard before its time is over, whatever else the machine does.
             patience::until("it speaks", || system.launched.parts[0].1.last_lines().contains(says));
             system.launched.await_ready(&mut |_| false)

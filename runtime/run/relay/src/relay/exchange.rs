@@ -59,6 +59,8 @@ pub trait Exchange {
     /// Parameters of the simulator that have other values in this run than the simulator gives them, by name. They are
     /// set before the run begins; one that the simulator does not have is an error.
     fn parameters(&self) -> &[(String, f64)];
+    /// What programs that are launched for this run have in their arguments, by the names of placeholders.
+    fn arguments(&self) -> &[(String, String)];
     /// What operations on nodes want done since the last call, in this order. A transport without nodes has nothing to
     /// do with them.
     fn take_orders(&mut self) -> Vec<Order>;

@@ -130,7 +130,7 @@ impl System {
 
     /// Connects to the system, which is started if the plan says how.
     fn begin(&mut self, seed: u64, relay: &mut dyn Exchange) -> Result<(), TransportError> {
-        if !self.connected || !self.settings.resets {
+        if !self.connected || !self.settings.resets || !self.launched.are_of(relay.arguments()) {
             self.end();
             self.is_own()?;
             self.lines = lines(&self.plan, relay.wires());
@@ -144,7 +144,7 @@ impl System {
             self.launched.reserve_port()?;
             let launched = &self.launched;
             self.bus.listen(&|address| launched.fill(address))?;
-            self.launched.start(seed)?;
+            self.launched.start(seed, relay.arguments())?;
             self.assemble(COMPLETE_WITHIN)?;
         }
         self.bus.reset(SILENCE)?;
@@ -571,7 +571,7 @@ mod tests {
         let settings = Settings { has_clock: false, resets: false, addresses: Vec::new() };
         let context = LaunchContext { in_runner: false, ..LaunchContext::of_worker(folder.to_owned()) };
         let mut system = System::new(&plan, Box::new(bus), settings, context);
-        system.launched.start(1)?;
+        system.launched.start(1, &[])?;
         system.assemble(Duration::ZERO)
     }
 

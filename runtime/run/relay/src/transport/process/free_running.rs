@@ -137,7 +137,8 @@ impl FreeRunning {
         let (connection, was_used) = match &mut self.connection {
             Some(connection) => (connection, true),
             empty => {
-                self.launched.start_first(seed, "after its reset").map_err(TransportError::from)?;
+                let scene = relay.arguments();
+                self.launched.start_first(seed, scene, "after its reset").map_err(TransportError::from)?;
                 (empty.insert(Connection::start(&self.program, self.launched.alarm())?), false)
             }
         };
@@ -339,7 +340,7 @@ impl Transport for FreeRunning {
 
     fn reset(&mut self, seed: u64, relay: &mut dyn Exchange) -> Result<(), TransportError> {
         self.now = SimTime::ZERO;
-        if !self.capabilities().resets {
+        if !self.capabilities().resets || !self.launched.are_of(relay.arguments()) {
             self.close();
         }
         if self.connection.is_some() {

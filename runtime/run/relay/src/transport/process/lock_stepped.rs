@@ -91,7 +91,8 @@ impl LockStepped {
         let connection = match &mut self.connection {
             Some(connection) => connection,
             empty => {
-                self.launched.start_first(seed, "after its reset").map_err(TransportError::from)?;
+                let scene = relay.arguments();
+                self.launched.start_first(seed, scene, "after its reset").map_err(TransportError::from)?;
                 let (running, input, output) = self.program.start().map_err(TransportError::from)?;
                 let output = Attended { pipe: output, alarm: self.launched.alarm() };
                 let session = Session::new(BufReader::with_capacity(1 << 16, output), input);
@@ -134,7 +135,7 @@ impl Transport for LockStepped {
 
     fn reset(&mut self, seed: u64, relay: &mut dyn Exchange) -> Result<(), TransportError> {
         self.now = SimTime::ZERO;
-        if !self.capabilities().resets {
+        if !self.capabilities().resets || !self.launched.are_of(relay.arguments()) {
             self.close();
         }
         // A fault of a process that was used before may belong to the previous run, so this run starts a new process.
