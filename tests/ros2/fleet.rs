@@ -1,6 +1,6 @@
 //! A fleet in namespaces, of nodes that know nothing of it: each has its own member of a group, one of them is
-//! disturbed by its name or by the choice of a test, a scene sets a parameter of a node, and a start that waits for one
-//! says so.
+//! disturbed by its name or by the choice of a test, a scene sets a parameter of a node, another one is in the arguments
+//! of all carts, and a start that waits for one says so.
 
 use serde_json::Value;
 use sesame_tests::workspace;
@@ -22,7 +22,8 @@ fn fleet(name: &str, more: &str) -> Option<Space> {
                topic place = \"/{{r1,r2}}/place\" : Place\n\
                topic speed = \"/{{r1,r2}}/speed\" : Speed\n\
                node cart \"/{{r1,r2}}/cart\" {{\n\
-                 launch {python:?} {program:?} \"cart\" \"{{ros-args}}\" \"--ros-args\" \"-r\" \"__ns:=/{{member}}\" {ready}\n\
+                 launch {python:?} {program:?} \"cart\" \"{{ros-args}}\" \"--ros-args\" \"-r\" \"__ns:=/{{member}}\"\n\
+                        \"-p\" \"start:={{start}}\" {ready}\n\
                  publishes place  subscribes speed\n\
                }}\n\
                node manager \"/manager\" {{\n\
@@ -36,6 +37,7 @@ fn fleet(name: &str, more: &str) -> Option<Space> {
              metric apart  maximise default 0m = max(max of place.data - place.data) outbound\n\
              metric far    maximise default 0m = max(max of place.data) outbound\n\
              parameter pace \"manager/pace\": real[m/s] in [0m/s, 4m/s] default 1m/s\n\
+             parameter start: real[m] in [-9km, 9km] default 0m\n\
              operation slip on place[r2].data from cart = bias [0m, 9m]\n\
              operation deaf on one of speed.data to cart = stuck at [0m/s, 1m/s]\n\
              operation stop on node one of cart = pause\n\
@@ -45,10 +47,11 @@ fn fleet(name: &str, more: &str) -> Option<Space> {
              test hears_nothing {{ deaf value 0m/s member \"r2\" from 1s to 6s }}\n\
              test skids {{ skid value 0 member \"r2\" from 1s to 6s }}\n\
              test races {{ pace value 4m/s before start }}\n\
+             test starts_behind {{ start value -9km before start }}\n\
              campaign first {{\n\
                objectives apart\n\
                observes   ahead, behind, far\n\
-               operations slip, deaf, stop, skid, pace 1 per test\n\
+               operations slip, deaf, stop, skid, pace, start 1 per test\n\
                search     random {{ evaluations 2 }}\n\
                end        after 6s\n\
              }}\n",
@@ -68,7 +71,9 @@ fn each_cart_has_its_own_topics_one_of_them_is_disturbed_and_a_scene_drives_them
     }
     assert!(!wiring.contains("/r1/place/from/cart/r2"), "{wiring}");
 
-    fleet.sesamec(&["known", "carts.sesame", "slips", "stands", "hears_nothing", "skids", "races"]).expect(0);
+    fleet
+        .sesamec(&["known", "carts.sesame", "slips", "stands", "hears_nothing", "skids", "races", "starts_behind"])
+        .expect(0);
     let listed = fleet.sesamec(&["list", "carts.sesame", "--results", "known", "--format", "json"]).expect(0);
     let listed: Value = serde_json::from_str(&listed.out).expect("it is JSON");
     let value = |test: &str, metric: &str| -> f64 {
@@ -84,6 +89,8 @@ fn each_cart_has_its_own_topics_one_of_them_is_disturbed_and_a_scene_drives_them
     assert!(fore("T2") > 4.0 - beside && aft("T2") < beside, "only `r1` stands: {listed:#}");
     assert!(aft("T3") > 5.0 - beside && fore("T3") < beside, "only `r2` hears nothing: {listed:#}");
     assert!(aft("T4") > 5.0 - beside && fore("T4") < beside, "only `r2` has no grip: {listed:#}");
+    // Each cart has it as a parameter of floating point, or it would not start.
+    assert!(value("T6", "far") < -8000.0 && value("T0", "far") > -1.0, "both start behind: {listed:#}");
     assert!(value("T5", "far") > 2.0 * value("T0", "far"), "the manager has another pace: {listed:#}");
 }
 

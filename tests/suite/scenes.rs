@@ -63,3 +63,47 @@ fn start_positions_and_the_fault_of_one_robot_are_found_together_and_shrunk_to_t
 fn in_folder(project: &Project, test: &str) -> String {
     project.folder.join(format!("small/shrink-{test}")).display().to_string()
 }
+
+#[test]
+fn what_is_launched_beside_a_simulator_has_the_scene_of_each_test_in_its_arguments() {
+    let folder = fresh_folder("launched_scene");
+    for file in ["sim.py", "world.py", "space.sesame"] {
+        fs::copy(workspace().join("tests/simulators/launched_scene").join(file), folder.join(file)).unwrap();
+    }
+    let project = Project { space: folder.join("space.sesame"), runners: folder.join("runners"), folder };
+    let sesamec = |arguments: &[&str]| without_cargo(&project, arguments);
+    // The numbers of the test, the furthest place and the number of boxes. The robot drives for a second.
+    let measured = |results: &str| {
+        let listed = sesamec(&["list", "space.sesame", "--results", results, "--format", "json"]).expect(0).json();
+        let row = |row: &serde_json::Value| {
+            let number = |metric: &str| row["measured"][metric].as_f64().unwrap_or_else(|| panic!("{listed:#}"));
+            let place = (number("furthest") * 1e6).round() / 1e6;
+            (row["test"].as_str().unwrap().to_owned(), place, number("heaviest"))
+        };
+        listed["tests"].as_array().unwrap().iter().map(row).collect::<Vec<_>>()
+    };
+    let row = |test: &str, place: f64, boxes: f64| (test.to_owned(), place, boxes);
+
+    // One worker keeps the simulator from test to test, and starts what is launched anew for each.
+    let known = ["known", "space.sesame", "--campaign", "scenes", "--workers", "1", "--results", "k"];
+    sesamec(&known).expect(0);
+    let expected = [row("T0", 1.5, 1.0), row("T1", 2.25, 1.0), row("T2", 1.5, 6.0), row("T3", -1.0, 3.0)];
+    let mut found = measured("k/known");
+    found.sort_by(|one, other| one.0.cmp(&other.0));
+    assert_eq!(found, expected);
+
+    let run = |into: &str, workers: &str| {
+        let run = ["run", "space.sesame", "--campaign", "scenes", "--", "--workers", workers, "--results", into];
+        sesamec(&run).expect(0).digest()
+    };
+    assert_eq!(run("one", "1"), run("three", "3"), "the same for any number of workers");
+    let found = measured("three/1");
+    assert!(found.len() > 4, "{found:?}");
+    assert_eq!(found[0], row("T0", 1.5, 1.0));
+    assert!(found.iter().any(|(_, place, _)| (*place - 1.5).abs() > 0.1), "{found:?}");
+
+    // A campaign that knows nothing of scenes has their usual values.
+    sesamec(&["run", "space.sesame", "--campaign", "late", "--", "--results", "late"]).expect(0);
+    let found = measured("late/1");
+    assert!(found.iter().all(|(_, place, boxes)| (*place, *boxes) == (1.5, 1.0)), "{found:?}");
+}

@@ -5,9 +5,9 @@ use sesame_plan::testing::{self, field, lab, message, minimal, node, ros2, simlo
 use sesame_plan::{
     Activation, ActivationMode, Adjustment, Answer, Bound, CampaignPlan, Channel, Clock, Command, Dimension, Domain,
     Endpoint, Fitted, Interface, InterfaceField, KnownTestId, LabBudget, Launch, Lifecycle, MembersOf, MessageId,
-    MessageType, MetricId, MetricSource, Node, NodeId, OperationId, Proxy, RankOrder, Ready, ReadyWhen, RelayBudget,
-    Ros, Search, ShapeForm, ShapePlace, Simlog, SimlogVersion, Simulator, StepBy, Stepping, Strategy, Target, Topic,
-    TopicId, TopicMembers, Type, WireNames, WireType, Wiring,
+    MessageType, MetricId, MetricSource, Node, NodeId, OperationId, OperationKind, Proxy, RankOrder, Ready, ReadyWhen,
+    RelayBudget, Ros, Search, ShapeForm, ShapePlace, Simlog, SimlogVersion, Simulator, StepBy, Stepping, Strategy,
+    Target, Topic, TopicId, TopicMembers, Type, WireNames, WireType, Wiring,
 };
 use sesame_record::sample;
 
@@ -24,6 +24,15 @@ fn adjustments(plan: &mut CampaignPlan) -> &mut Vec<Adjustment> {
 /// Another topic that an operation disturbs, as a whole.
 fn further(topic: u32) -> Target {
     Target { topic: TopicId(topic), members: None, places: Vec::new() }
+}
+
+/// Makes an operation a scene.
+fn scene(plan: &mut CampaignPlan, parameter: Option<&str>, usual: Option<f64>) {
+    let operation = &mut plan.operations[2];
+    "start_x".clone_into(&mut operation.name);
+    operation.topic = None;
+    operation.members = None;
+    operation.kind = OperationKind::Scene { parameter: parameter.map(str::to_owned), usual };
 }
 
 /// A change to a plan, and what is then said of it.
@@ -108,6 +117,21 @@ fn each_thing_that_later_code_relies_on_is_asked_for() {
         (
             |plan| plan.operations[0].members = Some(MembersOf::Chosen(vec![vec![0]])),
             "operations[0].members: are not chosen by the last parameter",
+        ),
+        (|plan| scene(plan, None, None), "operations[2].kind.usual: is not there, and programs are launched with it"),
+        (|plan| scene(plan, Some("x"), Some(f64::NAN)), "operations[2].kind.usual: NaN is not finite"),
+        (
+            |plan| scene(plan, None, Some(1.0)),
+            "operations[2].kind.parameter: `start_x` has neither this nor a place in the arguments",
+        ),
+        (
+            |plan| {
+                scene(plan, Some("x"), Some(1.0));
+                let arguments = vec!["x:={start_x}".to_owned()];
+                let command = Command { program: "./arm".to_owned(), arguments };
+                plan.simulator.lifecycle.launch = Some(Launch { command, ready: None });
+            },
+            "operations[2].kind.parameter: `start_x` has both this and a place in the arguments",
         ),
         (|plan| plan.operations[2].within.end = -1.0, "operations[2].within: runs from 0 to -1"),
         (|plan| plan.operations[2].inclusion = 1.5, "operations[2].inclusion: 1.5 is not in 0..=1"),

@@ -68,6 +68,31 @@ fn the_key_of_a_filter_is_a_field_of_the_elements_or_a_list_beside_theirs() {
 }
 
 #[test]
+fn a_scene_in_the_arguments_of_what_is_launched_is_mentioned_there() {
+    let (sources, index, has_errors) = index(
+        "space cell
+        system {
+          simulator sim = mqtt \"mqtt://127.0.0.1:1883\"
+          topic place = \"place\" : real[m]
+          launch \"./world\" \"{\\\"boxes\\\": {boxes}}\"
+          terminate \"./end\" \"{boxes}\"
+          node robot { publishes place  launch \"./robot\" \"{worker}\" \"{start_x}:{start_x}\" }
+        }
+        metric far maximise default 0m = max(place)
+        parameter start_x: real[m] in [-2m, 2m] default 0m
+        parameter boxes: int in [0, 6] default 0
+        campaign c { objectives far  operations start_x 1 per test  search random { evaluations 2 }  end after 5s }",
+    );
+    assert!(!has_errors);
+    let at = |name: &str, line: u32| (name.to_owned(), line);
+    assert_eq!(uses(&sources, &index, "boxes"), [at("sim", 5), at("sim", 6)]);
+    assert_eq!(uses(&sources, &index, "start_x"), [at("robot", 7), at("robot", 7), at("c", 12)]);
+    for name in ["boxes", "start_x"] {
+        assert!(index.uses(only(&index, name)).all(|used| sources.snippet(used.span) == name), "{name}");
+    }
+}
+
+#[test]
 fn an_operation_on_a_node_or_its_parameter_mentions_the_node() {
     let text = "space cell
         system { simulator sim = ros2  node arm { launch \"./arm\" }  node plan { } }

@@ -11,8 +11,8 @@ PERIOD = 0.05
 
 
 def cart(node: Node) -> None:
-    """Publishes where it is, in its own namespace; without `grip`, its parameter, it does not move."""
-    state = {"speed": 0.0, "place": 0.0}
+    """Publishes where it is, in its own namespace, from its parameter `start` on; without `grip` it does not move."""
+    state = {"speed": 0.0, "place": node.declare_parameter("start", 0.0).value}
     node.declare_parameter("grip", 1.0)
     node.create_subscription(Float64, "speed", lambda heard: state.update(speed=heard.data), 10)
     places = node.create_publisher(Float64, "place", 10)

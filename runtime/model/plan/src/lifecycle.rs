@@ -149,3 +149,19 @@ pub fn fill_placeholders(text: &str, value: impl Fn(&str) -> Option<String>) -> 
 pub fn has_placeholder(text: &str, word: &str) -> bool {
     text.contains(&format!("{{{word}}}"))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::operation;
+
+    #[test]
+    fn a_real_number_has_a_decimal_point_in_an_argument_and_a_whole_one_has_none() {
+        let mut scene = operation(0, OperationKind::Scene { parameter: None, usual: Some(0.0) });
+        let written = |scene: &Operation| [1.5, -2.0, -0.0, 1e-7, 1e20].map(|value| scene.as_argument(value));
+        assert_eq!(written(&scene), ["1.5", "-2.0", "0.0", "0.0000001", "100000000000000000000.0"]);
+        let Domain::Number { integer, .. } = &mut scene.parameters[0].domain else { panic!("it is a number") };
+        *integer = true;
+        assert_eq!([3.0, -0.0].map(|value| scene.as_argument(value)), ["3", "0"]);
+    }
+}

@@ -216,7 +216,7 @@ impl CampaignPlan {
             at(
                 "kind.parameter",
                 require(parameter.is_none() == in_arguments, || {
-                    let does = if in_arguments { "has" } else { "has neither this nor" };
+                    let does = if in_arguments { "has both this and" } else { "has neither this nor" };
                     format!("`{}` {does} a place in the arguments of what is launched", operation.name)
                 }),
             )?;

@@ -137,6 +137,29 @@ fn a_program_gets_what_its_worker_has_of_its_own_and_an_empty_input() {
 }
 
 #[test]
+fn a_program_has_the_scene_of_its_start_in_its_arguments_and_so_has_one_that_is_started_again() {
+    if !python() {
+        return;
+    }
+    let program = "import sys, time\nopen('said', 'a').write(sys.argv[1] + ' ')\nprint('up')\ntime.sleep(1000)";
+    let end = command("python3", &["-c", "import sys; open('ended', 'a').write(sys.argv[1] + ' ')", "{start_x}"]);
+    let node = launch_with(program, &["start_x:={start_x}"], Some((line("up"), SOON)));
+    let _alone = alone();
+    let mut system = system(None, vec![node], Some(end));
+    let scene = |value: &str| vec![("start_x".to_owned(), value.to_owned())];
+    for value in ["0.5", "-2.0"] {
+        system.launched.start(5, &scene(value)).unwrap();
+        system.launched.await_ready(&mut |_| false).unwrap();
+    }
+    assert!(system.launched.are_of(&scene("-2.0")) && !system.launched.are_of(&scene("0.5")));
+    assert!(system.launched.restart(NodeId(0)).unwrap());
+    system.launched.await_ready(&mut |_| false).unwrap();
+    assert_eq!(system.file("said"), "start_x:=0.5 start_x:=-2.0 start_x:=-2.0 ");
+    system.launched.end();
+    assert_eq!(system.file("ended"), "0.5 -2.0 ");
+}
+
+#[test]
 fn the_system_is_ready_before_nodes_are_launched_and_each_readiness_is_awaited() {
     if !python() {
         return;

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use sesame_base::time::SimTime;
-use sesame_plan::testing::{minimal, test_of};
+use sesame_plan::testing::{minimal, operation, test_of, use_of};
+use sesame_plan::{Activation, Choice, Command, Launch, OperationKind, Ready, ReadyWhen, TestOperation};
 
 use super::*;
 use crate::metric::MetricTable;
@@ -78,4 +79,41 @@ fn a_clock_that_goes_on_after_a_reset_counts_from_what_it_shows_then() {
 fn without_a_reset_the_first_tick_is_time_zero() {
     let times = times(false, &[70, 75], &[80, 90], 1);
     assert_eq!(times[0], Ok(5), "from 70 to 75");
+}
+
+#[test]
+fn what_is_launched_with_the_scene_of_a_test_is_kept_while_tests_have_the_same_although_a_service_resets_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut plan = minimal();
+    let (parameter, usual) = (None, Some(0.5));
+    plan.operations = vec![operation(0, OperationKind::Scene { parameter, usual })];
+    let place = format!("x:={{{}}}", plan.operations[0].name);
+    let script = "echo \"$0\" >> log; echo up; exec sleep 1000".to_owned();
+    plan.simulator.lifecycle.launch = Some(Launch {
+        command: Command { program: "sh".to_owned(), arguments: vec!["-c".to_owned(), script, place] },
+        ready: Some(Ready { when: ReadyWhen::Line { text: "up".to_owned() }, within: 120.0 }),
+    });
+    let bus = Written { events: VecDeque::new(), after_reset: vec![5, 6] };
+    let settings = Settings { has_clock: true, resets: true, addresses: Vec::new() };
+    let context = LaunchContext { in_runner: false, ..LaunchContext::of_worker(folder.path().to_owned()) };
+    let mut transport = on_bus(&plan, Box::new(bus), settings, context);
+    let wires = WireTable::new(&plan);
+    let metrics = MetricTable::new(&plan, &wires, &[]).unwrap();
+    let mut launched_after = |chosen: Option<f64>| {
+        let used = |value| TestOperation {
+            activation: Activation::Offline,
+            ..use_of(0, 0.0, 1.0, vec![Choice::Value { value }], 1)
+        };
+        let test = test_of(chosen.map(used).into_iter().collect());
+        let mut relay = Relay::new(&plan, &wires, &test, metrics.start(), &[]).unwrap();
+        assert!(relay.parameters().is_empty(), "the simulator is not asked for it");
+        relay.begin();
+        transport.reset(1, &mut relay).unwrap();
+        std::fs::read_to_string(folder.path().join("log")).unwrap().lines().map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert_eq!(launched_after(None), ["x:=0.5"]);
+    assert_eq!(launched_after(Some(0.5)), ["x:=0.5"]);
+    assert_eq!(launched_after(Some(-2.0)), ["x:=0.5", "x:=-2.0"]);
+    assert_eq!(launched_after(Some(-2.0)), ["x:=0.5", "x:=-2.0"]);
+    assert_eq!(launched_after(None), ["x:=0.5", "x:=-2.0", "x:=0.5"]);
 }
