@@ -478,7 +478,7 @@ pub(crate) mod tests {
             campaign both { objectives far  operations start_x, boxes 1 per test
                             search random { evaluations 2 }  end after 5s }
             campaign boxed from both { operations boxes, lag 1 per test }
-            campaign watch { search passive { repeat 2 }  end after 5s }";
+            campaign watch { passive 2 times  observes far  end after 5s }";
         let mut sources = SourceMap::new();
         let file = sources.add("s.sesame", text.to_owned());
         let analysis = analyse(&sources, file);

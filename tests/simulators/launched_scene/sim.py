@@ -17,7 +17,7 @@ while order:
             sys.exit("it takes no parameters")
         start, boxes = Path(os.environ["SESAME_WORKER_FOLDER"], "world").read_text().split()
         place, step = float(start), order["reset"]["step"]
-        order = answer({"ready": {"publishes": ["place", "load"], "subscribes": [], "resets": True}})
+        order = answer({"ready": {"publishes": ["place", "load"], "subscribes": ["place"], "resets": True}})
     else:
         place += step
         messages = [{"topic": "place", "value": place}, {"topic": "load", "value": int(boxes)}]
