@@ -192,6 +192,7 @@ fn value(of: &Expression, at: &Computed) -> f64 {
         Expression::Min(of) => all(of).reduce(f64::min).unwrap(),
         Expression::Max(of) => all(of).reduce(f64::max).unwrap(),
         Expression::Divide { .. }
+        | Expression::Scene { .. }
         | Expression::Integral(_)
         | Expression::Distance(_)
         | Expression::SignedDistance(_)

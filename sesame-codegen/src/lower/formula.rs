@@ -61,6 +61,7 @@ mod tests {
             Expression::Distance(Box::new(Distance { from, to: Point::Input(3), scale: 1.0 })),
             Expression::Time,
             Expression::Now,
+            Expression::Scene { operation: "start_x".to_owned(), usual: -0.1 },
         ] {
             let text = serde_json::to_string(&of).unwrap();
             assert_eq!(serde_json::from_str::<Expression>(&text).unwrap(), of, "{text}");

@@ -104,6 +104,18 @@ impl<'a> Resolver<'a> {
             self.report(diagnostic);
             return None;
         }
+        if condition.reads_scene() {
+            let scene = first_part(written, &|part| match &part.kind {
+                ExpressionKind::Field(path) => self.named_scene(path).map(|_| path.span),
+                _ => None,
+            });
+            let title = "evidence cannot read a parameter of the space";
+            let diagnostic = Diagnostic::new(Code::BAD_MONITOR, scene.unwrap_or(written.span), title)
+                .label("a monitor hears messages only")
+                .note("it also runs where no test chooses a value: let the simulator publish this on a topic");
+            self.report(diagnostic);
+            return None;
+        }
         if depth::of_condition(condition) > MAX_DEPTH {
             let title = format!("this condition is nested more than {MAX_DEPTH} levels deep");
             self.report(Diagnostic::new(Code::TOO_LARGE, written.span, title).label("nested too deeply"));

@@ -208,7 +208,7 @@ impl<'a> Resolver<'a> {
             self.over_time(call, name, moved_inside(expression));
             return;
         }
-        if !reads_a_topic(expression) {
+        if !self.reads_a_topic(expression) {
             self.no_topic(span);
             return;
         }
@@ -224,6 +224,16 @@ impl<'a> Resolver<'a> {
             vec![(Span { hi: span.lo, ..span }, format!("{word}(")), (span.end(), ")".to_owned())],
         ));
         self.report(diagnostic);
+    }
+
+    /// Whether a value depends on messages at all.
+    fn reads_a_topic(&self, expression: &ast::Expression) -> bool {
+        let reads = |part: &ast::Expression| match &part.kind {
+            ExpressionKind::Field(path) => self.named_scene(path).is_none(),
+            ExpressionKind::Members(..) => true,
+            _ => false,
+        };
+        first_part(expression, &|part| reads(part).then_some(())).is_some()
     }
 
     fn no_robustness(&mut self, expression: &'a ast::Expression) {
@@ -295,9 +305,10 @@ impl<'a> Resolver<'a> {
                 let unit = self.unit_in_formula(quantity)?;
                 (!quantity.value.is_nan()).then_some((Expression::Constant(quantity.value), unit))
             }
-            ExpressionKind::Field(path) => match self.named_clock(path) {
-                Some(clock) => Some((clock.expression.clone(), Some(Unit::seconds()))),
-                None => self.numeric_input(inputs, path, None),
+            ExpressionKind::Field(path) => match (self.named_clock(path), self.named_scene(path)) {
+                (Some(clock), _) => Some((clock.expression.clone(), Some(Unit::seconds()))),
+                (None, Some(scene)) => self.value_of_scene(path, scene),
+                (None, None) => self.numeric_input(inputs, path, None),
             },
             ExpressionKind::Members(members, word, path) => self.numeric_input(inputs, path, Some((*members, *word))),
             ExpressionKind::Negate(of) => {
@@ -460,12 +471,6 @@ pub(super) fn position(inputs: &mut Vec<Input>, input: Input) -> u32 {
         inputs.len() - 1
     });
     u32::try_from(at).expect("a formula has fewer than 2^32 inputs")
-}
-
-/// Whether a value depends on messages at all.
-fn reads_a_topic(expression: &ast::Expression) -> bool {
-    let reads = |part: &ast::Expression| matches!(part.kind, ExpressionKind::Field(_) | ExpressionKind::Members(..));
-    first_part(expression, &|part| reads(part).then_some(())).is_some()
 }
 
 /// The first aggregate over time in an expression.

@@ -57,6 +57,7 @@ fn never_negative(expression: &Expression) -> bool {
         Expression::Divide { value, by } => never_negative(value) && never_negative(by),
         Expression::Input(_)
         | Expression::Integral(_)
+        | Expression::Scene { .. }
         | Expression::Negate(_)
         | Expression::SignedDistance(_)
         | Expression::Unary { .. }

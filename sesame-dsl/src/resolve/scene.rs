@@ -1,10 +1,12 @@
 //! Parameters of the simulator or of launched programs: what a scenario is, and may vary from test to test.
 
 use super::Resolver;
-use crate::diagnostic::{Code, Diagnostic};
-use crate::model::{ChoiceKind, Domain, OperationKind, Parameter};
+use super::formula::Number;
+use crate::diagnostic::{Code, Diagnostic, Suggestion};
+use crate::index::Kind;
+use crate::model::{ChoiceKind, Domain, Expression, OperationKind, Parameter};
 use crate::span::Span;
-use crate::syntax::ast::{self, Name};
+use crate::syntax::ast::{self, Name, Path, UnitName};
 
 impl<'a> Resolver<'a> {
     /// The operation that sets a parameter, and what a test may choose for it.
@@ -14,8 +16,7 @@ impl<'a> Resolver<'a> {
             Some(place) => self.can_be_in_arguments(name, scene, place),
             None => self.takes_parameters(name),
         };
-        let ends = [scene.range.low.unit.as_ref(), scene.range.high.unit.as_ref()];
-        let unit = self.declared_unit([scene.unit.as_ref(), ends[0], ends[1]])?;
+        let unit = self.declared_unit(units_of(scene))?;
         let what = format!("`{}`", name.text);
         let permitted = self.range(&scene.range, unit.as_ref(), &what)?;
         let usual = match &scene.usual {
@@ -69,6 +70,43 @@ impl<'a> Resolver<'a> {
         sound
     }
 
+    /// The parameter whose name a path is.
+    pub(super) fn named_scene(&self, path: &Path) -> Option<&'a ast::Scene> {
+        let named = self.names.get(path.topic.text.as_str())?;
+        if !path.is_name() || named.kind != Kind::Operation {
+            return None;
+        }
+        match &self.file.operations[named.index].body.kind {
+            ast::OperationKind::Scene(scene) => Some(scene),
+            _ => None,
+        }
+    }
+
+    /// The value of a parameter in a formula: what the test chose, or else its usual value, without which it is
+    /// reported. Mistakes of the declaration are reported there.
+    pub(super) fn value_of_scene(&mut self, path: &'a Path, scene: &'a ast::Scene) -> Option<Number> {
+        let name = &path.topic.text;
+        let Some(usual) = &scene.usual else {
+            let title = format!("`{name}` has no value in tests that do not choose one");
+            let low = self.text(scene.range.low.span);
+            let mut diagnostic = Diagnostic::new(Code::CLAUSE_MISSING, path.span, title)
+                .label("a formula needs its value in every test")
+                .secondary(scene.range.span, "declared without `default`");
+            let add = format!("add the value with which such tests begin, such as `default {low}`");
+            let after = scene.range.span.end();
+            diagnostic.suggestions.push(Suggestion::possible(add, vec![(after, format!(" default {low}"))]));
+            self.report(diagnostic);
+            return None;
+        };
+        let before = self.diagnostics.len();
+        let number = self.declared_unit(units_of(scene)).and_then(|unit| {
+            let usual = self.value(usual, unit.as_ref(), &format!("`{name}`"))?;
+            Some((Expression::Scene { operation: name.clone(), usual }, unit))
+        });
+        self.diagnostics.truncate(before);
+        number
+    }
+
     /// Reports a simulator that takes no parameters.
     fn takes_parameters(&mut self, Name { text: name, span }: &Name) -> bool {
         let Some((word, simulator)) = self.without(|kind| kind.takes_parameters) else { return true };
@@ -83,4 +121,9 @@ impl<'a> Resolver<'a> {
         self.report(diagnostic);
         false
     }
+}
+
+/// The units that say what the unit of a parameter is, the first of which does.
+fn units_of(scene: &ast::Scene) -> [Option<&UnitName>; 3] {
+    [scene.unit.as_ref(), scene.range.low.unit.as_ref(), scene.range.high.unit.as_ref()]
 }

@@ -186,3 +186,12 @@ fn what_is_said_of_a_monitor_elsewhere_mentions_it_and_its_parts() {
     assert!(who("R1").contains(&"missed".to_owned()));
     assert!(index.references.iter().all(|reference| reference.target.is_some()));
 }
+
+#[test]
+fn a_formula_mentions_the_parameter_of_the_space_that_it_reads() {
+    let (sources, index, has_errors) = index(include_str!("../good/scenes.sesame"));
+    assert!(!has_errors);
+    let of = |name: &str| uses(&sources, &index, name).into_iter().map(|(name, _)| name).collect::<Vec<_>>();
+    assert_eq!(of("start_y"), ["moved", "stays", "scenes"]);
+    assert_eq!(of("load"), ["burdened", "heavy", "scenes"]);
+}

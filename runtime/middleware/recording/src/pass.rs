@@ -2,16 +2,19 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use sesame_base::observation::OperationEffect;
 use sesame_base::time::SimTime;
 use sesame_base::visible::visible;
-use sesame_plan::{CampaignPlan, OperationId, Span};
+use sesame_plan::{CampaignPlan, Choice, OperationId, Span};
 use sesame_relay::feed::{End, Passing};
 use sesame_relay::json::Shapes;
+use sesame_relay::metric::Scene;
 use sesame_relay::wire::{Wire, WireTable};
 
 use crate::container::{Channel, Entry, Message, read};
@@ -93,6 +96,7 @@ pub(crate) fn pass(
         shapes: Shapes::default(),
         start: None,
         zero: None,
+        scene: Arc::default(),
         now: SimTime::ZERO,
         messages: 0,
         subject: None,
@@ -175,6 +179,8 @@ struct Reader<'a> {
     start: Option<u64>,
     /// What the clock of the stamps showed at that time, in seconds, if a trace says so.
     zero: Option<f64>,
+    /// The parameters of the space for which the test chose a value, by the names that they had.
+    scene: Arc<Scene>,
     now: SimTime,
     messages: u64,
     subject: Option<BTreeMap<String, String>>,
@@ -193,6 +199,7 @@ impl Reader<'_> {
         match entry {
             Entry::File => self.file += 1,
             Entry::Metadata(name, metadata) if name == SUBJECT => {
+                self.scene = chosen(&metadata).map_err(|_| self.damaged("its test cannot be read"))?;
                 self.subject = Some(metadata);
                 self.start = Some(0);
             }
@@ -292,6 +299,7 @@ impl Reader<'_> {
         each(&Passing {
             time,
             // The clock of other recorders is that of their messages.
+            scene: &self.scene,
             zero: self.zero.unwrap_or_else(|| Duration::from_nanos(start).as_secs_f64()),
             wire,
             published: !delivered,
@@ -349,12 +357,51 @@ impl Reader<'_> {
     }
 }
 
+/// Operations as a trace has them: those of its plan, or those that its test uses.
+#[derive(Deserialize)]
+struct Recorded<T> {
+    operations: Vec<T>,
+}
+
+impl<T: DeserializeOwned> Recorded<T> {
+    fn read(subject: &BTreeMap<String, String>, key: &str) -> serde_json::Result<Self> {
+        serde_json::from_str(subject.get(key).map_or("", String::as_str))
+    }
+}
+
+/// The parameters of the space for which the test of a trace chose a value.
+fn chosen(subject: &BTreeMap<String, String>) -> serde_json::Result<Arc<Scene>> {
+    #[derive(Deserialize)]
+    struct Declared {
+        name: String,
+        kind: Kind,
+    }
+    #[derive(Deserialize)]
+    struct Kind {
+        kind: String,
+    }
+    #[derive(Deserialize)]
+    struct Use {
+        operation: OperationId,
+        parameters: Vec<serde_json::Value>,
+    }
+    let declared: Recorded<Declared> = Recorded::read(subject, "plan")?;
+    let test: Recorded<Use> = Recorded::read(subject, "definition")?;
+    let mut chosen = Vec::new();
+    for Use { operation, parameters } in test.operations {
+        let declared = declared.operations.get(operation.index());
+        let Some(scene) = declared.filter(|declared| declared.kind.kind == "scene") else { continue };
+        for parameter in parameters {
+            if let Choice::Value { value } = serde_json::from_value(parameter)? {
+                chosen.push((scene.name.clone(), value));
+            }
+        }
+    }
+    Ok(chosen.into())
+}
+
 /// When operations that count in `fuzzing_time()` were active or held messages back, according to a trace.
 fn timed(subject: &BTreeMap<String, String>, effects: &str) -> serde_json::Result<Vec<Span>> {
-    #[derive(Deserialize)]
-    struct Recorded<T> {
-        operations: Vec<T>,
-    }
     #[derive(Deserialize)]
     struct Declared {
         /// As in a plan: omitted if it is true.
@@ -364,9 +411,8 @@ fn timed(subject: &BTreeMap<String, String>, effects: &str) -> serde_json::Resul
     struct Use {
         operation: OperationId,
     }
-    let entry = |key: &str| subject.get(key).map_or("", String::as_str);
-    let declared: Recorded<Declared> = serde_json::from_str(entry("plan"))?;
-    let test: Recorded<Use> = serde_json::from_str(entry("definition"))?;
+    let declared: Recorded<Declared> = Recorded::read(subject, "plan")?;
+    let test: Recorded<Use> = Recorded::read(subject, "definition")?;
     let effects: Vec<OperationEffect> = serde_json::from_str(effects)?;
     let counts =
         |id: OperationId| declared.operations.get(id.index()).is_none_or(|operation| operation.timed != Some(false));

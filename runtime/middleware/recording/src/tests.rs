@@ -8,12 +8,12 @@ use std::path::Path;
 use mcap::records::MessageHeader;
 use mcap::{WriteOptions, Writer};
 
-use sesame_base::observation::{Observation, Outcome};
+use sesame_base::observation::{MetricObservation, Observation, Outcome};
 use sesame_base::time::SimTime;
 use sesame_plan::testing::{latency, offset, operation, plan, test_of, use_of};
 use sesame_plan::{
-    Aggregate, CampaignPlan, Choice, Distribution, Drain, Expression, Formula, Input, Members, Metric, MetricSource,
-    OperationKind, Side, Test, ValueMode,
+    Activation, Aggregate, CampaignPlan, Choice, Distribution, Drain, Expression, Formula, Input, Members, Metric,
+    MetricSource, Operation, OperationKind, Side, Test, TestOperation, ValueMode,
 };
 use sesame_rng::Stream;
 
@@ -176,6 +176,51 @@ fn a_recording_gives_metrics_their_values_again() {
     assert_eq!((run.test.as_str(), run.outcome.as_str()), ("T1", "completed"));
     let values: Vec<Option<f64>> = run.metrics.iter().map(|metric| metric.value).collect();
     assert_eq!(values, observed.metrics.iter().map(|metric| metric.value).collect::<Vec<_>>());
+}
+
+#[test]
+fn a_recording_says_what_its_test_chose_for_the_space() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut plan, test) = awkward_plan();
+    let scene = OperationKind::Scene { parameter: "arm/start".to_owned(), usual: Some(0.5) };
+    plan.operations.push(Operation { name: "start".to_owned(), ..operation(0, scene) });
+    let MetricSource::Last { input } = &plan.metrics[1].source else { panic!("it is the last command") };
+    let start = Expression::Scene { operation: "start".to_owned(), usual: 0.5 };
+    let formula = Formula {
+        inputs: vec![Input::new(input.clone(), Members::Min)],
+        aggregate: Aggregate::Max { of: Expression::Sum(vec![Expression::Input(0), start]) },
+        when: None,
+        every: None,
+        per: None,
+        side: Side::Inbound,
+    };
+    let source = MetricSource::Formula { formula };
+    plan.metrics.push(Metric { name: "from_start".to_owned(), source, ..plan.metrics[1].clone() });
+    plan.validate().unwrap();
+    // The greatest command is the first, of minus a third of a tenth.
+    let from_start = |metrics: &[MetricObservation], start: f64| {
+        let value = metrics.last().and_then(|metric| metric.value).unwrap();
+        assert!((value - (start - 0.1 / 3.0)).abs() < 1e-12, "{value} from {start}");
+    };
+    from_start(&traced(tempfile::tempdir().unwrap().path(), &plan, &test).metrics, 0.5);
+
+    let mut chosen = test;
+    chosen.operations.push(TestOperation {
+        activation: Activation::Offline,
+        ..use_of(3, 0.0, 0.0, vec![Choice::Value { value: 7.0 }], 4)
+    });
+    from_start(&traced(folder.path(), &plan, &chosen).metrics, 7.0);
+    let file = folder.path().join("T1.mcap");
+    from_start(&fed(&file, &plan).unwrap().metrics, 7.0);
+    // So it does where the campaign has other operations.
+    plan.operations.rotate_right(1);
+    from_start(&fed(&file, &plan).unwrap().metrics, 7.0);
+    plan.operations.clear();
+    from_start(&fed(&file, &plan).unwrap().metrics, 7.0);
+    let other = folder.path().join("foreign.mcap");
+    foreign(&other, &[("arm/command", "json", 0, r#"{"value":-0.25}"#)]);
+    let of_others = fed(&other, &plan).unwrap().metrics;
+    assert_eq!(of_others.last().and_then(|metric| metric.value), Some(0.25), "nobody chose another start");
 }
 
 /// The greatest age of a command, as if it were its stamp.

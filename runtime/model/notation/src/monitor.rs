@@ -138,6 +138,7 @@ impl<'a> Names<'a> {
             }
             Expression::Time => "time".to_owned(),
             Expression::Now => "now".to_owned(),
+            Expression::Scene { operation, .. } => operation.clone(),
             Expression::Unary { function, of } => {
                 format!("{}({})", function.name(), self.expression(of, Unit::None))
             }

@@ -276,6 +276,13 @@ pub enum Expression {
     Time,
     /// What the clock of the simulator's stamps shows, in seconds: the same time, from where that clock counts.
     Now,
+    /// The value that the test chose for a parameter of the space.
+    Scene {
+        /// The operation of that kind, by its name: the plan holds it only if the campaign's tests may choose it.
+        operation: String,
+        /// The value in tests that do not choose it, in the unit of the parameter; finite.
+        usual: f64,
+    },
     /// A function of one number.
     Unary {
         /// Which.
@@ -306,6 +313,11 @@ impl Expression {
         matches!(self, Expression::Integral(_)) || self.parts().into_iter().any(Expression::integrates)
     }
 
+    /// Whether it contains the value of a parameter of the space.
+    pub fn reads_scene(&self) -> bool {
+        matches!(self, Expression::Scene { .. }) || self.parts().into_iter().any(Expression::reads_scene)
+    }
+
     /// The expressions that it is directly computed from, in order.
     pub fn parts(&self) -> Vec<&Expression> {
         match self {
@@ -315,7 +327,8 @@ impl Expression {
             | Expression::Distance(_)
             | Expression::SignedDistance(_)
             | Expression::Time
-            | Expression::Now => Vec::new(),
+            | Expression::Now
+            | Expression::Scene { .. } => Vec::new(),
             Expression::Negate(of) | Expression::Absolute(of) | Expression::Unary { of, .. } => vec![of],
             Expression::Divide { value: left, by: right } | Expression::Binary { left, right, .. } => vec![left, right],
             Expression::Sum(of) | Expression::Product(of) | Expression::Min(of) | Expression::Max(of) => {
@@ -485,12 +498,21 @@ pub enum Condition {
 impl Condition {
     /// Whether it contains the simulation time or an integral, so that it changes without a message.
     pub fn reads_time(&self) -> bool {
+        self.any_expression(&Expression::reads_time)
+    }
+
+    /// Whether it contains the value of a parameter of the space.
+    pub fn reads_scene(&self) -> bool {
+        self.any_expression(&Expression::reads_scene)
+    }
+
+    fn any_expression(&self, is: &dyn Fn(&Expression) -> bool) -> bool {
         match self {
             Condition::Constant(_) | Condition::Input(_) => false,
-            Condition::Compare { left, right, .. } => left.reads_time() || right.reads_time(),
-            Condition::Same { left, right } => left.reads_time() || right.reads_time(),
-            Condition::All(parts) | Condition::Any(parts) => parts.iter().any(Condition::reads_time),
-            Condition::Not(of) => of.reads_time(),
+            Condition::Compare { left, right, .. } => is(left) || is(right),
+            Condition::Same { left, right } => left.any_expression(is) || right.any_expression(is),
+            Condition::All(parts) | Condition::Any(parts) => parts.iter().any(|part| part.any_expression(is)),
+            Condition::Not(of) => of.any_expression(is),
         }
     }
 }

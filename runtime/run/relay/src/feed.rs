@@ -2,11 +2,13 @@
 
 mod fuzzing_time;
 
+use std::sync::Arc;
+
 use sesame_base::observation::{MetricObservation, MonitorObservation};
 use sesame_base::time::SimTime;
 use sesame_plan::{CampaignPlan, MetricSource, Side, Span};
 
-use crate::metric::{MetricTable, Metrics};
+use crate::metric::{MetricTable, Metrics, Scene};
 use crate::monitor::{Decided, Monitors};
 use crate::value::Value;
 use crate::wire::{Wire, WireTable};
@@ -19,6 +21,8 @@ pub struct Passing<'v> {
     pub time: SimTime,
     /// What the clock of the stamps showed at time zero, in seconds.
     pub zero: f64,
+    /// The parameters of the space for which the test chose a value; none in a recording that no runner made.
+    pub scene: &'v Arc<Scene>,
     /// Its wire.
     pub wire: Wire,
     /// Whether this is the message as it was published.
@@ -100,8 +104,9 @@ impl<'a, 'd> Feeder<'a, 'd> {
 
     /// The next message, which is not earlier than the one before.
     pub fn message(&mut self, message: &Passing<'_>) {
-        let &Passing { time, zero, wire, published, delivered, index, value } = message;
+        let &Passing { time, zero, scene, wire, published, delivered, index, value } = message;
         self.metrics.clock_at_zero(zero);
+        self.metrics.set_scene(scene);
         self.pass_to(time);
         self.now = time;
         if published {

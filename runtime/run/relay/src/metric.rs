@@ -1,6 +1,7 @@
 //! Metrics: numbers computed from the messages of a test.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use sesame_base::observation::Reach;
 use sesame_base::time::SimTime;
@@ -32,7 +33,8 @@ mod tests;
 
 pub use engine::{MetricError, MetricTable, Metrics};
 pub(crate) use engine::{Shown, next_mark};
-pub(crate) use expression::{Clocks, Moment, holds};
+pub use expression::Scene;
+pub(crate) use expression::{Given, Moment, holds};
 pub(crate) use held::{HeardValues, HeldInputs, Optional, hear};
 pub(crate) use memory::Memories;
 pub(crate) use probe::sample;
@@ -64,6 +66,8 @@ pub struct Context {
     now: SimTime,
     /// What the clock of the simulator's stamps showed at time zero, in seconds.
     zero: f64,
+    /// The parameters of the space for which the test chose a value.
+    scene: Arc<Scene>,
     topic: Text,
     value: Option<f64>,
     series: Vec<(f64, f64)>,
@@ -83,9 +87,9 @@ impl Context {
         self.now.seconds()
     }
 
-    /// When a formula is computed.
-    fn clocks(&self) -> Clocks {
-        Clocks { now: self.now, zero: self.zero }
+    /// What a formula is given besides the values of messages.
+    fn given(&self) -> Given<'_> {
+        Given { now: self.now, zero: self.zero, scene: &self.scene }
     }
 
     /// Name on the wire of the message's topic; if the input is a group, the name of the member.

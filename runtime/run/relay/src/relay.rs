@@ -30,6 +30,7 @@ mod stage;
 mod traffic;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use fuzzing_time::Read;
 use publishing::Publishing;
@@ -41,13 +42,11 @@ use sesame_base::condition::holds;
 use sesame_base::observation::Counters;
 use sesame_base::time::SimTime;
 use sesame_plan::condition::{Condition, Operand};
-use sesame_plan::{
-    CampaignPlan, Copies, Drain, MetricId, MetricSource, Moment, NodeId, OperationId, OperationKind, Side, Test,
-};
+use sesame_plan::{CampaignPlan, Copies, Drain, MetricId, MetricSource, Moment, NodeId, OperationKind, Side, Test};
 
 use crate::files::SpaceFiles;
 use crate::fuzz::{ChoiceError, Disturbance, KeyedRng, OnWire, OperationEntry, Order, PerWire, Resource, RunContext};
-use crate::metric::Metrics;
+use crate::metric::{Metrics, Scene};
 use crate::monitor::Monitors;
 use crate::value::Value;
 use crate::wire::{Wire, WireTable};
@@ -197,12 +196,14 @@ impl<'a> Relay<'a> {
         for (metric, with) in formulas {
             metrics.compare(metric, with);
         }
+        let chosen = chosen(&operations);
+        metrics.set_scene(&chosen);
         let reads = |wire, side| variables.iter().any(|&metric| metrics.hears(metric, wire, side));
         let is_score = |&metric: &MetricId| matches!(plan.metric(metric).source, MetricSource::Monitor { .. });
         let monitors = Monitors::new(&metrics, wires);
         let hears =
             |wire| metrics.delivers(wire) || monitors.as_ref().is_some_and(|monitors| monitors.hears_delivered(wire));
-        let Scene { parameters, arguments } = Scene::of(plan, &operations);
+        let Beginning { parameters, arguments } = Beginning::of(plan, &chosen);
         Ok(Relay {
             wires,
             disturbed_by: pipelines.iter().map(Vec::len).collect(),
@@ -489,32 +490,37 @@ impl<'a> Relay<'a> {
     }
 }
 
+/// The parameters of the space for which the test chose a value.
+fn chosen(operations: &[Stage]) -> Arc<Scene> {
+    let scenes = operations.iter().filter_map(|stage| match stage.disturbance {
+        Disturbance::Scene(value) => Some((stage.name.clone(), value)),
+        _ => None,
+    });
+    scenes.collect()
+}
+
 /// The values with which a run begins: those that the test chooses, and the usual values of the others.
 #[derive(Default)]
-struct Scene {
+struct Beginning {
     /// Of the simulator's parameters.
     parameters: Vec<(String, f64)>,
     /// Of what launched programs have in their arguments.
     arguments: Vec<(String, String)>,
 }
 
-impl Scene {
-    fn of(plan: &CampaignPlan, operations: &[Stage]) -> Self {
-        let mut scene = Scene::default();
-        for (id, operation) in (0..).map(OperationId).zip(&plan.operations) {
+impl Beginning {
+    fn of(plan: &CampaignPlan, chosen: &Scene) -> Self {
+        let mut beginning = Beginning::default();
+        for operation in &plan.operations {
             let OperationKind::Scene { parameter, usual } = &operation.kind else { continue };
-            let chosen =
-                operations.iter().filter(|stage| stage.operation == id).find_map(|stage| match stage.disturbance {
-                    Disturbance::Scene(value) => Some(value),
-                    _ => None,
-                });
+            let chosen = chosen.iter().find(|(name, _)| *name == operation.name).map(|&(_, value)| value);
             let Some(value) = chosen.or(*usual) else { continue };
             match parameter {
-                Some(parameter) => scene.parameters.push((parameter.clone(), value)),
-                None => scene.arguments.push((operation.name.clone(), operation.as_argument(value))),
+                Some(parameter) => beginning.parameters.push((parameter.clone(), value)),
+                None => beginning.arguments.push((operation.name.clone(), operation.as_argument(value))),
             }
         }
-        scene
+        beginning
     }
 }
 

@@ -47,6 +47,8 @@ impl CampaignPlan {
             let one = matches!(input.members, Members::Min | Members::Max | Members::Sum | Members::Only(_));
             at("members", require(one, || "are not taken together".to_owned()))
         })?;
+        let alone = || "reads a parameter of the space, which monitors do not know".to_owned();
+        at("condition", require(!condition.reads_scene(), alone))?;
         at("condition", proposition(condition, inputs))
     }
 
@@ -123,6 +125,7 @@ fn expression(of: &Expression, inputs: &[Input]) -> Checked {
         }
         Expression::Min(of) | Expression::Max(of) => filled(of)?,
         Expression::Distance(distance) => finite(distance.scale)?,
+        Expression::Scene { operation: _, usual } => finite(*usual)?,
         Expression::SignedDistance(distance) => region(&distance.to)?,
         _ => {}
     }
@@ -222,5 +225,12 @@ mod tests {
         let sound = |of: Expression| expression(&of, &inputs).is_ok();
         assert!(sound(Expression::Integral(0)) && sound(Expression::Input(1)));
         assert!(!sound(Expression::Integral(1)) && !sound(Expression::Input(0)) && !sound(Expression::Integral(2)));
+    }
+
+    #[test]
+    fn the_usual_value_of_a_scene_is_a_number() {
+        let sound = |usual| expression(&Expression::Scene { operation: "start_x".to_owned(), usual }, &[]).is_ok();
+        assert!(sound(-1.5));
+        assert!(!sound(f64::NAN) && !sound(f64::INFINITY));
     }
 }

@@ -126,6 +126,7 @@ pub(super) fn number(of: &Expression, input: &dyn Fn(u32) -> Option<f64>) -> Opt
         | Expression::SignedDistance(_)
         | Expression::Time
         | Expression::Now
+        | Expression::Scene { .. }
         | Expression::Integral(_)
         | Expression::Unary { .. }
         | Expression::Binary { .. } => None,
@@ -135,7 +136,11 @@ pub(super) fn number(of: &Expression, input: &dyn Fn(u32) -> Option<f64>) -> Opt
 /// Whether an expression is a finite number for all inputs, which are finite.
 fn is_finite(of: &Expression) -> bool {
     match of {
-        Expression::Input(_) | Expression::Integral(_) | Expression::Time | Expression::Now => true,
+        Expression::Input(_)
+        | Expression::Integral(_)
+        | Expression::Time
+        | Expression::Now
+        | Expression::Scene { .. } => true,
         Expression::Negate(of) | Expression::Absolute(of) => is_finite(of),
         Expression::Min(parts) | Expression::Max(parts) => parts.iter().all(is_finite),
         _ => constant(of).is_some_and(f64::is_finite),
@@ -178,6 +183,7 @@ pub(super) fn text(of: &Expression, input: &dyn Fn(u32) -> usize) -> String {
         Expression::Integral(at) => format!("integral #{}", input(*at)),
         Expression::Time => "time".to_owned(),
         Expression::Now => "now".to_owned(),
+        Expression::Scene { operation, .. } => format!("scene {operation}"),
         Expression::Unary { function, .. } => function.name().to_owned(),
         Expression::Binary { function, .. } => function.name().to_owned(),
     };

@@ -23,7 +23,7 @@ use sesame_plan::{Aggregate, CampaignPlan, Condition, Formula, Input, Members, T
 
 use crate::metric::Context;
 use crate::metric::attendance::Attendance;
-use crate::metric::expression::{Clocks, Held, greatest, least};
+use crate::metric::expression::{Given, Held, greatest, least};
 use crate::metric::growth::{next_change, next_crossing};
 use crate::metric::held::{HeardValues, HeldInputs, Optional, Read, hear};
 use crate::metric::memory::Memories;
@@ -254,12 +254,12 @@ impl<'p> FormulaState<'p> {
     }
 
     /// When one of its comparisons changes, if nothing but time passes from now on.
-    pub(super) fn next_change(&self, clocks: Clocks) -> Option<SimTime> {
-        self.held().filter_map(|inputs| next_change(self.formula, &inputs, clocks)).min()
+    pub(super) fn next_change(&self, given: Given<'_>) -> Option<SimTime> {
+        self.held().filter_map(|inputs| next_change(self.formula, &inputs, given)).min()
     }
 
     /// When its value goes beyond a number or reaches it, if nothing but time passes from now on.
-    pub(super) fn next_crossing(&self, bound: f64, value: Option<f64>, clocks: Clocks) -> Option<SimTime> {
+    pub(super) fn next_crossing(&self, bound: f64, value: Option<f64>, given: Given<'_>) -> Option<SimTime> {
         let (of, beyond): (_, fn(f64, f64) -> bool) = match &self.formula.aggregate {
             Aggregate::Min { of } => (of, |value, bound| value < bound),
             Aggregate::Max { of } => (of, |value, bound| value > bound),
@@ -270,7 +270,7 @@ impl<'p> FormulaState<'p> {
         if value.is_some_and(|value| beyond(value, bound)) {
             return None;
         }
-        self.held().filter_map(|inputs| next_crossing(of, bound, &inputs, clocks)).min()
+        self.held().filter_map(|inputs| next_crossing(of, bound, &inputs, given)).min()
     }
 
     /// The values of the inputs, for each of what is aggregated apart.

@@ -10,7 +10,7 @@ use sesame_plan::condition::Operand;
 use sesame_plan::{Bound, CampaignPlan, Members, MetricId, MetricSource, RequirementId, Side, Span, TopicId, Trend};
 
 use crate::metric::aggregate::FormulaState;
-use crate::metric::expression::Clocks;
+use crate::metric::expression::{Given, Scene};
 use crate::metric::robustness::RobustnessState;
 use crate::metric::{Context, Hook, HookEntry};
 use crate::relay::{beyond, reaching};
@@ -142,7 +142,6 @@ impl<'p> MetricTable<'p> {
         Metrics {
             table: self,
             now: SimTime::ZERO,
-            zero: 0.0,
             waiting: Vec::new(),
             timed,
             stepped: None,
@@ -159,8 +158,6 @@ pub struct Metrics<'p> {
     states: Vec<State<'p>>,
     /// The latest time.
     now: SimTime,
-    /// What the clock of the simulator's stamps showed at time zero, in seconds.
-    zero: f64,
     /// The metrics whose formulas wait for the end of the current instant.
     waiting: Vec<usize>,
     /// The metrics whose formulas change while time passes.
@@ -238,8 +235,12 @@ impl Metrics<'_> {
     /// The clock of the simulator's stamps showed so many seconds at time zero. Until this is known, it shows the
     /// simulation time.
     pub fn clock_at_zero(&mut self, seconds: f64) {
-        self.zero = seconds;
         self.states.iter_mut().for_each(|state| state.context.zero = seconds);
+    }
+
+    /// The test chose these values of parameters of the space. Until this is known, they have their usual ones.
+    pub fn set_scene(&mut self, scene: &Arc<Scene>) {
+        self.states.iter_mut().for_each(|state| state.context.scene = Arc::clone(scene));
     }
 
     /// The value of this metric is compared with this in conditions.
@@ -319,9 +320,9 @@ impl Metrics<'_> {
         if self.table.step.is_some() || !formula.is_timed() {
             return mark;
         }
-        let clocks = Clocks { now: self.now, zero: self.zero };
-        let crossings = numbers().filter_map(|number| formula.next_crossing(number, context.value, clocks));
-        mark.into_iter().chain(crossings).chain(formula.next_change(clocks)).min()
+        let given = Given { now: self.now, ..context.given() };
+        let crossings = numbers().filter_map(|number| formula.next_crossing(number, context.value, given));
+        mark.into_iter().chain(crossings).chain(formula.next_change(given)).min()
     }
 
     fn number(&self, with: Operand) -> Option<f64> {

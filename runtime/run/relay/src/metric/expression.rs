@@ -13,14 +13,19 @@ use crate::metric::region::signed_distance;
 /// what it came to with the last message, the value by which it grows since, and the time of that message in seconds.
 pub(crate) type Held = [f64; 3];
 
-/// When a formula is computed.
+/// What a formula is given besides the values of messages.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Clocks {
+pub(crate) struct Given<'a> {
     /// The simulation time.
     pub(crate) now: SimTime,
     /// What the clock of the simulator's stamps showed at time zero, in seconds.
     pub(crate) zero: f64,
+    /// The parameters of the space for which the test chose a value.
+    pub(crate) scene: &'a Scene,
 }
+
+/// Values that a test chose for parameters of the space, each with the parameter's name.
+pub type Scene = [(String, f64)];
 
 /// What a formula is computed from at one moment.
 pub(crate) struct Moment<'a> {
@@ -29,13 +34,15 @@ pub(crate) struct Moment<'a> {
     time: f64,
     /// What the clock of the simulator's stamps showed at time zero, in seconds.
     zero: f64,
+    scene: &'a Scene,
     undefined: Cell<Option<Undefined>>,
 }
 
 impl<'a> Moment<'a> {
-    /// The values of a formula's inputs at a time.
-    pub(crate) fn new(inputs: &'a [Held], clocks: Clocks) -> Self {
-        Moment { inputs, time: clocks.now.seconds(), zero: clocks.zero, undefined: Cell::new(None) }
+    /// With these values of a formula's inputs.
+    pub(crate) fn new(inputs: &'a [Held], given: Given<'a>) -> Self {
+        let Given { now, zero, scene } = given;
+        Moment { inputs, time: now.seconds(), zero, scene, undefined: Cell::new(None) }
     }
 
     /// The first function that had no value, of all that was computed.
@@ -46,6 +53,11 @@ impl<'a> Moment<'a> {
     /// By how much an integral grows each second.
     pub(super) fn pace(&self, integral: u32) -> f64 {
         self.inputs[integral as usize][1]
+    }
+
+    /// What the test chose for a parameter of the space, if it did.
+    fn chosen(&self, parameter: &str) -> Option<f64> {
+        self.scene.iter().find(|(name, _)| name == parameter).map(|&(_, value)| value)
     }
 
     fn point(&self, point: Point) -> Held {
@@ -109,6 +121,7 @@ pub(super) fn number(of: &Expression, at: &Moment<'_>) -> f64 {
         Expression::SignedDistance(distance) => signed_distance(at.point(distance.from), &distance.to),
         Expression::Time => at.time,
         Expression::Now => at.zero + at.time,
+        Expression::Scene { operation, usual } => at.chosen(operation).unwrap_or(*usual),
         Expression::Unary { function, of } => {
             let of = number(of, at);
             at.checked(function.name(), (of, None), unary(*function, of))
@@ -179,7 +192,7 @@ mod tests {
 
     /// At so many seconds, where the clock of stamps showed 1000 s at time zero.
     fn at(inputs: &[Held], seconds: f64) -> Moment<'_> {
-        Moment::new(inputs, Clocks { now: SimTime::from_seconds(seconds), zero: 1000.0 })
+        Moment::new(inputs, Given { now: SimTime::from_seconds(seconds), zero: 1000.0, scene: &[] })
     }
 
     fn number(of: &Expression, inputs: &[Held]) -> f64 {
@@ -226,6 +239,16 @@ mod tests {
     fn time_is_that_of_the_moment() {
         assert_eq!(super::number(&Expression::Time, &at(&[], 2.5)), 2.5);
         assert_eq!(super::number(&Expression::Now, &at(&[], 2.5)), 1002.5);
+    }
+
+    #[test]
+    fn a_parameter_of_the_space_is_what_the_test_chose_or_its_usual_value() {
+        let start = Expression::Scene { operation: "start_x".to_owned(), usual: 0.5 };
+        for (chosen, value) in [("start_x", -2.0), ("start_y", 0.5)] {
+            let scene = [("load".to_owned(), 9.0), (chosen.to_owned(), -2.0)];
+            let given = Given { now: SimTime::ZERO, zero: 0.0, scene: &scene };
+            assert_eq!(super::number(&start, &Moment::new(&[], given)), value, "{chosen}");
+        }
     }
 
     #[test]

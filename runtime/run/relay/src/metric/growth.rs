@@ -3,50 +3,50 @@
 use sesame_base::time::SimTime;
 use sesame_plan::{Aggregate, Comparison, Condition, Expression, Formula};
 
-use crate::metric::expression::{Clocks, Held, Moment, number};
+use crate::metric::expression::{Given, Held, Moment, number};
 
 /// The first moment from now on at which a comparison in a formula changes, with these values of its inputs. Only
 /// comparisons are looked at whose two sides change evenly, by the same amount each second: what else time does to a
 /// formula is seen at messages. A comparison for equality holds for a moment only, which is not looked for.
-pub(super) fn next_change(formula: &Formula, inputs: &[Held], clocks: Clocks) -> Option<SimTime> {
+pub(super) fn next_change(formula: &Formula, inputs: &[Held], given: Given<'_>) -> Option<SimTime> {
     let of = match &formula.aggregate {
         Aggregate::Duration { of } | Aggregate::Count { of } => Some(of),
         Aggregate::Last { .. } | Aggregate::Min { .. } | Aggregate::Max { .. } | Aggregate::Mean { .. } => None,
     };
     let mut first = None;
     for condition in of.into_iter().chain(&formula.when) {
-        in_condition(condition, inputs, clocks, &mut first);
+        in_condition(condition, inputs, given, &mut first);
     }
     first
 }
 
 /// The first moment from now on at which an expression is above or below a number and was not before.
-pub(super) fn next_crossing(of: &Expression, bound: f64, inputs: &[Held], clocks: Clocks) -> Option<SimTime> {
+pub(super) fn next_crossing(of: &Expression, bound: f64, inputs: &[Held], given: Given<'_>) -> Option<SimTime> {
     let bound = Expression::Constant(bound);
-    let crossing = |by| change(&Compared { left: of, by, right: &bound }, inputs, clocks);
+    let crossing = |by| change(&Compared { left: of, by, right: &bound }, inputs, given);
     [Comparison::Above, Comparison::Below, Comparison::AtLeast, Comparison::AtMost]
         .into_iter()
         .filter_map(crossing)
         .min()
 }
 
-fn in_condition(condition: &Condition, inputs: &[Held], clocks: Clocks, first: &mut Option<SimTime>) {
+fn in_condition(condition: &Condition, inputs: &[Held], given: Given<'_>, first: &mut Option<SimTime>) {
     match condition {
         Condition::Constant(_) | Condition::Input(_) => {}
         Condition::Compare { left, by, right } => {
-            let found = change(&Compared { left, by: *by, right }, inputs, clocks);
+            let found = change(&Compared { left, by: *by, right }, inputs, given);
             *first = first.iter().copied().chain(found).min();
         }
         Condition::Same { left, right } => {
-            in_condition(left, inputs, clocks, first);
-            in_condition(right, inputs, clocks, first);
+            in_condition(left, inputs, given, first);
+            in_condition(right, inputs, given, first);
         }
         Condition::All(parts) | Condition::Any(parts) => {
             for part in parts {
-                in_condition(part, inputs, clocks, first);
+                in_condition(part, inputs, given, first);
             }
         }
-        Condition::Not(of) => in_condition(of, inputs, clocks, first),
+        Condition::Not(of) => in_condition(of, inputs, given, first),
     }
 }
 
@@ -56,7 +56,7 @@ struct Compared<'a> {
     right: &'a Expression,
 }
 
-fn change(compared: &Compared<'_>, inputs: &[Held], clocks: Clocks) -> Option<SimTime> {
+fn change(compared: &Compared<'_>, inputs: &[Held], given: Given<'_>) -> Option<SimTime> {
     /// More than rounding makes of a time in seconds, in nanoseconds.
     const MARGIN: i64 = 1 << 12;
     let Compared { left, by, right } = *compared;
@@ -64,11 +64,11 @@ fn change(compared: &Compared<'_>, inputs: &[Held], clocks: Clocks) -> Option<Si
         return None;
     }
     let holds_at = |nanos: i64| {
-        let moment = Moment::new(inputs, Clocks { now: SimTime::from_nanos(nanos), ..clocks });
+        let moment = Moment::new(inputs, Given { now: SimTime::from_nanos(nanos), ..given });
         by.holds(number(left, &moment), number(right, &moment))
     };
-    let now = clocks.now.nanos();
-    let moment = Moment::new(inputs, clocks);
+    let now = given.now.nanos();
+    let moment = Moment::new(inputs, given);
     let pace = slope(left, &moment)? - slope(right, &moment)?;
     let away = number(right, &moment) - number(left, &moment);
     let seconds = away / pace;
@@ -132,12 +132,13 @@ mod tests {
             ]),
         ) {
             let inputs = [[f64::from(input) * 1e-9, 0.0, 0.0]];
-            let clocks = |nanos| Clocks { now: SimTime::from_nanos(nanos), zero: f64::from(zero) * 1e-9 };
+            let given =
+                |nanos| Given { now: SimTime::from_nanos(nanos), zero: f64::from(zero) * 1e-9, scene: &[] };
             let condition = compared(time, f64::from(factor), by, f64::from(bound) * 1e-9);
-            let at = |nanos| holds(&condition, &Moment::new(&inputs, clocks(nanos)));
+            let at = |nanos| holds(&condition, &Moment::new(&inputs, given(nanos)));
             let expected = (now + 1..2_000).find(|&nanos| at(nanos) != at(now)).map(SimTime::from_nanos);
             let mut first = None;
-            in_condition(&condition, &inputs, clocks(now), &mut first);
+            in_condition(&condition, &inputs, given(now), &mut first);
             prop_assert_eq!(first, expected);
         }
     }
@@ -145,7 +146,7 @@ mod tests {
     #[test]
     fn what_does_not_change_evenly_is_left_to_messages() {
         let square = Expression::Product(vec![Expression::Time, Expression::Time]);
-        let moment = Moment::new(&[], Clocks { now: SimTime::ZERO, zero: 0.0 });
+        let moment = Moment::new(&[], Given { now: SimTime::ZERO, zero: 0.0, scene: &[] });
         assert_eq!(slope(&square, &moment), None);
         assert_eq!(
             slope(

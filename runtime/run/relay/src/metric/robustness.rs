@@ -99,8 +99,8 @@ impl Instance {
         let (Some(values), Some(monitor)) = (self.held.values(), &mut self.monitor) else { return };
         self.pushed = context.now;
         for (at, signal) in signals.iter().enumerate() {
-            let moment = Moment::new(values, context.clocks());
-            let value = number(signal, &moment);
+            let moment = Moment::new(values, context.given());
+            let (value, undefined) = (number(signal, &moment), moment.undefined());
             // As with other formulas: if arithmetic gives no number, the last value stays.
             if value.is_finite() {
                 monitor.push(context.now, at, value);
@@ -108,7 +108,7 @@ impl Instance {
                     self.samples.push(context.now, at, value);
                 }
             }
-            if let Some(undefined) = moment.undefined() {
+            if let Some(undefined) = undefined {
                 context.note(format!("{undefined} at {}", context.now));
             } else if !value.is_finite() {
                 context.note(format!("refused the value {value} at {}", context.now));

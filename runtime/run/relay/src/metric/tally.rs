@@ -15,13 +15,18 @@ pub(super) fn step(formula: &Formula, held: &HeldInputs, tally: &mut Tally, cont
         tally.stop(now);
         return None;
     };
-    let moment = Moment::new(inputs, context.clocks());
-    let counted = tally.take(formula, &moment, now, context);
-    if let Some(undefined) = moment.undefined() {
-        context.note(format!("{undefined} at {now}"));
+    let moment = Moment::new(inputs, context.given());
+    let counted = tally.take(formula, &moment, now);
+    match (moment.undefined(), &counted) {
+        (Some(undefined), _) => context.note(format!("{undefined} at {now}")),
+        (None, Err(Refused(value))) => context.note(format!("refused the value {value} at {now}")),
+        (None, Ok(_)) => {}
     }
-    counted
+    counted.ok().flatten()
 }
+
+/// A value that is not finite.
+struct Refused(f64);
 
 /// The aggregate of a formula's values.
 #[derive(Debug, Clone, Default)]
@@ -40,35 +45,32 @@ pub(super) struct Tally {
 
 impl Tally {
     /// Aggregates the values of a moment. Returns the number that counted, if numbers do.
-    fn take(&mut self, formula: &Formula, moment: &Moment<'_>, now: SimTime, context: &mut Context) -> Option<f64> {
+    fn take(&mut self, formula: &Formula, moment: &Moment<'_>, now: SimTime) -> Result<Option<f64>, Refused> {
         let due = |tally: &mut Tally| formula.every.is_none_or(|period| tally.due(now, SimTime::from_seconds(period)));
         let counts = formula.when.as_ref().is_none_or(|when| holds(when, moment));
         let of = match &formula.aggregate {
             Aggregate::Duration { of } => {
                 self.hold(now, counts && holds(of, moment));
-                return None;
+                return Ok(None);
             }
             Aggregate::Count { of } => {
                 let before = *self.value.get_or_insert(0.0);
                 if counts && holds(of, moment) && due(self) {
                     self.value = Some(before + 1.0);
                 }
-                return None;
+                return Ok(None);
             }
             Aggregate::Last { of } | Aggregate::Min { of } | Aggregate::Max { of } | Aggregate::Mean { of } => of,
         };
         if !counts {
-            return None;
+            return Ok(None);
         }
         let value = number(of, moment);
         if !value.is_finite() {
-            if moment.undefined().is_none() {
-                context.note(format!("refused the value {value} at {now}"));
-            }
-            return None;
+            return Err(Refused(value));
         }
         if !due(self) {
-            return None;
+            return Ok(None);
         }
         self.messages += 1.0;
         self.sum += value;
@@ -78,7 +80,7 @@ impl Tally {
             (Aggregate::Mean { .. }, _) => self.sum / self.messages,
             _ => value,
         });
-        Some(value)
+        Ok(Some(value))
     }
 
     /// Whether a message at this time counts.

@@ -4,7 +4,7 @@ use sesame_base::time::SimTime;
 use sesame_monitor::Truth;
 use sesame_plan::{CampaignPlan, Evidence, TopicId};
 
-use crate::metric::{Clocks, HeardValues, HeldInputs, Memories, Moment, Optional, hear, holds};
+use crate::metric::{Given, HeardValues, HeldInputs, Memories, Moment, Optional, hear, holds};
 use crate::value::Value;
 use crate::wire::Wire;
 
@@ -110,8 +110,8 @@ impl Sources {
 /// What the condition of evidence comes to with these values.
 pub(super) fn truth_of(evidence: &Evidence, held: &HeldInputs, now: SimTime) -> Truth {
     let Some(inputs) = held.values() else { return Truth::Unknown };
-    // Evidence does not read the time.
-    let moment = Moment::new(inputs, Clocks { now, zero: 0.0 });
+    // Evidence reads neither the time nor what a test chose.
+    let moment = Moment::new(inputs, Given { now, zero: 0.0, scene: &[] });
     let truth = Truth::from(holds(&evidence.condition, &moment));
     if moment.undefined().is_some() { Truth::Unknown } else { truth }
 }
