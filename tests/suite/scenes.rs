@@ -108,3 +108,43 @@ fn what_is_launched_beside_a_simulator_has_the_scene_of_each_test_in_its_argumen
     let found = measured("delays/1");
     assert!(found.iter().all(|(_, place, boxes)| (*place, *boxes) == (1.5, 1.0)), "{found:?}");
 }
+
+#[test]
+fn formulas_read_what_each_test_chose_or_the_default() {
+    let project = crossing_carts("scenes_in_formulas");
+    let mut text = fs::read_to_string(&project.space).unwrap();
+    // Each cart is a step from its start when it first says where it is.
+    let metrics = "metric least_a = min(poses[a].x + start_a)\n\
+                   metric least_b = min(poses[b].y + start_b)\n\
+                   metric margin  = robustness(always (poses[b].y > -start_b))\n\
+                   metric first_b = min(poses[b].y)\n\n";
+    for (from, to) in [
+        ("/// How far before", &*format!("{metrics}/// How far before")),
+        ("objectives closest\n", "objectives closest\n  observes least_a, least_b, margin, first_b\n"),
+        ("evaluations 120", "evaluations 12"),
+        // Where `a` starts, no test of this campaign chooses.
+        ("operations start_a, start_b, late, noisy 1..3", "operations start_b, late 1..2"),
+    ] {
+        assert!(text.contains(from), "{from}");
+        text = text.replacen(from, to, 1);
+    }
+    fs::write(&project.space, text).unwrap();
+    without_cargo(&project, &["run", SPACE, "--", "--results", "r"]).expect(0);
+
+    let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
+    let mut starts = Vec::new();
+    for test in 0..=12 {
+        let show = ["show", SPACE, &format!("T{test}"), "--results", "r/1", "--format", "json"];
+        let shown = without_cargo(&project, &show).expect(0).json();
+        let value = |name: &str| {
+            let metric = shown["metrics"].as_array().unwrap().iter().find(|metric| metric["metric"] == name);
+            metric.and_then(|metric| metric["value"].as_f64()).unwrap_or_else(|| panic!("{name}: {shown}"))
+        };
+        for name in ["least_a", "least_b", "margin"] {
+            assert!(near(value(name), 0.05), "{name}: {shown}");
+        }
+        starts.push(0.05 - value("first_b"));
+    }
+    assert!(near(starts[0], 9.0), "T0 chooses nothing: {starts:?}");
+    assert!(starts.iter().filter(|&&start| !near(start, 9.0)).count() > 2, "{starts:?}");
+}

@@ -4,6 +4,7 @@
 mod additions;
 mod copies;
 mod order;
+mod scenes;
 mod split;
 
 use sesame_base::observation::{MetricObservation, Observation, OperationEffect, Outcome};

@@ -23,6 +23,8 @@ pub(crate) struct Script {
     pub(crate) blanks: Vec<Blank>,
     /// Lines of which it publishes half of the messages twice, one right after the other.
     pub(crate) doubled: Vec<usize>,
+    /// Parameters that it asks for, whose values change nothing.
+    pub(crate) parameters: Vec<String>,
 }
 
 /// One topic on the wire.
@@ -82,8 +84,11 @@ pub(crate) struct Robot {
 }
 
 impl Simulator for Robot {
-    fn start(_: &Setup, bus: &mut Bus<'_>) -> Result<Self, SimulatorError> {
+    fn start(setup: &Setup, bus: &mut Bus<'_>) -> Result<Self, SimulatorError> {
         let script = SCRIPT.with_borrow_mut(Option::take).expect("a script is set before each run");
+        for parameter in &script.parameters {
+            setup.parameter(parameter, 0.0);
+        }
         let ports: Vec<Port> = script.lines.iter().map(|line| bus.open(&line.path)).collect();
         for (line, &port) in script.lines.iter().zip(&ports) {
             if line.subscribed {

@@ -182,7 +182,7 @@ fn a_recording_gives_metrics_their_values_again() {
 fn a_recording_says_what_its_test_chose_for_the_space() {
     let folder = tempfile::tempdir().unwrap();
     let (mut plan, test) = awkward_plan();
-    let scene = OperationKind::Scene { parameter: "arm/start".to_owned(), usual: Some(0.5) };
+    let scene = OperationKind::Scene { parameter: Some("arm/start".to_owned()), usual: Some(0.5) };
     plan.operations.push(Operation { name: "start".to_owned(), ..operation(0, scene) });
     let MetricSource::Last { input } = &plan.metrics[1].source else { panic!("it is the last command") };
     let start = Expression::Scene { operation: "start".to_owned(), usual: 0.5 };

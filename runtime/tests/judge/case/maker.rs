@@ -71,7 +71,8 @@ impl Maker {
             instances.truncate(1);
         }
         let requirements = self.requirements(&metrics);
-        let mut script = Script { lines, crash: None, over: None, blanks: Vec::new(), doubled: Vec::new() };
+        let mut script =
+            Script { lines, crash: None, over: None, blanks: Vec::new(), doubled: Vec::new(), parameters: Vec::new() };
         if self.chance(0.15) {
             script.over = Some(self.between(3, steps).unsigned_abs());
         }
