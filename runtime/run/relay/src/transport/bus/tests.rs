@@ -10,7 +10,7 @@ use sesame_plan::{Activation, Choice, Command, Launch, OperationKind, Ready, Rea
 
 use super::*;
 use crate::metric::MetricTable;
-use crate::relay::Relay;
+use crate::relay::{Exchange, Relay};
 use crate::wire::WireTable;
 
 /// A bus with a clock. Each reset is followed by ticks.
