@@ -97,7 +97,7 @@ impl Chosen {
                 Domain::Number { low: value - 2.0, high: value + 2.0, shape: ChoiceKind::Value, integer: false };
             let known_as = format!("simulator/{name}");
             self.case.script.parameters.push(known_as.clone());
-            let kind = OperationKind::Scene { parameter: known_as, usual: Some(usual) };
+            let kind = OperationKind::Scene { parameter: Some(known_as), usual: Some(usual) };
             let parameters = vec![testing::parameter("value", domain)];
             let operations = &mut self.case.plan.operations;
             let operation = OperationId(u32::try_from(operations.len()).unwrap());
