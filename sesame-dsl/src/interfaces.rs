@@ -26,7 +26,7 @@ pub trait Interfaces {
     }
 }
 
-/// A message of a dialect of MAVLink.
+/// A message of a dialect of `MAVLink`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DialectMessage {
     /// Its fields.

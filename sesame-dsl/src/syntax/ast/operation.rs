@@ -154,7 +154,6 @@ impl OperationKind {
     pub(crate) fn written(&self, parameter: &str) -> Option<Span> {
         match self {
             OperationKind::Plain { amounts, .. } => amounts.as_ref().map(Amounts::span),
-            OperationKind::OnNode(OnNode::Set(New::Range(range)) | OnNode::Slow(range)) => Some(range.span),
             OperationKind::OnNode(OnNode::Set(New::Values(values))) => {
                 Some(values.first()?.span().to(values.last()?.span()))
             }
@@ -165,6 +164,7 @@ impl OperationKind {
             OperationKind::StuckAt(Stuck::Constants(names)) => Some(names.first()?.span.to(names.last()?.span)),
             OperationKind::Latency { range, .. }
             | OperationKind::Reorder { range, .. }
+            | OperationKind::OnNode(OnNode::Set(New::Range(range)) | OnNode::Slow(range))
             | OperationKind::Scene(Scene { range, .. }) => Some(range.span),
             OperationKind::BurstLoss { enter, leave, loss, .. } => {
                 let written = match parameter {

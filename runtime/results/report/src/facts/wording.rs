@@ -60,14 +60,9 @@ pub(crate) fn tests_not_imported(rows: &[TestRow]) -> Option<String> {
 /// if there is one, and `(never set)` where it is the default.
 pub(crate) fn value_text(shown: MetricValue, unit: Option<&str>, constant: Option<&str>, bounds: &[Bound]) -> String {
     let Some(value) = shown.value else { return "unmeasured".to_owned() };
-    let mut text = number::beside(value, bounds, unit);
-    if let Some(constant) = constant {
-        text.push_str(&format!(" ({constant})"));
-    }
-    if !shown.set {
-        text.push_str(" (never set)");
-    }
-    text
+    let named = constant.map(|constant| format!(" ({constant})")).unwrap_or_default();
+    let unset = if shown.set { "" } else { " (never set)" };
+    format!("{}{named}{unset}", number::beside(value, bounds, unit))
 }
 
 /// As [`value_text`], of a metric of a plan.
