@@ -73,7 +73,9 @@ impl Chosen {
                 self.expression(right);
             }
             Expression::Sum(of) | Expression::Product(of) | Expression::Min(of) | Expression::Max(of) => {
-                of.iter_mut().for_each(|of| self.expression(of));
+                for of in of {
+                    self.expression(of);
+                }
             }
             Expression::Input(_)
             | Expression::Integral(_)
