@@ -119,7 +119,6 @@ fn each_thing_that_later_code_relies_on_is_asked_for() {
             "operations[0].members: are not chosen by the last parameter",
         ),
         (|plan| scene(plan, None, None), "operations[2].kind.usual: is not there, and programs are launched with it"),
-        (|plan| scene(plan, Some("x"), Some(f64::NAN)), "operations[2].kind.usual: NaN is not finite"),
         (
             |plan| scene(plan, None, Some(1.0)),
             "operations[2].kind.parameter: `start_x` has neither this nor a place in the arguments",
