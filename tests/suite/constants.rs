@@ -16,7 +16,7 @@ order = json.loads(sys.stdin.readline())
 while order:
     if "reset" in order:
         status = 1
-        topics = {"publishes": ["plug", "cart/battery"], "subscribes": ["plug"]}
+        topics = {"publishes": ["plug", "cart/battery", "cart/spare"], "subscribes": ["plug"]}
         order = answer({"ready": {**topics, "resets": True}})
     else:
         for message in answer({"publish": [{"topic": "plug", "value": 1.0}]})["deliver"]:
@@ -34,10 +34,13 @@ system {
     status: int
   }
   topic battery = "cart/battery" : Battery
+  topic spare   = "cart/spare" : Battery
   topic plug    = "plug" : real
 }
 
 metric status maximise default 0 = max(battery.status)
+/// Nobody says anything of it.
+metric spare_status    default 1 = last(spare.status)
 requirement R1 "The battery is charged" = status == STATUS_CHARGING
 
 operation pulled on plug = stuck at [0, 0]
@@ -46,6 +49,7 @@ test out { pulled value 0 from 1s to 2s  expect status == STATUS_DISCHARGING }
 
 campaign pulling {
   objectives status
+  observes   spare_status
   operations pulled 1 per test
   search     random { evaluations 2 }
   end        after 3s
@@ -62,6 +66,7 @@ fn values_and_bounds_that_are_constants_have_their_names_in_the_terminal_and_on_
     sesamec(&["known", SPACE, "out"]);
     let shown = sesamec(&["show", SPACE, "out", "--results", "known"]);
     assert!(shown.contains("2 (STATUS_DISCHARGING)") && shown.contains("= 1 (STATUS_CHARGING)"), "{shown}");
+    assert!(shown.contains("1 (never set)"), "a default was never observed: {shown}");
     let json = sesamec(&["show", SPACE, "out", "--results", "known", "--format", "json"]);
     assert!(json.contains(r#""constant": "STATUS_DISCHARGING""#), "{json}");
     sesamec(&["report", SPACE, "--results", "known", "--output", "page.html"]);

@@ -203,7 +203,7 @@ pub struct MetricReport {
     pub unit: Option<String>,
     /// Its value.
     pub value: Option<f64>,
-    /// The name of the constant that its value is, if it is clear which one is meant.
+    /// The name of the constant that its value is, if the value was set and it is clear which constant is meant.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub constant: Option<String>,
     /// Whether the value was set; otherwise it is the default.
@@ -353,13 +353,14 @@ pub(crate) fn report_on(
             .map(|(id, metric)| {
                 let shown = observation.metrics.get(id.index());
                 let value = shown.and_then(|shown| shown.value);
-                let constant = value.and_then(|value| plan.constant_of(id, value));
+                let set = shown.is_some_and(|shown| shown.set);
+                let constant = wording::constant_of(plan, id, MetricValue::whole(value, set));
                 MetricReport {
                     metric: metric.name.clone(),
                     unit: metric.unit.clone(),
                     value,
                     constant: constant.map(str::to_owned),
-                    set: shown.is_some_and(|shown| shown.set),
+                    set,
                     changes: shown.map_or(0, |shown| shown.series.len()),
                     robustness: shown.map_or_else(Vec::new, |shown| shown.robustness.clone()),
                 }

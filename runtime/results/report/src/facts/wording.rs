@@ -67,8 +67,12 @@ pub(crate) fn value_text(shown: MetricValue, unit: Option<&str>, constant: Optio
 
 /// As [`value_text`], of a metric of a plan.
 pub(crate) fn value_of(plan: &CampaignPlan, metric: MetricId, shown: MetricValue, bounds: &[Bound]) -> String {
-    let constant = shown.value.and_then(|value| plan.constant_of(metric, value));
-    value_text(shown, plan.metric(metric).unit.as_deref(), constant, bounds)
+    value_text(shown, plan.metric(metric).unit.as_deref(), constant_of(plan, metric, shown), bounds)
+}
+
+/// The name of the constant that a metric's value is, if there is one. A default was never observed, so it has none.
+pub(crate) fn constant_of(plan: &CampaignPlan, metric: MetricId, shown: MetricValue) -> Option<&str> {
+    shown.value.filter(|_| shown.set).and_then(|value| plan.constant_of(metric, value))
 }
 
 /// The bound of a requirement with its unit. The name of the constant that it is follows, if there is one.
