@@ -21,46 +21,32 @@ impl<'a> Resolver<'a> {
     ) -> Option<(OperationKind, Vec<Parameter>)> {
         let written = self.kind_for(resource, body)?;
         let has_nodes = self.has_nodes(resource, written);
-        let found = self.nodes_named(&resource.node);
-        let transition = match written {
-            OnNode::Transition(name) => Some(self.transition(name)?),
-            _ => None,
-        };
-        let (values, parameter) = match written {
-            OnNode::Set(New::Range(range)) => {
-                (Some(Vec::new()), Some(number("value", None, self.range(range, None, "the parameter")?)))
-            }
-            OnNode::Set(New::Values(written)) => {
-                let (values, parameter) = self.new_values(written)?;
-                (Some(values), Some(parameter))
-            }
-            OnNode::Slow(range) => (None, Some(self.kept_share(range)?)),
-            OnNode::Transition(_) | OnNode::Pause | OnNode::Kill => (None, None),
-        };
         // The members of a group follow each other.
-        let node = *found?.first()?;
-        if !has_nodes {
-            return None;
-        }
-        let can = match written {
-            OnNode::Set(_) | OnNode::Transition(_) => true,
-            OnNode::Pause | OnNode::Kill | OnNode::Slow(_) if self.orders_nodes() => true,
-            OnNode::Slow(_) => self.is_launched(resource, node, body.kind_word) & self.runs_freely(body),
-            OnNode::Pause | OnNode::Kill => self.is_launched(resource, node, body.kind_word),
-        };
-        if !can {
-            return None;
-        }
-        let node = node_of_plans(node);
-        let kind = match (written, values, &resource.parameter) {
-            (OnNode::Set(_), Some(values), Some(parameter)) => {
-                OperationKind::Set { node, parameter: parameter.text.clone(), values }
+        let node = self.nodes_named(&resource.node).and_then(|found| found.first().copied()).filter(|_| has_nodes);
+        let word = body.kind_word;
+        let (kind, parameter) = match written {
+            OnNode::Set(new) => {
+                let (values, value) = self.new_values(new)?;
+                let parameter = resource.parameter.as_ref().expect("`set` was found to be on a parameter").text.clone();
+                (OperationKind::Set { node: node_of_plans(node?), parameter, values }, Some(value))
             }
-            (OnNode::Transition(_), ..) => OperationKind::Transition { node, transition: transition? },
-            (OnNode::Pause, ..) => OperationKind::Pause { node },
-            (OnNode::Slow(_), ..) => OperationKind::Slow { node },
-            (OnNode::Kill, ..) => OperationKind::Kill { node },
-            (OnNode::Set(_), ..) => unreachable!("the kind was found to be for what it acts on"),
+            OnNode::Transition(name) => {
+                let transition = self.transition(name)?;
+                (OperationKind::Transition { node: node_of_plans(node?), transition }, None)
+            }
+            OnNode::Slow(range) => {
+                let share = self.kept_share(range)?;
+                let node = node?;
+                if !(self.can_be_stopped(resource, node, word) & self.runs_freely(word)) {
+                    return None;
+                }
+                (OperationKind::Slow { node: node_of_plans(node) }, Some(share))
+            }
+            OnNode::Pause | OnNode::Kill => {
+                let node = node.filter(|node| self.can_be_stopped(resource, *node, word)).map(node_of_plans)?;
+                let pauses = matches!(written, OnNode::Pause);
+                (if pauses { OperationKind::Pause { node } } else { OperationKind::Kill { node } }, None)
+            }
         };
         Some((kind, parameter.into_iter().collect()))
     }
@@ -88,8 +74,15 @@ impl<'a> Resolver<'a> {
         None
     }
 
-    /// What a parameter is set to, and the choice of one of these values: all different, and of one type.
-    fn new_values(&mut self, written: &'a [ast::NewValue]) -> Option<(Vec<NewValue>, Parameter)> {
+    /// What a parameter is set to: values that are all different and of one type, or none for a number; and what a test
+    /// chooses.
+    fn new_values(&mut self, written: &'a New) -> Option<(Vec<NewValue>, Parameter)> {
+        let written = match written {
+            New::Range(range) => {
+                return Some((Vec::new(), number("value", None, self.range(range, None, "the parameter")?)));
+            }
+            New::Values(written) => written,
+        };
         let mut values: Vec<NewValue> = Vec::new();
         let mut texts: Vec<String> = Vec::new();
         for new in written {
@@ -118,16 +111,15 @@ impl<'a> Resolver<'a> {
         };
         let (mut numbers, mut truths, mut texts) = (Vec::new(), Vec::new(), Vec::new());
         for item in items {
+            let first = &items[0];
+            if of_item(item) != of_item(first) {
+                self.report_mixed((item.span(), of_item(item)), (first.span(), of_item(first)));
+                return None;
+            }
             match item {
                 Item::Number(number) => numbers.push(self.value(number, None, "the parameter")?),
                 Item::Truth(truth, _) => truths.push(*truth),
                 Item::Text(text) => texts.push(text.text.clone()),
-            }
-            if let (Some(first), [numbers, truths, texts]) = (items.first(), [numbers.len(), truths.len(), texts.len()])
-                && ![numbers, truths, texts].contains(&(numbers + truths + texts))
-            {
-                self.report_mixed((item.span(), of_item(item)), (first.span(), of_item(first)));
-                return None;
             }
         }
         Some(match (truths.is_empty(), texts.is_empty()) {
@@ -146,12 +138,12 @@ impl<'a> Resolver<'a> {
         self.report(diagnostic);
     }
 
-    /// Whether the nodes are parts of the simulator, which does to them what operations want.
+    /// Whether the nodes are parts of the simulator, which pauses, slows and kills them itself.
     fn orders_nodes(&self) -> bool {
         self.kind().is_some_and(|(kind, _)| kind.properties().orders_nodes)
     }
 
-    /// Reports a simulator that cannot do to its nodes what an operation wants.
+    /// Reports a simulator on whose nodes this kind of operation cannot act.
     fn has_nodes(&mut self, resource: &ast::Resource, written: &OnNode) -> bool {
         const INSTEAD: &str = "disturb the topics of the node instead, for example with `blackhole` or `latency`";
         let of_ros = matches!(written, OnNode::Set(_) | OnNode::Transition(_));
@@ -258,8 +250,12 @@ impl<'a> Resolver<'a> {
         Some(number("share", None, share))
     }
 
-    /// Reports a node that the runner does not launch, so that it has no process to stop.
-    fn is_launched(&mut self, resource: &ast::Resource, node: NodeId, word: Span) -> bool {
+    /// Reports a node that neither the simulator stops, nor the runner, which does not launch it and has no process to
+    /// stop.
+    fn can_be_stopped(&mut self, resource: &ast::Resource, node: NodeId, word: Span) -> bool {
+        if self.orders_nodes() {
+            return true;
+        }
         let Some(node) = self.system.nodes[node.index()].as_ref() else { return false };
         if node.launch.is_some() {
             return true;
@@ -276,12 +272,15 @@ impl<'a> Resolver<'a> {
     }
 
     /// Reports a slowed node of a simulator that waits for its nodes in every step.
-    fn runs_freely(&mut self, body: &ast::OperationBody) -> bool {
+    fn runs_freely(&mut self, word: Span) -> bool {
+        if self.orders_nodes() {
+            return true;
+        }
         let Some(step) = self.transport().and_then(|transport| transport.settings.steppings.first()) else {
             return true;
         };
         let title = "`slow` has no effect on a node of a stepped simulator";
-        let diagnostic = Diagnostic::new(Code::NODE_OUT_OF_REACH, body.kind_word, title)
+        let diagnostic = Diagnostic::new(Code::NODE_OUT_OF_REACH, word, title)
             .label("a step takes as long as its nodes need, so a share of the time changes nothing")
             .secondary(step.0, "the simulator is stepped here")
             .note("to delay what the node publishes, use `latency` on its topics");
