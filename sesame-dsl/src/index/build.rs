@@ -12,7 +12,7 @@ use crate::syntax::ast::eddi::{Eddi, State};
 use crate::syntax::ast::lifecycle::{Command, Launch, ReadyWhen};
 use crate::syntax::ast::physical::Physical;
 use crate::syntax::ast::{
-    self, Activation, ActivationMode, Campaign, ComparedWith, Contained, Expression, ExpressionKind, Formula,
+    self, Activation, ActivationMode, Bound, Campaign, ComparedWith, Contained, Expression, ExpressionKind, Formula,
     FormulaKind, Head, Metric, MetricSource, Name, Operation, OperationBody, OperationKind, Path, Resource, Step,
     System, Test, Text, TriggerEnd, Type, TypeKind,
 };
@@ -61,7 +61,7 @@ pub(crate) fn index(merged: &Merged) -> Index {
         indexer.metric(metric, id);
     }
     for (requirement, id) in requirements {
-        indexer.mention_metric(&requirement.metric, id);
+        indexer.mention_bounded(&requirement.metric, &requirement.bound, id);
     }
     for (operation, id) in operations {
         indexer.operation(operation, id);
@@ -255,6 +255,14 @@ impl<'a> Indexer<'a> {
         self.refer(Span { hi: dot, ..name.span }, target, within);
         let part = target.and_then(|monitor| self.members.get(&(monitor, part)).copied());
         self.refer(Span { lo: dot + 1, ..name.span }, part, within);
+    }
+
+    /// A metric, and the constant that bounds it.
+    fn mention_bounded(&mut self, metric: &'a Name, bound: &'a Bound, within: DefinitionId) {
+        self.mention_metric(metric, within);
+        if let Bound::Constant(_, constant) = bound {
+            self.path(constant, within);
+        }
     }
 
     /// A part of a monitor, if a path is one: what is before its dot is a monitor.
@@ -511,7 +519,7 @@ impl<'a> Indexer<'a> {
             resource,
             from,
             to,
-            kind: _,
+            kind,
             kind_word: _,
             within: _,
             lengths: _,
@@ -524,6 +532,9 @@ impl<'a> Indexer<'a> {
         } = &operation.body;
         for place in targets.iter().flat_map(|target| &target.places) {
             self.path(place, id);
+        }
+        for constant in kind.constants() {
+            self.path(constant, id);
         }
         if let Some(Resource { parameter: _, node, chosen: _, span: _ }) = resource {
             self.mention(&node.name, id);
@@ -558,7 +569,7 @@ impl<'a> Indexer<'a> {
         }
         for expectation in expectations {
             match expectation {
-                ast::Expectation::Metric { metric, bound: _ } => self.mention_metric(metric, id),
+                ast::Expectation::Metric { metric, bound } => self.mention_bounded(metric, bound, id),
                 ast::Expectation::Requirement(name) => {
                     self.mention(name, id);
                 }
@@ -656,11 +667,13 @@ impl<'a> Indexer<'a> {
             fits: _,
             has_errors: _,
         } = lab;
-        let excluded = excludes.iter().map(|(name, _)| name);
+        for (metric, bound) in excludes {
+            self.mention_bounded(metric, bound, id);
+        }
         let ranked = ranks.iter().flat_map(|(_, keys)| keys).map(|(name, _)| name);
         let tolerated = tolerances.iter().flat_map(|(_, metrics)| metrics).map(|(name, _)| name);
-        for name in excluded.chain(ranked).chain(tolerated) {
-            self.mention(name, id);
+        for name in ranked.chain(tolerated) {
+            self.mention_metric(name, id);
         }
         self.mention_all(interlocks, id);
     }

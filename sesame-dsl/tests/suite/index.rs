@@ -195,3 +195,27 @@ fn a_formula_mentions_the_parameter_of_the_space_that_it_reads() {
     assert_eq!(of("start_y"), ["moved", "stays", "scenes"]);
     assert_eq!(of("load"), ["burdened", "heavy", "scenes"]);
 }
+
+#[test]
+fn operations_and_bounds_mention_the_messages_of_their_constants() {
+    let (sources, index, has_errors) = index(
+        "space cart
+        system {
+          simulator sim = mqtt \"mqtt://127.0.0.1:1883\"
+          message Battery { constant EMPTY = 0  constant FULL = 9  state: int }
+          topic battery = \"battery\" : Battery
+        }
+        metric state minimise default 9 = last(battery.state)
+        requirement R1 \"charged\" = state >= Battery.FULL
+        operation held on battery.state = stuck at one of Battery.EMPTY, FULL
+        operation drawn on battery.state = random one of EMPTY, Battery.FULL
+        test known { drawn from 1s to 2s  expect state == Battery.EMPTY }
+        campaign c { objectives state  operations held, drawn 1 per test
+                     search random { evaluations 2 }  end after 5s }",
+    );
+    assert!(!has_errors);
+    let at = |name: &str, line: u32| (name.to_owned(), line);
+    let of_battery = [at("battery", 5), at("R1", 8), at("held", 9), at("drawn", 10), at("known", 11)];
+    assert_eq!(uses(&sources, &index, "Battery"), of_battery);
+    assert!(index.references.iter().all(|reference| reference.target.is_some()));
+}

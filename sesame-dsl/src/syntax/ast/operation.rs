@@ -150,6 +150,14 @@ pub(crate) struct Scene {
 }
 
 impl OperationKind {
+    /// The names of constants of messages in it.
+    pub(crate) fn constants(&self) -> &[Path] {
+        match self {
+            OperationKind::StuckAt(Stuck::Constants(names)) | OperationKind::RandomConstant(names) => names,
+            _ => &[],
+        }
+    }
+
     /// Where it is written what a parameter of a kind, other than a custom one, may be.
     pub(crate) fn written(&self, parameter: &str) -> Option<Span> {
         match self {
