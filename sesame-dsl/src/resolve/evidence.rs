@@ -83,22 +83,24 @@ impl<'a> Resolver<'a> {
             return None;
         }
         if condition.reads_time() {
-            let time = first_part(written, &|part| match &part.kind {
-                ExpressionKind::Field(path) if self.named_clock(path).is_some() => Some((path.span, false)),
+            let found = first_part(written, &|part| match &part.kind {
+                ExpressionKind::Field(path) => self.named_clock(path).map(|clock| (path.span, Some(clock))),
                 ExpressionKind::Call(name, _) if memory_named(&name.text) == Some(Remembers::Integral) => {
-                    Some((part.span, true))
+                    Some((part.span, None))
                 }
                 _ => None,
             });
-            let (span, integral) = time.unwrap_or((written.span, false));
-            let (title, note) = if integral {
-                let title = "evidence cannot read an integral, which grows between messages";
-                (title, "a metric can, such as `max(integral(power))`, and a requirement on that")
-            } else {
-                let note = "how long it must hold is said by `held`, and when it is too old by `stale after`";
-                ("evidence cannot read the simulation time", note)
+            let (span, clock) = found.expect("what reads the time has a word for it or an integral");
+            let (what, note) = match clock {
+                None => (
+                    "an integral, which grows between messages",
+                    "a metric can, such as `max(integral(power))`, and a requirement on that",
+                ),
+                Some(clock) => {
+                    (clock.means, "how long it must hold is said by `held`, and when it is too old by `stale after`")
+                }
             };
-            let diagnostic = Diagnostic::new(Code::BAD_MONITOR, span, title)
+            let diagnostic = Diagnostic::new(Code::BAD_MONITOR, span, format!("evidence cannot read {what}"))
                 .label("evidence changes when messages arrive")
                 .note(note);
             self.report(diagnostic);
@@ -106,7 +108,7 @@ impl<'a> Resolver<'a> {
         }
         if condition.reads_scene() {
             let scene = first_part(written, &|part| match &part.kind {
-                ExpressionKind::Field(path) => self.named_scene(path).map(|_| path.span),
+                ExpressionKind::Field(path) => self.scene_at(path).map(|_| path.span),
                 _ => None,
             });
             let title = "evidence cannot read a parameter of the space";
@@ -117,8 +119,7 @@ impl<'a> Resolver<'a> {
             return None;
         }
         if depth::of_condition(condition) > MAX_DEPTH {
-            let title = format!("this condition is nested more than {MAX_DEPTH} levels deep");
-            self.report(Diagnostic::new(Code::TOO_LARGE, written.span, title).label("nested too deeply"));
+            self.too_deep("condition", written.span);
             return None;
         }
         Some(())

@@ -108,8 +108,7 @@ impl<'a> Resolver<'a> {
             return None;
         }
         if depth::of_aggregate(&aggregate).max(when.as_ref().map_or(0, depth::of_condition)) > MAX_DEPTH {
-            let title = format!("this formula is nested more than {MAX_DEPTH} levels deep");
-            self.report(Diagnostic::new(Code::TOO_LARGE, whole, title).label("nested too deeply"));
+            self.too_deep("formula", whole);
             return None;
         }
         if let (Aggregate::Last { of: Expression::Input(0) }, None, None, None, false) =
@@ -229,7 +228,7 @@ impl<'a> Resolver<'a> {
     /// Whether a value depends on messages at all.
     fn reads_a_topic(&self, expression: &ast::Expression) -> bool {
         let reads = |part: &ast::Expression| match &part.kind {
-            ExpressionKind::Field(path) => self.named_scene(path).is_none(),
+            ExpressionKind::Field(path) => self.scene_at(path).is_none(),
             ExpressionKind::Members(..) => true,
             _ => false,
         };
@@ -305,7 +304,7 @@ impl<'a> Resolver<'a> {
                 let unit = self.unit_in_formula(quantity)?;
                 (!quantity.value.is_nan()).then_some((Expression::Constant(quantity.value), unit))
             }
-            ExpressionKind::Field(path) => match (self.named_clock(path), self.named_scene(path)) {
+            ExpressionKind::Field(path) => match (self.named_clock(path), self.scene_at(path)) {
                 (Some(clock), _) => Some((clock.expression.clone(), Some(Unit::seconds()))),
                 (None, Some(scene)) => self.value_of_scene(path, scene),
                 (None, None) => self.numeric_input(inputs, path, None),

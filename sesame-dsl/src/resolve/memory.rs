@@ -20,7 +20,7 @@ impl<'a> Resolver<'a> {
     /// The number that one of these functions computes.
     pub(super) fn remembered(&mut self, inputs: &mut Vec<Input>, call: &'a ast::Expression) -> Option<Number> {
         let (memory, of) = computed(call);
-        let of_messages = |path| self.named_clock(path).is_none() && self.named_scene(path).is_none();
+        let of_messages = |path| self.named_clock(path).is_none() && self.scene_at(path).is_none();
         let read = read_in(call).filter(|read| of_messages(read.path));
         let Some(read) = read else {
             let innermost = memory.first().map_or("previous", |(_, name)| name.text.as_str());

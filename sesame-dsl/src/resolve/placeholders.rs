@@ -1,11 +1,11 @@
 //! Placeholders in the arguments of launched programs: what a worker has of its own, and scenes, which tests choose.
 
 use super::words::list;
-use super::{Definition, Kind, Resolver};
+use super::{Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::similar::most_similar;
 use crate::span::Span;
-use crate::syntax::ast::{OperationKind, Text};
+use crate::syntax::ast::Text;
 
 /// What a worker has of its own.
 const KNOWN: [&str; 6] = ["worker", "domain", "port", "folder", "seed", "ros-args"];
@@ -25,7 +25,7 @@ pub(super) enum Purpose {
 }
 
 impl<'a> Resolver<'a> {
-    /// Reports placeholders that are not replaced; returns whether there is none of them. Notes which scenes are there.
+    /// Reports placeholders that nothing replaces, and returns whether there are none. Notes the scenes in the text.
     pub(super) fn placeholders(&mut self, text: &Text, purpose: Purpose) -> bool {
         let permitted = match purpose {
             Purpose::Argument => &KNOWN[..],
@@ -37,7 +37,7 @@ impl<'a> Resolver<'a> {
             // With its braces.
             let span = place.map_or(text.span, |Span { file, lo, hi }| Span { file, lo: lo - 1, hi: hi + 1 });
             let scene = self.scene_named(word).filter(|_| purpose != Purpose::Port);
-            if let (Some(declared), true) = (scene, permitted.contains(&word)) {
+            if let (Some((declared, _)), true) = (scene, permitted.contains(&word)) {
                 let title = format!("`{{{word}}}` could be the parameter `{word}` or what the worker has of its own");
                 let diagnostic = Diagnostic::new(Code::PLACEHOLDER, span, title)
                     .label("two values have this name")
@@ -70,14 +70,6 @@ impl<'a> Resolver<'a> {
             }
         }
         sound
-    }
-
-    /// Where the parameter of the space with this name is declared, if there is one.
-    fn scene_named(&self, name: &str) -> Option<Span> {
-        let Definition { kind, index, span } = *self.names.get(name)?;
-        let is_scene =
-            kind == Kind::Operation && matches!(self.file.operations.get(index)?.body.kind, OperationKind::Scene(_));
-        is_scene.then_some(span)
     }
 
     /// What to say of a word in braces that nothing replaces.

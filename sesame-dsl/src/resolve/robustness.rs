@@ -64,7 +64,7 @@ impl<'a> Resolver<'a> {
             signals[at] = Expression::Sum(vec![twice, Expression::Constant(-amount)]);
         }
         if signals.iter().map(depth::of_expression).max().max(Some(resolved.depth())) > Some(MAX_DEPTH) {
-            self.too_deep(of.span);
+            self.too_deep("formula", of.span);
             return None;
         }
         if inputs.is_empty() {
@@ -105,8 +105,8 @@ impl<'a> Resolver<'a> {
         }
     }
 
-    fn too_deep(&mut self, span: Span) {
-        let title = format!("this formula is nested more than {MAX_DEPTH} levels deep");
+    pub(super) fn too_deep(&mut self, what: &str, span: Span) {
+        let title = format!("this {what} is nested more than {MAX_DEPTH} levels deep");
         self.report(Diagnostic::new(Code::TOO_LARGE, span, title).label("nested too deeply"));
     }
 
@@ -198,7 +198,7 @@ impl<'a> Resolver<'a> {
 
     fn prefixed(&mut self, parts: &mut Signals, prefixes: &'a [Prefix], of: &'a ast::Expression) -> Option<Temporal> {
         if prefixes.len() > MAX_DEPTH {
-            self.too_deep(of.span);
+            self.too_deep("formula", of.span);
             return None;
         }
         let intervals: Vec<_> = prefixes.iter().map(|prefix| self.interval(prefix.interval.as_ref())).collect();

@@ -1,9 +1,8 @@
 //! Parameters of the simulator or of launched programs: what a scenario is, and may vary from test to test.
 
-use super::Resolver;
 use super::formula::Number;
+use super::{Definition, Kind, Resolver};
 use crate::diagnostic::{Code, Diagnostic, Suggestion};
-use crate::index::Kind;
 use crate::model::{ChoiceKind, Domain, Expression, OperationKind, Parameter};
 use crate::span::Span;
 use crate::syntax::ast::{self, Name, Path, UnitName};
@@ -70,16 +69,21 @@ impl<'a> Resolver<'a> {
         sound
     }
 
-    /// The parameter whose name a path is.
-    pub(super) fn named_scene(&self, path: &Path) -> Option<&'a ast::Scene> {
-        let named = self.names.get(path.topic.text.as_str())?;
-        if !path.is_name() || named.kind != Kind::Operation {
+    /// The parameter of the space with this name, and where it is declared.
+    pub(super) fn scene_named(&self, name: &str) -> Option<(Span, &'a ast::Scene)> {
+        let Definition { kind, index, span } = *self.names.get(name)?;
+        if kind != Kind::Operation {
             return None;
         }
-        match &self.file.operations[named.index].body.kind {
-            ast::OperationKind::Scene(scene) => Some(scene),
+        match &self.file.operations.get(index)?.body.kind {
+            ast::OperationKind::Scene(scene) => Some((span, scene)),
             _ => None,
         }
+    }
+
+    /// The parameter of the space that a path is.
+    pub(super) fn scene_at(&self, path: &Path) -> Option<&'a ast::Scene> {
+        self.scene_named(&path.topic.text).filter(|_| path.is_name()).map(|(_, scene)| scene)
     }
 
     /// The value of a parameter in a formula: what the test chose, or else its usual value, without which it is
@@ -115,7 +119,7 @@ impl<'a> Resolver<'a> {
             .label("only `in_process`, `process` and `ros2` simulators begin a run with other values")
             .secondary(simulator, "the simulator is declared here")
             .note(format!(
-                "programs that are launched can have it in their arguments, as in `launch \"./robot\" \"{{{name}}}\"`"
+                "launched programs can have it in their arguments, as in `launch \"./robot\" \"{{{name}}}\"`"
             ))
             .note("a custom operation `before start` can change the files with which a system starts");
         self.report(diagnostic);
