@@ -36,12 +36,16 @@ pub(super) fn misnamed_operations(space: &Space, diagnostics: &mut Vec<Diagnosti
 /// Operations on topics without a subscriber, if nodes say what they subscribe to: no node subscribes to the topic, no
 /// monitor needs it, and no outbound metric reads it.
 pub(super) fn unheard_operations(space: &Space, diagnostics: &mut Vec<Diagnostic>) {
-    let subscribed = space.nodes.values().flat_map(|node| node.subscribes.iter().map(move |used| (node, used)));
-    if subscribed.clone().next().is_none() {
+    let mut subscribed: BTreeSet<TopicId> = BTreeSet::new();
+    let mut heard: BTreeSet<TopicId> = BTreeSet::new();
+    for node in space.nodes.values() {
+        subscribed.extend(node.subscribes.iter().map(|used| used.topic));
+        let disturbed = node.subscribes.iter().filter(|used| !hears_itself_alone(space, node, used));
+        heard.extend(disturbed.map(|used| used.topic));
+    }
+    if subscribed.is_empty() {
         return;
     }
-    let others = subscribed.filter(|(node, used)| !hears_itself_alone(space, node, used));
-    let mut heard: BTreeSet<TopicId> = others.map(|(_, used)| used.topic).collect();
     for metric in space.metrics.values() {
         match &metric.source {
             MetricSource::Robustness(robustness) if robustness.outbound => {
@@ -59,14 +63,16 @@ pub(super) fn unheard_operations(space: &Space, diagnostics: &mut Vec<Diagnostic
     }
     for operation in space.operations.values() {
         let unheard = operation.topics().filter(|topic| !heard.contains(topic));
-        let unheard: Vec<&Declaration> = unheard.map(|topic| &space.topics[topic].declaration).collect();
-        let Some(topic) = unheard.first() else { continue };
+        let unheard: Vec<(&Declaration, bool)> =
+            unheard.map(|topic| (&space.topics[topic].declaration, subscribed.contains(&topic))).collect();
+        let Some(&(topic, is_subscribed)) = unheard.first() else { continue };
         if unheard.len() < operation.targets.len() {
-            diagnostics.extend(unheard.iter().map(|topic| partly_unheard(space, operation, topic)));
+            let partly = |&(topic, is_subscribed): &_| partly_unheard(operation, topic, is_subscribed);
+            diagnostics.extend(unheard.iter().map(partly));
             continue;
         }
-        let name = &operation.declaration.name;
-        let title = format!("operation `{name}` has no effect: {} to `{}`", who_subscribes(space, topic), topic.name);
+        let why = why_unheard(&format!("`{}`", topic.name), is_subscribed);
+        let title = format!("operation `{}` has no effect: {why}", operation.declaration.name);
         diagnostics.push(
             Diagnostic::new(Code::NOBODY_HEARS, operation.declaration.span, title)
                 .label("no monitor and no outbound metric reads its topic either")
@@ -87,21 +93,19 @@ fn hears_itself_alone(space: &Space, node: &Node, used: &TopicMembers) -> bool {
     one_rule && topic.channel == Channel::Topic && (0..count).all(|member| !used.has(member) || publishes(member))
 }
 
-/// Who subscribes to a topic that nobody hears as operations change it, as the subject and verb of a sentence.
-fn who_subscribes(space: &Space, topic: &Declaration) -> &'static str {
-    let mut used = space.nodes.values().flat_map(|node| &node.subscribes);
-    let subscribes = used.any(|used| space.topics[used.topic].declaration.name == topic.name);
-    if subscribes {
-        "only nodes that publish on it, and so hear it undisturbed, subscribe"
+/// Why nobody hears what operations do on a topic, to which nodes may be subscribed nevertheless.
+fn why_unheard(topic: &str, is_subscribed: bool) -> String {
+    if is_subscribed {
+        format!("only nodes that publish on {topic} subscribe to it, and they hear it undisturbed")
     } else {
-        "no node subscribes"
+        format!("no node subscribes to {topic}")
     }
 }
 
 /// An operation on several topics, one of which nobody hears.
-fn partly_unheard(space: &Space, operation: &Operation, topic: &Declaration) -> Diagnostic {
-    let name = &operation.declaration.name;
-    let title = format!("operation `{name}` has no effect on `{}`: {} to it", topic.name, who_subscribes(space, topic));
+fn partly_unheard(operation: &Operation, topic: &Declaration, is_subscribed: bool) -> Diagnostic {
+    let (name, why) = (&operation.declaration.name, why_unheard("it", is_subscribed));
+    let title = format!("operation `{name}` has no effect on `{}`: {why}", topic.name);
     Diagnostic::new(Code::NOBODY_HEARS, operation.declaration.span, title)
         .label("no monitor and no outbound metric reads this topic either")
         .secondary(topic.span, "the topic is declared here")

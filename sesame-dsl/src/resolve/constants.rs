@@ -102,7 +102,7 @@ impl<'a> Resolver<'a> {
         let title = format!("`{}` is a constant of {}", path.topic.text, list(&messages));
         let first = messages[0].to_owned();
         let diagnostic = Diagnostic::new(Code::OTHER_KIND, path.span, title)
-            .label("it has another value in each")
+            .label("it has a different value in each")
             .did_you_mean(path.topic.span, format!("{first}.{}", path.topic.text));
         self.report(diagnostic);
         Some(None)
@@ -116,7 +116,7 @@ impl<'a> Resolver<'a> {
         path.fields.len() == 1 && message.is_some_and(|message| !message.constants.is_empty())
     }
 
-    /// The numbers of constants that are written with their names; reports what is none.
+    /// The numbers of constants that are written with their names; reports anything else.
     pub(super) fn numbers_of_constants(&mut self, names: &'a [Path]) -> Option<Vec<f64>> {
         let numbers: Vec<Option<f64>> = names
             .iter()
@@ -125,7 +125,7 @@ impl<'a> Resolver<'a> {
         numbers.into_iter().collect()
     }
 
-    /// The number of a constant that is written with its name; reports what is none. `expected` is what else may stand
+    /// The number of a constant that is written with its name; reports anything else. `expected` is what else may stand
     /// there.
     pub(super) fn number_of_constant(&mut self, name: &'a Path, expected: &str) -> Option<f64> {
         match self.constant_of(name) {

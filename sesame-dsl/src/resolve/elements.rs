@@ -342,9 +342,9 @@ impl<'a> Resolver<'a> {
             let exceeded = |wire: &WireType| wire.exceeded_by(&text.text).map(|found| (found, wire.clone()));
             let Some(((length, bound), wire)) = wires.into_iter().find_map(exceeded) else { continue };
             fit = false;
-            let units = if matches!(wire, WireType::WString { .. }) { "units of UTF-16" } else { "bytes" };
+            let units = if matches!(wire, WireType::WString { .. }) { "UTF-16 code units" } else { "bytes" };
             let (of, wire) = (self.text(written.span), interfaces::in_words(&wire));
-            let title = format!("`{}` is too long for `{of}`: it is `{wire}`", self.text(text.span));
+            let title = format!("`{}` is too long for a `{wire}` in `{of}`", self.text(text.span));
             let diagnostic = Diagnostic::new(Code::OUT_OF_RANGE, text.span, title)
                 .label(format!("expected at most {bound} {units}, not {length}"));
             self.report(diagnostic);

@@ -39,7 +39,7 @@ pub(super) fn scan(shell: Shell, language: &Language, arguments: &Ros2) -> anyho
     let network = if arguments.network {
         ""
     } else {
-        ", and nodes on other machines, or of Cyclone DDS on a network interface, are heard with `--network` only"
+        ", and only `--network` hears nodes on other machines, or of Cyclone DDS on a network interface"
     };
     let nothing = format!("nothing runs in domain {domain}; the domain of a node is its ROS_DOMAIN_ID{network}");
     tell(shell, &facts, &nothing);
