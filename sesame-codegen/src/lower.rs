@@ -14,6 +14,7 @@ mod condition;
 mod formula;
 mod id;
 mod lab;
+mod launch;
 mod monitor;
 mod operation;
 mod robustness;
@@ -22,13 +23,12 @@ mod selection;
 mod simulator;
 mod system;
 
-use std::collections::BTreeMap;
-
 use sesame_dsl::model::{self, CampaignId, EddiId, Space};
 use sesame_plan as plan;
 
 use self::id::topic_id;
-use self::operation::{custom_operations, operation};
+use self::launch::launched_as_usual;
+use self::operation::custom_operations;
 use self::selection::{Selection, without_operations};
 pub use self::simulator::simulator;
 use self::system::{lifecycle, message, node, topic, unit};
@@ -75,22 +75,6 @@ pub fn lower_monitor(
     whole.tests = vec![without_operations()];
     let plan = launched_as_usual(whole, space).of_monitor_alone(monitor::monitor_id(monitor))?;
     Ok(MonitorPlan { name, plan, system_file: space.file_of(&space.simulator.declaration).to_owned() })
-}
-
-/// The plan with the usual values of scenes that its tests never choose in the arguments of what it launches.
-fn launched_as_usual(mut plan: plan::CampaignPlan, space: &Space) -> plan::CampaignPlan {
-    let is_chosen = |name: &str| plan.operations.iter().any(|operation| operation.name == name);
-    let usual = space.operations.values().filter_map(|declared| {
-        let plan::OperationKind::Scene { parameter: None, usual: Some(usual) } = declared.kind else { return None };
-        let name = declared.declaration.name.clone();
-        let value = operation(declared, plan.campaign.end_after, Vec::new()).as_argument(usual);
-        (!is_chosen(&name)).then_some((name, value))
-    });
-    let usual: BTreeMap<String, String> = usual.collect();
-    for argument in plan.commands_mut().flat_map(|command| &mut command.arguments) {
-        *argument = plan::fill_placeholders(argument, |word| usual.get(word).cloned());
-    }
-    plan
 }
 
 /// The plan of a campaign with nothing but the system and its monitors: no metrics, operations, tests or labs.
@@ -460,37 +444,6 @@ pub(crate) mod tests {
         let RunnerPlan { plan, .. } = lower(&space, space.campaign("again").unwrap(), "cell.sesame", "sesamec 0.0.0");
         let read: plan::CampaignPlan = serde_json::from_str(&serde_json::to_string(&plan).unwrap()).unwrap();
         assert_eq!(read, plan);
-    }
-
-    #[test]
-    fn a_campaign_launches_with_the_usual_values_of_scenes_that_its_tests_do_not_choose() {
-        let text = "space s system {
-              simulator robots = mqtt \"mqtt://127.0.0.1:1883\"
-              topic place = \"place\" : real[m]
-              launch \"./world\" \"{boxes}\" \"x:={start_x}\"
-              terminate \"./end\" \"{boxes}\"
-              node robot { publishes place  launch \"./robot\" \"{start_x}/{boxes}/{worker}\" }
-            }
-            metric far maximise default 0m = max(place)
-            parameter start_x: real[m] in [-200cm, 2m] default -1m
-            parameter boxes: int in [0, 6] default 0
-            operation lag on place = latency [0s, 1s]
-            campaign both { objectives far  operations start_x, boxes 1 per test
-                            search random { evaluations 2 }  end after 5s }
-            campaign boxed from both { operations boxes, lag 1 per test }
-            campaign watch { passive 2 times  observes far  end after 5s }";
-        let mut sources = SourceMap::new();
-        let file = sources.add("s.sesame", text.to_owned());
-        let analysis = analyse(&sources, file);
-        let space = analysis.model.unwrap_or_else(|| panic!("{:#?}", analysis.diagnostics));
-        let arguments = |campaign: &str| {
-            let RunnerPlan { plan, .. } = lower(&space, space.campaign(campaign).unwrap(), "s.sesame", "sesamec 0.0.0");
-            plan.validate().unwrap();
-            plan.commands().flat_map(|command| &command.arguments).cloned().collect::<Vec<_>>()
-        };
-        assert_eq!(arguments("both"), ["{boxes}", "x:={start_x}", "{start_x}/{boxes}/{worker}", "{boxes}"]);
-        assert_eq!(arguments("boxed"), ["{boxes}", "x:=-1.0", "-1.0/{boxes}/{worker}", "{boxes}"]);
-        assert_eq!(arguments("watch"), ["0", "x:=-1.0", "-1.0/0/{worker}", "0"]);
     }
 
     #[test]
