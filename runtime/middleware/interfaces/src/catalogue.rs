@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use sesame_plan::{Interface, InterfaceField, WireType};
+use sesame_plan::{Interface, InterfaceField};
 
 use crate::Definition;
 
@@ -69,7 +69,7 @@ impl Catalogue {
     pub fn missing(&self) -> Vec<String> {
         let contained = self.definitions.values().flat_map(|definition| &definition.fields);
         let mut missing: Vec<String> = contained
-            .filter_map(|field| nested(&field.ty))
+            .filter_map(|field| field.ty.interface())
             .filter(|name| !self.definitions.contains_key(*name))
             .map(str::to_owned)
             .collect();
@@ -99,7 +99,7 @@ impl Catalogue {
         let definition =
             definition.ok_or_else(|| ResolveError::Missing { name: name.to_owned(), path: path.clone() })?;
         path.push(name.to_owned());
-        for name in definition.fields.iter().filter_map(|field| nested(&field.ty)) {
+        for name in definition.fields.iter().filter_map(|field| field.ty.interface()) {
             self.collect(name, path, found)?;
         }
         path.pop();
@@ -107,14 +107,5 @@ impl Catalogue {
         let fields = fields.map(|field| InterfaceField { name: field.name.clone(), ty: field.ty.clone() });
         found.push(Interface { name: name.to_owned(), fields: fields.collect() });
         Ok(())
-    }
-}
-
-/// The interface in a type.
-fn nested(ty: &WireType) -> Option<&str> {
-    match ty {
-        WireType::Interface { name } => Some(name),
-        WireType::Array { of, .. } | WireType::Sequence { of, .. } => nested(of),
-        WireType::Primitive { .. } | WireType::String { .. } | WireType::WString { .. } => None,
     }
 }

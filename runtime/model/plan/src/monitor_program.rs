@@ -3,9 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
-use crate::{
-    CampaignPlan, FieldRef, Interface, Lifecycle, MessageId, MonitorId, Side, TopicId, Type, WireType, Wiring,
-};
+use crate::{CampaignPlan, FieldRef, Interface, Lifecycle, MessageId, MonitorId, Side, TopicId, Type, Wiring};
 
 /// Why a monitor cannot be a program of its own, in words with a remedy.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -180,7 +178,7 @@ impl CampaignPlan {
         let mut kept: Vec<Interface> = Vec::new();
         for interface in ros.interfaces.iter().rev() {
             if named.contains(&interface.name) {
-                named.extend(interface.fields.iter().filter_map(|field| in_interface(&field.ty)).map(str::to_owned));
+                named.extend(interface.fields.iter().filter_map(|field| field.ty.interface()).map(str::to_owned));
                 kept.push(interface.clone());
             }
         }
@@ -222,15 +220,6 @@ fn moved(ty: &mut Type, places: &BTreeMap<usize, MessageId>) {
         Type::Message { id } => *id = places[&id.index()],
         Type::List { of } => moved(of, places),
         Type::Bool | Type::Int { .. } | Type::Real { .. } | Type::Text | Type::Point { .. } => {}
-    }
-}
-
-/// The interface that values of a type are or hold.
-fn in_interface(ty: &WireType) -> Option<&str> {
-    match ty {
-        WireType::Interface { name } => Some(name),
-        WireType::Array { of, .. } | WireType::Sequence { of, .. } => in_interface(of),
-        WireType::Primitive { .. } | WireType::String { .. } | WireType::WString { .. } => None,
     }
 }
 

@@ -112,8 +112,17 @@ impl WireType {
     /// UTF-16 text of any length.
     pub const WSTRING: WireType = WireType::WString { bound: None };
 
-    /// The length of a text that is too long for this type, with the longest that is not: in bytes of UTF-8, or in
-    /// units of UTF-16. `None` for a text that fits, and for types that are no texts.
+    /// The name of the interface that its values are, or that the elements of its lists and arrays are.
+    pub fn interface(&self) -> Option<&str> {
+        match self {
+            WireType::Interface { name } => Some(name),
+            WireType::Array { of, .. } | WireType::Sequence { of, .. } => of.interface(),
+            WireType::Primitive { .. } | WireType::String { .. } | WireType::WString { .. } => None,
+        }
+    }
+
+    /// The length of a text that is too long for this type, and the greatest length that is not: in bytes of UTF-8, or
+    /// in units of UTF-16. `None` for a text that fits, and for a type other than text.
     pub fn exceeded_by(&self, text: &str) -> Option<(usize, u32)> {
         let (bound, length) = match self {
             WireType::String { bound } => ((*bound)?, text.len()),

@@ -114,19 +114,12 @@ impl Encoding {
 
 /// An interface preceded by those that it contains, out of many, in their order.
 fn contained(known: &[Interface], name: &str) -> Vec<Interface> {
-    fn nested(ty: &WireType) -> Option<&str> {
-        match ty {
-            WireType::Interface { name } => Some(name),
-            WireType::Array { of, .. } | WireType::Sequence { of, .. } => nested(of),
-            WireType::Primitive { .. } | WireType::String { .. } | WireType::WString { .. } => None,
-        }
-    }
     let mut needed = vec![name];
     let mut found = Vec::new();
     for interface in known.iter().rev().filter(|interface| {
         let is_needed = needed.contains(&interface.name.as_str());
         if is_needed {
-            needed.extend(interface.fields.iter().filter_map(|field| nested(&field.ty)));
+            needed.extend(interface.fields.iter().filter_map(|field| field.ty.interface()));
         }
         is_needed
     }) {

@@ -170,7 +170,7 @@ fn without(simulator: &Simulator, part: &str) -> String {
 fn sound_interfaces(interfaces: &[Interface]) -> Checked {
     let mut known: BTreeSet<&str> = BTreeSet::new();
     each("interfaces", interfaces, |interface| {
-        let contained = |ty: &WireType| match interface_of(ty) {
+        let contained = |ty: &WireType| match ty.interface() {
             Some(inner) => require(known.contains(inner), || format!("`{inner}` is not before it")),
             None => Ok(()),
         };
@@ -182,13 +182,4 @@ fn sound_interfaces(interfaces: &[Interface]) -> Checked {
         let new = known.insert(&interface.name);
         at("name", require(new, || format!("`{}` is there twice", interface.name)))
     })
-}
-
-/// The interface that values of a type are or hold.
-fn interface_of(ty: &WireType) -> Option<&str> {
-    match ty {
-        WireType::Interface { name } => Some(name),
-        WireType::Array { of, .. } | WireType::Sequence { of, .. } => interface_of(of),
-        WireType::Primitive { .. } | WireType::String { .. } | WireType::WString { .. } => None,
-    }
 }
