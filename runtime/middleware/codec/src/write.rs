@@ -257,18 +257,17 @@ fn text(value: Option<&Value>) -> &str {
     if let Some(Value::Text(text)) = value { Text::as_str(text) } else { "" }
 }
 
-/// The first characters of a text, as many as a type may have units of this length.
+/// The longest beginning of a text that fits its bound, if each character has this length.
 fn fitting(text: &str, bound: Option<u32>, length: impl Fn(char) -> usize) -> &str {
     let Some(bound) = bound else { return text };
-    let mut left = bound as usize;
-    let too_far = text.char_indices().find(|(_, character)| match left.checked_sub(length(*character)) {
-        Some(after) => {
-            left = after;
-            false
+    let mut total = 0;
+    for (at, character) in text.char_indices() {
+        total += length(character);
+        if total > bound as usize {
+            return &text[..at];
         }
-        None => true,
-    });
-    too_far.map_or(text, |(at, _)| &text[..at])
+    }
+    text
 }
 
 fn items(value: Option<&Value>) -> &[Value] {
