@@ -286,7 +286,7 @@ impl CampaignPlan {
     /// The name of a number in a field of a topic's messages, if it is clear which constant of the message is meant:
     /// the only one of this number whose name begins like the field's, `MODE_AUTO` of `mode`; or the only one of this
     /// number, if the message has no other number that could be meant.
-    pub fn constant(&self, topic: TopicId, path: &[&str], number: f64) -> Option<&str> {
+    pub fn constant<S: AsRef<str>>(&self, topic: TopicId, path: &[S], number: f64) -> Option<&str> {
         let (message, field) = self.fields_to(topic, path).nth(path.len().checked_sub(1)?)?;
         let is_number = |field: &&Field| matches!(field.ty, Type::Int { .. } | Type::Real { .. });
         if !is_number(&field) {
@@ -307,7 +307,7 @@ impl CampaignPlan {
     /// clear which constant is meant, as in [`CampaignPlan::constant`].
     pub fn constant_of(&self, metric: MetricId, value: f64) -> Option<&str> {
         let FieldRef { topic, path } = self.metric(metric).source.field()?;
-        self.constant(*topic, &path.iter().map(String::as_str).collect::<Vec<_>>(), value)
+        self.constant(*topic, path, value)
     }
 
     /// Whether a message of its type may lack a value: a field on the way to it is optional.
@@ -341,10 +341,10 @@ mod tests {
         let name = |topic, field, number| plan.constant(TopicId(topic), &[field], number);
         assert_eq!(name(0, "status", 2.0), Some("STATUS_BAD"), "it begins like its field");
         assert_eq!(name(0, "status", 3.0), None);
-        assert_eq!(name(0, "cells", 1.0), None, "one cell is no status");
+        assert_eq!(name(0, "cells", 1.0), None, "one cell is not a status");
         assert_eq!(name(1, "mode", 1.0), Some("DRIVING"), "the message has one number");
-        assert_eq!(name(1, "name", 1.0), None, "a text is no number");
-        assert_eq!((name(1, "none", 1.0), plan.constant(TopicId(1), &[], 1.0)), (None, None));
+        assert_eq!(name(1, "name", 1.0), None, "a text is not a number");
+        assert_eq!((name(1, "none", 1.0), plan.constant::<&str>(TopicId(1), &[], 1.0)), (None, None));
 
         // A metric has it if its values are those of the field.
         let status = FieldRef { topic: TopicId(0), path: vec!["status".to_owned()] };

@@ -79,7 +79,10 @@ pub(crate) fn constant_of(plan: &CampaignPlan, metric: MetricId, shown: MetricVa
 pub(crate) fn bound_of(plan: &CampaignPlan, requirement: &Requirement) -> String {
     let text = number::bound(requirement.bound, plan.metric(requirement.metric).unit.as_deref());
     let constant = requirement.bound.number().and_then(|number| plan.constant_of(requirement.metric, number));
-    constant.map_or(text.clone(), |constant| format!("{text} ({constant})"))
+    match constant {
+        Some(constant) => format!("{text} ({constant})"),
+        None => text,
+    }
 }
 
 /// The bounds of a plan's requirements on a metric.
