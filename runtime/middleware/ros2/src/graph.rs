@@ -8,9 +8,10 @@ use std::sync::Arc;
 
 use rustdds::GUID;
 use sesame_codec::cdr::Codec;
-use sesame_plan::{Interface, InterfaceField, Primitive, WireType};
 use sesame_relay::value::{Fields, Record, Text, Value};
 use sesame_relay::wire::Wanted;
+
+use crate::layouts::{Layout, interfaces};
 
 /// The topic on which participants say what nodes they have.
 pub(crate) const DISCOVERY_TOPIC: &str = "ros_discovery_info";
@@ -35,38 +36,25 @@ pub(crate) struct NodeEntities {
 }
 
 const INFO: &str = "rmw_dds_common/msg/ParticipantEntitiesInfo";
-const ENTITIES: &str = "rmw_dds_common/msg/NodeEntitiesInfo";
 const GID: &str = "rmw_dds_common/msg/Gid";
 
-fn interfaces() -> [Interface; 3] {
-    let field = |name: &str, ty| InterfaceField { name: name.to_owned(), ty };
-    let of = |name: &str| WireType::Interface { name: name.to_owned() };
-    let sequence = |name: &str| WireType::Sequence { of: Box::new(of(name)), bound: None };
-    let byte = WireType::Primitive { primitive: Primitive::Uint8 };
-    [
-        Interface {
-            name: GID.to_owned(),
-            fields: vec![field("data", WireType::Array { of: Box::new(byte), length: 16 })],
-        },
-        Interface {
-            name: ENTITIES.to_owned(),
-            fields: vec![
-                field("node_namespace", WireType::STRING),
-                field("node_name", WireType::STRING),
-                field("reader_gid_seq", sequence(GID)),
-                field("writer_gid_seq", sequence(GID)),
-            ],
-        },
-        Interface {
-            name: INFO.to_owned(),
-            fields: vec![field("gid", of(GID)), field("node_entities_info_seq", sequence(ENTITIES))],
-        },
-    ]
-}
+const LAYOUTS: &[Layout] = &[
+    (GID, &[("data", "uint8[16]")]),
+    (
+        "rmw_dds_common/msg/NodeEntitiesInfo",
+        &[
+            ("node_namespace", "string"),
+            ("node_name", "string"),
+            ("reader_gid_seq", "rmw_dds_common/msg/Gid[]"),
+            ("writer_gid_seq", "rmw_dds_common/msg/Gid[]"),
+        ],
+    ),
+    (INFO, &[("gid", GID), ("node_entities_info_seq", "rmw_dds_common/msg/NodeEntitiesInfo[]")]),
+];
 
 impl NodeInfo {
     pub(crate) fn new() -> Self {
-        NodeInfo { codec: Codec::new(&interfaces(), INFO, &Wanted::All).expect("the layout is known") }
+        NodeInfo { codec: Codec::new(&interfaces(LAYOUTS), INFO, &Wanted::All).expect("the layout is known") }
     }
 
     /// The nodes of a participant, as it says; `None` if it cannot be read.

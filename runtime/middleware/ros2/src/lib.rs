@@ -5,6 +5,7 @@
 
 mod dds;
 mod graph;
+mod layouts;
 mod lifecycle;
 mod names;
 mod node_service;

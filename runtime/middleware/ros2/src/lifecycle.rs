@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use sesame_plan::{Interface, InterfaceField, Primitive, Transition, WireType};
+use sesame_plan::Transition;
 use sesame_relay::value::{Fields, Record, Text, Value};
 
 use crate::dds::{DdsError, Endpoint, Participant};
+use crate::layouts::Layout;
 use crate::node_service::{Service, Ticket};
 
 /// The lifecycle of one node.
@@ -40,22 +41,14 @@ const TRANSITION: &str = "lifecycle_msgs/msg/Transition";
 /// The field of messages that have none.
 const NO_FIELDS: &str = "structure_needs_at_least_one_member";
 
-fn interfaces() -> Vec<Interface> {
-    let field = |name: &str, ty| InterfaceField { name: name.to_owned(), ty };
-    let number = |name: &str| field(name, WireType::Primitive { primitive: Primitive::Uint8 });
-    let truth = |name: &str| field(name, WireType::Primitive { primitive: Primitive::Bool });
-    let nested = |name: &str, of: &str| field(name, WireType::Interface { name: of.to_owned() });
-    let interface = |name: &str, fields| Interface { name: name.to_owned(), fields };
-    let named = || vec![number("id"), field("label", WireType::STRING)];
-    vec![
-        interface(STATE, named()),
-        interface(TRANSITION, named()),
-        interface("lifecycle_msgs/srv/GetState_Request", vec![number(NO_FIELDS)]),
-        interface("lifecycle_msgs/srv/GetState_Response", vec![nested("current_state", STATE)]),
-        interface("lifecycle_msgs/srv/ChangeState_Request", vec![nested("transition", TRANSITION)]),
-        interface("lifecycle_msgs/srv/ChangeState_Response", vec![truth("success")]),
-    ]
-}
+const LAYOUTS: &[Layout] = &[
+    (STATE, &[("id", "uint8"), ("label", "string")]),
+    (TRANSITION, &[("id", "uint8"), ("label", "string")]),
+    ("lifecycle_msgs/srv/GetState_Request", &[(NO_FIELDS, "uint8")]),
+    ("lifecycle_msgs/srv/GetState_Response", &[("current_state", STATE)]),
+    ("lifecycle_msgs/srv/ChangeState_Request", &[("transition", TRANSITION)]),
+    ("lifecycle_msgs/srv/ChangeState_Response", &[("success", "bool")]),
+];
 
 impl State {
     pub(crate) fn name(self) -> &'static str {
@@ -89,8 +82,8 @@ impl State {
 impl Lifecycle {
     pub(crate) fn join(node: &str, dds: &mut Participant) -> Result<Self, DdsError> {
         Ok(Lifecycle {
-            get: Service::join(node, "get_state", "lifecycle_msgs/srv/GetState", &interfaces(), dds)?,
-            change: Service::join(node, "change_state", "lifecycle_msgs/srv/ChangeState", &interfaces(), dds)?,
+            get: Service::join(node, "get_state", "lifecycle_msgs/srv/GetState", LAYOUTS, dds)?,
+            change: Service::join(node, "change_state", "lifecycle_msgs/srv/ChangeState", LAYOUTS, dds)?,
         })
     }
 

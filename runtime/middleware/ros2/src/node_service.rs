@@ -5,11 +5,11 @@ use std::sync::Arc;
 use rustdds::rpc::SampleIdentity;
 use rustdds::{GUID, SequenceNumber};
 use sesame_codec::cdr::Codec;
-use sesame_plan::Interface;
 use sesame_relay::value::Value;
 use sesame_relay::wire::Wanted;
 
 use crate::dds::{DdsError, Endpoint, Participant, ReaderId, Sample, WriterId, mirrored};
+use crate::layouts::{Layout, interfaces};
 use crate::names;
 
 /// A service of a node, with what encodes its requests and decodes its replies.
@@ -30,17 +30,18 @@ pub(crate) struct Ticket {
 }
 
 impl Service {
-    /// Joins the service of a node, which is of a type among these interfaces.
+    /// Joins the service of a node, whose type is among these layouts.
     pub(crate) fn join(
         node: &str,
         service: &str,
         ty: &str,
-        interfaces: &[Interface],
+        layouts: &[Layout],
         dds: &mut Participant,
     ) -> Result<Self, DdsError> {
         let path = format!("{node}/{service}");
+        let interfaces = interfaces(layouts);
         let codec = |part: &str| {
-            Codec::new(interfaces, &format!("{ty}_{part}"), &Wanted::All).map_err(|error| DdsError(error.to_string()))
+            Codec::new(&interfaces, &format!("{ty}_{part}"), &Wanted::All).map_err(|error| DdsError(error.to_string()))
         };
         let type_name = |part: &str| names::type_name(&format!("{ty}_{part}"));
         let qos = mirrored([]);

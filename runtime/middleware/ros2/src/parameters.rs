@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use sesame_plan::{Interface, InterfaceField, NewValue, Primitive, WireType};
+use sesame_plan::NewValue;
 use sesame_relay::value::{Fields, Record, Text, Value};
 
 use crate::dds::{DdsError, Endpoint, Participant};
+use crate::layouts::Layout;
 use crate::node_service::{Service, Ticket};
 
 /// The parameters of one node.
@@ -19,8 +20,6 @@ pub(crate) struct Parameters {
 pub(crate) struct ParameterValue(Value);
 
 const VALUE: &str = "rcl_interfaces/msg/ParameterValue";
-const PARAMETER: &str = "rcl_interfaces/msg/Parameter";
-const RESULT: &str = "rcl_interfaces/msg/SetParametersResult";
 
 /// What parameters can be, by their numbers in ROS, the first of which is that of a parameter without a value: where
 /// the value is, and what it is in words.
@@ -37,42 +36,35 @@ const TYPES: [(&str, &str); 10] = [
     ("string_array_value", "a list of texts"),
 ];
 
-fn interfaces() -> Vec<Interface> {
-    let field = |name: &str, ty| InterfaceField { name: name.to_owned(), ty };
-    let primitive = |primitive| WireType::Primitive { primitive };
-    let list = |of| WireType::Sequence { of: Box::new(of), bound: None };
-    let nested = |name: &str| WireType::Interface { name: name.to_owned() };
-    let interface = |name: &str, fields| Interface { name: name.to_owned(), fields };
-    vec![
-        interface(
-            VALUE,
-            vec![
-                field("type", primitive(Primitive::Uint8)),
-                field("bool_value", primitive(Primitive::Bool)),
-                field("integer_value", primitive(Primitive::Int64)),
-                field("double_value", primitive(Primitive::Float64)),
-                field("string_value", WireType::STRING),
-                field("byte_array_value", list(primitive(Primitive::Uint8))),
-                field("bool_array_value", list(primitive(Primitive::Bool))),
-                field("integer_array_value", list(primitive(Primitive::Int64))),
-                field("double_array_value", list(primitive(Primitive::Float64))),
-                field("string_array_value", list(WireType::STRING)),
-            ],
-        ),
-        interface(PARAMETER, vec![field("name", WireType::STRING), field("value", nested(VALUE))]),
-        interface(RESULT, vec![field("successful", primitive(Primitive::Bool)), field("reason", WireType::STRING)]),
-        interface("rcl_interfaces/srv/GetParameters_Request", vec![field("names", list(WireType::STRING))]),
-        interface("rcl_interfaces/srv/GetParameters_Response", vec![field("values", list(nested(VALUE)))]),
-        interface("rcl_interfaces/srv/SetParameters_Request", vec![field("parameters", list(nested(PARAMETER)))]),
-        interface("rcl_interfaces/srv/SetParameters_Response", vec![field("results", list(nested(RESULT)))]),
-    ]
-}
+const LAYOUTS: &[Layout] = &[
+    (
+        VALUE,
+        &[
+            ("type", "uint8"),
+            ("bool_value", "bool"),
+            ("integer_value", "int64"),
+            ("double_value", "float64"),
+            ("string_value", "string"),
+            ("byte_array_value", "uint8[]"),
+            ("bool_array_value", "bool[]"),
+            ("integer_array_value", "int64[]"),
+            ("double_array_value", "float64[]"),
+            ("string_array_value", "string[]"),
+        ],
+    ),
+    ("rcl_interfaces/msg/Parameter", &[("name", "string"), ("value", VALUE)]),
+    ("rcl_interfaces/msg/SetParametersResult", &[("successful", "bool"), ("reason", "string")]),
+    ("rcl_interfaces/srv/GetParameters_Request", &[("names", "string[]")]),
+    ("rcl_interfaces/srv/GetParameters_Response", &[("values", "rcl_interfaces/msg/ParameterValue[]")]),
+    ("rcl_interfaces/srv/SetParameters_Request", &[("parameters", "rcl_interfaces/msg/Parameter[]")]),
+    ("rcl_interfaces/srv/SetParameters_Response", &[("results", "rcl_interfaces/msg/SetParametersResult[]")]),
+];
 
 impl Parameters {
     pub(crate) fn join(node: &str, dds: &mut Participant) -> Result<Self, DdsError> {
         Ok(Parameters {
-            get: Service::join(node, "get_parameters", "rcl_interfaces/srv/GetParameters", &interfaces(), dds)?,
-            set: Service::join(node, "set_parameters", "rcl_interfaces/srv/SetParameters", &interfaces(), dds)?,
+            get: Service::join(node, "get_parameters", "rcl_interfaces/srv/GetParameters", LAYOUTS, dds)?,
+            set: Service::join(node, "set_parameters", "rcl_interfaces/srv/SetParameters", LAYOUTS, dds)?,
         })
     }
 

@@ -87,7 +87,7 @@ struct System {
     promises: Promises,
     /// The wires on which nodes owe answers that are stopped: these come when the nodes go on.
     postponed: BTreeMap<NodeId, Vec<Wire>>,
-    /// Nodes that were killed and started again, and have forgotten what they owe.
+    /// Nodes that have forgotten what they owe: they were killed and started again, or brought back to a state.
     restarted: BTreeSet<NodeId>,
     /// Whether something could not be restored, so that the next run must start afresh.
     spoilt: bool,

@@ -7,6 +7,8 @@ use sesame_plan::{Interface, InterfaceField, Primitive, WireType};
 use sesame_relay::value::{Fields, Record, Text, Value};
 use sesame_relay::wire::Wanted;
 
+use crate::layouts::{Layout, interfaces};
+
 /// The service.
 pub(super) const SERVICE: &str = "type_description_interfaces/srv/GetTypeDescription";
 
@@ -16,8 +18,8 @@ pub(super) struct Descriptions {
     reply: Codec,
 }
 
-/// The layouts of the service's messages, each with its fields as in a `.msg` file.
-const LAYOUTS: &[(&str, &[(&str, &str)])] = &[
+/// The layouts of the service's messages.
+const LAYOUTS: &[Layout] = &[
     ("Request", &[("type_name", "string"), ("type_hash", "string"), ("include_type_sources", "bool")]),
     (
         "FieldType",
@@ -40,30 +42,10 @@ const LAYOUTS: &[(&str, &[(&str, &str)])] = &[
     ),
 ];
 
-fn layouts() -> Vec<Interface> {
-    let ty = |written: &str| {
-        let (of, many) = written.strip_suffix("[]").map_or((written, false), |of| (of, true));
-        let of = match of {
-            "string" => WireType::STRING,
-            "bool" => WireType::Primitive { primitive: Primitive::Bool },
-            "uint8" => WireType::Primitive { primitive: Primitive::Uint8 },
-            "uint64" => WireType::Primitive { primitive: Primitive::Uint64 },
-            name => WireType::Interface { name: name.to_owned() },
-        };
-        if many { WireType::Sequence { of: Box::new(of), bound: None } } else { of }
-    };
-    let field = |(name, written): &(&str, &str)| InterfaceField { name: (*name).to_owned(), ty: ty(written) };
-    let layout = |(name, fields): &(&str, &[(&str, &str)])| Interface {
-        name: (*name).to_owned(),
-        fields: fields.iter().map(field).collect(),
-    };
-    LAYOUTS.iter().map(layout).collect()
-}
-
 impl Descriptions {
     pub(super) fn new() -> Self {
-        let layouts = layouts();
-        let codec = |name| Codec::new(&layouts, name, &Wanted::All).expect("the layout is known");
+        let interfaces = interfaces(LAYOUTS);
+        let codec = |name| Codec::new(&interfaces, name, &Wanted::All).expect("the layout is known");
         Descriptions { request: codec("Request"), reply: codec("Response") }
     }
 

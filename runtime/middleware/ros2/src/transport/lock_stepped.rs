@@ -122,7 +122,7 @@ impl System {
         }
     }
 
-    /// What nodes owe that were stopped and go on is owed now; one that was killed has forgotten it.
+    /// What nodes owe that were stopped and go on is owed now; one that was killed or not active has forgotten it.
     fn call_back(&mut self, round: &mut Round) {
         let back: Vec<NodeId> = self.postponed.keys().copied().filter(|&node| !self.is_absent(node)).collect();
         for node in back {

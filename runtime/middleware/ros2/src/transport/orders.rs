@@ -136,7 +136,7 @@ impl System {
 
     /// Brings a node back to a state in which it was, from the one in which it is.
     fn bring_back(&mut self, node: NodeId, before: State) -> Result<(), TransportError> {
-        // What it was told meanwhile it does not answer any more.
+        // It does not answer what it was sent while it was not active.
         self.restarted.insert(node);
         let Some(session) = &mut self.session else { return Ok(()) };
         let back = match session.state(node)? {
