@@ -9,7 +9,7 @@ use sesame_relay::metric::MetricTable;
 use sesame_relay::wire::WireTable;
 
 use crate::error::RecordingError;
-use crate::pass::{self, Ending, RecordedRun};
+use crate::pass::{self, Ending, Read, RecordedRun};
 use crate::payload::Reads;
 
 /// The result of feeding a recording to a campaign's metrics.
@@ -51,8 +51,12 @@ pub fn feed_telling(
     // The fuzzing time at each moment follows from what is said at the end of a trace.
     let busy = if asks_for_busy(plan) { pass::busy(path)? } else { None };
     let mut feeder = Feeder::new(plan, wires, table, busy.as_deref().unwrap_or_default(), decided);
-    let ending = pass::pass(path, plan, wires, Reads::Used, &mut |message| {
-        feeder.message(message);
+    let ending = pass::pass(path, plan, wires, Reads::Used, &mut |read| {
+        match read {
+            Read::Scene(scene) => feeder.set_scene(&scene),
+            Read::ClockAtZero(seconds) => feeder.clock_at_zero(seconds),
+            Read::Message(message) => feeder.message(&message),
+        }
         Ok(())
     })?;
     let Ending { run, end, busy, warnings: about_topics, damage: _, messages } = ending;

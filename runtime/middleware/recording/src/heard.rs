@@ -11,7 +11,7 @@ use sesame_relay::monitor::recorded::RecordedMonitors;
 use sesame_relay::wire::WireTable;
 
 use crate::error::RecordingError;
-use crate::pass::{Ending, RecordedRun, pass};
+use crate::pass::{Ending, Read, RecordedRun, pass};
 use crate::payload::Reads;
 
 #[cfg(test)]
@@ -33,7 +33,8 @@ pub fn monitors<'p>(
 ) -> Result<(RecordedMonitors<'p>, Option<RecordedRun>, Vec<String>), RecordingError> {
     let mut heard = RecordedMonitors::new(plan, wires, Arc::clone(network));
     let mut last = SimTime::ZERO;
-    let Ending { run, end, mut warnings, .. } = pass(path, plan, wires, Reads::Used, &mut |message| {
+    let Ending { run, end, mut warnings, .. } = pass(path, plan, wires, Reads::Used, &mut |read| {
+        let Read::Message(message) = read else { return Ok(()) };
         last = message.time;
         for (side, is_so) in [(Side::Inbound, message.published), (Side::Outbound, message.delivered)] {
             if is_so {

@@ -64,6 +64,15 @@ pub(crate) struct Ending {
     pub(crate) messages: u64,
 }
 
+/// What a recording says, in its order.
+pub(crate) enum Read<'v> {
+    /// The parameters of the space for which the test chose a value, by the names that they had.
+    Scene(Arc<Scene>),
+    /// What the clock of the stamps showed at time zero, in seconds; not said if stamps are in simulation time.
+    ClockAtZero(f64),
+    Message(Passing<'v>),
+}
+
 /// Passes the messages of a recording on, in order of time and without a simulator.
 ///
 /// The messages of a runner's trace come in the same order as in its run. In any other recording, the messages on
@@ -75,7 +84,7 @@ pub(crate) fn pass(
     plan: &CampaignPlan,
     wires: &WireTable,
     reads: Reads,
-    each: &mut dyn FnMut(&Passing<'_>) -> Result<(), RecordingError>,
+    each: &mut dyn FnMut(Read<'_>) -> Result<(), RecordingError>,
 ) -> Result<Ending, RecordingError> {
     // Where traces are recorded, all is wanted.
     let mut unrecorded = plan.clone();
@@ -95,8 +104,6 @@ pub(crate) fn pass(
         counted: vec![0; wires.len()],
         shapes: Shapes::default(),
         start: None,
-        zero: None,
-        scene: Arc::default(),
         now: SimTime::ZERO,
         messages: 0,
         subject: None,
@@ -177,10 +184,6 @@ struct Reader<'a> {
     shapes: Shapes,
     /// Log time of the start of the run, in nanoseconds: zero in a trace, that of the first message elsewhere.
     start: Option<u64>,
-    /// What the clock of the stamps showed at that time, in seconds, if a trace says so.
-    zero: Option<f64>,
-    /// The parameters of the space for which the test chose a value, by the names that they had.
-    scene: Arc<Scene>,
     now: SimTime,
     messages: u64,
     subject: Option<BTreeMap<String, String>>,
@@ -194,19 +197,20 @@ impl Reader<'_> {
     fn entry(
         &mut self,
         entry: Entry<'_>,
-        each: &mut dyn FnMut(&Passing<'_>) -> Result<(), RecordingError>,
+        each: &mut dyn FnMut(Read<'_>) -> Result<(), RecordingError>,
     ) -> Result<(), RecordingError> {
         match entry {
             Entry::File => self.file += 1,
             Entry::Metadata(name, metadata) if name == SUBJECT => {
-                self.scene = chosen(&metadata).map_err(|_| self.damaged("its test cannot be read"))?;
+                let scene = chosen(&metadata).map_err(|_| self.damaged("its test cannot be read"))?;
                 self.subject = Some(metadata);
                 self.start = Some(0);
+                return each(Read::Scene(scene));
             }
             Entry::Metadata(name, metadata) if name == RUN => self.ending = Some(metadata),
             Entry::Metadata(name, metadata) if name == CLOCK => {
                 let zero = metadata.get(ZERO).and_then(|zero| zero.parse().ok());
-                self.zero = Some(zero.ok_or_else(|| self.damaged("its clock cannot be read"))?);
+                return each(Read::ClockAtZero(zero.ok_or_else(|| self.damaged("its clock cannot be read"))?));
             }
             Entry::Metadata(..) => {}
             Entry::Channel(channel) => self.channel(&channel)?,
@@ -271,10 +275,18 @@ impl Reader<'_> {
         sequence: Option<u32>,
         log_time: u64,
         data: &[u8],
-        each: &mut dyn FnMut(&Passing<'_>) -> Result<(), RecordingError>,
+        each: &mut dyn FnMut(Read<'_>) -> Result<(), RecordingError>,
     ) -> Result<(), RecordingError> {
         let &Line { wire, delivered, ref payloads } = &self.lines[line as usize];
-        let start = *self.start.get_or_insert(log_time);
+        let start = match self.start {
+            Some(start) => start,
+            None => {
+                self.start = Some(log_time);
+                // The clock of other recorders is that of their messages.
+                each(Read::ClockAtZero(Duration::from_nanos(log_time).as_secs_f64()))?;
+                log_time
+            }
+        };
         let since = log_time.checked_sub(start).and_then(|since| i64::try_from(since).ok());
         let time = since.map(SimTime::from_nanos).filter(|&time| time >= self.now);
         let Some(time) = time else {
@@ -296,17 +308,14 @@ impl Reader<'_> {
         let counted = &mut self.counted[wire.index()];
         let index = sequence.map_or(*counted, u64::from);
         *counted += 1;
-        each(&Passing {
+        each(Read::Message(Passing {
             time,
-            // The clock of other recorders is that of their messages.
-            scene: &self.scene,
-            zero: self.zero.unwrap_or_else(|| Duration::from_nanos(start).as_secs_f64()),
             wire,
             published: !delivered,
             delivered: delivered || !self.delivered_apart[wire.index()],
             index,
             value: &value,
-        })
+        }))
     }
 
     fn damaged(&self, problem: &str) -> RecordingError {

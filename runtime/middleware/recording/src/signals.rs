@@ -8,7 +8,7 @@ use sesame_relay::value::Value;
 use sesame_relay::wire::WireTable;
 
 use crate::error::RecordingError;
-use crate::pass::pass;
+use crate::pass::{Read, pass};
 use crate::payload::Reads;
 
 /// The most samples that are read of a recording; with more, memory could run out.
@@ -37,7 +37,8 @@ pub fn signals(
     wires: &WireTable,
 ) -> Result<BTreeMap<String, Signal>, RecordingError> {
     let mut collector = Collector { samples: 0, signals: BTreeMap::new() };
-    let ending = pass(path, plan, wires, Reads::Declared, &mut |message| {
+    let ending = pass(path, plan, wires, Reads::Declared, &mut |read| {
+        let Read::Message(message) = read else { return Ok(()) };
         if !message.published {
             return Ok(());
         }

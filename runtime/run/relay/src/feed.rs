@@ -19,10 +19,6 @@ use fuzzing_time::{FuzzingTime, scored_bounds};
 pub struct Passing<'v> {
     /// Simulation time.
     pub time: SimTime,
-    /// What the clock of the stamps showed at time zero, in seconds.
-    pub zero: f64,
-    /// The parameters of the space for which the test chose a value; none in a recording that no runner made.
-    pub scene: &'v Arc<Scene>,
     /// Its wire.
     pub wire: Wire,
     /// Whether this is the message as it was published.
@@ -102,11 +98,19 @@ impl<'a, 'd> Feeder<'a, 'd> {
         feeder
     }
 
+    /// The clock of the stamps showed so many seconds at time zero. Without this, stamps are in simulation time.
+    pub fn clock_at_zero(&mut self, seconds: f64) {
+        self.metrics.clock_at_zero(seconds);
+    }
+
+    /// The test chose these values of parameters of the space. Without this, they have their usual ones.
+    pub fn set_scene(&mut self, scene: &Arc<Scene>) {
+        self.metrics.set_scene(scene);
+    }
+
     /// The next message, which is not earlier than the one before.
     pub fn message(&mut self, message: &Passing<'_>) {
-        let &Passing { time, zero, scene, wire, published, delivered, index, value } = message;
-        self.metrics.clock_at_zero(zero);
-        self.metrics.set_scene(scene);
+        let &Passing { time, wire, published, delivered, index, value } = message;
         self.pass_to(time);
         self.now = time;
         if published {
