@@ -15,6 +15,7 @@
 //! other wires are counted separately.
 
 mod altered;
+mod beginning;
 mod compensation;
 mod course;
 mod crossings;
@@ -30,8 +31,8 @@ mod stage;
 mod traffic;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
 
+use beginning::{Beginning, chosen};
 use fuzzing_time::Read;
 use publishing::Publishing;
 use release::{Held, ReleaseQueue};
@@ -42,11 +43,11 @@ use sesame_base::condition::holds;
 use sesame_base::observation::Counters;
 use sesame_base::time::SimTime;
 use sesame_plan::condition::{Condition, Operand};
-use sesame_plan::{CampaignPlan, Copies, Drain, MetricId, MetricSource, Moment, NodeId, OperationKind, Side, Test};
+use sesame_plan::{CampaignPlan, Copies, Drain, MetricId, MetricSource, Moment, NodeId, Side, Test};
 
 use crate::files::SpaceFiles;
 use crate::fuzz::{ChoiceError, Disturbance, KeyedRng, OnWire, OperationEntry, Order, PerWire, Resource, RunContext};
-use crate::metric::{Metrics, Scene};
+use crate::metric::Metrics;
 use crate::monitor::Monitors;
 use crate::value::Value;
 use crate::wire::{Wire, WireTable};
@@ -103,10 +104,7 @@ pub struct Relay<'a> {
     flooded: bool,
     /// What the transport has to do.
     orders: Vec<Order>,
-    /// Parameters of the simulator that are not as it has them, by name.
-    parameters: Vec<(String, f64)>,
-    /// What launched programs have in their arguments, by the names of placeholders.
-    arguments: Vec<(String, String)>,
+    beginning: Beginning,
     /// The listeners besides the metrics.
     taps: Vec<&'a mut dyn Listener>,
 }
@@ -203,12 +201,10 @@ impl<'a> Relay<'a> {
         let monitors = Monitors::new(&metrics, wires);
         let hears =
             |wire| metrics.delivers(wire) || monitors.as_ref().is_some_and(|monitors| monitors.hears_delivered(wire));
-        let Beginning { parameters, arguments } = Beginning::of(plan, &chosen);
         Ok(Relay {
             wires,
             disturbed_by: pipelines.iter().map(Vec::len).collect(),
-            parameters,
-            arguments,
+            beginning: Beginning::of(plan, &chosen),
             heard: wires.iter().map(hears).chain(wires.links().iter().map(|_| false)).collect(),
             acted_on: plan.operations.iter().flat_map(|operation| wires.acted_on(operation)).collect(),
             conditions: Conditions {
@@ -490,40 +486,6 @@ impl<'a> Relay<'a> {
     }
 }
 
-/// The parameters of the space for which the test chose a value.
-fn chosen(operations: &[Stage]) -> Arc<Scene> {
-    let scenes = operations.iter().filter_map(|stage| match stage.disturbance {
-        Disturbance::Scene(value) => Some((stage.name.clone(), value)),
-        _ => None,
-    });
-    scenes.collect()
-}
-
-/// The values with which a run begins: those that the test chooses, and the usual values of the others.
-#[derive(Default)]
-struct Beginning {
-    /// Of the simulator's parameters.
-    parameters: Vec<(String, f64)>,
-    /// Of what launched programs have in their arguments.
-    arguments: Vec<(String, String)>,
-}
-
-impl Beginning {
-    fn of(plan: &CampaignPlan, chosen: &Scene) -> Self {
-        let mut beginning = Beginning::default();
-        for operation in &plan.operations {
-            let OperationKind::Scene { parameter, usual } = &operation.kind else { continue };
-            let chosen = chosen.iter().find(|(name, _)| *name == operation.name).map(|&(_, value)| value);
-            let Some(value) = chosen.or(*usual) else { continue };
-            match parameter {
-                Some(parameter) => beginning.parameters.push((parameter.clone(), value)),
-                None => beginning.arguments.push((operation.name.clone(), operation.as_argument(value))),
-            }
-        }
-        beginning
-    }
-}
-
 impl Exchange for Relay<'_> {
     fn wires(&self) -> &WireTable {
         self.wires
@@ -579,11 +541,11 @@ impl Exchange for Relay<'_> {
     }
 
     fn parameters(&self) -> &[(String, f64)] {
-        &self.parameters
+        &self.beginning.parameters
     }
 
     fn arguments(&self) -> &[(String, String)] {
-        &self.arguments
+        &self.beginning.arguments
     }
 
     fn take_orders(&mut self) -> Vec<Order> {

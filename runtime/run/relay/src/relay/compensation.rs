@@ -31,7 +31,7 @@ impl Relay<'_> {
             let seed = derive_seed(seed, "adjustment", &[at]);
             let value = drawn(&adjustment.levels, seed);
             match &adjustment.what {
-                Fitted::Parameter { name } => self.parameters.push((name.clone(), value)),
+                Fitted::Parameter { name } => self.beginning.parameters.push((name.clone(), value)),
                 what => self.adjust(plan, what, value, seed),
             }
         }
