@@ -198,7 +198,7 @@ pub(crate) trait Wires {
     fn subscribe(&mut self, port: Port);
     fn publish(&mut self, now: SimTime, port: Port, value: Value);
     fn receive(&mut self, port: Port) -> Option<Value>;
-    /// The nodes that the simulator does itself.
+    /// The nodes that are parts of the simulator.
     fn nodes(&mut self) -> &mut Offered;
 }
 

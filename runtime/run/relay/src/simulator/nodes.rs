@@ -1,4 +1,4 @@
-//! Nodes that a simulator does itself, and what it can do to them when the runner says so.
+//! Nodes that are parts of a simulator, and what it can do to them when the runner says so.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 

@@ -1,4 +1,4 @@
-//! What operations want done to nodes that a simulator does itself, as orders to the simulator.
+//! What operations want done to nodes that are parts of a simulator, as orders to the simulator.
 
 use sesame_base::time::SimTime;
 use sesame_plan::{CampaignPlan, NodeId, OperationKind};

@@ -62,7 +62,7 @@ pub(super) struct Ready<'a> {
     /// Parameters that it takes with `reset`.
     #[serde(default)]
     pub(super) parameters: Vec<String>,
-    /// Nodes that it does itself, and what it can do to each of them.
+    /// Nodes that are parts of it, and what it can do to each of them.
     #[serde(default)]
     pub(super) nodes: Offers,
     /// Whether it can be reset again; if not, it is restarted for each test.

@@ -30,7 +30,7 @@ pub(super) struct Reset {
 pub(super) struct Step<'a> {
     /// Its end, in seconds.
     pub(super) time: f64,
-    /// For nodes that the simulator does itself.
+    /// For nodes that are parts of the simulator.
     #[serde(default)]
     pub(super) orders: Vec<OrderToNode>,
     #[serde(default, borrow)]
