@@ -294,9 +294,8 @@ pub(super) fn operations(operations: &[OperationReport]) -> Table {
 pub(super) fn metrics(metrics: &[MetricReport]) -> Table {
     let mut table = Table::with([Column::heading("metric"), Column::words("value"), Column::number("changes")]);
     for metric in metrics {
-        let shown = MetricValue::whole(metric.value, metric.set);
-        let value = value_text(shown, metric.unit.as_deref(), metric.constant.as_deref(), &[]);
-        table.row([Datum::text(&metric.metric), Datum::Text(value), Datum::count(metric.changes)]);
+        let value = Datum::Text(metric.value_text());
+        table.row([Datum::text(&metric.metric), value, Datum::count(metric.changes)]);
     }
     table
 }

@@ -216,6 +216,14 @@ pub struct MetricReport {
     pub robustness: Vec<(f64, f64)>,
 }
 
+impl MetricReport {
+    /// Its value in words.
+    pub(crate) fn value_text(&self) -> String {
+        let shown = MetricValue::whole(self.value, self.set);
+        wording::value_text(shown, self.unit.as_deref(), self.constant.as_deref(), &[])
+    }
+}
+
 /// A requirement in one test.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct VerdictReport {

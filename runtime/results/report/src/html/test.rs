@@ -4,12 +4,11 @@ use std::path::Path;
 
 use sesame_base::gathered::gathered;
 use sesame_present::markup::Markup;
-use sesame_record::{MetricValue, RecordError, Repository, TRACES, Verdict};
+use sesame_record::{RecordError, Repository, TRACES, Verdict};
 
 use crate::export::{Expected, ExportError, export};
 use crate::facts::show::{TestReport, report_on};
 use crate::facts::summary::Summary;
-use crate::facts::wording::value_text;
 use crate::html::command;
 use crate::html::timeline::timeline;
 use crate::sentences::{beyond_sentence, outcome_sentence};
@@ -72,12 +71,7 @@ fn heading(body: &mut Markup, summary: &Summary, report: &TestReport) {
         .iter()
         .filter_map(|objective| {
             let metric = report.metrics.iter().find(|metric| metric.metric == objective.metric)?;
-            let shown = MetricValue::whole(metric.value, metric.set);
-            Some(format!(
-                "{} {}",
-                metric.metric,
-                value_text(shown, metric.unit.as_deref(), metric.constant.as_deref(), &[])
-            ))
+            Some(format!("{} {}", metric.metric, metric.value_text()))
         })
         .collect();
     body.element("p", &[("class", "values")], &values.join(" · "));
