@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{CampaignPlan, Domain, Operation, OperationKind, TopicId};
+use crate::{CampaignPlan, Domain, Operation, TopicId};
 
 /// What a system says in addition to its simulator.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -118,11 +118,6 @@ impl Operation {
             self.parameters.iter().any(|parameter| matches!(parameter.domain, Domain::Number { integer: true, .. }));
         if integer || written.contains('.') { written } else { format!("{written}.0") }
     }
-
-    /// Whether it is a scene that launched programs have in their arguments.
-    pub fn is_in_arguments(&self) -> bool {
-        matches!(self.kind, OperationKind::Scene { parameter: None, .. })
-    }
 }
 
 /// A text with words in braces replaced by their values, each once: what is put in is not looked at again. Words that
@@ -153,6 +148,7 @@ pub fn has_placeholder(text: &str, word: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::OperationKind;
     use crate::testing::operation;
 
     #[test]
