@@ -55,8 +55,8 @@ impl State {
         STATES.iter().find(|(state, ..)| *state == self).map_or("", |(.., name)| name)
     }
 
-    /// The state to which an operation takes a node that is in this one; `None` if its transition leads back up to
-    /// this one, or down to it.
+    /// The state to which an operation with this transition takes a node that is in this state; `None` if the node is
+    /// already there, or further.
     pub(crate) fn after(self, transition: Transition) -> Option<State> {
         let (.., from, to) = TRANSITIONS.into_iter().find(|(known, ..)| *known == transition)?;
         let leads = if to < from { to < self } else { self < to };
@@ -106,7 +106,7 @@ impl Lifecycle {
         }
         match reply.at(&["current_state", "label"]) {
             Some(Value::Text(label)) => Err(format!("it is {label}")),
-            _ => Err("it says no state".to_owned()),
+            _ => Err("it does not say its state".to_owned()),
         }
     }
 

@@ -263,7 +263,7 @@ impl Session {
             let Some(lifecycle) = self.lifecycles.get(&node) else { break };
             let ticket = lifecycle.change(transition, &self.dds)?;
             let Some(reply) = self.reply(ticket, TRANSITION)? else {
-                return Ok(Err(format!("it does not answer to `{}`", transition.word())));
+                return Ok(Err(format!("it does not answer `{}`", transition.word())));
             };
             match self.lifecycles.get(&node).map_or(Ok(true), |lifecycle| lifecycle.was_changed(reply)) {
                 Ok(true) => {}

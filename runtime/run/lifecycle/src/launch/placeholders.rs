@@ -5,7 +5,7 @@ use sesame_plan::{fill_placeholders, has_placeholder};
 /// An argument that is replaced by a list of arguments.
 const LIST: &str = "{ros-args}";
 
-/// What a worker has of its own, and what its run does.
+/// What a worker and its run have of their own.
 #[derive(Debug, Clone)]
 pub(super) struct Own {
     pub(super) worker: u32,
