@@ -278,15 +278,11 @@ impl Reader<'_> {
         each: &mut dyn FnMut(Read<'_>) -> Result<(), RecordingError>,
     ) -> Result<(), RecordingError> {
         let &Line { wire, delivered, ref payloads } = &self.lines[line as usize];
-        let start = match self.start {
-            Some(start) => start,
-            None => {
-                self.start = Some(log_time);
-                // The clock of other recorders is that of their messages.
-                each(Read::ClockAtZero(Duration::from_nanos(log_time).as_secs_f64()))?;
-                log_time
-            }
-        };
+        if self.start.is_none() {
+            // The clock of other recorders is that of their messages.
+            each(Read::ClockAtZero(Duration::from_nanos(log_time).as_secs_f64()))?;
+        }
+        let start = *self.start.get_or_insert(log_time);
         let since = log_time.checked_sub(start).and_then(|since| i64::try_from(since).ok());
         let time = since.map(SimTime::from_nanos).filter(|&time| time >= self.now);
         let Some(time) = time else {
