@@ -2,15 +2,12 @@
 //! relay undisturbed, and each of them can be lost, late or changed.
 
 use std::fs;
-use std::path::Path;
-use std::process::{Child, Stdio};
-use std::time::Instant;
 
-use serde_json::Value;
 use sesame_tests::{command, done, fresh_folder, sesamec, workspace};
 
 use crate::environment::{Domain, Space, Vendor};
-use crate::peer::LIMIT;
+use crate::peer::Peer;
+use crate::scans::looked;
 
 /// Two robots that count, and a manager that calls both: it lets the first one count to the end, and cancels what the
 /// second one does.
@@ -92,13 +89,8 @@ fn each_part_of_an_action_passes_undisturbed_and_can_be_disturbed() {
 
     let tests = ["no_goals", "is_late", "is_silent", "is_refused", "goes_on", "counts_on"];
     robots.sesamec(&[&["known", "robots.sesame"], &tests[..]].concat()).expect(0);
-    let listed = robots.sesamec(&["list", "robots.sesame", "--results", "known", "--format", "json"]).expect(0);
-    let listed: Value = serde_json::from_str(&listed.out).expect("it is JSON");
-    let value = |test: &str, metric: &str| -> f64 {
-        let found = listed["tests"].as_array().expect("it lists tests").iter().find(|row| row["test"] == test);
-        let found = found.unwrap_or_else(|| panic!("no {test} in {listed:#}"));
-        found["measured"][metric].as_f64().unwrap_or_else(|| panic!("no {metric} in {listed:#}"))
-    };
+    let listed = robots.listed("known");
+    let value = |test: &str, metric: &str| listed.value(test, metric);
     let one = |metric: &str| value("T0", metric);
     // Undisturbed, goals are reached or cancelled, and what the topics of the action say is what happened.
     assert!(one("succeeded") >= 2.0 && one("accepted") >= 2.0 && one("cancelled") >= 2.0, "{listed:#}");
@@ -119,38 +111,19 @@ fn each_part_of_an_action_passes_undisturbed_and_can_be_disturbed() {
     assert!(value("T6", "furthest") == 8.0, "it counts to another number: {listed:#}");
 }
 
-/// A program that is ended with the test.
-struct Program(Child);
-
-impl Program {
-    fn start(python: &Path, domain: &Domain, arguments: &[&str]) -> Program {
-        let mut program = command(python);
-        program.arg(workspace().join("tests/ros2/peers/counter.py")).args(arguments);
-        program.env("ROS_DOMAIN_ID", domain.number.to_string()).env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST");
-        Program(program.stdout(Stdio::null()).spawn().expect("a peer can be started"))
-    }
-}
-
-impl Drop for Program {
-    fn drop(&mut self) {
-        _ = self.0.kill();
-        _ = self.0.wait();
-    }
-}
-
 #[test]
 fn a_scan_declares_actions_with_their_servers_and_clients() {
     let Some(python) = Vendor::Jazzy.python() else { return };
     let (folder, domain) = (fresh_folder("scanned_actions"), Domain::free());
-    let _programs = [
-        Program::start(&python, &domain, &["counter", "--ros-args", "-r", "__ns:=/r1"]),
-        Program::start(&python, &domain, &["counter", "--ros-args", "-r", "__ns:=/r2"]),
-        Program::start(&python, &domain, &["manager", "r1", "r2"]),
+    let start = |arguments: &[&str]| Peer::start(&python, &domain, "counter.py", arguments);
+    let _robots_and_manager = [
+        start(&["counter", "--ros-args", "-r", "__ns:=/r1"]),
+        start(&["counter", "--ros-args", "-r", "__ns:=/r2"]),
+        start(&["manager", "r1", "r2"]),
     ];
     let share = Vendor::share(&python).display().to_string();
     let number = domain.number.to_string();
     let arguments = ["scan", "ros2", "--domain", &number, "--types", &share, "--seconds", "8"];
-    let begun = Instant::now();
     let all = [
         "action count = \"/{r1,r2}/count\" : \"test_msgs/action/Fibonacci\"  // 1 server, 1 client",
         "node counter \"/{r1,r2}/counter\"",
@@ -158,13 +131,10 @@ fn a_scan_declares_actions_with_their_servers_and_clients() {
         "calls count",
     ];
     let squeezed = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
-    let space = loop {
-        let found = done(command(sesamec()).args(arguments).current_dir(&folder)).expect(0).out;
-        if all.iter().all(|part| squeezed(&found).contains(&squeezed(part))) {
-            break found;
-        }
-        assert!(begun.elapsed() < LIMIT, "more is awaited:\n{found}");
-    };
+    let space = looked(&folder, &arguments, |found| {
+        let found = squeezed(found);
+        all.iter().all(|part| found.contains(&squeezed(part)))
+    });
     fs::write(folder.join("scanned.sesame"), space).expect("a space can be written");
     done(command(sesamec()).args(["check", "scanned.sesame"]).current_dir(&folder)).expect(0);
 }

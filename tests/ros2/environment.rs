@@ -1,9 +1,11 @@
 //! The Pythons of the peers, and domains and ports in which tests do not hear each other.
 
+use std::fmt::{self, Display};
 use std::fs;
 use std::net::{Ipv4Addr, UdpSocket};
 use std::path::{Path, PathBuf};
 
+use serde_json::Value;
 use sesame_tests::{Done, command, done, fresh_folder, from_own_place, sesamec};
 
 /// An environment with a middleware.
@@ -63,6 +65,7 @@ pub(crate) fn packages_of_roslib() -> Option<PathBuf> {
 /// A space in a folder of its own, whose nodes are in a domain of their own.
 pub(crate) struct Space {
     folder: PathBuf,
+    file: String,
     /// Held for as long as it is used.
     _domain: Domain,
 }
@@ -72,12 +75,41 @@ impl Space {
     pub(crate) fn write(name: &str, domain: Domain, file: &str, text: &str) -> Space {
         let folder = fresh_folder(name);
         fs::write(folder.join(file), text).expect("a space can be written");
-        Space { folder, _domain: domain }
+        Space { folder, file: file.to_owned(), _domain: domain }
+    }
+
+    pub(crate) fn folder(&self) -> &Path {
+        &self.folder
     }
 
     /// `sesamec` in its folder.
     pub(crate) fn sesamec(&self, arguments: &[&str]) -> Done {
         done(command(sesamec()).args(arguments).current_dir(&self.folder))
+    }
+
+    /// The tests in a folder of results.
+    #[track_caller]
+    pub(crate) fn listed(&self, results: &str) -> Listed {
+        Listed(self.sesamec(&["list", &self.file, "--results", results, "--format", "json"]).expect(0).json())
+    }
+}
+
+/// The tests of a run, as `list` gives them.
+pub(crate) struct Listed(Value);
+
+impl Listed {
+    /// What a metric measured in a test.
+    #[track_caller]
+    pub(crate) fn value(&self, test: &str, metric: &str) -> f64 {
+        let found = self.0["tests"].as_array().expect("it lists tests").iter().find(|row| row["test"] == test);
+        let measured = found.and_then(|row| row["measured"][metric].as_f64());
+        measured.unwrap_or_else(|| panic!("no {metric} of {test} in {self:#}"))
+    }
+}
+
+impl Display for Listed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
     }
 }
 

@@ -2,7 +2,6 @@
 //! disturbed by its name or by the choice of a test, a scene sets a parameter of a node, another one is in the
 //! arguments of all carts, and a start that waits for one says so.
 
-use serde_json::Value;
 use sesame_tests::workspace;
 
 use crate::environment::{Domain, Space, Vendor};
@@ -73,13 +72,8 @@ fn each_cart_has_its_own_topics_one_of_them_is_disturbed_and_a_scene_drives_them
 
     let tests = ["slips", "stands", "hears_nothing", "skids", "races", "starts_behind"];
     fleet.sesamec(&[&["known", "carts.sesame", "--workers", "2"], &tests[..]].concat()).expect(0);
-    let listed = fleet.sesamec(&["list", "carts.sesame", "--results", "known", "--format", "json"]).expect(0);
-    let listed: Value = serde_json::from_str(&listed.out).expect("it is JSON");
-    let value = |test: &str, metric: &str| -> f64 {
-        let found = listed["tests"].as_array().expect("it lists tests").iter().find(|row| row["test"] == test);
-        let found = found.unwrap_or_else(|| panic!("no {test} in {listed:#}"));
-        found["measured"][metric].as_f64().unwrap_or_else(|| panic!("no {metric} in {listed:#}"))
-    };
+    let listed = fleet.listed("known");
+    let value = |test: &str, metric: &str| listed.value(test, metric);
     // Undisturbed they drive side by side, but for what a busy machine does to one of them.
     let beside = 1.5;
     assert!(value("T0", "apart") < beside, "{listed:#}");

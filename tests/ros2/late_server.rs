@@ -1,7 +1,6 @@
 //! A client that waits for its service and calls it once, while the server takes long to come up: its call is answered
 //! as without the runner, although the service is cut.
 
-use serde_json::Value;
 use sesame_tests::workspace;
 
 use crate::environment::{Domain, Space, Vendor};
@@ -44,11 +43,6 @@ fn the_only_call_of_a_client_is_answered_however_late_the_server_comes() {
     gripper
         .sesamec(&["run", "gripper.sesame", "--", "--allow-unheard", "--workers", "1", "--results", "one"])
         .expect(3);
-    let listed = gripper.sesamec(&["list", "gripper.sesame", "--results", "one/1", "--format", "json"]).expect(0);
-    let listed: Value = serde_json::from_str(&listed.out).expect("it is JSON");
-    let finished = |test: &str| {
-        let found = listed["tests"].as_array().expect("it lists tests").iter().find(|row| row["test"] == test);
-        found.and_then(|row| row["measured"]["finished"].as_f64()).unwrap_or_else(|| panic!("no {test} in {listed:#}"))
-    };
-    assert_eq!([finished("T0"), finished("T1")], [1.0, 1.0], "{listed:#}");
+    let listed = gripper.listed("one/1");
+    assert_eq!(["T0", "T1"].map(|test| listed.value(test, "finished")), [1.0, 1.0], "{listed:#}");
 }

@@ -1,20 +1,20 @@
 //! A managed node by rclpy: operations set its parameters of every type and take it through transitions of its
 //! lifecycle, and everything is as before when they end.
 
-use serde_json::Value;
 use sesame_tests::workspace;
 
 use crate::environment::{Domain, Space, Vendor};
 
-/// The parameters of the node, with what an operation sets them to, and how a formula sees that they have this value.
-const PARAMETERS: [(&str, &str, &str); 7] = [
-    ("enabled", "false", "not enabled.bool_value"),
-    ("mode", "one of \"manual\", \"off\"", "mode.string_value == \"manual\""),
-    ("gains", "list [-0.5, 1e3]", "gains.double_array_value[1] == 1000"),
-    ("ids", "one of list [7], list []", "ids.integer_array_value[0] == 7"),
-    ("words", "list [\"\", \"c, d\"]", "words.string_array_value[1] == \"c, d\""),
-    ("flags", "list [true, false, true]", "not flags.bool_array_value[1]"),
-    ("raw", "list [255]", "raw.byte_array_value[0] == 255"),
+/// The parameters of the node: what an operation may set each to, the `value` that a test chooses, and a formula that
+/// holds while the parameter has it.
+const PARAMETERS: [(&str, &str, &str, &str); 7] = [
+    ("enabled", "false", "false", "not enabled.bool_value"),
+    ("mode", r#"one of "manual", "off""#, "manual", r#"mode.string_value == "manual""#),
+    ("gains", "list [-0.5, 1e3]", "list [-0.5, 1000]", "gains.double_array_value[1] == 1000"),
+    ("ids", "one of list [7], list []", "list [7]", "ids.integer_array_value[0] == 7"),
+    ("words", r#"list ["", "c, d"]"#, r#"list [\"\", \"c, d\"]"#, r#"words.string_array_value[1] == "c, d""#),
+    ("flags", "list [true, false, true]", "list [true, false, true]", "not flags.bool_array_value[1]"),
+    ("raw", "list [255]", "list [255]", "raw.byte_array_value[0] == 255"),
 ];
 
 /// The lidar with operations on it, and what a test chooses for each of its parameters.
@@ -24,15 +24,6 @@ fn managed(name: &str, vendor: Vendor) -> Option<Space> {
     let types = Vendor::share(&python).display().to_string();
     let python = python.display().to_string();
     let program = workspace().join("tests/ros2/peers/managed.py").display().to_string();
-    let each = |written: &dyn Fn(&str, &str, &str) -> String| -> String {
-        PARAMETERS.iter().map(|(name, value, holds)| written(name, value, holds)).collect()
-    };
-    let chosen = |value: &str| match value.strip_prefix("one of ") {
-        Some("\"manual\", \"off\"") => "\"manual\"".to_owned(),
-        Some(_) => "\"list [7]\"".to_owned(),
-        // The last text in a list is quoted, so its quotes are escaped in the choice of a test.
-        None => format!("\"{}\"", value.replace("1e3", "1000").replace('"', "\\\"")),
-    };
     let text = format!(
         "space lidars\n\
          system {{\n\
@@ -76,33 +67,18 @@ fn managed(name: &str, vendor: Vendor) -> Option<Space> {
            end        after 4s\n\
          }}\n",
         domain = domain.number,
-        topics = each(&|name, _, _| format!("topic {name} = \"/{name}\" : Setting\n")),
-        names = each(&|name, _, _| format!(", {name}")),
-        metrics = each(&|name, _, holds| format!("metric m_{name} default 0s = duration({holds})\n")),
-        operations = each(&|name, value, _| {
-            format!("operation set_{name} on parameter \"{name}\" of lidar = set {value}\n")
-        }),
-        uses = each(&|name, value, _| format!("set_{name} value {} from 1s to 2s\n", chosen(value))),
-        observed = each(&|name, _, _| format!(", m_{name}")),
-        operated = each(&|name, _, _| format!(", set_{name}")),
+        topics = PARAMETERS.map(|(name, ..)| format!("topic {name} = \"/{name}\" : Setting\n")).concat(),
+        names = PARAMETERS.map(|(name, ..)| format!(", {name}")).concat(),
+        metrics =
+            PARAMETERS.map(|(name, .., holds)| format!("metric m_{name} default 0s = duration({holds})\n")).concat(),
+        operations = PARAMETERS
+            .map(|(name, values, ..)| format!("operation set_{name} on parameter \"{name}\" of lidar = set {values}\n"))
+            .concat(),
+        uses = PARAMETERS.map(|(name, _, chosen, _)| format!("set_{name} value \"{chosen}\" from 1s to 2s\n")).concat(),
+        observed = PARAMETERS.map(|(name, ..)| format!(", m_{name}")).concat(),
+        operated = PARAMETERS.map(|(name, ..)| format!(", set_{name}")).concat(),
     );
     Some(Space::write(name, domain, "lidars.sesame", &text))
-}
-
-/// The tests of a space that were run, as `list` gives them.
-struct Listed(Value);
-
-impl Listed {
-    fn of(space: &Space) -> Listed {
-        let listed = space.sesamec(&["list", "lidars.sesame", "--results", "known", "--format", "json"]).expect(0);
-        Listed(serde_json::from_str(&listed.out).expect("it is JSON"))
-    }
-
-    fn value(&self, test: &str, metric: &str) -> f64 {
-        let found = self.0["tests"].as_array().expect("it lists tests").iter().find(|row| row["test"] == test);
-        let measured = found.and_then(|row| row["measured"][metric].as_f64());
-        measured.unwrap_or_else(|| panic!("no {metric} of {test} in {:#}", self.0))
-    }
 }
 
 #[test]
@@ -110,7 +86,7 @@ fn parameters_of_every_type_are_set_and_have_their_old_values_again() {
     let Some(lidar) = managed("parameters_of_every_type", Vendor::Jazzy) else { return };
     lidar.sesamec(&["check", "lidars.sesame"]).expect(0);
     lidar.sesamec(&["known", "lidars.sesame", "settings", "wrong", "--workers", "1"]).expect(0);
-    let listed = Listed::of(&lidar);
+    let listed = lidar.listed("known");
     for (name, ..) in PARAMETERS {
         let metric = format!("m_{name}");
         let durations = ["T0", "T1", "T2"].map(|test| listed.value(test, &metric));
@@ -132,13 +108,13 @@ fn a_node_is_taken_through_a_transition_and_back() {
     for (name, vendor) in [("transitions_kilted", Vendor::Kilted), ("transitions_jazzy", Vendor::Jazzy)] {
         let Some(lidar) = managed(name, vendor) else { continue };
         lidar.sesamec(&["known", "lidars.sesame", "stops", "cleans", "is_on", "refuses", "--workers", "1"]).expect(0);
-        let listed = Listed::of(&lidar);
+        let listed = lidar.listed("known");
         let [lowest, at_last, scans, inactive] = ["lowest", "at_last", "scans", "inactive"]
             .map(|metric| ["T0", "T1", "T2", "T3", "T4"].map(|test| listed.value(test, metric)));
-        assert_eq!(lowest, [3.0, 2.0, 1.0, 3.0, 3.0], "the states are numbers of ROS: {:#}", listed.0);
-        assert_eq!(at_last, [3.0; 5], "all are active again: {:#}", listed.0);
-        assert!((0.2..2.5).contains(&inactive[1]), "{:#}", listed.0);
-        assert!(scans[1] > 0.0 && scans[1] < 0.9 * scans[3], "it does not scan meanwhile: {:#}", listed.0);
+        assert_eq!(lowest, [3.0, 2.0, 1.0, 3.0, 3.0], "the states are numbers of ROS: {listed:#}");
+        assert_eq!(at_last, [3.0; 5], "all are active again: {listed:#}");
+        assert!((0.2..2.5).contains(&inactive[1]), "{listed:#}");
+        assert!(scans[1] > 0.0 && scans[1] < 0.9 * scans[3], "it does not scan meanwhile: {listed:#}");
         let shown = |test: &str| lidar.sesamec(&["show", "lidars.sesame", test, "--results", "known"]).expect(0).out;
         let said = "node `lidar` cannot `activate`: it is active";
         assert!(shown("T3").contains(said), "{}", shown("T3"));

@@ -5,16 +5,9 @@ use std::fs;
 use std::path::PathBuf;
 
 use serde_json::Value;
-use sesame_tests::{Done, command, done, fresh_folder, sesamec, workspace};
+use sesame_tests::workspace;
 
-use crate::environment::{Domain, Vendor};
-
-/// A node that publishes an angle, in a world of one middleware.
-struct World {
-    folder: PathBuf,
-    /// Held for as long as it is used.
-    _domain: Domain,
-}
+use crate::environment::{Domain, Space, Vendor};
 
 /// What differs between middlewares.
 struct Middleware {
@@ -65,15 +58,13 @@ impl Middleware {
     }
 }
 
-impl World {
-    /// One whose relay may add so much.
-    fn new(name: &str, domain: Domain, middleware: &Middleware, budget: &str) -> World {
-        let Middleware { simulator, launch, python, talker } = middleware;
-        let folder = fresh_folder(name);
-        let talker = workspace().join(talker);
-        let talker = quoted(&[&python.display().to_string(), &talker.display().to_string(), "{ros-args}"]);
-        let text = format!(
-            "space angles\n\
+/// A node that publishes an angle, in a world of one middleware, whose relay may add so much.
+fn world(name: &str, domain: Domain, middleware: &Middleware, budget: &str) -> Space {
+    let Middleware { simulator, launch, python, talker } = middleware;
+    let talker = workspace().join(talker);
+    let talker = quoted(&[&python.display().to_string(), &talker.display().to_string(), "{ros-args}"]);
+    let text = format!(
+        "space angles\n\
              system {{\n\
                simulator robot = {simulator}\n\
                {launch}\n\
@@ -94,23 +85,17 @@ impl World {
                search     random {{ evaluations 2 }}\n\
                end        after 2s\n\
              }}\n"
-        );
-        fs::write(folder.join("angles.sesame"), text).expect("a space can be written");
-        World { folder, _domain: domain }
-    }
+    );
+    Space::write(name, domain, "angles.sesame", &text)
+}
 
-    fn sesamec(&self, arguments: &[&str]) -> Done {
-        done(command(sesamec()).args(arguments).current_dir(&self.folder))
-    }
-
-    /// `sesamec prepare` with its page: what was found.
-    fn prepare(&self, code: i32) -> Value {
-        let said = self.sesamec(&["prepare", "angles.sesame", "--runs", "1", "--format", "json"]).expect(code);
-        let page = fs::read_to_string(self.folder.join("runners/first/results/prepare/report.html"));
-        let page = page.expect("it ends in a page");
-        assert!(page.contains("id=\"null\"") && page.contains("id=\"mitm\""), "{page}");
-        serde_json::from_str(&said.out).expect("it is JSON")
-    }
+/// `sesamec prepare` with its page: what was found.
+fn prepare(world: &Space, code: i32) -> Value {
+    let said = world.sesamec(&["prepare", "angles.sesame", "--runs", "1", "--format", "json"]).expect(code);
+    let page = fs::read_to_string(world.folder().join("runners/first/results/prepare/report.html"));
+    let page = page.expect("it ends in a page");
+    assert!(page.contains("id=\"null\"") && page.contains("id=\"mitm\""), "{page}");
+    said.json()
 }
 
 /// It is ready, and what was added to the topic was measured: to how many messages, which this returns, and how long to
@@ -136,20 +121,20 @@ const KEPT: &str = "60s";
 fn nodes_of_ros_2_are_prepared() {
     let domain = Domain::free();
     let Some(middleware) = Middleware::ros2(&domain) else { return };
-    is_ready(&World::new("prepared_ros2", domain, &middleware, KEPT).prepare(0));
+    is_ready(&prepare(&world("prepared_ros2", domain, &middleware, KEPT), 0));
 }
 
 #[test]
 fn nodes_of_ros_1_are_prepared() {
     let Some(middleware) = Middleware::ros1() else { return };
-    is_ready(&World::new("prepared_ros1", Domain::free(), &middleware, KEPT).prepare(0));
+    is_ready(&prepare(&world("prepared_ros1", Domain::free(), &middleware, KEPT), 0));
 }
 
 #[test]
 fn nodes_behind_a_bridge_are_prepared() {
     let domain = Domain::free();
     let Some(middleware) = Middleware::rosbridge(&domain, None) else { return };
-    is_ready(&World::new("prepared_rosbridge", domain, &middleware, KEPT).prepare(0));
+    is_ready(&prepare(&world("prepared_rosbridge", domain, &middleware, KEPT), 0));
 }
 
 /// Two seconds with two hundred messages each, of which some are lost while systems start and end.
@@ -162,13 +147,13 @@ fn what_is_added_over_each_middleware_stays_within_half_a_second_at_200_hz() {
         return;
     };
     let worlds = [
-        World::new("prepared_ros2_quick", domain, &ros2, "500ms"),
-        World::new("prepared_ros1_quick", Domain::free(), &ros1, "500ms"),
-        World::new("prepared_rosbridge_quick", bridged, &behind, "500ms"),
+        world("prepared_ros2_quick", domain, &ros2, "500ms"),
+        world("prepared_ros1_quick", Domain::free(), &ros1, "500ms"),
+        world("prepared_rosbridge_quick", bridged, &behind, "500ms"),
     ];
     for world in worlds {
-        let messages = is_ready(&world.prepare(0));
-        assert!(messages > 200, "{messages} in {}", world.folder.display());
+        let messages = is_ready(&prepare(&world, 0));
+        assert!(messages > 200, "{messages} in {}", world.folder().display());
     }
 }
 
@@ -176,8 +161,8 @@ fn what_is_added_over_each_middleware_stays_within_half_a_second_at_200_hz() {
 fn a_bridge_that_takes_20_ms_more_exceeds_a_budget_of_5_ms_and_no_campaign_runs_then() {
     let domain = Domain::free();
     let Some(middleware) = Middleware::rosbridge(&domain, Some("0.02")) else { return };
-    let world = World::new("prepared_late", domain, &middleware, "5ms");
-    let found = world.prepare(3);
+    let world = world("prepared_late", domain, &middleware, "5ms");
+    let found = prepare(&world, 3);
     let stage = &found["mitm"]["stages"][1];
     let objection = stage["objections"][0].as_str().expect("it has an objection");
     assert!(objection.contains("the budget is 5 ms latency"), "{found:#}");

@@ -33,7 +33,7 @@ fn all_of(all: &[&str]) -> impl Fn(&str) -> bool {
 /// What a scan says when it has found enough. It listens longer each time but the first, for nodes may take
 /// long to start and to answer on a busy machine.
 #[track_caller]
-fn looked(folder: &Path, arguments: &[&str], is_enough: impl Fn(&str) -> bool) -> String {
+pub(crate) fn looked(folder: &Path, arguments: &[&str], is_enough: impl Fn(&str) -> bool) -> String {
     let (begun, mut arguments) = (Instant::now(), arguments.to_vec());
     loop {
         let found = in_folder(folder, &arguments).expect(0).out;

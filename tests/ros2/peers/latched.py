@@ -1,5 +1,5 @@
-"""Says something once, before anybody listens, and keeps it for whoever subscribes later, as `/tf_static` is kept. Says
-`up` then, and stays until it is ended."""
+"""Publishes something once, before anybody listens, and keeps it for whoever subscribes later, as `/tf_static` is kept.
+Says that it is up then, and stays until it is ended."""
 
 import common
 import rclpy
@@ -10,5 +10,5 @@ rclpy.init()
 node = rclpy.create_node("mapper")
 publisher = node.create_publisher(String, "/map", QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL))
 publisher.publish(String(data="hall"))
-print("up", flush=True)
+common.say(up=True)
 common.spin(node)
