@@ -9,12 +9,6 @@ const SPACE: &str = "lookout.sesame";
 /// A cart drives towards a wall at 1 m/s, and stops half a metre before it as long as a sensor has told it a distance
 /// within the last 0.4 s; it is blind only if both are silent for longer.
 const SIMULATOR: &str = r#"
-import json, sys
-
-def answer(what):
-    print(json.dumps(what), flush=True)
-    return json.loads(sys.stdin.readline() or "null")
-
 PATHS = ["sensors/left/range", "sensors/right/range"]
 order = json.loads(sys.stdin.readline())
 while order:

@@ -6,12 +6,6 @@ const SPACE: &str = "charger.sesame";
 
 /// The battery is charged until its plug is pulled, when the command says so.
 const SIMULATOR: &str = r#"
-import json, sys
-
-def answer(what):
-    print(json.dumps(what), flush=True)
-    return json.loads(sys.stdin.readline() or "null")
-
 order = json.loads(sys.stdin.readline())
 while order:
     if "reset" in order:

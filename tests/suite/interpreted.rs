@@ -16,10 +16,19 @@ pub(crate) fn two_robots(name: &str) -> Project {
     Project { space, runners: folder.join("runners"), folder }
 }
 
-/// A space, and its simulator in Python, `sim.py`.
+/// What a simulator in Python begins with: `answer` says something, and returns the next order, or nothing at the end.
+const ANSWER: &str = r#"
+import json, sys
+
+def answer(what):
+    print(json.dumps(what), flush=True)
+    return json.loads(sys.stdin.readline() or "null")
+"#;
+
+/// A space, and its simulator in Python, `sim.py`, which begins with [`ANSWER`].
 pub(crate) fn in_python(name: &str, space: &str, text: &str, simulator: &str) -> Project {
     let folder = fresh_folder(name);
-    fs::write(folder.join("sim.py"), simulator).unwrap();
+    fs::write(folder.join("sim.py"), [ANSWER, simulator].concat()).unwrap();
     fs::write(folder.join(space), text).unwrap();
     Project { space: folder.join(space), runners: folder.join("runners"), folder }
 }
@@ -82,7 +91,7 @@ fn tests_end_as_soon_as_their_condition_holds() {
     });
     assert_eq!(digests[0], digests[1]);
     let show = ["show", "two_robots.sesame", "T0", "-c", "crossing", "--format", "json"];
-    let shown: serde_json::Value = serde_json::from_str(&without_cargo(&project, &show).expect(0).out).unwrap();
+    let shown = without_cargo(&project, &show).expect(0).json();
     assert_eq!(shown["outcome"], "completed");
     // Two hundred messages, one every 50 ms, and the one that makes it true.
     let end = shown["end"].as_f64().unwrap();

@@ -9,12 +9,6 @@ const SPACE: &str = "carts.sesame";
 
 /// Two carts drive towards a wall. They are told once to stop; what its pilot said last holds while it says nothing.
 const SIMULATOR: &str = r#"
-import json, sys
-
-def answer(what):
-    print(json.dumps(what), flush=True)
-    return json.loads(sys.stdin.readline() or "null")
-
 class Pilot:
     def __init__(self):
         self.restart()

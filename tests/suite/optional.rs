@@ -10,12 +10,6 @@ const SPACE: &str = "vendors.sesame";
 /// `acme` always knows its position; `bolt` loses it every other time, and says so in one of two ways. The simulator
 /// counts the states that a control would get.
 const SIMULATOR: &str = r#"
-import json, sys
-
-def answer(what):
-    print(json.dumps(what), flush=True)
-    return json.loads(sys.stdin.readline() or "null")
-
 PATHS = ["uagv/v2/acme/1/state", "uagv/v2/bolt/7/state"]
 
 def state(vendor, number):
