@@ -43,7 +43,7 @@ enum Role {
     Other,
     /// What sees to it that a simulator ends, with all that it started.
     Keeper,
-    /// It is only being started, and has the command line of the one that starts it yet.
+    /// It is only being started, and still has the command line of the one that starts it.
     Starting,
 }
 
