@@ -59,8 +59,7 @@ fn prepared(name: &str, budget: &str) -> Option<[f64; 2]> {
         sesamec.env("NODE_PATH", packages.join("node_modules"));
         done(sesamec.args(arguments).current_dir(&folder))
     };
-    let said = sesamec(&["prepare", "fleet.sesame", "--runs", "1", "--format", "json"]).expect(0);
-    let found: Value = serde_json::from_str(&said.out).expect("it is JSON");
+    let found = sesamec(&["prepare", "fleet.sesame", "--runs", "1", "--format", "json"]).expect(0).json();
     println!("{found:#}");
     assert_eq!(found["passed"], true, "{found:#}");
     let tests = found["known"]["tests"].as_array().expect("both are run");

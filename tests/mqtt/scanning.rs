@@ -2,10 +2,10 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::time::Instant;
 
-use serde_json::Value;
+use sesame_peers::Ended;
 use sesame_tests::{Done, command, done, fresh_folder, sesamec, workspace};
 
 use crate::peers::{Broker, Client, LIMIT, packages};
@@ -16,22 +16,11 @@ fn in_folder(folder: &Path, arguments: &[&str]) -> Done {
 }
 
 /// Vehicles or their control, which end with the test.
-struct Program(Child);
-
-impl Program {
-    fn start(packages: &Path, part: &str, port: u16) -> Program {
-        let mut node = Command::new("node");
-        node.arg(workspace().join("tests/mqtt/fleet.js")).args([part, &port.to_string()]);
-        node.env("NODE_PATH", packages.join("node_modules")).stdout(Stdio::null());
-        Program(node.spawn().expect("node starts"))
-    }
-}
-
-impl Drop for Program {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
+fn start(packages: &Path, part: &str, port: u16) -> Ended {
+    let mut node = Command::new("node");
+    node.arg(workspace().join("tests/mqtt/fleet.js")).args([part, &port.to_string()]);
+    node.env("NODE_PATH", packages.join("node_modules")).stdout(Stdio::null());
+    Ended(node.spawn().expect("node starts"))
 }
 
 #[test]
@@ -42,7 +31,7 @@ fn the_space_of_a_fleet_passes_its_check() {
     let url = format!("mqtt://127.0.0.1:{}", broker.port);
     // It is built before it is to listen.
     sesamec();
-    let _vehicles = Program::start(&packages, "vehicles", broker.port);
+    let _vehicles = start(&packages, "vehicles", broker.port);
     // The last of these stays at the broker.
     let mut publisher =
         Client::start(&packages, &["publish", &broker.port.to_string(), "peers/one/speed", "3", "3", "2", "retain"]);
@@ -55,7 +44,7 @@ fn the_space_of_a_fleet_passes_its_check() {
         let seconds = listening.next().expect("vehicles and their control are heard");
         let space = std::thread::scope(|scope| {
             let scan = scope.spawn(|| in_folder(&folder, &["scan", "mqtt", &url, "--seconds", seconds]).expect(0).out);
-            let _control = Program::start(&packages, "control", broker.port);
+            let _control = start(&packages, "control", broker.port);
             scan.join().expect("it scans")
         });
         let all = ["/order\"", "{agv0,agv1,agv2}/state\"", "/connection\"", "    agvPosition: StateAgvPosition"];
@@ -85,7 +74,7 @@ fn the_space_of_a_fleet_passes_its_check() {
     }
     let arguments = ["scan", "mqtt", &url, "--topics", "uagv/v2/+/+/state", "--seconds", "3", "--format", "json"];
     let found = loop {
-        let found: Value = serde_json::from_str(&in_folder(&folder, &arguments).expect(0).out).expect("it is JSON");
+        let found = in_folder(&folder, &arguments).expect(0).json();
         if found["topics"].as_array().is_some_and(|topics| topics.len() == 3) {
             break found;
         }

@@ -69,8 +69,7 @@ impl Example {
 
     /// Tests of the latest run with what was measured in them, by number.
     pub(crate) fn tests(&self, campaign: &str) -> Vec<Value> {
-        let listed = self.sesamec("list", campaign, &["--format", "json"]).expect(0);
-        let listed: Value = serde_json::from_str(&listed.out).expect("it is JSON");
+        let listed = self.sesamec("list", campaign, &["--format", "json"]).expect(0).json();
         listed["tests"].as_array().expect("tests are listed").clone()
     }
 
@@ -145,8 +144,7 @@ fn a_parameter_a_service_and_nodes_change_the_motion_and_afterwards_everything_i
         assert_ne!((distance(before), cycle(before)), (distance(first), cycle(first)), "{campaign}");
     }
 
-    let shown = cell.sesamec("show", "resources", &["T1", "--format", "json"]).expect(0);
-    let shown: Value = serde_json::from_str(&shown.out).unwrap();
+    let shown = cell.sesamec("show", "resources", &["T1", "--format", "json"]).expect(0).json();
     let counted = |operation: &str, counter: &str| {
         let of = shown["operations"].as_array().unwrap().iter().find(|of| of["operation"] == operation).unwrap();
         of["counters"][counter].as_u64().unwrap()
@@ -318,12 +316,11 @@ fn a_robot_that_is_located_late_meets_another_one_in_the_warehouse_and_always_al
 
 /// The campaign that the example's page begins with.
 #[test]
-#[ignore = "takes five minutes"]
+#[ignore = "long: a campaign of 80 tests"]
 fn a_search_finds_whose_localisation_has_to_be_late_for_which_collision_in_the_warehouse() {
     let Some(warehouse) = warehouse("warehouse_collisions", &[]) else { return };
     warehouse.sesamec("run", "collisions", &WORKERS).expect(0);
-    let said = warehouse.sesamec("causes", "collisions", &["--format", "json"]).expect(0).out;
-    let said: Value = serde_json::from_str(&said).expect("it is JSON");
+    let said = warehouse.sesamec("causes", "collisions", &["--format", "json"]).expect(0).json();
     let text = |value: &Value| value.as_str().unwrap_or_else(|| panic!("{said:#}")).to_owned();
     let of = |cause: &Value| -> (String, Vec<String>) {
         let operations = cause["operations"].as_array().unwrap_or_else(|| panic!("{said:#}"));
@@ -398,7 +395,7 @@ fn what_a_scan_of_the_running_cell_writes_is_run_with_a_campaign_below_it() {
 
 /// The campaign that the example's page begins with, twice, with pymoo's non-dominated sort as the oracle.
 #[test]
-#[ignore = "takes three minutes"]
+#[ignore = "long: two campaigns of 18 tests"]
 fn the_front_of_the_first_look_is_what_pymoo_finds_and_a_second_look_has_its_digest() {
     let Some(cell) = iiwa_cell("iiwa_first_look", &[]) else { return };
     let [first, second] = [(); 2].map(|()| cell.sesamec("run", "first_look", &WORKERS).expect(0));

@@ -208,7 +208,7 @@ fn four_disturbances_of_what_controllers_say_come_to_the_same_over_simlog_as_ove
 /// grows where arms swing past each other (up to 1.7e-5 in one test of forty), so the nodes of ROS 2 have numbers of 32
 /// bits here, too.
 #[test]
-#[ignore = "takes three minutes, and builds an optimised sesamec"]
+#[ignore = "long: forty tests over each protocol, and an optimised sesamec is built"]
 fn forty_tests_over_simlog_are_quick_and_come_to_the_same_as_over_ros2() {
     let Some(cells) = cells("iiwa_forty", &HEARD, Size { evaluations: 40, seconds: 10 }) else { return };
     change(&cells[0], &OF_32_BITS);

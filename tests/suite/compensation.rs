@@ -38,8 +38,7 @@ impl Study {
     }
 
     fn json(&self, arguments: &[&str]) -> serde_json::Value {
-        let done = self.sesamec(&[arguments, &["--format", "json"]].concat()).expect(0);
-        serde_json::from_str(&done.out).unwrap_or_else(|error| panic!("{error}:\n{}", done.out))
+        self.sesamec(&[arguments, &["--format", "json"]].concat()).expect(0).json()
     }
 
     fn results(&self, folder: &str) -> String {
@@ -165,7 +164,7 @@ fn noise_is_fitted_by_how_much_runs_differ_and_varied_from_run_to_run() {
     child.wait().unwrap();
     let again = study.sesamec(&[&asked[..], &["--format", "json"]].concat()).expect(0);
     assert!(again.err.contains("Continuing a fit of which"), "{}", again.err);
-    let again: serde_json::Value = serde_json::from_str(&again.out).unwrap();
+    let again = again.json();
     assert_eq!(again["compensation"], compensated["compensation"]);
     assert_eq!(again["held_out"], compensated["held_out"]);
     assert!(!tried.exists());

@@ -26,10 +26,6 @@ fn results(runner: &Runner, results: &str) -> Repository {
     Repository::open(&runner.folder.join(results).join("3")).unwrap()
 }
 
-fn json(text: &str) -> serde_json::Value {
-    serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
-}
-
 #[test]
 fn a_front_is_of_confirmed_tests_and_says_how_often_each_finding_came_again() {
     let runner = gusty("confirming", "confirming");
@@ -54,7 +50,7 @@ fn a_front_is_of_confirmed_tests_and_says_how_often_each_finding_came_again() {
     let plan = repository.plan();
     let front = repository.latest_result_set().unwrap().unwrap().members;
     assert!(!front.is_empty() && front.iter().all(|test| repetitions.contains_key(test)), "{front:?}");
-    let summary = json(&runner.run(&["report", "--format", "json", "--results", "results/3"]).expect(0).out);
+    let summary = runner.run(&["report", "--format", "json", "--results", "results/3"]).expect(0).json();
     let confirmed = summary["confirmed"].as_array().unwrap();
     assert_eq!(confirmed.len(), repetitions.len());
     let mut standings = BTreeMap::new();
@@ -264,8 +260,7 @@ fn tests_of_finished_results_are_confirmed_later_and_the_front_stays() {
     assert!(before.repetitions().unwrap().is_empty());
     drop(before);
 
-    let said = runner.run(&["confirm", "-n", "3", "--results", "results/3", "--format", "json"]).expect(0);
-    let tests = json(&said.out);
+    let tests = runner.run(&["confirm", "-n", "3", "--results", "results/3", "--format", "json"]).expect(0).json();
     let numbers: Vec<u64> = tests.as_array().unwrap().iter().map(|test| test["number"].as_u64().unwrap()).collect();
     assert_eq!(numbers, front.iter().map(|&number| u64::from(number)).collect::<Vec<_>>());
     let again = runner.run(&["confirm", &format!("T{}", front[0]), "-n", "2", "--results", "results/3"]).expect(0);

@@ -86,7 +86,7 @@ fn analyses_of_a_results_file_say_what_the_campaign_said() {
     let sentence = "1 of 1 pair of operations acted together, 4 of 4 in the same quarter of the run";
     assert!(pairs.err.contains(&format!("note: {sentence}")), "{}", pairs.err);
     assert!(said.contains(sentence), "{said}");
-    let pairs: serde_json::Value = serde_json::from_str(&pairs.out).unwrap();
+    let pairs = pairs.json();
     let [lift, cut, both] = [0, 1, 2].map(|row| pairs[row]["together"].as_u64().unwrap());
     assert!(both <= lift.min(cut) && lift + cut - both <= 30, "{pairs}");
     assert_eq!((pairs[2]["first"].as_str(), pairs[2]["second"].as_str()), (Some("lift"), Some("cut")));
@@ -109,7 +109,7 @@ fn analyses_of_a_results_file_say_what_the_campaign_said() {
 
     let indicators = results(&["indicators", "--format", "json"], &folder);
     assert!(indicators.err.contains("note: hypervolumes are measured from fuzzing_time "), "{}", indicators.err);
-    let indicators: serde_json::Value = serde_json::from_str(&indicators.out).unwrap();
+    let indicators = indicators.json();
     let recorded = repository.indicators().unwrap();
     assert_eq!(indicators.as_array().unwrap().len(), recorded.len());
     let last = indicators.as_array().unwrap().last().unwrap();

@@ -65,8 +65,7 @@ fn a_robot_that_waits_is_found_to_be_coupled_and_a_sheet_warns_of_it() {
     assert!(said.contains("`east` and `north` touch first at"), "{said}");
     assert!(said.contains("the robot reads messages that depend on what was removed. The method does not hold."));
     let with = together.to_str().unwrap();
-    let found = lab(&["contacts", "--second", "east", "--together", with, "--format", "json"], &apart).expect(0);
-    let rows: serde_json::Value = serde_json::from_str(&found.out).unwrap();
+    let rows = lab(&["contacts", "--second", "east", "--together", with, "--format", "json"], &apart).expect(0).json();
     assert_eq!((&rows[0]["motion"], &rows[0]["one"]), (&"coupled".into(), &"east".into()), "{rows}");
     assert!(rows[0]["least_distance_m"].as_f64().unwrap() < 0.0 && rows[0]["first_contact_s"].is_number(), "{rows}");
     assert!(rows[0]["margins_touch_s"].as_f64() < rows[0]["first_contact_s"].as_f64(), "{rows}");
@@ -75,8 +74,7 @@ fn a_robot_that_waits_is_found_to_be_coupled_and_a_sheet_warns_of_it() {
     let results = ran(&project, "dangerous");
     let folder = results.display().to_string();
     project.sesamec("replay", &["T1", "--record", "--campaign", "dangerous", "--results", &folder]).expect(0);
-    let found = lab(&["interlocks", "--format", "json"], &[&results]).expect(0);
-    let rows: serde_json::Value = serde_json::from_str(&found.out).unwrap();
+    let rows = lab(&["interlocks", "--format", "json"], &[&results]).expect(0).json();
     assert_eq!((&rows[1]["test"], &rows[1]["interlock"]), (&"T1".into(), &"prevents".into()), "{rows}");
     assert!(rows[1]["lead_s"].as_f64().unwrap() > 0.0, "{rows}");
     let late = solid(&lab(&["interlocks", "T1", "--lead", "1800"], &[&results]).expect(0).out);

@@ -31,8 +31,7 @@ impl Study {
     }
 
     fn json(&self, arguments: &[&str], code: i32) -> Value {
-        let said = self.sesamec(&[arguments, &["--format", "json"]].concat()).expect(code);
-        serde_json::from_str(&said.out).unwrap()
+        self.sesamec(&[arguments, &["--format", "json"]].concat()).expect(code).json()
     }
 }
 

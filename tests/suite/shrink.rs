@@ -34,8 +34,7 @@ fn violations(runner: &Runner, count: usize) -> Vec<u32> {
 fn shrunk(runner: &Runner, test: u32, into: &str, more: &[&str]) -> Value {
     let test = format!("T{test}");
     let arguments = ["shrink", &test, "--results", "found/42", "--into", into, "--format", "json"];
-    let said = runner.run(&[&arguments, more].concat()).expect(0);
-    serde_json::from_str(&said.out).unwrap()
+    runner.run(&[&arguments, more].concat()).expect(0).json()
 }
 
 fn number(value: &Value) -> f64 {

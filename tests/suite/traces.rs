@@ -43,8 +43,7 @@ fn files_named(folder: &Path, part: &str) -> Vec<PathBuf> {
 }
 
 fn fed(runner: &Runner, trace: &Path, code: i32) -> Value {
-    let said = runner.run(&["replay-recording", trace.to_str().unwrap(), "--format", "json"]).expect(code);
-    serde_json::from_str(&said.out).unwrap()
+    runner.run(&["replay-recording", trace.to_str().unwrap(), "--format", "json"]).expect(code).json()
 }
 
 /// The number in a name such as `T17`.
@@ -122,7 +121,7 @@ fn a_hook_that_is_changed_is_compared_with_what_was_recorded() {
     for name in traces(&runner.folder.join("r/5")) {
         let trace = runner.folder.join(format!("r/5/traces/{name}.mcap"));
         let said = runner.run(&["replay-recording", trace.to_str().unwrap(), "--format", "json"]);
-        let fed: Value = serde_json::from_str(&said.out).unwrap();
+        let fed = said.json();
         let metric = fed["metrics"]
             .as_array()
             .unwrap()

@@ -61,7 +61,7 @@ fn a_vendored_runner_has_all_it_needs_and_speaks_of_no_checkout() {
     // Cargo finds every crate: those without a source of their own lie in the runner.
     let mut metadata = command(env!("CARGO"));
     metadata.args(["metadata", "--format-version", "1", "--offline"]).current_dir(&runner);
-    let metadata: serde_json::Value = serde_json::from_str(&done(&mut metadata).expect(0).out).unwrap();
+    let metadata = done(&mut metadata).expect(0).json();
     let packages = metadata["packages"].as_array().unwrap();
     let paths = packages.iter().filter(|package| package["source"].is_null());
     let paths: Vec<&str> = paths.map(|package| package["manifest_path"].as_str().unwrap()).collect();

@@ -16,8 +16,7 @@ fn copied(simulator: &str, name: &str) -> Project {
 }
 
 fn json(project: &Project, command: &str, arguments: &[&str], code: i32) -> Value {
-    let said = project.sesamec(command, &[arguments, &["--format", "json"]].concat()).expect(code);
-    serde_json::from_str(&said.out).unwrap()
+    project.sesamec(command, &[arguments, &["--format", "json"]].concat()).expect(code).json()
 }
 
 #[test]
