@@ -5,7 +5,7 @@ use std::fs;
 use std::os::unix::fs::symlink;
 
 use serde_json::Value;
-use sesame_tests::{command, done, fresh_folder, sesamec, workspace};
+use sesame_tests::{command, completed_with_delays, done, fresh_folder, sesamec, workspace};
 
 use crate::peers::python;
 
@@ -28,22 +28,8 @@ fn repeated(name: &str, seconds: u32) -> Option<[Value; 3]> {
         done(&mut sesamec)
     };
     run("run", &["--", "--workers", "2"]).ended_freely();
-    let read = |subcommand: &str, arguments: &[&str]| -> Value {
-        let arguments = [arguments, &["--format", "json"]].concat();
-        serde_json::from_str(&run(subcommand, &arguments).expect(0).out).expect("it is JSON")
-    };
-    for test in ["T1", "T2"] {
-        let shown = read("show", &[test]);
-        let delayed = &shown["operations"][0]["counters"]["delayed"];
-        assert!(delayed.as_u64().is_some_and(|count| count > 0), "{test} is late: {shown}");
-    }
-    let listed = read("list", &[]);
-    let [reference, first, second, ..] = &listed["tests"].as_array().expect("tests are listed")[..] else {
-        panic!("{listed}")
-    };
-    let tests = [reference, first, second].map(Value::clone);
+    let tests = completed_with_delays(run);
     for test in &tests {
-        assert_eq!(test["outcome"], "completed", "{test}");
         assert!(measured(test, "reached") > 0.0 && measured(test, "closest") < 99.0, "the vehicles drive: {test}");
     }
     Some(tests)

@@ -20,6 +20,8 @@ use std::process::{Command, Output, Stdio};
 use std::sync::OnceLock;
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use serde_json::Value;
+
 pub use port::{Port, from_own_place};
 pub use relaying::relay_for_a_moment;
 
@@ -186,7 +188,7 @@ impl Done {
 
     /// What it said on standard output, which is JSON alone.
     #[track_caller]
-    pub fn json(&self) -> serde_json::Value {
+    pub fn json(&self) -> Value {
         serde_json::from_str(&self.out).unwrap_or_else(|error| panic!("not JSON alone ({error}): {}", self.out))
     }
 
@@ -221,6 +223,28 @@ pub fn done(command: &mut Command) -> Done {
     Done::of(
         &command.output().unwrap_or_else(|error| panic!("{} does not start: {error}", command.get_program().display())),
     )
+}
+
+/// The reference run and both tests of a campaign that repeats a delay twice. Insists that all three were completed, and
+/// that messages were late in both tests. `run` takes a subcommand and its arguments, for `sesamec` or a runner.
+#[track_caller]
+pub fn completed_with_delays(run: impl Fn(&str, &[&str]) -> Done) -> [Value; 3] {
+    let read = |subcommand: &str, arguments: &[&str]| {
+        run(subcommand, &[arguments, &["--format", "json"]].concat()).expect(0).json()
+    };
+    for test in ["T1", "T2"] {
+        let shown = read("show", &[test]);
+        let delayed = &shown["operations"][0]["counters"]["delayed"];
+        assert!(delayed.as_u64().is_some_and(|count| count > 0), "nothing is late in {test}: {shown}");
+    }
+    let listed = read("list", &[]);
+    let [reference, first, second, ..] = &listed["tests"].as_array().expect("tests are listed")[..] else {
+        panic!("{listed}")
+    };
+    [reference, first, second].map(|test| {
+        assert_eq!(test["outcome"], "completed", "{test}");
+        test.clone()
+    })
 }
 
 /// A folder with a space in it, and the runners that come of it.
