@@ -1,4 +1,4 @@
-"""Compiles Nav2's action and the messages of tf for the Python of `examples/fleet`: there are no wheels of them.
+"""Compiles Nav2's action and the messages of tf for the Python of `examples/fleet`: there are no wheels for them.
 
     python3.11 examples/warehouse/interfaces.py [PYTHON]
 
@@ -17,7 +17,7 @@ import sysconfig
 
 HERE = pathlib.Path(__file__).resolve().parent
 DEFINITIONS, BUILT = HERE / "interfaces", HERE / "built"
-# What the generators need, of which one is no wheel.
+# What the generators need. One of the two has no wheel.
 TOOLS = (
     "empy==3.3.4 --hash=sha256:73ac49785b601479df4ea18a7c79bc1304a8a7c34c02b9472cf1206ae88f01b3\n"
     "lark==1.3.1 --hash=sha256:c629b661023a014c37da873b4ff58a817398d12635d3bbb2c5a03be7fe5d1e12\n"

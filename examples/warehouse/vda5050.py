@@ -161,7 +161,7 @@ class Vehicle:
         return self.velocity
 
     def has_passed(self, node: dict[str, Any]) -> bool:
-        """Whether it believes to have reached a node, or to be beyond it."""
+        """Whether it believes that it has reached a node or passed it."""
         here, goal = self.navigator.place, self.navigator.goal
         if here is None or goal is None:
             return False
@@ -169,7 +169,7 @@ class Vehicle:
 
     def state(self) -> dict[str, Any]:
         """Its state, in terms of VDA 5050."""
-        state = {
+        return {
             "orderId": self.order["orderId"],
             "orderUpdateId": self.order["orderUpdateId"],
             "lastNodeId": self.last["nodeId"],
@@ -186,7 +186,6 @@ class Vehicle:
             "errors": [],
             "safetyState": {"eStop": "NONE", "fieldViolation": False},
         }
-        return state
 
     def news(self, now: int) -> dict[str, Any] | None:
         """Its state, if that is new or was not said for a while."""
@@ -197,7 +196,7 @@ class Vehicle:
         return state if self.navigator.place is None else {**state, "agvPosition": self.position()}
 
     def position(self) -> dict[str, Any]:
-        """Where it believes to be."""
+        """Where it believes that it is."""
         x, y = self.navigator.place
         return {"x": x, "y": y, "theta": 0.0, "mapId": "hall", "positionInitialized": True}
 

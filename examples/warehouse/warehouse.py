@@ -2,7 +2,7 @@
 
 Three robots drive north and south, three east and west, each to and fro between the two stations of its own lane. So
 each of the first three shares one crossing with each of the others. Robots have no lasers: they stop where the manager
-has not cleared their way. Everybody knows where robots are only from what was heard of it.
+has not cleared their way. The manager and the robots know where a robot is only from what they hear.
 
 Nothing here knows a middleware; times are whole nanoseconds of simulation time, places are metres.
 """
@@ -13,7 +13,6 @@ from enum import Enum
 
 SECOND = 1_000_000_000
 PERIOD = SECOND // 5  # of control
-RADIUS = 0.35  # of a robot
 
 CRUISE = 1.2  # metres per second
 BRAKING = 0.5  # metres per second and second at which a navigator plans to stop
@@ -137,7 +136,7 @@ class Floor:
 
 @dataclass
 class Navigator:
-    """Drives one robot to its goal, as far as its way is clear, by the places that it hears."""
+    """Drives one robot to its goal, as far as its way is clear. It knows only the places that it hears."""
 
     place: Place | None = None
     located: int = 0  # when it was there
@@ -159,11 +158,11 @@ class Navigator:
         return ((self.goal[0] - self.place[0]) / left * speed, (self.goal[1] - self.place[1]) / left * speed)
 
     def left(self) -> float:
-        """How far it believes to be from its goal."""
+        """How far it believes that it is from its goal."""
         return math.inf if self.goal is None or self.place is None else distance(self.place, self.goal)
 
     def has_arrived(self) -> bool:
-        """Whether it believes to be at its goal."""
+        """Whether it believes that it is at its goal."""
         return self.left() < ARRIVED
 
 
@@ -196,7 +195,7 @@ class Orders:
 
 
 class Manager:
-    """Sends robots to and fro, and lets one at a time cross each crossing, by the places that it hears."""
+    """Sends robots to and fro, and lets one at a time cross each crossing. It knows only the places that it hears."""
 
     def __init__(self) -> None:
         self.reset()

@@ -1,4 +1,4 @@
-"""A robot's world, which is launched beside the simulator and told in its arguments what the scenario is."""
+"""A robot's world, which is launched beside the simulator, with the scenario in its arguments."""
 import sys
 import time
 from pathlib import Path
