@@ -31,7 +31,8 @@ fn who_comes_and_goes_during_a_run_is_noted_by_node_and_topic() {
     let publisher = || start("publisher.py", "--topic /peer/undisturbed --rate 50 --count 200 --hold");
     // The publisher leaves when it is dropped, and the subscriber when it has heard enough.
     let (first, subscriber) = (publisher(), start("subscriber.py", "--count 100"));
-    let nodes = "node speaker \"/peer_publisher\" { publishes peer }  node listener { subscribes peer }";
+    let nodes =
+        "node speaker \"/peer_publisher\" { publishes peer }  node listener \"/peer_subscriber\" { subscribes peer }";
     let mut system = System::new(plan(&space(&domain, KIND, nodes, "", "1000s")));
     let (first, again, stray) = (RefCell::new(Some(first)), RefCell::new(None), RefCell::new(None));
     let begin = Instant::now();

@@ -19,8 +19,9 @@ use crate::dds::{DdsError, Endpoint};
 use crate::graph::DISCOVERY_TOPIC;
 use crate::names;
 
-/// How long names of nodes are awaited that are to be said: they come later than publishers and subscribers.
-const NAMES: Duration = Duration::from_secs(3);
+/// How long the name of a node is awaited that its participant is yet to say: it comes later than the node's publishers
+/// and subscribers. Fast DDS says only after three seconds what got lost, so a name may need two of its periods.
+pub(super) const NAMES: Duration = Duration::from_secs(10);
 
 /// How often it is looked for names meanwhile.
 const LOOK: Duration = Duration::from_millis(20);

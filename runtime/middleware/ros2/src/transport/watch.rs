@@ -8,11 +8,10 @@ use std::time::{Duration, Instant};
 
 use rustdds::GUID;
 
+use super::presence::NAMES;
+
 /// How often it is looked who is there while a run goes on.
 pub(super) const LOOK: Duration = Duration::from_millis(500);
-
-/// How long the name of somebody who has appeared is awaited.
-const NAME: Duration = Duration::from_secs(3);
 
 /// What a node does on a topic or with a service.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -118,7 +117,7 @@ impl Watch {
                 continue;
             }
             let since = *self.fresh.entry(guid).or_insert(now);
-            if newcomer.will_be_named && now.duration_since(since) < NAME {
+            if newcomer.will_be_named && now.duration_since(since) < NAMES {
                 continue;
             }
             self.fresh.remove(&guid);
