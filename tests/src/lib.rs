@@ -225,8 +225,8 @@ pub fn done(command: &mut Command) -> Done {
     )
 }
 
-/// The reference run and both tests of a campaign that repeats a delay twice. Insists that all three were completed, and
-/// that messages were late in both tests. `run` takes a subcommand and its arguments, for `sesamec` or a runner.
+/// The reference run and both tests of a campaign that repeats a delay twice. Insists that all three were completed,
+/// and that messages were late in both tests. `run` takes a subcommand and its arguments, for `sesamec` or a runner.
 #[track_caller]
 pub fn completed_with_delays(run: impl Fn(&str, &[&str]) -> Done) -> [Value; 3] {
     let read = |subcommand: &str, arguments: &[&str]| {
