@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::Duration;
 
 use rustdds::GUID;
 use sesame_codec::cdr::Codec;
@@ -17,6 +18,10 @@ use crate::layouts::{Layout, interfaces};
 pub(crate) const DISCOVERY_TOPIC: &str = "ros_discovery_info";
 /// Its type in DDS.
 pub(crate) const DISCOVERY_TYPE: &str = "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_";
+
+/// How long the name of a node is awaited that its participant is yet to say: it comes later than the node's publishers
+/// and subscribers. Fast DDS says only after three seconds what got lost, so a name may need two of its periods.
+pub(crate) const NAMES: Duration = Duration::from_secs(10);
 
 /// The bytes that identify something in a domain.
 pub(crate) type Gid = [u8; 16];

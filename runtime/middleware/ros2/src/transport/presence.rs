@@ -16,12 +16,8 @@ use super::session::{ClockReader, Connected, Session, Stepper};
 use super::wall_clock::now;
 use super::watch::{DeclaredEndpoint, Present, Role};
 use crate::dds::{DdsError, Endpoint};
-use crate::graph::DISCOVERY_TOPIC;
+use crate::graph::{DISCOVERY_TOPIC, NAMES};
 use crate::names;
-
-/// How long the name of a node is awaited that its participant is yet to say: it comes later than the node's publishers
-/// and subscribers. Fast DDS says only after three seconds what got lost, so a name may need two of its periods.
-pub(super) const NAMES: Duration = Duration::from_secs(10);
 
 /// How often it is looked for names meanwhile.
 const LOOK: Duration = Duration::from_millis(20);

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use rustdds::GUID;
 
-use super::presence::NAMES;
+use crate::graph::NAMES;
 
 /// How often it is looked who is there while a run goes on.
 pub(super) const LOOK: Duration = Duration::from_millis(500);
