@@ -416,8 +416,8 @@ fn findings_in_gusts_hold_where_they_were_confirmed() {
     let space = space.replace("NAME", "gusts").replace("1..2 per test", "1..2 per test may overlap");
     let project = Project::new("gusts", &format!("{space}\n{more}"), "gusty");
     let held = judged(&project, &["believing", "longer", "averaging", "confirming", "doubting"], 20);
-    // A front of means holds tests that do harm in some runs only, so it is no more reproducible than one of single runs;
-    // worst runs and marks are what tells them apart.
+    // A front of means holds tests that do harm in some runs only, so it is no more reproducible than one of single
+    // runs; worst runs and marks are what tells them apart.
     let as_many_runs = held["longer"].runs;
     assert!(held["sure"].runs > as_many_runs && held["doubting"].runs > as_many_runs, "{held:?}");
 }
