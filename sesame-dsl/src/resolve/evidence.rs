@@ -96,9 +96,7 @@ impl<'a> Resolver<'a> {
                     "an integral, which grows between messages",
                     "a metric can, such as `max(integral(power))`, and a requirement on that",
                 ),
-                Some(clock) => {
-                    (clock.means, "how long it must hold is said by `held`, and when it is too old by `stale after`")
-                }
+                Some(clock) => (clock.means, "`held` says how long it must hold, and `stale after` when it is too old"),
             };
             let diagnostic = Diagnostic::new(Code::BAD_MONITOR, span, format!("evidence cannot read {what}"))
                 .label("evidence changes when messages arrive")

@@ -24,6 +24,11 @@ fn uses(sources: &SourceMap, index: &Index, name: &str) -> Vec<(String, u32)> {
     uses.map(|used| (index.full_name(used.within), sources.position(used.span).line)).collect()
 }
 
+/// Who mentions a name, in the order of the text.
+fn who(sources: &SourceMap, index: &Index, name: &str) -> Vec<String> {
+    uses(sources, index, name).into_iter().map(|(who, _)| who).collect()
+}
+
 const BROKEN: &str = "space broken
 system {
   message Zone { /// How deep.
@@ -59,7 +64,7 @@ fn a_file_with_errors_has_its_definitions_and_their_uses() {
 fn the_key_of_a_filter_is_a_field_of_the_elements_or_a_list_beside_theirs() {
     let (sources, index, has_errors) = index(include_str!("../good/lists.sesame"));
     assert!(!has_errors);
-    let of = |name: &str| uses(&sources, &index, name).into_iter().map(|(name, _)| name).collect::<Vec<_>>();
+    let of = |name: &str| who(&sources, &index, name);
     assert_eq!(of("Joints.name"), ["elbow", "turning", "bent", "names", "names", "names", "names"]);
     assert_eq!(of("Joints.position"), ["elbow", "turning", "widest", "bent"]);
     assert_eq!(of("Transform.child"), ["apart", "apart", "moved"]);
@@ -172,7 +177,7 @@ fn what_is_said_of_a_monitor_elsewhere_mentions_it_and_its_parts() {
     let text = include_str!("../good/monitors.sesame");
     let (sources, index, has_errors) = index(text);
     assert!(!has_errors);
-    let who = |name: &str| uses(&sources, &index, name).into_iter().map(|(who, _)| who).collect::<Vec<_>>();
+    let who = |name: &str| who(&sources, &index, name);
     let campaign = "missed_hazards_of_the_certificate";
     assert_eq!(
         who("transport.brakes_ok"),
@@ -191,7 +196,7 @@ fn what_is_said_of_a_monitor_elsewhere_mentions_it_and_its_parts() {
 fn a_formula_mentions_the_parameter_of_the_space_that_it_reads() {
     let (sources, index, has_errors) = index(include_str!("../good/scenes.sesame"));
     assert!(!has_errors);
-    let of = |name: &str| uses(&sources, &index, name).into_iter().map(|(name, _)| name).collect::<Vec<_>>();
+    let of = |name: &str| who(&sources, &index, name);
     assert_eq!(of("start_y"), ["moved", "stays", "scenes"]);
     assert_eq!(of("load"), ["burdened", "heavy", "scenes"]);
 }

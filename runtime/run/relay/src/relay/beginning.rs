@@ -20,9 +20,9 @@ pub(super) fn chosen(operations: &[Stage]) -> Arc<Scene> {
 /// The values with which a run begins: those that the test chooses, and the usual values of the others.
 #[derive(Default)]
 pub(super) struct Beginning {
-    /// Of the simulator's parameters, by name.
+    /// The values of the simulator's parameters, by their names.
     pub(super) parameters: Vec<(String, f64)>,
-    /// Of what launched programs have in their arguments, by the names of placeholders.
+    /// The values in the arguments of launched programs, by the names of their placeholders.
     pub(super) arguments: Vec<(String, String)>,
 }
 
