@@ -121,13 +121,7 @@ impl<'a> Resolver<'a> {
             }
             return None;
         };
-        let value = self.value(end, Some(&Unit::seconds()), "the end of a test")?;
-        if value > 0.0 {
-            return Some(value);
-        }
-        let title = "`end after` must be greater than 0s";
-        self.report(Diagnostic::new(Code::OUT_OF_RANGE, end.span, title).label("expected more than 0s"));
-        None
+        self.above_zero(end, &Unit::seconds(), "the end of a test", "`end after` must be greater than 0s")
     }
 
     fn objectives(&mut self, campaign: &'a ast::Campaign) -> Option<Vec<usize>> {

@@ -30,13 +30,8 @@ impl<'a> Resolver<'a> {
     }
 
     fn length(&mut self, quantity: &ast::Quantity) -> Option<f64> {
-        let seconds = self.value(quantity, Some(&Unit::seconds()), "the duration of an activation")?;
-        if seconds > 0.0 {
-            return Some(seconds);
-        }
         let title = "an activation must last longer than 0s";
-        self.report(Diagnostic::new(Code::OUT_OF_RANGE, quantity.span, title).label("expected more than 0s"));
-        None
+        self.above_zero(quantity, &Unit::seconds(), "the duration of an activation", title)
     }
 
     fn times_activated(&mut self, times: ast::Count) -> Option<u32> {

@@ -184,14 +184,8 @@ impl<'a> Resolver<'a> {
 
     /// A quantity greater than zero.
     pub(super) fn positive(&mut self, quantity: &ast::Quantity, unit: &Unit, what: &str) -> Option<f64> {
-        let value = self.value(quantity, Some(unit), what)?;
-        if value > 0.0 {
-            return Some(value);
-        }
         let title = format!("`{}` is out of range for {what}", self.text(quantity.span));
-        let label = format!("expected more than 0{}", unit.text());
-        self.report(Diagnostic::new(Code::OUT_OF_RANGE, quantity.span, title).label(label));
-        None
+        self.above_zero(quantity, unit, what, &title)
     }
 
     /// `said_by`: the field that says the state of the monitor, so that its guarantees need nothing else.

@@ -247,20 +247,16 @@ impl<'a> Resolver<'a> {
     }
 
     fn every(&mut self, word: Span, every: &ast::Quantity, aggregate: &Aggregate) -> Option<f64> {
-        let seconds = self.value(every, Some(&Unit::seconds()), "`every`")?;
         let name = match aggregate {
             Aggregate::Min { .. } => "min",
             Aggregate::Max { .. } => "max",
             Aggregate::Duration { .. } => "duration",
             Aggregate::Last { .. } | Aggregate::Mean { .. } | Aggregate::Count { .. } => {
-                if seconds <= 0.0 {
-                    let title = "the interval of `every` must be greater than 0s";
-                    self.report(Diagnostic::new(Code::OUT_OF_RANGE, every.span, title).label("expected more than 0s"));
-                    return None;
-                }
-                return Some(seconds);
+                let title = "the interval of `every` must be greater than 0s";
+                return self.above_zero(every, &Unit::seconds(), "`every`", title);
             }
         };
+        self.value(every, Some(&Unit::seconds()), "`every`")?;
         let diagnostic =
             Diagnostic::new(Code::IDLE_CLAUSE, word.to(every.span), format!("`every` has no effect on `{name}(…)`"))
                 .label("remove this")

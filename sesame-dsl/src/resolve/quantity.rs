@@ -209,12 +209,29 @@ impl Resolver<'_> {
         exact.unwrap_or_else(|| convert(percentage, Some(&percent()), None))
     }
 
+    /// A quantity that must be greater than 0, as a number in a unit; `title` says so. A number that is not greater is
+    /// out of range whatever unit it lacks.
+    pub(super) fn above_zero(&mut self, quantity: &Quantity, unit: &Unit, what: &str, title: &str) -> Option<f64> {
+        let value = if is_bare_and_not_positive(quantity) { 0.0 } else { self.value(quantity, Some(unit), what)? };
+        if value > 0.0 {
+            return Some(value);
+        }
+        let label = format!("expected more than 0{}", unit.text());
+        self.report(Diagnostic::new(Code::OUT_OF_RANGE, quantity.span, title).label(label));
+        None
+    }
+
     /// A range of times that are not negative, in seconds.
     pub(super) fn times(&mut self, range: &ast::Range, what: &str) -> Option<Range> {
         let found = self.range(range, Some(&Unit::seconds()), what)?;
         let all = Range { low: 0.0, high: f64::INFINITY };
         self.inside(found, range.span, all, what, "0s or more", None).then_some(found)
     }
+}
+
+/// Whether a number has no unit, and none that makes it greater than 0.
+pub(super) fn is_bare_and_not_positive(quantity: &Quantity) -> bool {
+    quantity.unit.is_none() && quantity.value <= 0.0
 }
 
 /// Whether both ends of a range are times.

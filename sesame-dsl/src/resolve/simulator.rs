@@ -3,6 +3,7 @@
 use sesame_plan::SimulatorKind;
 
 use super::Resolver;
+use super::quantity::is_bare_and_not_positive;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::model::{Simulator, Transport};
 use crate::syntax::ast::{self, Name};
@@ -108,9 +109,13 @@ impl<'a> Resolver<'a> {
     pub(super) fn step(&mut self, step: &ast::Quantity) -> Option<u64> {
         let nanoseconds = Unit::parse("ns").expect("`ns` is in the table");
         let seconds = Unit::seconds();
-        self.value(step, Some(&seconds), "a step size")?;
-        let unit = step.unit.as_ref().and_then(|unit| Unit::parse(&unit.text).ok())?;
-        let value = unit.convert(step.value, &nanoseconds);
+        let value = if is_bare_and_not_positive(step) {
+            0.0
+        } else {
+            self.value(step, Some(&seconds), "a step size")?;
+            let unit = step.unit.as_ref().and_then(|unit| Unit::parse(&unit.text).ok())?;
+            unit.convert(step.value, &nanoseconds)
+        };
         // A whole number of nanoseconds in decimals may differ from it by a rounding error.
         let rounded = value.round();
         if (1.0..=3.6e12).contains(&rounded) && (value - rounded).abs() <= rounded * 1e-12 {

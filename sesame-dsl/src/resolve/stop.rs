@@ -70,12 +70,8 @@ impl<'a> Resolver<'a> {
     }
 
     fn wall_time(&mut self, quantity: &ast::Quantity) -> Option<StopRule> {
-        let seconds = self.value(quantity, Some(&Unit::seconds()), "the time limit of a search")?;
-        if seconds > 0.0 {
-            return Some(StopRule::WallTime { seconds });
-        }
         let title = "the time limit of a search must be greater than 0s";
-        self.report(Diagnostic::new(Code::OUT_OF_RANGE, quantity.span, title).label("expected more than 0s"));
-        None
+        let seconds = self.above_zero(quantity, &Unit::seconds(), "the time limit of a search", title)?;
+        Some(StopRule::WallTime { seconds })
     }
 }
