@@ -1,5 +1,6 @@
 //! Conditions: those of tests, and the building blocks of those that a campaign grows.
 
+use super::quantity::is_bare_and_not_positive;
 use super::words::list;
 use super::{Kind, Resolver};
 use crate::clocks::clock_of;
@@ -512,9 +513,11 @@ impl<'a> Resolver<'a> {
     }
 
     fn lengths(&mut self, range: &ast::Range) -> Option<Range> {
-        let found = self.times(range, "the duration of an activation")?;
-        if found.low > 0.0 {
-            return Some(found);
+        if !is_bare_and_not_positive(&range.low) {
+            let found = self.times(range, "the duration of an activation")?;
+            if found.low > 0.0 {
+                return Some(found);
+            }
         }
         let title = "an activation must last longer than 0s";
         self.report(Diagnostic::new(Code::OUT_OF_RANGE, range.low.span, title).label("expected more than 0s"));
