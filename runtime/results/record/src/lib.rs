@@ -32,6 +32,7 @@ mod lab_runs;
 mod left_out_operations;
 mod listed_messages;
 mod lost_requirements;
+mod machines;
 mod monitors;
 mod original_extents;
 mod plan;
@@ -58,6 +59,7 @@ mod standing;
 #[cfg(test)]
 mod tests;
 mod traffic;
+mod where_tests_ran;
 mod write_tests;
 
 use serde::Serialize;

@@ -15,8 +15,8 @@ use sesame_plan::CampaignPlan;
 
 use crate::schema::{DDL, ROBUSTNESS, TRAFFIC, TRAFFIC_SINCE, has_robustness, wide_views};
 use crate::{
-    RecordError, altered_messages, course, lab_runs, left_out_operations, listed_messages, lost_requirements, monitors,
-    original_extents, relay_latencies, series_views, split_operations,
+    RecordError, altered_messages, course, lab_runs, left_out_operations, listed_messages, lost_requirements, machines,
+    monitors, original_extents, relay_latencies, series_views, split_operations,
 };
 
 /// The objects of a schema by name: the kind of each, and the words of the statement that creates it.
@@ -76,6 +76,7 @@ pub(super) fn tables(connection: &Connection, path: &Path, schema: i64) -> Resul
         (relay_latencies::TABLE, relay_latencies::DDL),
         (listed_messages::TABLE, listed_messages::DDL),
         (lost_requirements::TABLE, lost_requirements::DDL),
+        (machines::TABLE, machines::DDL),
         (course::STATES, course::STATES_DDL),
     ];
     let of_monitors = monitors::OBJECTS.map(|name| (name, monitors::DDL));
