@@ -7,6 +7,10 @@
 //! `run` is the campaign, step by step; `evaluator` hands its tests to an `executor` and records the results;
 //! `observers` follow the search; `events` tell listeners what happens.
 
+#[cfg(feature = "agents")]
+mod agent;
+#[cfg(feature = "agents")]
+mod agents;
 mod confirmation;
 mod error;
 mod evaluator;
@@ -30,14 +34,18 @@ mod worker;
 mod worker_process;
 mod worker_program;
 
+#[cfg(feature = "agents")]
+pub use agent::{AgentSettings, work};
+#[cfg(feature = "agents")]
+pub use agents::Fleet;
 pub use confirmation::{Confirmations, confirm_recorded};
 pub use error::CampaignError;
 pub use events::{CampaignEvent, Listener, Progress};
-pub use executor::{Executor, ExecutorError, Job, JobResult, TraceRequest};
+pub use executor::{Executor, ExecutorError, Job, JobResult, Machines, TraceRequest};
 pub use link::Address;
-pub use pool::{Pool, PoolSettings};
+pub use pool::{Pool, PoolSettings, Retries};
 pub use reference::Ineffective;
-pub use run::{CampaignEnd, run_campaign};
+pub use run::{CampaignEnd, Place, run_campaign};
 pub use settings::{Settings, default_timeout};
 pub use single::{SingleSettings, run_single};
 pub use worker::serve;

@@ -3,6 +3,8 @@
 //! Results go to standard output, progress and problems to standard error. Exit codes: 0 done, 1 failed, 2 wrong usage,
 //! 3 done, but something is not as required where that was asked for, 130 stopped by the user.
 
+#[cfg(feature = "agents")]
+mod agent;
 mod caller;
 mod commands;
 #[cfg(all(feature = "process", feature = "mcap"))]
@@ -12,6 +14,10 @@ mod execution;
 mod explore;
 mod export;
 mod failure;
+#[cfg(feature = "agents")]
+mod fleet;
+#[cfg(feature = "agents")]
+mod forecast;
 mod gate;
 mod known;
 #[cfg(feature = "process")]
@@ -39,6 +45,8 @@ mod run_again;
 mod scratch;
 mod session;
 mod shrink;
+#[cfg(feature = "agents")]
+mod slurm;
 mod terminal;
 mod twin;
 mod view;
@@ -62,6 +70,8 @@ use crate::cli::terminal::say;
 use crate::interpreted::Interpreted;
 use crate::runner::Runner;
 
+#[cfg(feature = "agents")]
+pub use self::agent::{AgentArgs, AgentsArgs};
 pub use self::caller::{CALLER, Caller};
 pub use self::commands::{Internal, Running, Showing};
 pub use self::place::RUNNER;
@@ -114,6 +124,17 @@ pub fn interpret(runner: &Interpreted, caller: Caller, arguments: &[OsString]) -
     )
 }
 
+/// The command line of a runner that was compiled to this program, for tests that agents run: this process supervises
+/// them.
+#[cfg(feature = "agents")]
+pub fn supervise(program: &Path, runner: &Interpreted, caller: Caller, arguments: &[OsString]) -> ExitCode {
+    let session = WorkerProgram::compiled_at(program, runner)
+        .map_err(Failure::from)
+        .and_then(|program| Session::new(runner.runner(), program, caller));
+    let name = std::iter::once(OsString::from("runner"));
+    concluded(session.and_then(|session| dispatch(&session, name.chain(arguments.iter().cloned()))))
+}
+
 /// Carries out a command of a runner that is interpreted.
 #[cfg(feature = "process")]
 pub fn carry_out(command: &Running, runner: &Interpreted, caller: Caller) -> ExitCode {
@@ -139,6 +160,18 @@ pub fn serve(command: &Internal) -> ExitCode {
 #[cfg(feature = "process")]
 fn interpreted(runner: &Interpreted, caller: Caller) -> Result<Session, Failure> {
     Session::new(runner.runner(), WorkerProgram::interpreted(runner)?, caller)
+}
+
+/// Carries out `sesamec agent`.
+#[cfg(feature = "agents")]
+pub fn agent(args: &AgentArgs) -> ExitCode {
+    concluded(agent::agent(args))
+}
+
+/// Carries out `sesamec agents`.
+#[cfg(feature = "agents")]
+pub fn agents(args: &AgentsArgs) -> ExitCode {
+    concluded(agent::agents(args))
 }
 
 fn concluded(result: Result<ExitCode, Failure>) -> ExitCode {

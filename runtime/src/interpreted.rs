@@ -71,14 +71,25 @@ impl Interpreted {
 
     /// The runner that the runtime takes.
     pub(crate) fn runner(&self) -> Runner {
+        self.with_code_of(&Runner {
+            plan: "".into(),
+            directory: PathBuf::new(),
+            space: PathBuf::new(),
+            hooks: &[],
+            operations: &[],
+            connect: Connect::new(connect, PathBuf::new()),
+        })
+    }
+
+    /// A compiled runner with this plan and these folders in place of its own.
+    pub(crate) fn with_code_of(&self, compiled: &Runner) -> Runner {
         let Interpreted { plan, directory, space, simulator } = self;
         Runner {
             plan: plan.clone().into(),
             directory: directory.clone(),
             space: space.clone(),
-            hooks: &[],
-            operations: &[],
-            connect: Connect::new(connect, directory.join(simulator)),
+            connect: compiled.connect.clone().in_folder(directory.join(simulator)),
+            ..compiled.clone()
         }
     }
 }

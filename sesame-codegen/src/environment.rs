@@ -311,10 +311,15 @@ pub fn runtime_is_chosen(source: &Path, options: &EnvironmentOptions) -> Result<
     Ok(options.runtime.is_some() || settings(&home(source).join(SETTINGS))?.runtime.is_some())
 }
 
-/// The folders of the space and of its simulator, which is a program, for a runner without a crate.
-pub fn program_folders(source: &Path, plan: &RunnerPlan) -> Result<(PathBuf, PathBuf), Error> {
+/// Whether a simulator that is a program is where a runner without a crate would look for it.
+pub fn check_program(source: &Path, plan: &RunnerPlan) -> Result<(), Error> {
     let space = settled(home(source))?;
-    simulator_dependency(&space, &space, plan, &BTreeMap::new())?;
+    simulator_dependency(&space, &space, plan, &BTreeMap::new()).map(drop)
+}
+
+/// The folders of the space and of its simulator.
+pub fn folders(source: &Path, plan: &RunnerPlan) -> Result<(PathBuf, PathBuf), Error> {
+    let space = settled(home(source))?;
     let simulator = space.join(plan.system_folder());
     Ok((space, simulator))
 }

@@ -111,6 +111,10 @@ enum Command {
         /// Generate and build the runner even if the campaign needs no Rust code of yours.
         #[arg(long)]
         build: bool,
+        /// Run the tests by agents that take them from this queue: the URL of a broker of NATS, or a folder that all
+        /// machines share. `sesamec agent URL` starts an agent.
+        #[arg(long, value_name = "URL")]
+        on: Option<String>,
         /// Arguments for the runner.
         #[arg(last = true, value_name = "RUNNER ARGUMENTS")]
         arguments: Vec<std::ffi::OsString>,
@@ -121,6 +125,10 @@ enum Command {
     Showing(Showing),
     #[command(flatten)]
     Internal(Internal),
+    /// Run tests of campaigns that other machines announce in a queue, until Ctrl-C.
+    Agent(sesame_runtime::cli::AgentArgs),
+    /// List the agents and campaigns of a queue.
+    Agents(sesame_runtime::cli::AgentsArgs),
     /// Analyse the results of campaigns: what ran, fronts, points in the reduced parameter space, coverage.
     #[command(subcommand)]
     Results(results::Results),
@@ -220,10 +228,15 @@ pub fn run(
                 None => commands::generate(shell, language, &generation, &options, purpose),
             }
         }
-        Command::Run { generation, build, arguments } => runner::run(shell, language, &generation, build, &arguments),
+        Command::Run { generation, build, on, mut arguments } => {
+            arguments.extend(on.into_iter().flat_map(|on| ["--on".into(), on.into()]));
+            runner::run(shell, language, &generation, build, &arguments)
+        }
         Command::Running(command) => runner::running(shell, language, &command, of_campaign),
         Command::Showing(command) => runner::showing(shell, language, &command, of_campaign.1),
         Command::Internal(command) => Ok(sesame_runtime::cli::serve(&command)),
+        Command::Agent(asked) => Ok(sesame_runtime::cli::agent(&asked)),
+        Command::Agents(asked) => Ok(sesame_runtime::cli::agents(&asked)),
         Command::Results(asked) => results::results(shell, asked),
         Command::Select(asked) => select::selected(shell, &asked),
         Command::Gap(asked) => gap::compared(shell, &asked),

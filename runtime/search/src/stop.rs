@@ -62,6 +62,11 @@ pub struct StopRules {
 }
 
 impl StopRules {
+    /// Whether there is a rule.
+    pub fn are_any(&self) -> bool {
+        !self.rules.is_empty()
+    }
+
     /// The rules of a plan's campaign, before its first generation.
     pub fn from_plan(plan: &CampaignPlan) -> StopRules {
         // A plan whose cells do not form a grid was refused before.

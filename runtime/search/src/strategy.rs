@@ -13,15 +13,21 @@ use crate::sspr::Point;
 /// How tests are found, by ask and tell.
 ///
 /// The caller alternates: it asks for a generation, evaluates all of it in any order, and tells the results in the
-/// order asked. The number of tests of all generations together is exactly
+/// order asked. Of a strategy that [does not depend on results](Strategy::asks_ahead) it may ask for further
+/// generations before that. The number of tests of all generations together is exactly
 /// [`Task::evaluations`](sesame_plan::Task::evaluations), or less if the strategy runs out of tests; then
 /// [`Strategy::ended`] says so.
 pub trait Strategy: Send {
     /// The next generation of tests; empty when the search is over.
     fn ask(&mut self) -> Vec<Candidate>;
 
-    /// Takes the results of exactly the generation asked last, in its order.
+    /// Takes the results of exactly the oldest generation that was asked and not told, in its order.
     fn tell(&mut self, results: &[Evaluated]);
+
+    /// Whether further generations may be asked for before results are told: no test depends on results.
+    fn asks_ahead(&self) -> bool {
+        false
+    }
 
     /// Takes the reference run, before the first generation is asked.
     fn begin(&mut self, _reference: &Observation) {}

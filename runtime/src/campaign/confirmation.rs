@@ -248,8 +248,7 @@ impl Evaluator<'_> {
         }
         each(repeated.runs);
         while !waiting.is_empty() {
-            let JobResult { number: job, observation, notes, added: _, trace_failure: _, killed: _, lock_stepped: _ } =
-                self.next(&mut |_| {})?;
+            let JobResult { number: job, observation, notes, .. } = self.next(&mut |_| {})?;
             let Some((test, position, simulator_seed)) = waiting.remove(&job) else { continue };
             let repetition = Repetition::of(test, position, simulator_seed, &observation);
             self.recorder.put_repetition(&repetition, &observation.warnings)?;

@@ -12,7 +12,7 @@ use sesame_record as record;
 use sesame_record::{Event, EventKind, Origin, RecordError, Recorder, Repetition, TestRecord};
 
 use crate::campaign::error::{CampaignError, Halt};
-use crate::campaign::executor::{Executor, Job, JobResult, TraceRequest};
+use crate::campaign::executor::{Executor, Job, JobResult, Machines, TraceRequest};
 use crate::campaign::numbering::PlannedTest;
 use crate::campaign::silence;
 
@@ -21,6 +21,19 @@ const READ_TOGETHER: u32 = 50;
 
 /// How long an executor is waited for before it is looked whether the user stopped the campaign.
 const WAIT: Duration = Duration::from_millis(100);
+
+/// What happens while tests are run.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Happened<'a> {
+    /// A test has ended and is recorded.
+    Ended(&'a TestRecord),
+    /// No test has ended, and this is what the start of a system waits for; several times a second.
+    Waits(Option<&'a str>),
+    /// This has happened to a machine.
+    Told(&'a str),
+    /// Machines are as busy as this now.
+    Machines(Machines),
+}
 
 /// Runs tests and records them; what is recorded already is read instead.
 pub(super) struct Evaluator<'a> {
@@ -39,6 +52,10 @@ pub(super) struct Evaluator<'a> {
     /// Whether runs list the messages that operations alter, from now on.
     pub(super) lists_altered: bool,
     interrupted: &'a AtomicBool,
+    /// How busy machines were when that was last said.
+    machines: Option<Machines>,
+    /// Tests that were begun before their turn, and have not ended.
+    early: BTreeMap<u32, PlannedTest>,
 }
 
 /// Which traces are kept, and in which folder of results.
@@ -110,6 +127,8 @@ impl<'a> Evaluator<'a> {
             series: false,
             lists_altered: false,
             interrupted,
+            machines: None,
+            early: BTreeMap::new(),
         })
     }
 
@@ -118,21 +137,12 @@ impl<'a> Evaluator<'a> {
         self.reference = Some(reference.clone());
     }
 
-    /// Runs tests and records each as it ends; `each` sees all of them, in the order in which they end.
+    /// Runs tests and records each as it ends; `each` hears of all of them, in the order in which they end, and of what
+    /// happens meanwhile.
     pub(super) fn evaluate(
         &mut self,
         planned: Vec<PlannedTest>,
-        each: &mut dyn FnMut(&TestRecord),
-    ) -> Result<(), Halt> {
-        self.evaluate_awaited(planned, each, &mut |_| {})
-    }
-
-    /// As [`Evaluator::evaluate`]; `awaited` is called several times a second while no test ends.
-    pub(super) fn evaluate_awaited(
-        &mut self,
-        planned: Vec<PlannedTest>,
-        each: &mut dyn FnMut(&TestRecord),
-        awaited: &mut dyn FnMut(Option<&str>),
+        each: &mut dyn FnMut(Happened<'_>),
     ) -> Result<(), Halt> {
         let mut waiting = BTreeMap::new();
         let mut duplicates = Vec::new();
@@ -144,49 +154,90 @@ impl<'a> Evaluator<'a> {
                 if record.test != test.test || record.simulator_seed != test.simulator_seed {
                     return Err(CampaignError::OtherCampaign(test.number).into());
                 }
-                each(&record);
+                each(Happened::Ended(&record));
             } else if let Some(original) = test.duplicate_of {
                 duplicates.push((original, test));
             } else {
-                self.executor.submit(Job {
-                    number: test.number,
-                    test: test.test.clone(),
-                    simulator_seed: test.simulator_seed,
-                    trace: self.traces.as_ref().map(|traces| traces.request(&test)),
-                    compensation: self.compensation(),
-                    withheld: Vec::new(),
-                    lists_altered: self.lists_altered,
-                });
+                if self.early.remove(&test.number).is_none() {
+                    self.submit(&test);
+                }
                 waiting.insert(test.number, test);
             }
         }
         while !waiting.is_empty() {
-            let JobResult { number, observation, notes, added, trace_failure, killed, lock_stepped: _ } =
-                self.next(awaited)?;
-            let Some(test) = waiting.remove(&number) else { continue };
-            if let Some(reason) = trace_failure {
-                return Err(CampaignError::Trace { test: number, reason }.into());
-            }
-            if killed && test.origin == Origin::Reference {
-                // All tests are compared with it: they would be compared with that kill, for good.
-                let reason = observation.outcome.detail().unwrap_or_default();
-                return Err(CampaignError::Killed { test: number, reason }.into());
-            }
-            self.record(&test.observed(observation), each)?;
-            // Only there it is asked for: a campaign has too many tests.
-            if self.recorder.repository().task().undisturbed().is_some() {
-                let wires = added.iter().map(|wire| (wire.path.as_str(), &wire.latencies));
-                self.recorder.put_relay_latencies(number, wires)?;
-            }
-            for text in notes {
-                self.recorder.put_event(&Event { kind: EventKind::Session, test: Some(number), text })?;
+            let result = self.next(each)?;
+            if let Some(test) = self.early.remove(&result.number) {
+                // It is recorded now, so that it is not lost, and told in its turn.
+                let record = self.conclude(test, result)?;
+                self.recorded.insert(record.number);
+            } else if let Some(test) = waiting.remove(&result.number) {
+                let record = self.conclude(test, result)?;
+                each(Happened::Ended(&record));
             }
         }
         for (original, test) in duplicates {
             let observation = self.read(&mut VecDeque::new(), original..=original, test.origin)?.observation;
-            self.record(&test.observed(observation), each)?;
+            let record = test.observed(observation);
+            self.record(&record)?;
+            each(Happened::Ended(&record));
         }
         Ok(())
+    }
+
+    /// Records what came of a test.
+    fn conclude(&mut self, test: PlannedTest, result: JobResult) -> Result<TestRecord, Halt> {
+        let JobResult { number, observation, notes, added, trace_failure, killed, lock_stepped: _, machine } = result;
+        if let Some(reason) = trace_failure {
+            return Err(CampaignError::Trace { test: number, reason }.into());
+        }
+        if killed && test.origin == Origin::Reference {
+            // All tests are compared with it: they would be compared with that kill, for good.
+            let reason = observation.outcome.detail().unwrap_or_default();
+            return Err(CampaignError::Killed { test: number, reason }.into());
+        }
+        let record = test.observed(observation);
+        self.record(&record)?;
+        // Only there it is asked for: a campaign has too many tests.
+        if self.recorder.repository().task().undisturbed().is_some() {
+            let wires = added.iter().map(|wire| (wire.path.as_str(), &wire.latencies));
+            self.recorder.put_relay_latencies(number, wires)?;
+        }
+        if let Some(machine) = machine {
+            self.recorder.put_machine(number, &machine)?;
+        }
+        for text in notes {
+            self.recorder.put_event(&Event { kind: EventKind::Session, test: Some(number), text })?;
+        }
+        Ok(record)
+    }
+
+    fn submit(&mut self, test: &PlannedTest) {
+        self.executor.submit(Job {
+            number: test.number,
+            test: test.test.clone(),
+            simulator_seed: test.simulator_seed,
+            trace: self.traces.as_ref().map(|traces| traces.request(test)),
+            compensation: self.compensation(),
+            withheld: Vec::new(),
+            lists_altered: self.lists_altered,
+        });
+    }
+
+    /// Begins with tests of which [`evaluate`](Evaluator::evaluate) will be asked later, so that no worker has to wait
+    /// for the last test of a generation.
+    pub(super) fn begin_early(&mut self, planned: &[PlannedTest]) {
+        for test in planned {
+            let is_begun = self.recorded.contains(&test.number) || self.early.contains_key(&test.number);
+            if !is_begun && test.duplicate_of.is_none() {
+                self.submit(test);
+                self.early.insert(test.number, test.clone());
+            }
+        }
+    }
+
+    /// How many tests from this number on were begun before their turn, and have not ended.
+    pub(super) fn under_way_from(&self, number: u32) -> usize {
+        self.early.range(number..).count()
     }
 
     /// How many tests were recorded when the campaign was resumed, without reference runs.
@@ -194,20 +245,32 @@ impl<'a> Evaluator<'a> {
         Ok(u32::try_from(self.recorder.repository().evaluated()?).unwrap_or(u32::MAX))
     }
 
-    /// Waits for the next result of the executor; `awaited` is called several times a second meanwhile, with what
-    /// the start of a system waits for.
-    pub(super) fn next(&mut self, awaited: &mut dyn FnMut(Option<&str>)) -> Result<JobResult, Halt> {
+    /// Waits for the next result of the executor; `meanwhile` is called several times a second until it is there, and
+    /// for all that happens to machines.
+    pub(super) fn next(&mut self, meanwhile: &mut dyn FnMut(Happened<'_>)) -> Result<JobResult, Halt> {
         loop {
             if self.interrupted.load(Ordering::Relaxed) {
                 return Err(Halt::Stopped);
             }
-            if let Some(mut result) = self.executor.next(WAIT)? {
+            let next = self.executor.next(WAIT)?;
+            for text in self.executor.news() {
+                meanwhile(Happened::Told(&text));
+                self.recorder.put_event(&Event { kind: EventKind::Session, test: None, text })?;
+            }
+            let machines = self.executor.machines();
+            if machines != self.machines {
+                self.machines = machines;
+                if let Some(machines) = machines {
+                    meanwhile(Happened::Machines(machines));
+                }
+            }
+            if let Some(mut result) = next {
                 if let Some(reference) = &self.reference {
                     silence::judge(self.plan, reference, &mut result.observation);
                 }
                 return Ok(result);
             }
-            awaited(self.executor.waits().as_deref());
+            meanwhile(Happened::Waits(self.executor.waits().as_deref()));
         }
     }
 
@@ -240,12 +303,11 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    fn record(&mut self, record: &TestRecord, each: &mut dyn FnMut(&TestRecord)) -> Result<(), RecordError> {
+    fn record(&mut self, record: &TestRecord) -> Result<(), RecordError> {
         self.recorder.commit(record)?;
         for warning in &record.observation.warnings {
             self.warn(Some(record.number), warning.clone())?;
         }
-        each(record);
         Ok(())
     }
 }

@@ -6,6 +6,8 @@ use sesame_optimise::front::Front;
 use sesame_record::TestRecord;
 use sesame_search::coverage::Coverage;
 
+use crate::campaign::executor::Machines;
+
 /// Something that happened in a campaign.
 #[derive(Debug, Clone, Copy)]
 #[non_exhaustive]
@@ -19,6 +21,19 @@ pub enum CampaignEvent<'a> {
         /// What the start of the system waits for, if that takes long.
         missing: Option<&'a str>,
     },
+    /// The first reference run has not ended yet, and agents run it; told several times a second.
+    AgentsAwaited {
+        /// What is waited for, if that is more than the run.
+        missing: Option<&'a str>,
+    },
+    /// Something has happened to a machine whose agents run tests, or the campaign waits for agents. It is recorded
+    /// too.
+    Told {
+        /// What, in a sentence.
+        text: &'a str,
+    },
+    /// The machines whose agents run tests are as busy as this now.
+    Machines(Machines),
     /// The first reference run has shown something that a user should know before the search. It is recorded too.
     Warned {
         /// What, in a sentence.

@@ -20,16 +20,43 @@ pub trait Executor {
     /// The next test that has ended; `None` if none ends within `wait`.
     fn next(&mut self, wait: Duration) -> Result<Option<JobResult>, ExecutorError>;
 
-    /// Changes the wall time after which a test is stopped, for tests that have not begun yet.
-    fn set_timeout(&mut self, timeout: Duration);
+    /// Changes the wall time after which a test is stopped, for tests that have not begun yet. A machine on which a run
+    /// like the reference run takes longer than `reference` may give its tests more time.
+    fn set_timeout(&mut self, timeout: Duration, reference: Duration);
 
     /// Whether the simulators are stepped, so that equal tests give equal results.
     fn lock_stepped(&self) -> bool;
+
+    /// How many tests run at the same time, as far as is known now; at least one.
+    fn at_once(&self) -> usize;
 
     /// What the start of a system waits for, if it takes long, in a sentence.
     fn waits(&self) -> Option<String> {
         None
     }
+
+    /// The machines on which tests run; `None` if that is this one.
+    fn machines(&self) -> Option<Machines> {
+        None
+    }
+
+    /// What has happened to machines since this was last asked, in sentences.
+    fn news(&mut self) -> Vec<String> {
+        Vec::new()
+    }
+}
+
+/// How busy machines are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Machines {
+    /// How many there are.
+    pub machines: usize,
+    /// How many tests they run at once.
+    pub workers: usize,
+    /// How many they run now.
+    pub busy: usize,
+    /// How many tests wait for a machine.
+    pub waiting: usize,
 }
 
 /// A test to be run.
@@ -63,7 +90,7 @@ pub struct TraceRequest {
 }
 
 /// A test that has ended.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct JobResult {
     /// The job's number.
     pub number: u32,
@@ -81,14 +108,26 @@ pub struct JobResult {
     pub killed: bool,
     /// Whether the simulator is stepped, so that running the test again gives the same result.
     pub lock_stepped: bool,
+    /// The machine on which it ran, if that was not this one.
+    #[serde(default)]
+    pub machine: Option<String>,
 }
 
 /// Why tests cannot be run.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot start worker {worker}: {reason}")]
-pub struct ExecutorError {
-    /// Which worker, from 1.
-    pub worker: usize,
-    /// Why.
-    pub reason: String,
+pub enum ExecutorError {
+    /// A worker of this machine cannot be started.
+    #[error("cannot start worker {worker}: {reason}")]
+    Worker {
+        /// Which worker, from 1.
+        worker: usize,
+        /// Why.
+        reason: String,
+    },
+    /// Agents cannot be reached, or none can run tests.
+    #[error("agents cannot run the tests: {reason}")]
+    Agents {
+        /// Why.
+        reason: String,
+    },
 }

@@ -10,7 +10,7 @@ use sesame_search::Candidate;
 use sesame_search::test_key::SeenTests;
 
 /// A test that has its number and is to be run.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct PlannedTest {
     pub(super) number: u32,
     pub(super) origin: Origin,

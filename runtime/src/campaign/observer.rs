@@ -45,6 +45,11 @@ pub(super) trait Observer {
         recorder: &mut Recorder,
     ) -> Result<ControlFlow<String>, RecordError>;
 
+    /// Whether it may ever end the search.
+    fn may_end(&self) -> bool {
+        false
+    }
+
     /// What is to be said before the search begins.
     fn warning(&self) -> Option<String> {
         None

@@ -29,21 +29,40 @@ const START_LIMIT: Duration = Duration::from_secs(30);
 /// How long a worker that broke off the conversation may take to end.
 const DEATH_LIMIT: Duration = Duration::from_secs(2);
 
-/// How often a test is run again that the environment broke off: a failed launch, a lost connection, a clock that went
-/// back say nothing about the system.
-const RETRIES: usize = 2;
+/// Where a test is run again that the environment broke off: a failed launch, a lost connection, a clock that went back
+/// say nothing about the system.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Retries {
+    /// Here, twice at most.
+    Here,
+    /// Whoever asked for the test has it run elsewhere.
+    Elsewhere,
+}
+
+impl Retries {
+    fn here(self) -> usize {
+        match self {
+            Retries::Here => 2,
+            Retries::Elsewhere => 0,
+        }
+    }
+}
 
 /// How a pool runs its workers.
 #[derive(Debug, Clone)]
 pub struct PoolSettings {
     /// How many workers; at least one.
     pub workers: usize,
+    /// The number of the first one, from 1: others of this machine may have the numbers before.
+    pub first: usize,
     /// What is started as each worker: the runner itself.
     pub program: WorkerProgram,
     /// Folder in which each worker gets a folder of its own.
     pub directory: PathBuf,
     /// Wall time after which a test is stopped and its worker replaced.
     pub timeout: Duration,
+    /// Where tests are run again that the environment broke off.
+    pub retries: Retries,
 }
 
 /// Worker processes and the threads that talk to them.
@@ -70,7 +89,7 @@ impl Pool {
         // Dropped if a worker cannot be started, which ends those that were.
         let waits = Arc::default();
         let mut pool = Pool { jobs: Some(jobs), results, slots: Vec::new(), stop, timeout, lock_stepped: true, waits };
-        for number in 1..=settings.workers.max(1) {
+        for number in (settings.first..).take(settings.workers.max(1)) {
             let (stop, timeout) = (Arc::clone(&pool.stop), Arc::clone(&pool.timeout));
             let waits = Arc::clone(&pool.waits);
             let mut slot = WorkerSlot { number, settings: settings.clone(), worker: None, stop, timeout, waits };
@@ -94,12 +113,16 @@ impl Executor for Pool {
         self.results.recv_timeout(wait).map_or(Ok(None), |result| result.map(Some))
     }
 
-    fn set_timeout(&mut self, timeout: Duration) {
+    fn set_timeout(&mut self, timeout: Duration, _reference: Duration) {
         self.timeout.store(millis(timeout), Ordering::Relaxed);
     }
 
     fn lock_stepped(&self) -> bool {
         self.lock_stepped
+    }
+
+    fn at_once(&self) -> usize {
+        self.slots.len()
     }
 
     fn waits(&self) -> Option<String> {
@@ -152,14 +175,14 @@ impl WorkerSlot {
             Err(NotStarted { killed: true, .. }) if !self.stop.load(Ordering::Relaxed) => Worker::start(self),
             started => started,
         }
-        .map_err(|NotStarted { reason, .. }| ExecutorError { worker: self.number, reason })
+        .map_err(|NotStarted { reason, .. }| ExecutorError::Worker { worker: self.number, reason })
     }
 
-    /// Runs a test. If the environment breaks it off, the test is run again, [`RETRIES`] times at most; what happened
-    /// then is its outcome.
+    /// Runs a test. If the environment breaks it off, the test is run again, as often as [`Retries`] says; what
+    /// happened then is its outcome.
     fn run(&mut self, job: &Job) -> Result<JobResult, ExecutorError> {
         let mut notes = Vec::new();
-        for _ in 0..RETRIES {
+        for _ in 0..self.settings.retries.here() {
             let mut ended = self.run_unless_killed(job)?;
             notes.append(&mut ended.notes);
             let outcome = &ended.observation.outcome;
@@ -238,7 +261,10 @@ impl WorkerSlot {
             }
         };
         let number = job.number;
-        Ok((JobResult { number, observation, notes, added, trace_failure, killed: false, lock_stepped }, killed))
+        Ok((
+            JobResult { number, observation, notes, added, trace_failure, killed: false, lock_stepped, machine: None },
+            killed,
+        ))
     }
 
     /// Saves what a dead worker wrote of a trace that was asked for; why not, otherwise.

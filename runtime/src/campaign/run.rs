@@ -1,7 +1,7 @@
 //! A campaign from its first reference run to its last: ask the search for tests, run them, record them, tell the
 //! search.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, VecDeque};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
@@ -15,9 +15,11 @@ use sesame_record::{Recorder, Repository, ResultSet, Status};
 use sesame_search as search;
 use sesame_search::{Evaluated, Neighbours, Strategy};
 
+#[cfg(feature = "agents")]
+use crate::campaign::agents::{Agents, Fleet};
 use crate::campaign::confirmation::ConfirmedSearch;
 use crate::campaign::error::{CampaignError, Halt};
-use crate::campaign::evaluator::Evaluator;
+use crate::campaign::evaluator::{Evaluator, Happened};
 use crate::campaign::events::{CampaignEvent, Listener, Progress};
 use crate::campaign::executor::Executor;
 use crate::campaign::numbering::{Numbering, PlannedTest};
@@ -40,12 +42,24 @@ pub enum CampaignEnd {
     Interrupted,
 }
 
+/// Where the tests of a campaign run.
+#[derive(Default)]
+pub enum Place {
+    /// In worker processes of this machine.
+    #[default]
+    Here,
+    /// On machines with agents.
+    #[cfg(feature = "agents")]
+    Fleet(Box<Fleet>),
+}
+
 /// Runs the task of a recorder, with the plan of that task, in worker processes and records it; what the recorder
 /// already holds is not simulated again. Each worker gets a folder of its own in `directory`.
 pub fn run_campaign(
     plan: &CampaignPlan,
     recorder: Recorder,
     settings: &Settings,
+    place: Place,
     directory: &Path,
     interrupted: &AtomicBool,
     listener: &mut Listener<'_>,
@@ -53,8 +67,13 @@ pub fn run_campaign(
     // Before any process is started, so that a plan without a search is refused at once.
     let task = recorder.repository().task().clone();
     let strategy = search::strategy_of_task(plan, &task, settings.seed)?;
-    let mut pool = Pool::start(&settings.pool(task.evaluations(plan), directory, settings.first_timeout()))?;
-    run_with(plan, strategy, recorder, settings, &mut pool, interrupted, listener)
+    let timeout = settings.first_timeout();
+    let mut executor: Box<dyn Executor> = match place {
+        Place::Here => Box::new(Pool::start(&settings.pool(task.evaluations(plan), directory, timeout))?),
+        #[cfg(feature = "agents")]
+        Place::Fleet(fleet) => Box::new(Agents::start(*fleet, timeout)?),
+    };
+    run_with(plan, strategy, recorder, settings, &mut *executor, interrupted, listener)
 }
 
 /// Runs a campaign by any executor.
@@ -101,6 +120,8 @@ struct Campaign<'a, 'l> {
     confirmed: Option<ConfirmedSearch>,
     neighbours: Option<Neighbours>,
     front: Front,
+    /// Generations that were asked for before their turn, and begun.
+    ahead: VecDeque<(u32, Vec<PlannedTest>)>,
     /// Tests evaluated.
     done: u32,
     /// How many of them were recorded before this session.
@@ -125,9 +146,20 @@ impl<'a, 'l> Campaign<'a, 'l> {
         let front = Front::default();
         let (total, earlier) = (task.evaluations(plan), evaluator.earlier()?);
         let begun = Progress { done: 0, total, earlier, confirmation_runs: 0, front: &front, coverage: None };
+        let by_agents = evaluator.executor.machines().is_some();
         let (started, limit) = (Instant::now(), settings.first_timeout());
-        let reference = reference_run(&mut evaluator, &mut numbering, &mut |missing| {
-            listener(CampaignEvent::ReferenceRunAwaited { waited: started.elapsed(), limit, missing }, begun);
+        let reference = reference_run(&mut evaluator, &mut numbering, &mut |happened| {
+            let event = match happened {
+                // How long agents take is theirs to say: while none is there, nothing is stopped.
+                Happened::Waits(missing) if by_agents => CampaignEvent::AgentsAwaited { missing },
+                Happened::Waits(missing) => {
+                    CampaignEvent::ReferenceRunAwaited { waited: started.elapsed(), limit, missing }
+                }
+                Happened::Told(text) => CampaignEvent::Told { text },
+                Happened::Machines(machines) => CampaignEvent::Machines(machines),
+                Happened::Ended(_) => return,
+            };
+            listener(event, begun);
         })?;
         match &reference.outcome {
             outcome @ Outcome::Timeout { .. } => {
@@ -165,9 +197,9 @@ impl<'a, 'l> Campaign<'a, 'l> {
             evaluator.warn(test, text)?;
         }
         let timeout = settings.timeout.unwrap_or_else(|| default_timeout(reference.wall.run));
-        evaluator.executor.set_timeout(timeout);
-        strategy.begin(&reference);
         let took = Duration::from_secs_f64(reference.wall.run);
+        evaluator.executor.set_timeout(timeout, took);
+        strategy.begin(&reference);
         let mut campaign = Campaign {
             plan,
             evaluator,
@@ -178,6 +210,7 @@ impl<'a, 'l> Campaign<'a, 'l> {
             confirmed: plan.campaign.confirm.map(|confirmation| ConfirmedSearch::new(confirmation, settings.seed)),
             neighbours: Neighbours::from_plan(plan),
             front,
+            ahead: VecDeque::new(),
             done: 0,
             earlier,
             total,
@@ -189,7 +222,7 @@ impl<'a, 'l> Campaign<'a, 'l> {
 
     /// Goes on to the end, with the last reference run; returns why the search ended.
     fn finish(mut self) -> Result<String, Halt> {
-        let mut reason = loop {
+        let reason = loop {
             if let ControlFlow::Break(reason) = self.step()? {
                 break reason;
             }
@@ -199,9 +232,6 @@ impl<'a, 'l> Campaign<'a, 'l> {
         }
         for text in self.strategy.given_up() {
             self.evaluator.warn(None, text)?;
-        }
-        if let Some(why) = self.strategy.ended() {
-            reason = why;
         }
         self.tell(CampaignEvent::SearchEnded { reason: &reason });
         // All of its runs are such runs.
@@ -227,12 +257,11 @@ impl<'a, 'l> Campaign<'a, 'l> {
     /// One generation: asked for, run, confirmed, seen by observers, told to the search. `Break` says why there is
     /// no next one.
     fn step(&mut self) -> Result<ControlFlow<String>, Halt> {
-        let candidates = self.strategy.ask();
-        self.evaluator.lists_altered = self.strategy.lists_altered();
-        let Some(number) = candidates.first().map(|candidate| candidate.generation) else {
-            return Ok(ControlFlow::Break("all tests were evaluated".to_owned()));
+        let Some((number, planned)) = self.ahead.pop_front().or_else(|| self.ask()) else {
+            let why = self.strategy.ended();
+            return Ok(ControlFlow::Break(why.unwrap_or_else(|| "all tests were evaluated".to_owned())));
         };
-        let planned = candidates.into_iter().map(|candidate| self.numbering.candidate(candidate)).collect();
+        self.begin_early(&planned);
         let (mut tests, violating) = self.evaluate(planned)?;
         self.confirm(&mut tests, &violating)?;
 
@@ -251,6 +280,34 @@ impl<'a, 'l> Campaign<'a, 'l> {
         Ok(end.map_or(ControlFlow::Continue(()), ControlFlow::Break))
     }
 
+    /// The next generation of the search, with its tests; `None` if the search is over.
+    fn ask(&mut self) -> Option<(u32, Vec<PlannedTest>)> {
+        let candidates = self.strategy.ask();
+        self.evaluator.lists_altered = self.strategy.lists_altered();
+        let generation = candidates.first()?.generation;
+        Some((generation, candidates.into_iter().map(|candidate| self.numbering.candidate(candidate)).collect()))
+    }
+
+    /// Begins with further generations, if their tests do not depend on results, so that no worker waits while the last
+    /// tests of a generation end. What is recorded is the same however many tests are begun early.
+    fn begin_early(&mut self, planned: &[PlannedTest]) {
+        // Fresh runs of a generation would wait for tests of later ones, and what a rule to stop leaves out must not
+        // run.
+        let may_end = self.observers.iter().any(|observer| observer.may_end());
+        if !self.strategy.asks_ahead() || self.confirmed.is_some() || may_end {
+            return;
+        }
+        // Its own tests come first.
+        self.evaluator.begin_early(planned);
+        let wanted = 2 * self.evaluator.executor.at_once();
+        let next = planned.last().map_or(0, |test| test.number + 1);
+        while self.evaluator.under_way_from(next) < wanted {
+            let Some((generation, planned)) = self.ask() else { break };
+            self.evaluator.begin_early(&planned);
+            self.ahead.push_back((generation, planned));
+        }
+    }
+
     /// Runs the tests of a generation. Returns them in the order of their numbers, and the numbers of those that
     /// violate a requirement.
     fn evaluate(&mut self, planned: Vec<PlannedTest>) -> Result<(Vec<Evaluated>, BTreeSet<u32>), Halt> {
@@ -260,7 +317,19 @@ impl<'a, 'l> Campaign<'a, 'l> {
         let mut tests = Vec::with_capacity(planned.len());
         let mut violating = BTreeSet::new();
         let Campaign { evaluator, observers, confirmed, front, done, listener, .. } = self;
-        evaluator.evaluate(planned, &mut |record| {
+        evaluator.evaluate(planned, &mut |happened| {
+            let event = match happened {
+                Happened::Ended(_) => None,
+                Happened::Told(text) => Some(CampaignEvent::Told { text }),
+                Happened::Machines(machines) => Some(CampaignEvent::Machines(machines)),
+                Happened::Waits(_) => return,
+            };
+            if let Some(event) = event {
+                let confirmation_runs = confirmed.as_ref().map_or(0, ConfirmedSearch::runs);
+                let coverage = coverage(observers);
+                return listener(event, Progress { done: *done, total, earlier, confirmation_runs, front, coverage });
+            }
+            let Happened::Ended(record) = happened else { return };
             let fitness = search::fitness(plan, &record.observation);
             let point = counted_point(plan, record);
             *done += 1;
@@ -330,15 +399,21 @@ fn coverage(observers: &[Box<dyn Observer>]) -> Option<&search::coverage::Covera
     observers.iter().find_map(|observer| observer.coverage())
 }
 
-/// Performs a reference run: it is a test without operations. `awaited` is called several times a second until it ends.
+/// Performs a reference run: it is a test without operations. `meanwhile` is called several times a second until it
+/// ends.
 fn reference_run(
     evaluator: &mut Evaluator<'_>,
     numbering: &mut Numbering,
-    awaited: &mut dyn FnMut(Option<&str>),
+    meanwhile: &mut dyn FnMut(Happened<'_>),
 ) -> Result<Observation, Halt> {
     let mut shown = None;
     let planned = vec![numbering.reference_run()];
-    evaluator.evaluate_awaited(planned, &mut |record| shown = Some(record.observation.clone()), awaited)?;
+    evaluator.evaluate(planned, &mut |happened| {
+        if let Happened::Ended(record) = happened {
+            shown = Some(record.observation.clone());
+        }
+        meanwhile(happened);
+    })?;
     Ok(shown.unwrap_or_else(|| unreachable!("each test that is evaluated is shown")))
 }
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::Duration;
 
-use crate::campaign::pool::PoolSettings;
+use crate::campaign::pool::{PoolSettings, Retries};
 use crate::campaign::worker_program::WorkerProgram;
 
 /// A test that takes this many times as long as the reference run is taken to hang.
@@ -46,8 +46,10 @@ impl Settings {
         PoolSettings {
             workers: self.workers.min(usize::try_from(tests).unwrap_or(usize::MAX)).max(1),
             program: self.program.clone(),
+            first: 1,
             directory: directory.to_path_buf(),
             timeout,
+            retries: Retries::Here,
         }
     }
 }

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use crate::campaign::executor::{Executor as _, ExecutorError, Job, JobResult};
-use crate::campaign::pool::{Pool, PoolSettings};
+use crate::campaign::pool::{Pool, PoolSettings, Retries};
 use crate::campaign::worker_program::WorkerProgram;
 
 /// Where and how long one test runs.
@@ -26,7 +26,8 @@ pub fn run_single(
     interrupted: &AtomicBool,
 ) -> Result<Option<JobResult>, ExecutorError> {
     let SingleSettings { program, directory, timeout } = settings.clone();
-    let mut pool = Pool::start(&PoolSettings { workers: 1, program, directory, timeout })?;
+    let mut pool =
+        Pool::start(&PoolSettings { workers: 1, first: 1, program, directory, timeout, retries: Retries::Here })?;
     pool.submit(job);
     while !interrupted.load(Ordering::Relaxed) {
         if let Some(result) = pool.next(Duration::from_millis(100))? {

@@ -1,4 +1,4 @@
-//! The program that a supervisor starts as its worker: its own, which is called again.
+//! The program that a supervisor starts as its worker: its own, which is called again, or a compiled runner.
 
 use std::io::{self, Write as _};
 #[cfg(target_os = "linux")]
@@ -6,12 +6,14 @@ use std::os::unix::process::CommandExt as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The program of this process, as it becomes a worker.
+/// A program as it becomes a worker.
 #[derive(Debug, Clone)]
 pub struct WorkerProgram {
     executable: PathBuf,
-    /// What an interpreted runner's worker has to know, as JSON.
-    interpreted: Option<String>,
+    /// Whether it is the program of this process.
+    own: bool,
+    /// What a worker has to know of the runner, as JSON; `None` if it contains that.
+    runner: Option<String>,
     /// The lab in which it runs tests, instead of the simulator.
     lab: Option<String>,
     /// Whether it may be asked for traces, also if the campaign records none.
@@ -25,7 +27,8 @@ impl WorkerProgram {
     pub fn compiled() -> io::Result<Self> {
         Ok(WorkerProgram {
             executable: std::env::current_exe()?,
-            interpreted: None,
+            own: true,
+            runner: None,
             lab: None,
             records: false,
             relayed: None,
@@ -36,7 +39,29 @@ impl WorkerProgram {
     #[cfg(feature = "process")]
     pub fn interpreted(runner: &crate::interpreted::Interpreted) -> io::Result<Self> {
         let text = serde_json::to_string(runner)?;
-        Ok(WorkerProgram { interpreted: Some(text), ..WorkerProgram::compiled()? })
+        Ok(WorkerProgram { runner: Some(text), ..WorkerProgram::compiled()? })
+    }
+
+    /// A compiled runner, as a program of its own, with this plan and these folders in place of those that it was
+    /// compiled with.
+    #[cfg(feature = "agents")]
+    pub(crate) fn compiled_at(executable: &Path, runner: &crate::interpreted::Interpreted) -> io::Result<Self> {
+        let executable = executable.canonicalize()?;
+        Ok(WorkerProgram { executable, own: false, ..WorkerProgram::interpreted(runner)? })
+    }
+
+    /// The compiled runner that it is, if that is not the program of this process.
+    #[cfg(feature = "agents")]
+    pub(crate) fn of_another_process(&self) -> Option<&Path> {
+        (!self.own).then_some(self.executable.as_path())
+    }
+
+    /// The runner as other machines can run it; `None` if only its program knows it, and for one in a lab or with a
+    /// part of the relay.
+    #[cfg(feature = "agents")]
+    pub(crate) fn sent(&self) -> Option<crate::interpreted::Interpreted> {
+        let text = self.runner.as_ref().filter(|_| self.lab.is_none() && self.relayed.is_none())?;
+        serde_json::from_str(text).ok()
     }
 
     /// The same program as a worker that runs tests in this lab.
@@ -59,9 +84,9 @@ impl WorkerProgram {
 
     /// The command that starts a worker with this folder of its own.
     pub(super) fn command(&self, directory: &Path) -> io::Result<Command> {
-        let mut command = self.this_program();
+        let mut command = if self.own { self.this_program() } else { Command::new(&self.executable) };
         command.arg("worker");
-        if let Some(text) = &self.interpreted {
+        if let Some(text) = &self.runner {
             let file = directory.join("runner.json");
             // A file of an earlier worker goes, and nothing is written through a link.
             match std::fs::remove_file(&file) {

@@ -92,7 +92,7 @@ pub enum Internal {
     /// Serve a supervisor; started by `run`
     #[command(hide = true)]
     Worker {
-        /// The file with an interpreted runner
+        /// The file with a plan, and with folders, in place of those that the program contains
         #[cfg(feature = "process")]
         #[arg(long, value_name = "FILE")]
         runner: Option<std::path::PathBuf>,
@@ -192,9 +192,9 @@ impl Internal {
         match self {
             #[cfg(feature = "process")]
             Internal::Worker { runner: Some(file), lab, record, relay, supervisor } => {
-                let runner = crate::interpreted::Interpreted::read(file)
-                    .map_err(|error| Failure(format!("cannot read {}: {error}", file.display())))?
-                    .runner();
+                let sent = crate::interpreted::Interpreted::read(file)
+                    .map_err(|error| Failure(format!("cannot read {}: {error}", file.display())))?;
+                let runner = compiled.map_or_else(|| sent.runner(), |session| sent.with_code_of(&session.runner));
                 let plan = serde_json::from_str(&runner.plan)?;
                 serve(runner, recorded(plan, *record), lab.as_deref(), *relay, supervisor)
             }

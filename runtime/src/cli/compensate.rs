@@ -17,7 +17,7 @@ use sesame_record::Repository;
 use sesame_report::quantity;
 use sesame_rng::derive_seed;
 
-use crate::campaign::{Pool, PoolSettings};
+use crate::campaign::{Pool, PoolSettings, Retries};
 use crate::cli::execution::{
     ExecutionArgs, OutputArgs, begin, claim_files, interruptible, perform, refuse_unfilled, report_outcome, shown,
 };
@@ -123,7 +123,7 @@ pub(super) fn compensate(session: &Session, args: &CompensateArgs) -> Result<Exi
     }
 
     let files = claim_files(&session.runner, &session.plan)?;
-    refuse_unfilled(&session.runner, &session.plan, true)?;
+    refuse_unfilled(session, &session.plan, true)?;
     let interrupted = interruptible()?;
     let seed = derive_seed(campaign.campaign().seed, &format!("compensate {}", found.name), &[]);
     let tried = lab.folder().join(TRIED);
@@ -265,6 +265,8 @@ fn fitted(
     let mut pool = Pool::start(&PoolSettings {
         workers: usize::try_from(args.execution.workers(&session.plan)).unwrap_or(1),
         program: session.program.clone().recording(true),
+        first: 1,
+        retries: Retries::Here,
         directory: scratch.path().to_owned(),
         timeout: args.execution.timeout().unwrap_or(longest),
     })?;

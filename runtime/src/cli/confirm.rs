@@ -82,7 +82,7 @@ pub(super) fn confirm(session: &Session, args: &ConfirmArgs) -> Result<ExitCode,
 
     let mut recorder = Recorder::reopen(&folder, args.execution.workers(&session.plan))?;
     let files = claim_files(&session.runner, plan)?;
-    refuse_unfilled(&session.runner, plan, true)?;
+    refuse_unfilled(session, plan, true)?;
     let settings = args.execution.settings(session, seed, &files);
     let interrupted = interruptible()?;
     let confirmations = Confirmations { tests, times: args.times };

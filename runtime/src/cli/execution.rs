@@ -19,7 +19,7 @@ use sesame_relay::metric::unimplemented_hooks;
 use sesame_report as report;
 use sesame_report::Summary;
 
-use crate::campaign::{CampaignEnd, CampaignError, Settings, run_campaign};
+use crate::campaign::{CampaignEnd, CampaignError, Place, Settings, run_campaign};
 use crate::changed_files::ChangedFiles;
 use crate::cli::failure::{Failure, STOPPED};
 use crate::cli::gate::Gate;
@@ -152,8 +152,14 @@ impl ExecutionArgs {
     }
 }
 
-/// Names hooks that are not filled in; an objective among them ends the run before it starts.
-pub(super) fn refuse_unfilled(runner: &Runner, plan: &CampaignPlan, allowed: bool) -> Result<(), Failure> {
+/// Names hooks that are not filled in; an objective among them ends the run before it starts. The hooks of a runner
+/// that is a program of its own were looked at by whoever compiled it.
+pub(super) fn refuse_unfilled(session: &Session, plan: &CampaignPlan, allowed: bool) -> Result<(), Failure> {
+    #[cfg(feature = "agents")]
+    if session.program.of_another_process().is_some() {
+        return Ok(());
+    }
+    let runner = &session.runner;
     let unfilled = unimplemented_hooks(plan, runner.hooks);
     let mut objectives = Vec::new();
     for id in unfilled {
@@ -254,11 +260,33 @@ pub(super) fn execute(
     output: &OutputArgs,
     files: Files,
 ) -> Result<ExitCode, Failure> {
+    execute_at(session, recorder, folder, Place::Here, execution, output, files)
+}
+
+/// The same, with tests that run elsewhere.
+pub(super) fn execute_at(
+    session: &Session,
+    recorder: Recorder,
+    folder: &Path,
+    place: Place,
+    execution: &ExecutionArgs,
+    output: &OutputArgs,
+    files: Files,
+) -> Result<ExitCode, Failure> {
     let interrupted = interruptible()?;
     let started = Instant::now();
     let before = runs(recorder.repository())?;
     let again = |more: &[&str]| session.caller.command("resume", &[more, &[&shown(folder)]].concat());
-    let Some(repository) = perform(session, recorder, folder, execution, files, &interrupted, &again)? else {
+    let Some(repository) = perform_at(
+        session,
+        recorder,
+        folder,
+        place,
+        execution,
+        files,
+        Stopping { interrupted: &interrupted, again: &again },
+    )?
+    else {
         return Ok(ExitCode::from(STOPPED));
     };
     let code = report_outcome(&repository, folder, &folder.join("report.html"), output)?;
@@ -280,12 +308,33 @@ pub(super) fn perform(
     interrupted: &AtomicBool,
     again: &dyn Fn(&[&str]) -> String,
 ) -> Result<Option<Repository>, Failure> {
+    perform_at(session, recorder, folder, Place::Here, execution, files, Stopping { interrupted, again })
+}
+
+/// How a run is stopped, and the command that goes on with it.
+#[derive(Clone, Copy)]
+struct Stopping<'a> {
+    interrupted: &'a AtomicBool,
+    again: &'a dyn Fn(&[&str]) -> String,
+}
+
+/// The same, with tests that run elsewhere.
+fn perform_at(
+    session: &Session,
+    recorder: Recorder,
+    folder: &Path,
+    place: Place,
+    execution: &ExecutionArgs,
+    files: Files,
+    Stopping { interrupted, again }: Stopping<'_>,
+) -> Result<Option<Repository>, Failure> {
     let campaign = recorder.repository().campaign();
     let (plan, seed) = (campaign.plan.clone(), campaign.seed);
     let mut settings = execution.settings(session, seed, &files);
     settings.program = settings.program.recording(plan.campaign.record.is_some());
     let mut display = Display::new(&plan, seed, execution.workers(&plan));
-    let end = run_campaign(&plan, recorder, &settings, &folder.join("workers"), interrupted, &mut |event, progress| {
+    let directory = folder.join("workers");
+    let end = run_campaign(&plan, recorder, &settings, place, &directory, interrupted, &mut |event, progress| {
         display.update(event, progress);
     });
     display.finish();

@@ -74,7 +74,7 @@ pub(super) fn explore(session: &Session, args: &ExploreArgs) -> Result<ExitCode,
     drop(repository);
     let plan = task.plan(plan);
     let files = claim_files(&session.runner, &plan)?;
-    refuse_unfilled(&session.runner, &plan, true)?;
+    refuse_unfilled(session, &plan, true)?;
     let (recorder, folder) = begin(session, &results, &folder, &plan, &task, seed, &args.execution)?;
     execute(session, recorder, &folder, &args.execution, &args.output, files)
 }

@@ -61,7 +61,7 @@ pub(super) fn known(session: &Session, args: &KnownArgs) -> Result<ExitCode, Fai
     let task = Task::Known { tests: chosen(plan, &args.names).map_err(Failure)?, lab: None };
     let plan = plan_of(plan, &task, args.seed);
     let files = claim_files(&session.runner, &plan)?;
-    refuse_unfilled(&session.runner, &plan, true)?;
+    refuse_unfilled(session, &plan, true)?;
     let seed = args.seed.unwrap_or(plan.campaign.seed);
     let results = args.results.as_deref().unwrap_or(results);
     let (recorder, folder) = begin(session, results, "known", &plan, &task, seed, &args.execution)?;
@@ -72,7 +72,7 @@ pub(super) fn known(session: &Session, args: &KnownArgs) -> Result<ExitCode, Fai
 #[cfg(feature = "process")]
 fn in_lab(session: &Session, lab: &str, args: &KnownArgs) -> Result<ExitCode, Failure> {
     let lab = crate::lab::find(&session.plan, Some(lab))?;
-    refuse_unfilled(&session.runner, &session.plan, true)?;
+    refuse_unfilled(session, &session.plan, true)?;
     chosen(&session.plan, &args.names).map_err(Failure)?;
     let mut command = vec!["known".to_owned()];
     command.extend(args.names.iter().cloned());

@@ -36,7 +36,7 @@ pub(super) fn mitm(session: &Session, args: &MitmArgs) -> Result<ExitCode, Failu
         Some(name) => Some(find(&session.plan, Some(name))?.name.as_str()),
         None => None,
     };
-    refuse_unfilled(&session.runner, &session.plan, true)?;
+    refuse_unfilled(session, &session.plan, true)?;
     let seed = args.seed.unwrap_or(session.plan.campaign.seed);
     let mut command = vec!["mitm".to_owned(), "--runs".to_owned(), args.runs.to_string()];
     command.extend(lab.iter().flat_map(|&lab| ["--lab".to_owned(), lab.to_owned()]));

@@ -34,7 +34,7 @@ pub struct NullArgs {
 
 pub(super) fn null(session: &Session, args: &NullArgs) -> Result<ExitCode, Failure> {
     let lab = lab_of(&session.plan, args.lab.as_deref())?;
-    refuse_unfilled(&session.runner, &session.plan, true)?;
+    refuse_unfilled(session, &session.plan, true)?;
     let seed = args.seed.unwrap_or(session.plan.campaign.seed);
     let mut command = vec!["null".to_owned(), "--runs".to_owned(), args.runs.to_string()];
     command.extend(lab.iter().flat_map(|lab| ["--lab".to_owned(), lab.name.clone()]));

@@ -100,7 +100,7 @@ pub(super) fn physical(session: &Session, args: &PhysicalArgs) -> Result<ExitCod
     let task = Task::Lab(task);
     let plan = task.plan(&session.plan);
     let files = claim_files(&session.runner, &plan)?;
-    refuse_unfilled(&session.runner, &plan, true)?;
+    refuse_unfilled(&session, &plan, true)?;
     // There is one lab.
     let execution = args.execution.one_at_a_time();
     let (recorder, folder) = begin(&session, &results, &name, &plan, &task, seed, &execution)?;

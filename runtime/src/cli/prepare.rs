@@ -37,7 +37,7 @@ type Step<'s> = (&'static str, &'s dyn Fn(&Work<'_>, &mut Found) -> Result<bool,
 
 pub(super) fn prepare(session: &Session, args: &PrepareArgs) -> Result<ExitCode, Failure> {
     let lab = lab_of(&session.plan, args.lab.as_deref())?;
-    refuse_unfilled(&session.runner, &session.plan, true)?;
+    refuse_unfilled(session, &session.plan, true)?;
     let seed = args.seed.unwrap_or(session.plan.campaign.seed);
     let mut command = vec!["prepare".to_owned(), "--runs".to_owned(), args.runs.to_string()];
     command.extend(lab.iter().flat_map(|lab| ["--lab".to_owned(), lab.name.clone()]));

@@ -10,7 +10,7 @@ use sesame_plan::{CampaignPlan, Direction, MetricSource};
 use sesame_record::TestRecord;
 use sesame_report::{quantity, readable_sentence};
 
-use crate::campaign::{CampaignEvent, Progress};
+use crate::campaign::{CampaignEvent, Machines, Progress};
 use crate::cli::progress_line::{Line, awaited, cost, countdown, warning};
 use crate::cli::terminal::say;
 
@@ -37,6 +37,8 @@ pub(super) struct Display<'a> {
     /// What the start of the system was last said to wait for.
     missing: String,
     worst: Vec<Option<f64>>,
+    /// The machines whose agents run tests, if they do.
+    machines: Option<Machines>,
 }
 
 impl<'a> Display<'a> {
@@ -58,6 +60,7 @@ impl<'a> Display<'a> {
             awaited_due: Duration::ZERO,
             missing: String::new(),
             worst,
+            machines: None,
         }
     }
 
@@ -82,11 +85,21 @@ impl<'a> Display<'a> {
                 }
                 return;
             }
+            CampaignEvent::AgentsAwaited { missing } => {
+                if let Some(missing) = missing.filter(|missing| *missing != self.missing) {
+                    missing.clone_into(&mut self.missing);
+                    self.say(&format!("{name}: {}", visible_lines(missing)));
+                }
+                return;
+            }
+            CampaignEvent::Told { text } => return self.say(&format!("{name}: {}", visible_lines(text))),
+            CampaignEvent::Machines(machines) => self.machines = Some(machines),
             CampaignEvent::Warned { text } => return self.say(&warned(self.plan, text)),
             CampaignEvent::SearchStarted { reference, timeout } => {
                 self.began = Instant::now();
                 // How long the rest of a campaign takes that was stopped, its tests will show.
                 if progress.earlier == 0
+                    && self.machines.is_none()
                     && let Some(cost) = cost(reference, timeout, progress.total, self.workers)
                 {
                     self.say(&cost);
@@ -151,6 +164,10 @@ impl<'a> Display<'a> {
 
     fn details(&self, progress: Progress<'_>) -> Vec<String> {
         let mut parts = Vec::new();
+        if let Some(Machines { machines, workers, busy, waiting }) = self.machines {
+            let noun = if machines == 1 { "machine" } else { "machines" };
+            parts.push(format!("{machines} {noun}, {busy} of {workers} workers busy, {waiting} tests wait"));
+        }
         if !self.plan.campaign.objectives.is_empty() {
             parts.push(format!("front of {}", progress.front.numbers().len()));
         }

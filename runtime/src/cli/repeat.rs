@@ -70,7 +70,7 @@ pub(super) fn repeat(session: &Session, args: &RepeatArgs) -> Result<ExitCode, F
     let task = Task::Repeat { name, test, times: args.times };
     let plan = task.plan(&plan);
     let files = claim_files(&session.runner, &plan)?;
-    refuse_unfilled(&session.runner, &plan, true)?;
+    refuse_unfilled(session, &plan, true)?;
     let results = args.into.as_deref().unwrap_or(&results);
     let (recorder, folder) = begin(session, results, &folder_name, &plan, &task, seed, &args.execution)?;
     execute(session, recorder, &folder, &args.execution, &args.output, files)

@@ -50,7 +50,7 @@ pub(super) fn replay_recording(session: &Session, args: &ReplayRecordingArgs) ->
     use super::terminal::{print, print_json, say, text_options};
 
     let Session { runner, plan, .. } = session;
-    refuse_unfilled(runner, plan, true)?;
+    refuse_unfilled(session, plan, true)?;
     let wires = WireTable::new(plan);
     let table = MetricTable::new(plan, &wires, runner.hooks)?;
     panic_capture::install();

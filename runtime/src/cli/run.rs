@@ -9,8 +9,11 @@ use sesame_plan::Task;
 use sesame_record as record;
 use sesame_record::Recorder;
 
-use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute, refuse_unfilled, shown};
+use crate::campaign::Place;
+use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute_at, refuse_unfilled, shown};
 use crate::cli::failure::Failure;
+#[cfg(feature = "agents")]
+use crate::cli::fleet::FleetArgs;
 use crate::cli::over_budget::refuse_over_budget;
 use crate::cli::results_folder::{open, refuse_other_model, run_folder};
 use crate::cli::session::{Session, World};
@@ -39,6 +42,9 @@ pub(super) struct RunArgs {
     results: Option<PathBuf>,
     #[command(flatten)]
     world: World,
+    #[cfg(feature = "agents")]
+    #[command(flatten)]
+    fleet: FleetArgs,
     #[command(flatten)]
     execution: ExecutionArgs,
     #[command(flatten)]
@@ -53,6 +59,9 @@ pub struct ResumeArgs {
     results: Option<PathBuf>,
     #[command(flatten)]
     world: World,
+    #[cfg(feature = "agents")]
+    #[command(flatten)]
+    fleet: FleetArgs,
     #[command(flatten)]
     execution: ExecutionArgs,
     #[command(flatten)]
@@ -85,9 +94,21 @@ pub(super) fn run(session: &Session, args: &RunArgs) -> Result<ExitCode, Failure
         refuse_over_budget(session, results)?;
     }
     let files = claim_files(&session.runner, &plan)?;
-    refuse_unfilled(&session.runner, &plan, args.allow_unimplemented)?;
+    refuse_unfilled(session, &plan, args.allow_unimplemented)?;
     let (recorder, folder) = begin(session, results, &name, &plan, &Task::Campaign, seed, &args.execution)?;
-    execute(session, recorder, &folder, &args.execution, &args.output, files)
+    #[cfg(feature = "agents")]
+    let place = place(&args.fleet, session, &recorder, &folder)?;
+    #[cfg(not(feature = "agents"))]
+    let place = Place::Here;
+    execute_at(session, recorder, &folder, place, &args.execution, &args.output, files)
+}
+
+/// Where the tests of a run are carried out.
+#[cfg(feature = "agents")]
+fn place(fleet: &FleetArgs, session: &Session, recorder: &Recorder, folder: &Path) -> Result<Place, Failure> {
+    let campaign = recorder.repository().campaign();
+    let fleet = fleet.fleet(session, &campaign.plan, folder, campaign.seed)?;
+    Ok(fleet.map_or(Place::Here, |fleet| Place::Fleet(Box::new(fleet))))
 }
 
 /// The name of the results of a campaign whose simulation is compensated for a lab.
@@ -112,19 +133,24 @@ pub(super) fn resume(session: &Session, args: &ResumeArgs) -> Result<ExitCode, F
         if let Some(undisturbed) = task.undisturbed() {
             session = session.relaying(undisturbed.relayed);
         }
-        return go_on(&session, recorder, &folder, &execution, &args.output);
+        return go_on(&session, recorder, &folder, Place::Here, &execution, &args.output);
     }
     if let Some(undisturbed) = task.undisturbed() {
         let (session, execution) = (session.relaying(undisturbed.relayed), args.execution.one_at_a_time());
-        return go_on(&session, recorder, &folder, &execution, &args.output);
+        return go_on(&session, recorder, &folder, Place::Here, &execution, &args.output);
     }
-    go_on(session, recorder, &folder, &args.execution, &args.output)
+    #[cfg(feature = "agents")]
+    let place = place(&args.fleet, session, &recorder, &folder)?;
+    #[cfg(not(feature = "agents"))]
+    let place = Place::Here;
+    go_on(session, recorder, &folder, place, &args.execution, &args.output)
 }
 
 fn go_on(
     session: &Session,
     recorder: Recorder,
     folder: &Path,
+    place: Place,
     execution: &ExecutionArgs,
     output: &OutputArgs,
 ) -> Result<ExitCode, Failure> {
@@ -137,6 +163,6 @@ fn go_on(
         )));
     }
     let files = claim_files(&session.runner, plan)?;
-    refuse_unfilled(&session.runner, plan, true)?;
-    execute(session, recorder, folder, execution, output, files)
+    refuse_unfilled(session, plan, true)?;
+    execute_at(session, recorder, folder, place, execution, output, files)
 }

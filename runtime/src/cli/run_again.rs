@@ -53,7 +53,7 @@ pub(super) fn run_again(session: &Session, asked: Asked<'_>) -> Result<Option<Ag
     let record = repository.test(repository.find(asked.test)?)?;
     refuse_changed(session, &repository, record.number)?;
     let files = claim_files(&session.runner, plan)?;
-    refuse_unfilled(&session.runner, plan, true)?;
+    refuse_unfilled(session, plan, true)?;
     let interrupted = interruptible()?;
     let folder = Scratch::new(asked.run)?;
     let file = folder.path().join("recorded.mcap");

@@ -82,7 +82,7 @@ pub(super) fn shrink(session: &Session, args: &ShrinkArgs) -> Result<ExitCode, F
     let seed = repository.campaign().seed;
     let plan = task.plan(repository.plan());
     let files = claim_files(&session.runner, &plan)?;
-    refuse_unfilled(&session.runner, &plan, true)?;
+    refuse_unfilled(session, &plan, true)?;
     let folder_name = format!("shrink-{name}");
     let (recorder, folder) = begin(session, into, &folder_name, &plan, &task, seed, &args.execution)?;
     execute(session, recorder, &folder, &args.execution, &args.output, files)

@@ -98,11 +98,22 @@ impl<'a> Found<'a> {
 
     /// The runner as data, if the campaign needs no Rust beyond these features.
     fn interpreted(&self, is_there: fn(feature: &str) -> bool) -> anyhow::Result<Option<Interpreted>> {
-        let file = &self.generation.file;
-        if self.plan().needs_rust(is_there) || environment::runtime_is_chosen(file, &self.generation.options())? {
+        if self.plan().needs_rust(is_there) || self.chooses_runtime()? {
             return Ok(None);
         }
-        let (space, simulator) = environment::program_folders(file, self.plan())?;
+        environment::check_program(&self.generation.file, self.plan())?;
+        self.as_data().map(Some)
+    }
+
+    /// Whether its runner links another runtime than this program.
+    fn chooses_runtime(&self) -> anyhow::Result<bool> {
+        Ok(environment::runtime_is_chosen(&self.generation.file, &self.generation.options())?)
+    }
+
+    /// Its plan and its folders.
+    fn as_data(&self) -> anyhow::Result<Interpreted> {
+        let file = &self.generation.file;
+        let (space, simulator) = environment::folders(file, self.plan())?;
         let campaign = &self.plan().plan.campaign.name;
         let folder = self.generation.own_runners(&[campaign])?.join(names::campaign_folder(campaign));
         let results = folder.join("results");
@@ -111,7 +122,7 @@ impl<'a> Found<'a> {
         }
         owner::check(file, &folder)?;
         let directory = std::path::absolute(&folder).with_context(|| format!("cannot find {}", folder.display()))?;
-        Ok(Some(Interpreted { plan: emit::plan_json(self.plan()), directory, space, simulator }))
+        Ok(Interpreted { plan: emit::plan_json(self.plan()), directory, space, simulator })
     }
 }
 
@@ -131,6 +142,11 @@ pub(super) fn run(
     }
     let allowed = arguments.iter().any(|argument| argument == "--allow-unimplemented");
     compiled(shell, &found, arguments, allowed)
+}
+
+/// Whether tests are to be run by agents.
+fn by_agents(arguments: &[OsString]) -> bool {
+    arguments.iter().any(|argument| argument == "--on" || argument.as_encoded_bytes().starts_with(b"--on="))
 }
 
 /// A command that runs tests.
@@ -224,6 +240,15 @@ fn compiled(shell: Shell, found: &Found<'_>, arguments: &[OsString], allow_unfil
     }
     let folder = out.join(names::campaign_folder(campaign));
     let program = build::build(shell, &folder, campaign)?;
+    if by_agents(arguments) {
+        if found.chooses_runtime()? {
+            bail!(
+                "campaign `{campaign}` chooses a runtime of its own, which agents do not have: run it without `--on`, or \
+                 without that choice"
+            );
+        }
+        return Ok(sesame_runtime::cli::supervise(&program, &found.as_data()?, caller.clone(), arguments));
+    }
     let mut runner = Command::new(&program);
     runner.args(arguments).env(CALLER, serde_json::to_string(caller)?).env(RUNNER, folder.canonicalize()?);
     start(runner).with_context(|| format!("cannot run {}", program.display()))

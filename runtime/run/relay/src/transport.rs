@@ -320,6 +320,12 @@ impl Connect {
         Connect { make, folder }
     }
 
+    /// The same for programs that run in another folder.
+    #[must_use]
+    pub fn in_folder(self, folder: PathBuf) -> Self {
+        Connect { folder, ..self }
+    }
+
     /// A transport as the plan describes it.
     pub fn transport(&self, plan: &CampaignPlan) -> Box<dyn Transport> {
         (self.make)(plan, &self.folder)

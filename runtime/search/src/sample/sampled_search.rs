@@ -1,5 +1,7 @@
 //! Tests that do not depend on results, handed out one after the other.
 
+use std::collections::VecDeque;
+
 use sesame_base::observation::Observation;
 use sesame_plan::Test;
 
@@ -34,7 +36,8 @@ pub(crate) struct SampledSearch<S> {
     sampling: S,
     evaluations: u32,
     asked: u32,
-    awaited: usize,
+    /// How many tests each generation has that was asked and not told.
+    awaited: VecDeque<usize>,
     /// Whether all tests were asked for.
     over: bool,
 }
@@ -42,7 +45,7 @@ pub(crate) struct SampledSearch<S> {
 impl<S: Sampling> SampledSearch<S> {
     /// The first so many tests of a sampling.
     pub(crate) fn new(sampling: S, evaluations: u32) -> Self {
-        SampledSearch { sampling, evaluations, asked: 0, awaited: 0, over: false }
+        SampledSearch { sampling, evaluations, asked: 0, awaited: VecDeque::new(), over: false }
     }
 }
 
@@ -52,19 +55,24 @@ impl<S: Sampling> Strategy for SampledSearch<S> {
     }
 
     fn ask(&mut self) -> Vec<Candidate> {
-        assert!(self.awaited == 0, "a generation is told before the next is asked");
         let generation = self.asked / GENERATION;
         let end = self.evaluations.min(self.asked + GENERATION);
         let tests = (self.asked..end).map_while(|index| self.sampling.test(index));
         let batch: Vec<Candidate> = tests
             .map(|test| Candidate { test, parents: Vec::new(), generation, known: None, simulator_seed: None })
             .collect();
-        self.awaited = batch.len();
         self.over = batch.is_empty();
+        if !self.over {
+            self.awaited.push_back(batch.len());
+        }
         #[expect(clippy::cast_possible_truncation, reason = "at most as many as a generation has")]
         let asked = batch.len() as u32;
         self.asked += asked;
         batch
+    }
+
+    fn asks_ahead(&self) -> bool {
+        true
     }
 
     fn tests(&self) -> Option<u128> {
@@ -76,7 +84,6 @@ impl<S: Sampling> Strategy for SampledSearch<S> {
     }
 
     fn tell(&mut self, results: &[Evaluated]) {
-        assert!(results.len() == self.awaited, "exactly the generation asked last is told");
-        self.awaited = 0;
+        assert!(self.awaited.pop_front() == Some(results.len()), "exactly the oldest generation is told");
     }
 }

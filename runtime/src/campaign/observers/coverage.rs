@@ -62,6 +62,10 @@ impl Observer for CoverageOfEachGeneration {
         Ok(self.reached().map_or(ControlFlow::Continue(()), ControlFlow::Break))
     }
 
+    fn may_end(&self) -> bool {
+        self.stop_at.is_some()
+    }
+
     /// That no search can reach the goal.
     fn warning(&self) -> Option<String> {
         let (feasible, cells) = (self.feasible.count(), self.coverage.grid().len());

@@ -35,4 +35,8 @@ impl Observer for Rules {
         self.rules.tell(generation.tests);
         Ok(self.rules.reached(self.begun.elapsed()).map_or(ControlFlow::Continue(()), ControlFlow::Break))
     }
+
+    fn may_end(&self) -> bool {
+        self.rules.are_any()
+    }
 }

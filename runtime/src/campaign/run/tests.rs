@@ -20,6 +20,8 @@ struct InThread<'a> {
     /// The seed of the order in which tests end; `None` for the order in which they came.
     order: Option<Stream>,
     waiting: Vec<Job>,
+    /// How many tests it claims to run at once.
+    at_once: usize,
     /// Tests run so far, and after how many the user stops the campaign.
     run: u32,
     stop_after: Option<u32>,
@@ -50,13 +52,18 @@ impl Executor for InThread<'_> {
             trace_failure: None,
             killed: false,
             lock_stepped: true,
+            machine: None,
         }))
     }
 
-    fn set_timeout(&mut self, _: Duration) {}
+    fn set_timeout(&mut self, _: Duration, _: Duration) {}
 
     fn lock_stepped(&self) -> bool {
         true
+    }
+
+    fn at_once(&self) -> usize {
+        self.at_once
     }
 }
 
@@ -83,6 +90,17 @@ fn campaign(
     order: Option<u64>,
     stop_after: Option<u32>,
 ) -> (Result<CampaignEnd, CampaignError>, u32, Vec<String>) {
+    campaign_of(plan, folder, order, stop_after, 1)
+}
+
+/// The same with so many tests at once.
+fn campaign_of(
+    plan: &CampaignPlan,
+    folder: &Path,
+    order: Option<u64>,
+    stop_after: Option<u32>,
+    at_once: usize,
+) -> (Result<CampaignEnd, CampaignError>, u32, Vec<String>) {
     let recorder = if folder.join(record::DATABASE).exists() {
         Recorder::resume(folder, 1)
     } else {
@@ -90,7 +108,8 @@ fn campaign(
     };
     let interrupted = AtomicBool::new(false);
     let order = order.map(|seed| Stream::derive(seed, "order", &[]));
-    let mut executor = InThread { plan, order, waiting: Vec::new(), run: 0, stop_after, interrupted: &interrupted };
+    let mut executor =
+        InThread { plan, order, waiting: Vec::new(), at_once, run: 0, stop_after, interrupted: &interrupted };
     let strategy = search::strategy(plan, plan.campaign.seed).unwrap();
     let mut events = Vec::new();
     let end = run_with(
@@ -103,7 +122,8 @@ fn campaign(
         &mut |event, progress| {
             events.push(match event {
                 CampaignEvent::ReferenceRunAwaited { .. } => "awaited".to_owned(),
-                CampaignEvent::Warned { text } => text.to_owned(),
+                CampaignEvent::Told { text } | CampaignEvent::Warned { text } => text.to_owned(),
+                CampaignEvent::AgentsAwaited { .. } | CampaignEvent::Machines(_) => "machines".to_owned(),
                 CampaignEvent::SearchStarted { .. } => "search started".to_owned(),
                 CampaignEvent::TestEnded(record) => format!("test {} of {}", progress.done, record.number),
                 CampaignEvent::ConfirmationAdvanced => "confirmation".to_owned(),
@@ -202,6 +222,7 @@ fn a_campaign_whose_operations_reach_nothing_ends_before_it_searches_and_can_be_
             plan: &plan,
             order: None,
             waiting: Vec::new(),
+            at_once: 1,
             run: 0,
             stop_after: None,
             interrupted: &interrupted,
@@ -236,8 +257,12 @@ impl Executor for Deaf<'_> {
         self.0.lock_stepped()
     }
 
-    fn set_timeout(&mut self, timeout: Duration) {
-        self.0.set_timeout(timeout);
+    fn at_once(&self) -> usize {
+        self.0.at_once()
+    }
+
+    fn set_timeout(&mut self, timeout: Duration, reference: Duration) {
+        self.0.set_timeout(timeout, reference);
     }
 }
 
@@ -254,7 +279,7 @@ fn a_regression_test_runs_with_the_seed_that_it_names_whatever_the_seed_of_the_c
         let interrupted = AtomicBool::new(false);
         let (order, waiting) = (None, Vec::new());
         let mut executor =
-            InThread { plan: &plan, order, waiting, run: 0, stop_after: None, interrupted: &interrupted };
+            InThread { plan: &plan, order, waiting, at_once: 1, run: 0, stop_after: None, interrupted: &interrupted };
         let strategy = search::strategy_of_task(&plan, &task, seed).unwrap();
         let settings = Settings { seed, ..settings(&plan) };
         let end = run_with(&plan, strategy, recorder, &settings, &mut executor, &interrupted, &mut |_, _| {}).unwrap();
@@ -289,8 +314,12 @@ impl Executor for Slow<'_> {
         self.0.lock_stepped()
     }
 
-    fn set_timeout(&mut self, timeout: Duration) {
-        self.0.set_timeout(timeout);
+    fn at_once(&self) -> usize {
+        self.0.at_once()
+    }
+
+    fn set_timeout(&mut self, timeout: Duration, reference: Duration) {
+        self.0.set_timeout(timeout, reference);
     }
 }
 
@@ -302,7 +331,8 @@ fn what_the_reference_run_shows_is_told_before_the_search_and_waiting_for_it_is_
     let folder = tempfile::tempdir().unwrap();
     let interrupted = AtomicBool::new(false);
     let (order, waiting) = (None, Vec::new());
-    let quick = InThread { plan: &plan, order, waiting, run: 0, stop_after: None, interrupted: &interrupted };
+    let quick =
+        InThread { plan: &plan, order, waiting, at_once: 1, run: 0, stop_after: None, interrupted: &interrupted };
     let recorder = Recorder::create(folder.path(), &plan, plan.campaign.seed, 1).unwrap();
     let strategy = search::strategy(&plan, plan.campaign.seed).unwrap();
     let settings = Settings { reference_timeout: Some(Duration::from_secs(30)), ..settings(&plan) };
@@ -324,4 +354,38 @@ fn what_the_reference_run_shows_is_told_before_the_search_and_waiting_for_it_is_
     assert!(events[5..].iter().all(|event| event == "later"));
     let recorded = Repository::open(folder.path()).unwrap().events().unwrap();
     assert!(recorded.iter().any(|event| event.text == *warned), "it is in the report as well");
+}
+
+#[test]
+fn tests_of_a_search_that_learns_nothing_begin_early_and_are_recorded_in_their_turn() {
+    let mut plan = plan();
+    plan.campaign.search = Search::new(sesame_plan::Strategy::Random, 170);
+    plan.campaign.confirm = None;
+    let one = tempfile::tempdir().unwrap();
+    let (_, runs, _) = campaign_of(&plan, one.path(), None, None, 1);
+    assert_eq!(runs, 172, "each test, and two reference runs");
+    for (at_once, order, stop_after) in [(30, Some(1), None), (200, Some(2), None), (60, Some(3), Some(80))] {
+        let folder = tempfile::tempdir().unwrap();
+        let (end, runs, events) = campaign_of(&plan, folder.path(), order, stop_after, at_once);
+        if stop_after.is_some() {
+            assert!(matches!(end.unwrap(), CampaignEnd::Interrupted));
+            campaign_of(&plan, folder.path(), order, None, at_once).0.unwrap();
+        } else {
+            assert_eq!(runs, 172);
+            let generations: Vec<_> = events.iter().filter(|event| event.starts_with("generation")).collect();
+            assert_eq!(generations, ["generation 0", "generation 1", "generation 2", "generation 3"]);
+        }
+        assert_eq!(digest(folder.path()), digest(one.path()), "{at_once} at once");
+    }
+}
+
+#[test]
+fn no_test_begins_early_that_a_rule_to_stop_may_leave_out() {
+    let mut plan = plan();
+    plan.campaign.search = Search::new(sesame_plan::Strategy::Random, 170);
+    plan.campaign.confirm = None;
+    plan.campaign.coverage.as_mut().unwrap().stop_at = Some(0.01);
+    let folder = tempfile::tempdir().unwrap();
+    let (_, runs, events) = campaign_of(&plan, folder.path(), Some(1), None, 100);
+    assert_eq!(runs, 52, "a generation, and two reference runs: {events:?}");
 }
