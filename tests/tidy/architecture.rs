@@ -206,7 +206,7 @@ fn the_table_lists_each_room_of_the_runtime_and_no_other() {
             folder.unwrap_or_else(|| panic!("docs/rooms.md lists {name}, which is not a crate of the runtime"));
         assert_eq!(*rooms, modules(&workspace().join(folder)), "rooms of {name}: docs/rooms.md, and the crate");
     }
-    assert_eq!(listed.len(), 26, "{listed:?}");
+    assert_eq!(listed.len(), 27, "{listed:?}");
 }
 
 /// A file of a crate as the path of its module.

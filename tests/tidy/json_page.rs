@@ -14,7 +14,7 @@ const PAGE: &str = "docs/json.md";
 const MARK: &str = "<!-- From here on a test writes this page; CONTRIBUTING.md says how. -->\n";
 
 /// What is printed: the heading, how the values come, and the type with its file.
-const PRINTED: [(&str, &str, &str, &str); 17] = [
+const PRINTED: [(&str, &str, &str, &str); 19] = [
     (
         "`run`, `resume`, `known`, `repeat`, `shrink`, `report`",
         "One object.",
@@ -47,6 +47,13 @@ const PRINTED: [(&str, &str, &str, &str); 17] = [
     ),
     ("`sesamec explain NAME FILE`", "One object.", "Explained", "sesamec/src/uses.rs"),
     ("`sesamec scan`", "One object.", "Facts", "runtime/middleware/scan/src/facts.rs"),
+    ("`sesamec agents`", "One object.", "QueueContents", "runtime/src/cli/agent.rs"),
+    (
+        "`sesamec agents forecast`",
+        "A list with an object for each number of agents.",
+        "ForecastRow",
+        "runtime/src/cli/forecast.rs",
+    ),
 ];
 
 /// Crates whose types may be printed, by the folder of their sources.

@@ -35,6 +35,16 @@ pub fn installed(programs: &[&'static str], arguments: &[&str]) -> Option<&'stat
     found
 }
 
+/// Whether this user may do what a command does, here called `what`; see [`installed`].
+#[track_caller]
+pub fn permitted(what: &str, command: &mut Command) -> Option<()> {
+    let succeeds = command.output().is_ok_and(|said| said.status.success());
+    if !succeeds {
+        skip(&format!("this user may not make {what}"));
+    }
+    succeeds.then_some(())
+}
+
 /// Whether the system has `python3`; see [`installed`].
 #[track_caller]
 pub fn has_python3() -> bool {
