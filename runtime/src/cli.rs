@@ -74,6 +74,8 @@ use crate::runner::Runner;
 pub use self::agent::{AgentArgs, AgentsArgs};
 pub use self::caller::{CALLER, Caller};
 pub use self::commands::{Internal, Running, Showing};
+#[cfg(feature = "agents")]
+pub use self::fleet::FleetArgs;
 pub use self::place::RUNNER;
 
 /// What the exit codes of a runner mean.

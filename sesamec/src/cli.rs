@@ -111,10 +111,8 @@ enum Command {
         /// Generate and build the runner even if the campaign needs no Rust code of yours.
         #[arg(long)]
         build: bool,
-        /// Run the tests by agents that take them from this queue: the URL of a broker of NATS, or a folder that all
-        /// machines share. `sesamec agent URL` starts an agent.
-        #[arg(long, value_name = "URL")]
-        on: Option<String>,
+        #[command(flatten)]
+        agents: sesame_runtime::cli::FleetArgs,
         /// Arguments for the runner.
         #[arg(last = true, value_name = "RUNNER ARGUMENTS")]
         arguments: Vec<std::ffi::OsString>,
@@ -228,8 +226,8 @@ pub fn run(
                 None => commands::generate(shell, language, &generation, &options, purpose),
             }
         }
-        Command::Run { generation, build, on, mut arguments } => {
-            arguments.extend(on.into_iter().flat_map(|on| ["--on".into(), on.into()]));
+        Command::Run { generation, build, agents, mut arguments } => {
+            arguments.extend(agents.arguments());
             runner::run(shell, language, &generation, build, &arguments)
         }
         Command::Running(command) => runner::running(shell, language, &command, of_campaign),

@@ -1,13 +1,14 @@
 //! Whatever happens to agents, broker and supervisor: the results are those of one machine.
 
 use std::collections::BTreeSet;
+use std::fs;
 use std::process::Stdio;
 
 use serde_json::Value;
 use sesame_patience::until;
 use sesame_tests::{Project, command, done, sesamec};
 
-use crate::fleet::{Broker, Cell, TESTS, finished, started};
+use crate::fleet::{Broker, Cell, TESTS, finished, started, started_with_log};
 
 /// The machines of all tests of a run, and that each test has one.
 fn machines(cell: &Cell, results: &str) -> BTreeSet<String> {
@@ -204,17 +205,43 @@ fn with_descendants(id: u32) -> Vec<u32> {
 }
 
 #[test]
+fn a_prepared_folder_is_compared_with_that_of_the_campaign_and_one_with_other_files_is_refused() {
+    let (cell, other) = (Cell::new("agents_prepared"), Cell::new("agents_prepared_there"));
+    let on = cell.folder.join("queue").display().to_string();
+    let digest = cell.local_digest();
+    let there = other.folder.join("space");
+    fs::write(there.join("engine.so"), "what only the machines of agents have").unwrap();
+    let original = fs::read_to_string(there.join("sim.py")).unwrap();
+    fs::write(there.join("sim.py"), format!("{original}\n")).unwrap();
+    let start = |name: &str| {
+        let prepared = format!("robots={}", there.display());
+        let log = fs::File::create(cell.folder.join(format!("{name}.log"))).unwrap();
+        let mut agent = cell.command(&["agent", &on, "--machine", name, "--workers", "1", "--prepared", &prepared]);
+        sesame_peers::Ended(agent.stderr(log).spawn().unwrap())
+    };
+    let refusing = start("other");
+    let run = started(cell.run("remote", Some(&on)).args(["--prepared", "robots"]));
+    until("it refuses", || {
+        let said = fs::read_to_string(cell.folder.join("other.log")).unwrap();
+        said.contains("sim.py has another content than where the campaign was started")
+    });
+    drop(refusing);
+    fs::write(there.join("sim.py"), original).unwrap();
+    let _agent = start("same");
+    assert_eq!(finished(run).expect(0).digest(), digest);
+}
+
+#[test]
 fn a_campaign_waits_for_agents_and_says_which_command_starts_one() {
     let cell = Cell::new("agents_awaited");
     let on = cell.folder.join("queue").display().to_string();
-    let run = started(&mut cell.run("remote", Some(&on)));
-    // Its announcement is the first sign of it.
-    until("it is announced", || {
-        shown(&cell, &on)["campaigns"].as_array().is_some_and(|campaigns| campaigns.len() == 1)
-    });
-    let _agent = cell.agent(&on, "late");
-    let done = finished(run).expect(0);
+    let log = cell.folder.join("run.log");
+    let run = started_with_log(&mut cell.run("remote", Some(&on)), &log);
+    let said = |what: &str| fs::read_to_string(&log).unwrap().contains(what);
     let hint = format!("no agent works for this campaign: start one with `sesamec agent {on}`");
-    assert!(done.err.contains(&hint) && done.err.contains("`late` has joined"), "{}", done.err);
+    until("it says which command starts one", || said(&hint));
+    let _agent = cell.agent(&on, "late");
+    finished(run).expect(0);
+    assert!(said("`late` has joined"));
     assert_eq!(machines(&cell, "remote"), BTreeSet::from(["late".to_owned()]));
 }

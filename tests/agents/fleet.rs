@@ -1,7 +1,7 @@
 //! Agents, supervisors and a broker that tests start, kill and start again.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
 use sesame_patience::until;
@@ -109,6 +109,12 @@ pub(crate) struct Run(Option<Child>);
 /// Starts a run.
 pub(crate) fn started(command: &mut Command) -> Run {
     Run(Some(command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("sesamec starts")))
+}
+
+/// Starts a run that writes what it says into a file.
+pub(crate) fn started_with_log(command: &mut Command, log: &Path) -> Run {
+    let log = fs::File::create(log).expect("a log can be written");
+    Run(Some(command.stdout(Stdio::piped()).stderr(log).spawn().expect("sesamec starts")))
 }
 
 /// How a run that was started has ended.

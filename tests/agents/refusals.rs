@@ -5,7 +5,7 @@ use std::fs;
 use sesame_patience::until;
 use sesame_tests::done;
 
-use crate::fleet::{Cell, started};
+use crate::fleet::{Cell, started_with_log};
 
 fn failure(cell: &Cell, arguments: &[&str]) -> String {
     done(&mut cell.command(arguments)).expect(1).err
@@ -18,15 +18,22 @@ fn a_queue_that_is_none_is_refused_in_a_sentence() {
     assert!(of("amqp://localhost").contains("`amqp` is not a kind of queue"), "{}", of("amqp://localhost"));
     let nobody = failure(&cell, &["agents", "nats://127.0.0.1:1"]);
     assert!(nobody.contains("error: nats://127.0.0.1:1 cannot be reached: "), "{nobody}");
+    let run = done(&mut cell.run("remote", Some("nats://127.0.0.1:1"))).expect(1).err;
+    assert!(run.contains("nats://127.0.0.1:1 cannot be reached: ") && !cell.folder.join("remote").exists(), "{run}");
+    assert!(!cell.folder.join("settings").exists(), "no token was made for a queue that is not there");
 }
 
 #[test]
 fn an_agent_with_another_token_refuses_a_campaign_and_says_what_to_do() {
     let cell = Cell::new("agents_other_token");
     let on = cell.folder.join("queue").display().to_string();
-    let run = started(&mut cell.run("remote", Some(&on)));
+    let log = cell.folder.join("run.log");
+    let run = started_with_log(&mut cell.run("remote", Some(&on)), &log);
     until("it is announced", || fs::read_dir(cell.folder.join("queue/campaigns")).is_ok_and(|all| all.count() == 1));
     let other = cell.folder.join("another_token").display().to_string();
+    let missing = failure(&cell, &["agent", &on, "--token", &other]);
+    assert!(missing.contains(&format!("the token in {other}: ")), "a token that was named is not made: {missing}");
+    fs::write(&other, format!("{}\n", "0123456789abcdef".repeat(4))).unwrap();
     let mut agent = cell.command(&["agent", &on, "--token", &other]);
     let agent = agent.stderr(fs::File::create(cell.folder.join("agent.log")).unwrap()).spawn().unwrap();
     let agent = sesame_peers::Ended(agent);
@@ -34,6 +41,8 @@ fn an_agent_with_another_token_refuses_a_campaign_and_says_what_to_do() {
         let said = fs::read_to_string(cell.folder.join("agent.log")).unwrap();
         said.contains("is refused: it is signed with another token: copy the file of the token")
     });
+    let strangers = format!("no agent works for this campaign, and one on {on} has another token");
+    until("the campaign says so, too", || fs::read_to_string(&log).unwrap().contains(&strangers));
     drop(agent);
     run.kill();
     let text = fs::read_to_string(cell.folder.join("settings/sesame/token")).unwrap();

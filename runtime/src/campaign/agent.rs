@@ -217,7 +217,7 @@ impl Agent<'_> {
             _ => {}
         }
         match &announcement.program.space {
-            Files::Prepared { name } if !prepared.contains_key(name) => {
+            Files::Prepared { name, .. } if !prepared.contains_key(name) => {
                 return Some(format!(
                     "it needs a prepared folder `{name}`: start the agent with `--prepared {name}=FOLDER`"
                 ));
@@ -295,7 +295,11 @@ impl Agent<'_> {
             _ => {}
         }
         let folder = match space {
-            Files::Prepared { name } => self.settings.prepared[name].clone(),
+            Files::Prepared { name, files } => {
+                let folder = self.settings.prepared[name].clone();
+                bundle::compare(files, &folder).map_err(|error| Preparation::Failed(error.to_string()))?;
+                folder
+            }
             Files::Bundle(manifest) => {
                 let folder = own.join("space");
                 self.unpack(announcement, manifest, &folder)?;
@@ -459,9 +463,10 @@ impl Slot<'_> {
         let AgentSettings { token, name, .. } = self.agent.settings;
         let Work { number, attempt, .. } = *work;
         let ended = Ended { number, attempt, job: work.digest(), agent: name.clone(), outcome };
+        let ran = matches!(ended.outcome, EndedAs::Ran { .. });
         let sealed = token.seal(Kind::Ended, &self.announcement.campaign, &ended);
         if self.insist(|queue| queue.put_result(&self.announcement.campaign, &sealed)).is_some() {
-            self.agent.finished.fetch_add(1, Ordering::Relaxed);
+            self.agent.finished.fetch_add(u64::from(ran), Ordering::Relaxed);
             held.finish().ok();
         }
     }

@@ -23,6 +23,12 @@ use crate::campaign::executor::{Executor, ExecutorError, Job, JobResult, Machine
 /// How long it is waited before a queue that cannot be reached is tried again.
 const PAUSE: Duration = Duration::from_millis(200);
 
+/// How long a campaign waits for machines when all that there were have been put aside.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// How long nobody says that no agent is there: one that waits joins within this time.
+const JOINING: Duration = Duration::from_secs(3);
+
 /// What an announcement's campaign is run with.
 pub struct Fleet {
     /// The queue.
@@ -56,6 +62,12 @@ pub(super) struct Agents {
     machines: Machines,
     /// The machines that were said to refuse this campaign, each with the reason.
     refused: BTreeSet<(String, String)>,
+    /// How many agents and supervisors have another token.
+    strangers: usize,
+    /// Since when no agent works for this campaign.
+    alone: Option<Instant>,
+    /// Since when all machines that are there have been put aside.
+    stuck: Option<Instant>,
     /// Why the queue cannot be reached, if so.
     trouble: Option<String>,
     news: Vec<String>,
@@ -135,6 +147,9 @@ impl Agents {
             looked: None,
             machines: Machines { machines: 0, workers: 0, busy: 0, waiting: 0 },
             refused: BTreeSet::new(),
+            strangers: 0,
+            alone: Some(Instant::now()),
+            stuck: None,
             trouble: None,
             news: Vec::new(),
         };
@@ -163,24 +178,36 @@ impl Agents {
             return Ok(());
         }
         let said = self.queue.presences()?;
-        let ours = |sealed: &Vec<u8>| self.token.open::<Presence>(Kind::Presence, "", sealed).ok();
-        let mut present: Vec<Presence> = said.iter().filter_map(ours).collect();
         let campaign = &self.announcement.campaign;
+        let mut present = Vec::new();
+        self.strangers = 0;
+        for sealed in &said {
+            match self.token.open::<Presence>(Kind::Presence, "", sealed) {
+                Ok(agent) => present.push(agent),
+                Err(_) if Supervision::read(&self.token, sealed).is_some() => {}
+                Err(_) => self.strangers += 1,
+            }
+        }
+        let aside = |machine: &str| self.announcement.put_aside.iter().any(|(name, _)| name == machine);
         for Presence { agent, refused, .. } in &present {
-            for (_, reason) in refused.iter().filter(|(refused, _)| refused == campaign) {
+            // That it was put aside has been said.
+            let refused = refused.iter().filter(|(refused, _)| refused == campaign && !aside(&agent.machine));
+            for (_, reason) in refused {
                 if self.refused.insert((agent.machine.clone(), reason.clone())) {
                     self.news.push(format!("`{}` refuses this campaign: {reason}", agent.machine));
                 }
             }
         }
         // One that works for another campaign, or refuses this one, is of no use here.
-        present.retain(|agent| agent.campaign.as_ref() == Some(campaign));
+        let works = |agent: &Presence| agent.campaign.as_ref() == Some(campaign);
+        self.news.extend(self.dispatch.present(&present, works));
+        present.retain(works);
         let names: BTreeSet<&str> = present.iter().map(|agent| agent.agent.machine.as_str()).collect();
         let sum = |count: fn(&Presence) -> u32| present.iter().map(|agent| count(agent) as usize).sum();
         let busy: usize = sum(|agent| agent.busy);
         let waiting = self.dispatch.waiting().saturating_sub(busy);
         self.machines = Machines { machines: names.len(), workers: sum(|agent| agent.workers), busy, waiting };
-        self.news.extend(self.dispatch.present(&present));
+        self.alone = if self.machines.workers == 0 { self.alone.or_else(|| Some(Instant::now())) } else { None };
         self.looked = Some(Instant::now());
         Ok(())
     }
@@ -323,12 +350,15 @@ impl Executor for Agents {
             }
             Err(error) => return Err(ExecutorError::Agents { reason: error.to_string() }),
         };
-        match self.dispatch.stuck() {
-            Some(reasons) if taken.is_none() => {
-                Err(ExecutorError::Agents { reason: format!("no machine is left that can run tests: {reasons}") })
-            }
-            _ => Ok(taken),
+        let Some(reasons) = self.dispatch.stuck().filter(|_| taken.is_none()) else {
+            self.stuck = None;
+            return Ok(taken);
+        };
+        let stuck = *self.stuck.get_or_insert_with(Instant::now);
+        if stuck.elapsed() < PATIENCE {
+            return Ok(None);
         }
+        Err(ExecutorError::Agents { reason: format!("no machine is left that can run tests: {reasons}") })
     }
 
     fn set_timeout(&mut self, timeout: Duration, reference: Duration) {
@@ -345,8 +375,15 @@ impl Executor for Agents {
 
     fn waits(&self) -> Option<String> {
         let place = self.queue.place();
-        let nobody = || format!("no agent works for this campaign: start one with `sesamec agent {place}`");
-        self.trouble.clone().or_else(|| (self.machines.workers == 0).then(nobody))
+        let nobody = || match self.strangers {
+            0 => format!("no agent works for this campaign: start one with `sesamec agent {place}`"),
+            1 => format!("no agent works for this campaign, and one on {place} has another token"),
+            count => format!("no agent works for this campaign, and {count} on {place} have another token"),
+        };
+        let stuck = || format!("each machine was put aside, others are awaited for {} s", PATIENCE.as_secs());
+        let is_alone = self.alone.is_some_and(|since| since.elapsed() > JOINING);
+        let waits = self.stuck.map(|_| stuck()).or_else(|| is_alone.then(nobody));
+        self.trouble.clone().or(waits)
     }
 
     fn machines(&self) -> Option<Machines> {

@@ -198,10 +198,14 @@ pub(super) fn agent(args: &AgentArgs) -> Result<ExitCode, Failure> {
         leave_after: args.leave_after,
     };
     say(format_args!(
-        "`{}` waits for campaigns on {} and runs up to {} at once; Ctrl-C ends it",
+        "`{}` waits for campaigns on {} and runs {}; Ctrl-C ends it",
         settings.name.machine,
         settings.queue.place(),
-        if settings.workers == 1 { "one test".to_owned() } else { format!("{} tests", settings.workers) }
+        if settings.workers == 1 {
+            "one test at a time".to_owned()
+        } else {
+            format!("up to {} tests at once", settings.workers)
+        }
     ));
     campaign::work(&settings, &stop, &|text| say(format_args!("{}", visible_lines(text))));
     fs::remove_dir_all(&settings.folder)?;
@@ -300,7 +304,9 @@ pub(super) fn agents(args: &AgentsArgs) -> Result<ExitCode, Failure> {
         None => {}
     }
     let place = args.queue.as_ref().expect("it is required");
-    let (token, queue) = (args.access.token()?, args.access.open(place)?);
+    let queue = args.access.open(place)?;
+    // One that was made only now would be no other's.
+    let token = args.access.known_token()?.map_or_else(Token::random, Ok).map_err(Failure)?;
     let failed = |error: sesame_queue::queue::QueueError| Failure(error.to_string());
     if let Some(campaign) = &args.remove {
         if !queue.announcements().map_err(failed)?.iter().any(|(known, _)| known == campaign) {
@@ -345,21 +351,28 @@ pub(super) fn agents(args: &AgentsArgs) -> Result<ExitCode, Failure> {
 fn text(contents: &QueueContents) -> String {
     let mut lines = Vec::new();
     for ListedAgent { machine, workers, busy, finished, campaign, refused, .. } in &contents.agents {
-        let works = campaign.as_ref().map_or_else(|| "waits".to_owned(), |campaign| format!("works for {campaign}"));
-        lines.push(format!("agent `{machine}` {works}: {busy} of {workers} workers busy, {finished} tests finished"));
+        let title = |id: &String| {
+            let known = contents.campaigns.iter().find(|campaign| campaign.id == *id);
+            known.map_or_else(|| id.clone(), |campaign| campaign.title.clone())
+        };
+        let works = campaign.as_ref().map_or_else(|| "waits".to_owned(), |id| format!("works for {}", title(id)));
+        let tests = if *finished == 1 { "test" } else { "tests" };
+        lines.push(format!("agent `{machine}` {works}: {busy} of {workers} workers busy, {finished} {tests} run"));
         lines.extend(refused.iter().map(|each| format!("    refuses {}: {}", each.campaign, each.reason)));
     }
     for ListedCampaign { id, title, supervised, put_aside, .. } in &contents.campaigns {
         lines.push(format!("campaign {id}: {title}"));
         if !supervised {
             lines.push(format!(
-                "    its supervisor is not there: `sesamec resume` goes on with it, `--remove {id}` removes it"
+                "    its supervisor has gone: continue with `sesamec resume`, or delete it with `--remove {id}`"
             ));
         }
         lines.extend(put_aside.iter().map(|each| format!("    `{}` was put aside: {}", each.machine, each.reason)));
     }
     if contents.others > 0 {
-        lines.push(format!("{} more with another token", contents.others));
+        let (count, use_) = (contents.others, if contents.others == 1 { "uses" } else { "use" });
+        let what = if count == 1 { "agent or campaign" } else { "agents or campaigns" };
+        lines.push(format!("{count} {what} more {use_} another token"));
     }
     if lines.is_empty() {
         lines.push("no agents and no campaigns".to_owned());

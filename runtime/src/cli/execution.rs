@@ -260,7 +260,22 @@ pub(super) fn execute(
     output: &OutputArgs,
     files: Files,
 ) -> Result<ExitCode, Failure> {
-    execute_at(session, recorder, folder, Place::Here, execution, output, files)
+    execute_at(session, recorder, folder, Elsewhere::here(), execution, output, files)
+}
+
+/// Where tests run.
+pub(super) struct Elsewhere {
+    /// The executor.
+    pub(super) place: Place,
+    /// The options that say so, for a command that goes on with the run.
+    pub(super) options: Vec<String>,
+}
+
+impl Elsewhere {
+    /// On this machine.
+    pub(super) fn here() -> Self {
+        Elsewhere { place: Place::Here, options: Vec::new() }
+    }
 }
 
 /// The same, with tests that run elsewhere.
@@ -268,7 +283,7 @@ pub(super) fn execute_at(
     session: &Session,
     recorder: Recorder,
     folder: &Path,
-    place: Place,
+    Elsewhere { place, options }: Elsewhere,
     execution: &ExecutionArgs,
     output: &OutputArgs,
     files: Files,
@@ -276,7 +291,8 @@ pub(super) fn execute_at(
     let interrupted = interruptible()?;
     let started = Instant::now();
     let before = runs(recorder.repository())?;
-    let again = |more: &[&str]| session.caller.command("resume", &[more, &[&shown(folder)]].concat());
+    let options: Vec<&str> = options.iter().map(String::as_str).collect();
+    let again = |more: &[&str]| session.caller.command("resume", &[more, &options, &[&shown(folder)]].concat());
     let Some(repository) = perform_at(
         session,
         recorder,

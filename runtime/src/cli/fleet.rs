@@ -1,5 +1,6 @@
 //! Where a campaign's tests run, if not on this machine: the queue, its token, and what agents have to know.
 
+use std::ffi::OsString;
 use std::fs::{self, File};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -28,7 +29,7 @@ pub(super) const VERSION: &str = env!("CARGO_PKG_VERSION");
 #[derive(Debug, Clone, Default, Args)]
 pub(super) struct QueueArgs {
     /// The file with the token that agents and campaigns share; by default `sesame/token` in the user's folder of
-    /// settings, which is made if it is not there
+    /// settings, which `sesamec agent` and `run --on` make if it is not there
     #[arg(long, value_name = "FILE")]
     token: Option<PathBuf>,
     /// A file of credentials for the broker, as NATS writes them
@@ -41,12 +42,13 @@ pub(super) struct QueueArgs {
 
 /// Where tests are run.
 #[derive(Debug, Clone, Default, Args)]
-pub(super) struct FleetArgs {
+pub struct FleetArgs {
     /// Run the tests by agents: the URL of a broker of NATS, for example `nats://127.0.0.1:4222`, or a folder that all
     /// machines share. `sesamec agent URL` starts an agent
     #[arg(long, value_name = "URL")]
     on: Option<String>,
-    /// The folder of the space is on the machines of agents already, under this name; nothing is sent but the plan
+    /// The folder of the space is on the machines of agents already, under this name: they compare its files, and none
+    /// is sent
     #[arg(long, value_name = "NAME", requires = "on")]
     prepared: Option<String>,
     #[command(flatten)]
@@ -95,40 +97,45 @@ impl QueueArgs {
         }
     }
 
-    /// The token, which is made if it is not there.
+    /// The token. The one in the user's folder of settings is made if it is not there.
     pub(super) fn token(&self) -> Result<Token, Failure> {
-        let path = match &self.token {
-            Some(path) => path.clone(),
-            None => default_token_file()
-                .ok_or_else(|| Failure("there is no folder of settings: name a file with `--token FILE`".to_owned()))?,
-        };
-        let failed = |error: io::Error| Failure(format!("the token in {}: {error}", path.display()));
+        self.known_token()?.map_or_else(Self::made_token, Ok)
+    }
+
+    /// The token, if there is one. A file that was named has to be there.
+    pub(super) fn known_token(&self) -> Result<Option<Token>, Failure> {
+        let path = self.token.clone().map_or_else(default_token_file, Ok)?;
         match fs::read_to_string(&path) {
-            Ok(text) => Token::read(&text).ok_or_else(|| {
+            Ok(text) => Token::read(&text).map(Some).ok_or_else(|| {
                 Failure(format!(
                     "{} is not a token: 64 hexadecimal digits, as `sesamec agent` writes them",
                     path.display()
                 ))
             }),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                let token = Token::random().map_err(Failure)?;
-                if let Some(parent) = path.parent() {
-                    fs::create_dir_all(parent).map_err(failed)?;
-                }
-                match create_private(&path, &format!("{}\n", token.text())) {
-                    // Another program that was started at the same time was faster.
-                    Err(error) if error.kind() == io::ErrorKind::AlreadyExists => return self.token(),
-                    created => created.map_err(failed)?,
-                }
-                say(format_args!(
-                    "note: a token was made in {}. Copy this file to the same place on each machine that takes part; who has \
-                     it can have agents run programs",
-                    path.display()
-                ));
-                Ok(token)
-            }
-            Err(error) => Err(failed(error)),
+            Err(error) if error.kind() == io::ErrorKind::NotFound && self.token.is_none() => Ok(None),
+            Err(error) => Err(Failure(format!("the token in {}: {error}", path.display()))),
         }
+    }
+
+    /// A fresh token in the user's folder of settings.
+    fn made_token() -> Result<Token, Failure> {
+        let path = default_token_file()?;
+        let failed = |error: io::Error| Failure(format!("the token in {}: {error}", path.display()));
+        let token = Token::random().map_err(Failure)?;
+        if let Some(parent) = path.parent() {
+            fs::create_dir_all(parent).map_err(failed)?;
+        }
+        match create_private(&path, &format!("{}\n", token.text())) {
+            // Another program that was started at the same time was faster.
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => return QueueArgs::default().token(),
+            created => created.map_err(failed)?,
+        }
+        say(format_args!(
+            "note: created the token {}. Copy it to every machine that takes part; whoever has it can run programs on your \
+             agents",
+            path.display()
+        ));
+        Ok(token)
     }
 }
 
@@ -148,10 +155,11 @@ fn create_private(path: &Path, content: &str) -> io::Result<()> {
     created
 }
 
-fn default_token_file() -> Option<PathBuf> {
+fn default_token_file() -> Result<PathBuf, Failure> {
     let settings = std::env::var_os("XDG_CONFIG_HOME").map(PathBuf::from).filter(|folder| folder.is_absolute());
     let home = || std::env::home_dir().map(|home| home.join(".config"));
-    Some(settings.or_else(home)?.join("sesame").join("token"))
+    let settings = settings.or_else(home).map(|settings| settings.join("sesame").join("token"));
+    settings.ok_or_else(|| Failure("there is no folder of settings: name a file with `--token FILE`".to_owned()))
 }
 
 /// The architecture and system that programs of this machine are for.
@@ -160,7 +168,7 @@ pub(super) fn target() -> String {
 }
 
 /// Whether an address leads to another system on each machine.
-fn is_of_each_machine(address: &str) -> bool {
+pub(super) fn is_of_each_machine(address: &str) -> bool {
     let host = address.split_once("://").map_or(address, |(_, rest)| rest);
     let host = host.split('/').next().unwrap_or(host);
     let host = host.rsplit_once(':').map_or(host, |(host, _)| host).trim_matches(['[', ']']);
@@ -177,16 +185,49 @@ pub(super) fn machine() -> String {
     if name.is_empty() { "unnamed".to_owned() } else { name }
 }
 
+/// A queue that was reached, before anything of a run is written.
+pub(super) struct Reached {
+    queue: Arc<dyn Queue>,
+    token: Token,
+    prepared: Option<String>,
+}
+
 impl FleetArgs {
-    /// The agents that are to run a campaign whose results come into this folder; `None` if it runs here.
+    /// These arguments for the runner of a campaign.
+    pub fn arguments(&self) -> Vec<OsString> {
+        let QueueArgs { token, credentials, certificates } = &self.queue;
+        let given: [(&str, Option<OsString>); 5] = [
+            ("--on", self.on.clone().map(OsString::from)),
+            ("--prepared", self.prepared.clone().map(OsString::from)),
+            ("--token", token.clone().map(OsString::from)),
+            ("--credentials", credentials.clone().map(OsString::from)),
+            ("--certificates", certificates.clone().map(OsString::from)),
+        ];
+        given.into_iter().filter_map(|(name, value)| Some([OsString::from(name), value?])).flatten().collect()
+    }
+
+    /// The same for a command that goes on with the run. Paths are as they were given.
+    pub(super) fn shown(&self) -> Vec<String> {
+        self.arguments().iter().map(|word| word.to_string_lossy().into_owned()).collect()
+    }
+
+    /// The queue; `None` if the campaign runs here.
+    pub(super) fn reach(&self) -> Result<Option<Reached>, Failure> {
+        let Some(place) = &self.on else { return Ok(None) };
+        let (queue, token) = (self.queue.open(place)?, self.queue.token()?);
+        Ok(Some(Reached { queue, token, prepared: self.prepared.clone() }))
+    }
+}
+
+impl Reached {
+    /// The agents that are to run a campaign whose results come into this folder.
     pub(super) fn fleet(
-        &self,
+        self,
         session: &Session,
         plan: &CampaignPlan,
         folder: &Path,
         seed: u64,
-    ) -> Result<Option<Fleet>, Failure> {
-        let Some(place) = &self.on else { return Ok(None) };
+    ) -> Result<Fleet, Failure> {
         let Some(runner) = session.program.sent() else {
             return Err(Failure("agents run tests in the simulator only: run this without `--on`".to_owned()));
         };
@@ -201,16 +242,16 @@ impl FleetArgs {
             ))
         })?;
         let unread = |error: bundle::BundleError| Failure(error.to_string());
-        let (files, mut bundle) = if let Some(name) = &self.prepared {
-            (Files::Prepared { name: name.clone() }, Vec::new())
+        // What earlier runs left is of no use to agents.
+        let own = &runner.directory;
+        let run = folder.canonicalize()?;
+        let results = run.parent().filter(|results| !space.canonicalize().is_ok_and(|space| space == **results));
+        let is_ours = |path: &Path| {
+            path == own || path.canonicalize().is_ok_and(|path| path == run || Some(path.as_path()) == results)
+        };
+        let (files, mut bundle) = if let Some(name) = self.prepared {
+            (Files::Prepared { name, files: bundle::list_prepared(&space, &is_ours).map_err(unread)? }, Vec::new())
         } else {
-            // What earlier runs left is of no use to agents.
-            let own = &runner.directory;
-            let run = folder.canonicalize()?;
-            let results = run.parent().filter(|results| !space.canonicalize().is_ok_and(|space| space == **results));
-            let is_ours = |path: &Path| {
-                path == own || path.canonicalize().is_ok_and(|path| path == run || Some(path.as_path()) == results)
-            };
             let manifest = bundle::list(&space, &is_ours).map_err(unread)?;
             let at = |entry: &bundle::Entry| (entry.clone(), space.join(&entry.path));
             let bundle = manifest.files.iter().map(at).collect();
@@ -247,7 +288,7 @@ impl FleetArgs {
             put_aside: Vec::new(),
         };
         let lock_stepped = plan.simulator.step_ns().is_some();
-        let (queue, token) = (self.queue.open(place)?, self.queue.token()?);
-        Ok(Some(Fleet { queue, token, announcement, files: bundle, lock_stepped }))
+        let Reached { queue, token, .. } = self;
+        Ok(Fleet { queue, token, announcement, files: bundle, lock_stepped })
     }
 }

@@ -26,19 +26,19 @@ const MOST: u32 = 1_000_000;
 pub(super) struct ForecastArgs {
     /// The folder of a run like it, for example `results/42`: its tests say how long tests take, how many there are,
     /// and how large generations are
-    #[arg(value_name = "RUN", required_unless_present = "test")]
+    #[arg(value_name = "RUN", required_unless_present_all = ["test", "tests"])]
     run: Option<PathBuf>,
-    /// How long a test takes, in seconds, in place of the times of a run
+    /// How long a test takes, in seconds, in place of the times of a run; needs `--tests`
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     test: Option<Duration>,
     /// How many tests the campaign has; by default as many as the run
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST)), required_unless_present = "run")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST)))]
     tests: Option<u32>,
     /// How many tests the search asks for at a time: its population. By default as in the run, or all
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     generation: Option<u32>,
     /// Numbers of agents
-    #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = [1, 2, 5, 10, 20, 50, 100, 1000, 10_000],
+    #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = [1, 2, 5, 10, 20, 50, 100, 1000],
         value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST)))]
     agents: Vec<u32>,
     /// How many tests each agent runs at once

@@ -9,11 +9,14 @@ use sesame_plan::Task;
 use sesame_record as record;
 use sesame_record::Recorder;
 
+#[cfg(feature = "agents")]
 use crate::campaign::Place;
-use crate::cli::execution::{ExecutionArgs, OutputArgs, begin, claim_files, execute_at, refuse_unfilled, shown};
+use crate::cli::execution::{
+    Elsewhere, ExecutionArgs, OutputArgs, begin, claim_files, execute_at, refuse_unfilled, shown,
+};
 use crate::cli::failure::Failure;
 #[cfg(feature = "agents")]
-use crate::cli::fleet::FleetArgs;
+use crate::cli::fleet::{FleetArgs, Reached};
 use crate::cli::over_budget::refuse_over_budget;
 use crate::cli::results_folder::{open, refuse_other_model, run_folder};
 use crate::cli::session::{Session, World};
@@ -95,20 +98,29 @@ pub(super) fn run(session: &Session, args: &RunArgs) -> Result<ExitCode, Failure
     }
     let files = claim_files(&session.runner, &plan)?;
     refuse_unfilled(session, &plan, args.allow_unimplemented)?;
+    #[cfg(feature = "agents")]
+    let reached = args.fleet.reach()?;
     let (recorder, folder) = begin(session, results, &name, &plan, &Task::Campaign, seed, &args.execution)?;
     #[cfg(feature = "agents")]
-    let place = place(&args.fleet, session, &recorder, &folder)?;
+    let elsewhere = elsewhere(reached, &args.fleet, session, &recorder, &folder)?;
     #[cfg(not(feature = "agents"))]
-    let place = Place::Here;
-    execute_at(session, recorder, &folder, place, &args.execution, &args.output, files)
+    let elsewhere = Elsewhere::here();
+    execute_at(session, recorder, &folder, elsewhere, &args.execution, &args.output, files)
 }
 
 /// Where the tests of a run are carried out.
 #[cfg(feature = "agents")]
-fn place(fleet: &FleetArgs, session: &Session, recorder: &Recorder, folder: &Path) -> Result<Place, Failure> {
+fn elsewhere(
+    reached: Option<Reached>,
+    fleet: &FleetArgs,
+    session: &Session,
+    recorder: &Recorder,
+    folder: &Path,
+) -> Result<Elsewhere, Failure> {
+    let Some(reached) = reached else { return Ok(Elsewhere::here()) };
     let campaign = recorder.repository().campaign();
-    let fleet = fleet.fleet(session, &campaign.plan, folder, campaign.seed)?;
-    Ok(fleet.map_or(Place::Here, |fleet| Place::Fleet(Box::new(fleet))))
+    let agents = reached.fleet(session, &campaign.plan, folder, campaign.seed)?;
+    Ok(Elsewhere { place: Place::Fleet(Box::new(agents)), options: fleet.shown() })
 }
 
 /// The name of the results of a campaign whose simulation is compensated for a lab.
@@ -133,24 +145,24 @@ pub(super) fn resume(session: &Session, args: &ResumeArgs) -> Result<ExitCode, F
         if let Some(undisturbed) = task.undisturbed() {
             session = session.relaying(undisturbed.relayed);
         }
-        return go_on(&session, recorder, &folder, Place::Here, &execution, &args.output);
+        return go_on(&session, recorder, &folder, Elsewhere::here(), &execution, &args.output);
     }
     if let Some(undisturbed) = task.undisturbed() {
         let (session, execution) = (session.relaying(undisturbed.relayed), args.execution.one_at_a_time());
-        return go_on(&session, recorder, &folder, Place::Here, &execution, &args.output);
+        return go_on(&session, recorder, &folder, Elsewhere::here(), &execution, &args.output);
     }
     #[cfg(feature = "agents")]
-    let place = place(&args.fleet, session, &recorder, &folder)?;
+    let elsewhere = elsewhere(args.fleet.reach()?, &args.fleet, session, &recorder, &folder)?;
     #[cfg(not(feature = "agents"))]
-    let place = Place::Here;
-    go_on(session, recorder, &folder, place, &args.execution, &args.output)
+    let elsewhere = Elsewhere::here();
+    go_on(session, recorder, &folder, elsewhere, &args.execution, &args.output)
 }
 
 fn go_on(
     session: &Session,
     recorder: Recorder,
     folder: &Path,
-    place: Place,
+    elsewhere: Elsewhere,
     execution: &ExecutionArgs,
     output: &OutputArgs,
 ) -> Result<ExitCode, Failure> {
@@ -164,5 +176,5 @@ fn go_on(
     }
     let files = claim_files(&session.runner, plan)?;
     refuse_unfilled(session, plan, true)?;
-    execute_at(session, recorder, folder, place, execution, output, files)
+    execute_at(session, recorder, folder, elsewhere, execution, output, files)
 }

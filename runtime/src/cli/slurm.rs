@@ -16,7 +16,7 @@ use sesame_base::shell::quoted;
 
 use crate::cli::execution::seconds;
 use crate::cli::failure::Failure;
-use crate::cli::fleet::QueueArgs;
+use crate::cli::fleet::{QueueArgs, is_of_each_machine};
 use crate::cli::terminal::{print, say};
 
 /// How long before the end of its time a job is asked to end, so that its agent gives back what it runs.
@@ -94,8 +94,9 @@ fn script(args: &SlurmArgs, program: &Path, queue: &str, access: &[String]) -> S
         "open-mode=append".to_owned(),
     ];
     let mut script = "#!/bin/sh\n".to_owned();
-    for option in options {
-        writeln!(script, "#SBATCH --{option}").expect("a text can be written");
+    let options = options.into_iter().map(|option| format!("--{option}"));
+    for option in options.chain(args.options.iter().cloned()) {
+        writeln!(script, "#SBATCH {option}").expect("a text can be written");
     }
     let mut words = vec![program.display().to_string(), "agent".to_owned(), queue.to_owned()];
     words.extend(["--leave-after".to_owned(), args.leave_after.as_secs_f64().to_string()]);
@@ -120,6 +121,9 @@ pub(super) fn submit(args: &SlurmArgs) -> Result<ExitCode, Failure> {
     args.access.token()?;
     let access = args.access.arguments(&|path| absolute(path))?;
     let script = script(args, &std::env::current_exe()?, &queue, &access);
+    if args.queue.contains("://") && is_of_each_machine(&args.queue) {
+        say(format_args!("warning: `{}` is another address on each node: name the machine of the broker", args.queue));
+    }
     if args.print {
         return print(&script);
     }
@@ -132,7 +136,6 @@ pub(super) fn submit(args: &SlurmArgs) -> Result<ExitCode, Failure> {
     };
     let mut sbatch = Command::new("sbatch")
         .arg("--parsable")
-        .args(&args.options)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .spawn()

@@ -63,6 +63,8 @@ pub enum Files {
     Prepared {
         /// The name, as `--prepared NAME=FOLDER` gives it to an agent.
         name: String,
+        /// The files that have to be in it, and what is in them.
+        files: Manifest,
     },
 }
 

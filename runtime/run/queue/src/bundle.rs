@@ -13,7 +13,7 @@ use std::path::{Component, Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::message::digest_of;
+use crate::message::{digest_of, digest_of_all};
 use crate::queue::LARGEST_FILE;
 
 /// The most files of a bundle.
@@ -93,6 +93,12 @@ pub enum BundleError {
     /// The list of files was not made by this program.
     #[error("`{0}` is not a path inside of a folder")]
     Path(String),
+    /// A file of a prepared folder is not that of the campaign.
+    #[error("{} has another content than where the campaign was started", path.display())]
+    Differs {
+        /// The file.
+        path: PathBuf,
+    },
     /// A file is not what its hash says.
     #[error("`{0}` has another content than the campaign announced")]
     Content(String),
@@ -102,8 +108,18 @@ fn at(path: &Path) -> impl FnOnce(io::Error) -> BundleError + '_ {
     move |error| BundleError::Io { path: path.to_owned(), error }
 }
 
-/// Lists the files of a folder. Folders of tools and earlier results are left behind, and so is what `skip` says.
+/// Lists the files of a folder that is to travel. Folders of tools and earlier results are left behind, and so is what
+/// `skip` says.
 pub fn list(folder: &Path, skip: &dyn Fn(&Path) -> bool) -> Result<Manifest, BundleError> {
+    listed(folder, skip, true)
+}
+
+/// The same of a folder that agents have already, however large it is.
+pub fn list_prepared(folder: &Path, skip: &dyn Fn(&Path) -> bool) -> Result<Manifest, BundleError> {
+    listed(folder, skip, false)
+}
+
+fn listed(folder: &Path, skip: &dyn Fn(&Path) -> bool, travels: bool) -> Result<Manifest, BundleError> {
     let root = folder.canonicalize().map_err(at(folder))?;
     let (mut files, mut total) = (Vec::new(), 0);
     // Each with the folders that it lies in, behind all links.
@@ -118,7 +134,10 @@ pub fn list(folder: &Path, skip: &dyn Fn(&Path) -> bool) -> Result<Manifest, Bun
             }
             let real = path.canonicalize().map_err(at(&path))?;
             if !real.starts_with(&root) {
-                return Err(BundleError::LeadsOut { path });
+                if travels {
+                    return Err(BundleError::LeadsOut { path });
+                }
+                continue;
             }
             let behind = fs::metadata(&path).map_err(at(&path))?;
             if behind.is_dir() {
@@ -135,10 +154,10 @@ pub fn list(folder: &Path, skip: &dyn Fn(&Path) -> bool) -> Result<Manifest, Bun
                 continue;
             }
             total += behind.len();
-            if behind.len() > LARGEST_FILE {
+            if travels && behind.len() > LARGEST_FILE {
                 return Err(BundleError::TooLargeFile { path });
             }
-            if files.len() == MOST_FILES || total > LARGEST_BUNDLE {
+            if travels && (files.len() == MOST_FILES || total > LARGEST_BUNDLE) {
                 return Err(BundleError::TooLarge { folder: folder.to_owned() });
             }
             let below = path.strip_prefix(folder).expect("it is below the folder");
@@ -154,8 +173,21 @@ pub fn list(folder: &Path, skip: &dyn Fn(&Path) -> bool) -> Result<Manifest, Bun
 /// A file that travels under this name.
 pub fn entry_of(file: &Path, name: String) -> Result<Entry, BundleError> {
     let executable = is_executable(&fs::metadata(file).map_err(at(file))?);
-    let content = fs::read(file).map_err(at(file))?;
-    Ok(Entry { path: name, hash: digest_of(&content), length: content.len() as u64, executable })
+    let (hash, length) = fs::File::open(file).and_then(digest_of_all).map_err(at(file))?;
+    Ok(Entry { path: name, hash, length, executable })
+}
+
+/// Compares a folder with a manifest, of which it has to have each file; it may have others. The error names the first
+/// file that differs.
+pub fn compare(manifest: &Manifest, folder: &Path) -> Result<(), BundleError> {
+    for entry in &manifest.files {
+        let path = folder.join(inside(&entry.path)?);
+        let here = entry_of(&path, entry.path.clone())?;
+        if (&here.hash, here.length) != (&entry.hash, entry.length) {
+            return Err(BundleError::Differs { path });
+        }
+    }
+    Ok(())
 }
 
 /// Writes the files of a manifest into a folder, which need not exist; `content` gets each by its hash. Paths that
@@ -258,6 +290,22 @@ mod tests {
         unpack(&manifest, &to, &mut |entry| Ok(fs::read(from.path().join(&entry.path)).unwrap())).unwrap();
         assert_eq!(files(&to).into_keys().collect::<Vec<_>>(), paths);
         assert_eq!(files(&to)["world/models/arm.urdf"], "<robot/>");
+    }
+
+    #[test]
+    fn a_prepared_folder_may_have_more_files_and_each_that_it_should_have_is_compared() {
+        let (here, there) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        write(here.path(), "cell.sesame", "space cell");
+        write(here.path(), "world/arm.urdf", "<robot/>");
+        let manifest = list_prepared(here.path(), &|_| false).unwrap();
+        write(there.path(), "cell.sesame", "space cell");
+        assert!(matches!(compare(&manifest, there.path()), Err(BundleError::Io { .. })), "a file is missing");
+        write(there.path(), "world/arm.urdf", "<robot/>");
+        write(there.path(), "engine/engine.so", "large");
+        compare(&manifest, there.path()).unwrap();
+        write(there.path(), "world/arm.urdf", "<Robot/>");
+        let differs = compare(&manifest, there.path());
+        assert!(matches!(&differs, Err(BundleError::Differs { path }) if path.ends_with("arm.urdf")), "{differs:?}");
     }
 
     #[cfg(unix)]

@@ -143,15 +143,16 @@ impl Dispatch {
         Answer::Result(Box::new(Taken { number, agent, result, recorded, notes }))
     }
 
-    /// Who is there now. Returns in sentences what has changed.
-    pub fn present(&mut self, agents: &[Presence]) -> Vec<String> {
-        let present: BTreeSet<String> = agents.iter().map(|presence| presence.agent.machine.clone()).collect();
+    /// Which of the agents that are there work for this campaign now. Returns in sentences what has changed.
+    pub fn present(&mut self, agents: &[Presence], works: impl Fn(&Presence) -> bool) -> Vec<String> {
+        let machine = |presence: &Presence| presence.agent.machine.clone();
+        let heard: BTreeSet<String> = agents.iter().map(machine).collect();
+        let present: BTreeSet<String> = agents.iter().filter(|agent| works(agent)).map(machine).collect();
         let came = present.difference(&self.present).map(|machine| format!("`{machine}` has joined"));
-        let left = self
-            .present
-            .difference(&present)
-            .map(|machine| format!("`{machine}` is not heard any more: others get the tests that it had taken"));
-        let changes = came.chain(left).collect();
+        // One that was put aside, or works for another campaign by now, is not lost.
+        let lost = self.present.difference(&heard);
+        let lost = lost.map(|machine| format!("no sign of `{machine}` any more: its tests go to other machines"));
+        let changes = came.chain(lost).collect();
         self.present = present;
         changes
     }

@@ -6,6 +6,8 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 
+use crate::token::{Kind, Token};
+
 /// A test on its way to an agent.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Work {
@@ -127,16 +129,42 @@ pub struct Presence {
     pub refused: Vec<(String, String)>,
 }
 
+impl Supervision {
+    /// Reads what a supervisor with this token says, of whichever campaign.
+    pub fn read(token: &Token, sealed: &[u8]) -> Option<Supervision> {
+        let body = sealed.splitn(2, |&byte| byte == b'\n').nth(1)?;
+        // Not trusted: it only says which campaign the signature has to be for.
+        let said: Supervision = serde_json::from_slice(body).ok()?;
+        token.open(Kind::Supervision, &said.campaign, sealed).ok().filter(|read: &Supervision| *read == said)
+    }
+}
+
 /// The hash of bytes: SHA-256 in hexadecimal digits.
 pub fn digest_of(bytes: &[u8]) -> String {
     use sha2::Digest as _;
     crate::token::hex(&sha2::Sha256::digest(bytes))
 }
 
+/// The same of all that can be read, and how long it is.
+pub fn digest_of_all(mut from: impl std::io::Read) -> std::io::Result<(String, u64)> {
+    use sha2::Digest as _;
+    let (mut hash, mut length, mut piece) = (sha2::Sha256::new(), 0, vec![0; 1 << 16]);
+    loop {
+        match from.read(&mut piece) {
+            Ok(0) => return Ok((crate::token::hex(&hash.finalize()), length)),
+            Ok(read) => {
+                hash.update(&piece[..read]);
+                length += read as u64;
+            }
+            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::token::{Kind, Token};
 
     #[test]
     fn messages_are_read_as_they_were_sealed_and_jobs_and_results_keep_every_byte() {

@@ -241,7 +241,7 @@ impl Simulation<'_> {
             refused: Vec::new(),
         };
         let present: Vec<Presence> = self.machines.iter().filter(|machine| machine.present).map(presence).collect();
-        self.dispatch.present(&present);
+        self.dispatch.present(&present, |_| true);
     }
 
     fn submit_generation(&mut self) {

@@ -102,7 +102,7 @@ fn a_late_result_of_an_earlier_attempt_counts() {
 #[test]
 fn a_machine_with_faults_in_a_row_is_put_aside_and_named_and_one_success_begins_the_row_anew() {
     let mut dispatch = self::dispatch();
-    dispatch.present(&[presence("a"), presence("b")]);
+    dispatch.present(&[presence("a"), presence("b")], |_| true);
     for number in 0..2 {
         let work = dispatch.submit(number, job(number), LIMIT, false);
         again(dispatch.ended(ended(&work, "a", not_run())));
@@ -118,11 +118,13 @@ fn a_machine_with_faults_in_a_row_is_put_aside_and_named_and_one_success_begins_
     assert_eq!(dispatch.put_aside(), [("a".to_owned(), reason.to_owned())]);
     assert_eq!(dispatch.stuck(), None, "b is there");
     assert_eq!(
-        dispatch.present(&[presence("a")]),
-        ["`b` is not heard any more: others get the tests that it had taken"]
+        dispatch.present(&[presence("a")], |_| true),
+        ["no sign of `b` any more: its tests go to other machines"]
     );
     assert_eq!(dispatch.stuck(), Some(format!("`a`: {reason}")));
-    assert_eq!(dispatch.present(&[presence("a"), presence("c")]), ["`c` has joined"]);
+    assert_eq!(dispatch.present(&[presence("a")], |_| false), [""; 0], "one that was put aside is not lost");
+    assert_eq!(dispatch.present(&[presence("a")], |_| true), ["`a` has joined"]);
+    assert_eq!(dispatch.present(&[presence("a"), presence("c")], |_| true), ["`c` has joined"]);
     assert_eq!(dispatch.stuck(), None);
 }
 
