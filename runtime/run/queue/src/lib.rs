@@ -1,8 +1,8 @@
 //! Tests of one campaign on many machines: the queue between its supervisor and the agents that run them.
 //!
-//! The supervisor announces a campaign, puts its tests into a [queue](queue::Queue), and takes results out of it. An agent
-//! finds announced campaigns, takes one test after another, and puts in what came of it. What a test is, and how it is
-//! run, nobody here knows: jobs and results pass as JSON.
+//! The supervisor announces a campaign, puts its tests into a [queue](queue::Queue), and takes results out of it. An
+//! agent finds announced campaigns, takes one test after another, and puts in what came of it. What a test is, and how
+//! it is run, nobody here knows: jobs and results pass as JSON.
 //!
 //! The queue redelivers what an agent took and did not finish. What the supervisor concludes from results is decided
 //! by [`dispatch`], without a clock and without a connection, and what an agent does with a test by [`intake`]: so the
