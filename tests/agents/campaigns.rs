@@ -8,7 +8,7 @@ use serde_json::Value;
 use sesame_patience::until;
 use sesame_tests::{Project, command, done, sesamec};
 
-use crate::fleet::{Broker, Cell, TESTS, finished, started, started_with_log};
+use crate::fleet::{Broker, Cell, TESTS, finished, started, started_with_log, token_in};
 
 /// The machines of all tests of a run, and that each test has one.
 fn machines(cell: &Cell, results: &str) -> BTreeSet<String> {
@@ -82,7 +82,7 @@ fn a_compiled_runner_travels_and_comes_to_the_results_of_one_machine() {
     const CAMPAIGN: &str = "coverage_experiment";
     let project = Project::kuka_cell("agents_compiled");
     let place = |name: &str| project.folder.join(name).display().to_string();
-    let (on, token) = (place("queue"), place("token"));
+    let (on, token) = (place("queue"), token_in(&project.folder));
     let settings = ["--seed", "7", "--evaluations", "20", "--results"];
     let local = project.run(CAMPAIGN, &[&["--"], &settings[..], &["local"]].concat()).expect(0);
     let agent = |machine: &str| {

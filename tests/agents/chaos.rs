@@ -13,7 +13,7 @@ use sesame_record::Repository;
 use sesame_rng::Stream;
 use sesame_tests::{command, done, fresh_folder, sesamec, workspace};
 
-use crate::fleet::{Run, finished, started};
+use crate::fleet::{Run, finished, started, token_in};
 use crate::network::Network;
 
 /// The machine with the broker and the supervisor, and those with agents.
@@ -80,7 +80,7 @@ impl Campaign {
     }
 
     fn token(&self) -> String {
-        self.folder.join("token").display().to_string()
+        token_in(&self.folder)
     }
 
     fn agent(&self, network: &Network, machine: &str, on: &str) -> Ended {

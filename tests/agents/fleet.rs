@@ -103,6 +103,15 @@ impl Cell {
     }
 }
 
+/// The file of a token in a folder, written with the first call.
+pub(crate) fn token_in(folder: &Path) -> String {
+    let file = folder.join("token");
+    if !file.exists() {
+        fs::write(&file, format!("{}\n", "0123456789abcdef".repeat(4))).expect("a token can be written");
+    }
+    file.display().to_string()
+}
+
 /// A run that goes on until it ends, is killed, or this is dropped.
 pub(crate) struct Run(Option<Child>);
 

@@ -5,7 +5,7 @@ use std::fs;
 use sesame_patience::until;
 use sesame_tests::done;
 
-use crate::fleet::{Cell, started_with_log};
+use crate::fleet::{Cell, started_with_log, token_in};
 
 fn failure(cell: &Cell, arguments: &[&str]) -> String {
     done(&mut cell.command(arguments)).expect(1).err
@@ -33,7 +33,7 @@ fn an_agent_with_another_token_refuses_a_campaign_and_says_what_to_do() {
     let other = cell.folder.join("another_token").display().to_string();
     let missing = failure(&cell, &["agent", &on, "--token", &other]);
     assert!(missing.contains(&format!("the token in {other}: ")), "a token that was named is not made: {missing}");
-    fs::write(&other, format!("{}\n", "0123456789abcdef".repeat(4))).unwrap();
+    let other = token_in(&cell.folder);
     let mut agent = cell.command(&["agent", &on, "--token", &other]);
     let agent = agent.stderr(fs::File::create(cell.folder.join("agent.log")).unwrap()).spawn().unwrap();
     let agent = sesame_peers::Ended(agent);
