@@ -178,9 +178,9 @@ pub(super) fn agent(args: &AgentArgs) -> Result<ExitCode, Failure> {
     let parent =
         parent.ok_or_else(|| Failure("there is no folder of caches: name one with `--folder DIR`".to_owned()))?;
     let (folder, _lock) = own_folder(&parent)?;
-    let token = args.access.token()?;
     let stop = interruptible()?;
     let Some(queue) = awaited(args, &stop)? else { return Ok(ExitCode::SUCCESS) };
+    let token = args.access.token()?;
     let processors = || thread::available_parallelism().ok().and_then(|count| u32::try_from(count.get()).ok());
     // A token of its own is a fresh random number.
     let id = Token::random().map_err(Failure)?.text()[..16].to_owned();
