@@ -53,12 +53,12 @@ impl Campaign {
         let text = fs::read_to_string(&simulator).expect("the example has a simulator");
         let slow = text.replace(
             "    print(json.dumps(what), flush=True)\n",
-            "    __import__(\"time\").sleep(1 / 600)\n    print(json.dumps(what), flush=True)\n",
+            "    __import__(\"time\").sleep(1 / 4000)\n    print(json.dumps(what), flush=True)\n",
         );
         assert_ne!(slow, text);
         fs::write(&simulator, slow).expect("a simulator can be written");
         let space = folder.join("space/two_robots.sesame");
-        Campaign { folder, space, name: "crossing", evaluations: 60 }
+        Campaign { folder, space, name: "crossing", evaluations: 180 }
     }
 
     fn command(&self, arguments: &[&str]) -> Command {
