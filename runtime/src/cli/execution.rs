@@ -315,6 +315,7 @@ pub(super) fn execute_at(
 
 /// Runs a campaign to its end; `None` if the user stopped it, which it prints. `again` gives the command that goes on
 /// with it, with these options more.
+#[cfg(feature = "process")]
 pub(super) fn perform(
     session: &Session,
     recorder: Recorder,

@@ -75,6 +75,7 @@ impl QueueArgs {
     }
 
     /// The same, where it matters whether the queue may be there later.
+    #[cfg_attr(not(feature = "nats"), expect(clippy::unused_self, reason = "a folder needs no credentials"))]
     pub(super) fn connect(&self, place: &str) -> Result<Arc<dyn Queue>, QueueError> {
         let refused = |reason: String| Err(QueueError::Refused { place: place.to_owned(), reason });
         match place.split_once("://") {
