@@ -38,6 +38,8 @@ mod worker_program;
 pub use agent::{AgentSettings, work};
 #[cfg(feature = "agents")]
 pub use agents::Fleet;
+#[cfg(feature = "agents")]
+pub(crate) use agents::strangers;
 pub use confirmation::{Confirmations, confirm_recorded};
 pub use error::CampaignError;
 pub use events::{CampaignEvent, Listener, Progress};

@@ -41,7 +41,7 @@ fn an_agent_with_another_token_refuses_a_campaign_and_says_what_to_do() {
         let said = fs::read_to_string(cell.folder.join("agent.log")).unwrap();
         said.contains("is refused: it is signed with another token: copy the file of the token")
     });
-    let strangers = format!("no agent works for this campaign, and one on {on} has another token");
+    let strangers = format!("no agent works for this campaign; 1 agent or campaign on {on} has another token");
     until("the campaign says so, too", || fs::read_to_string(&log).unwrap().contains(&strangers));
     drop(agent);
     run.kill();

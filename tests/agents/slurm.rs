@@ -122,11 +122,25 @@ fn agents_that_slurm_starts_come_to_the_results_of_one_machine_although_a_node_i
     let Some(mut cluster) = Cluster::start(&cell.folder) else { return };
     let digest = cell.local_digest();
     let on = cell.folder.join("queue").display().to_string();
-    let submit = cell.command(&["agents", "slurm", &on, "--nodes", "2", "--time", "20min", "--workers", "1"]);
+    let submit = cell.command(&[
+        "agents",
+        "slurm",
+        &on,
+        "--nodes",
+        "2",
+        "--time",
+        "20min",
+        "--workers",
+        "1",
+        "--",
+        "--comment=agents of a test",
+    ]);
     let mut submit = cluster.network.on(HEAD, &submit);
     let submitted: Done = done(submit.env("SLURM_CONF", cluster.place("slurm.conf"))).expect(0);
     let id = submitted.out.trim().to_owned();
     assert!(id.parse::<u32>().is_ok(), "{submitted:?}");
+    let job = done(cluster.command("scontrol").args(["show", "job", &id])).expect(0);
+    assert!(job.out.contains("Comment=agents of a test"), "{job:?}");
     let run = started(&mut cluster.network.on(HEAD, &cell.run("remote", Some(&on))));
     cell.await_tests("remote", TESTS / 3);
     cluster.network.kill_all_on("n1");

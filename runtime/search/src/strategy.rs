@@ -24,7 +24,8 @@ pub trait Strategy: Send {
     /// Takes the results of exactly the oldest generation that was asked and not told, in its order.
     fn tell(&mut self, results: &[Evaluated]);
 
-    /// Whether further generations may be asked for before results are told: no test depends on results.
+    /// Whether further generations may be asked for before the results of earlier ones are known, since no test
+    /// depends on them.
     fn asks_ahead(&self) -> bool {
         false
     }

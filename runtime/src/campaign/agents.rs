@@ -15,13 +15,10 @@ use sesame_queue::announcement::Announcement;
 use sesame_queue::bundle::Entry;
 use sesame_queue::dispatch::{Answer, Dispatch, Taken};
 use sesame_queue::message::{Ended, Limit, Presence, Supervision, Work, digest_of};
-use sesame_queue::queue::{HERE, Queue, QueueError};
+use sesame_queue::queue::{HERE, PAUSE, Queue, QueueError};
 use sesame_queue::token::{Kind, SealError, Token};
 
 use crate::campaign::executor::{Executor, ExecutorError, Job, JobResult, Machines, TraceRequest};
-
-/// How long it is waited before a queue that cannot be reached is tried again.
-const PAUSE: Duration = Duration::from_millis(200);
 
 /// How long a campaign waits for machines when all that there were have been put aside.
 const PATIENCE: Duration = Duration::from_secs(10);
@@ -35,7 +32,7 @@ pub struct Fleet {
     pub queue: Arc<dyn Queue>,
     /// The secret that the agents share.
     pub token: Token,
-    /// What agents are told.
+    /// What agents have to know.
     pub announcement: Announcement,
     /// The files that agents need, and where they are here.
     pub files: Vec<(Entry, PathBuf)>,
@@ -62,7 +59,7 @@ pub(super) struct Agents {
     machines: Machines,
     /// The machines that were said to refuse this campaign, each with the reason.
     refused: BTreeSet<(String, String)>,
-    /// How many agents and supervisors have another token.
+    /// How many agents and campaigns have another token.
     strangers: usize,
     /// Since when no agent works for this campaign.
     alone: Option<Instant>,
@@ -117,7 +114,7 @@ impl Agents {
         let campaign = announcement.campaign.clone();
         let prepare = || -> Result<String, String> {
             let session = Token::random()?.text();
-            // Files first, so that whoever hears of the campaign finds them.
+            // Files first, so that every agent that hears of the campaign finds them.
             queue.make_room(&campaign).map_err(|error| error.to_string())?;
             for (entry, path) in &files {
                 if queue.has_file(&campaign, &entry.hash).map_err(|error| error.to_string())? {
@@ -237,7 +234,7 @@ impl Agents {
         let Some(sealed) = self.queue.take_result(&campaign, wait)? else { return Ok(None) };
         let ended = match self.token.open::<Ended>(Kind::Ended, &campaign, &sealed) {
             Ok(ended) => ended,
-            // Whoever has not the token says nothing here.
+            // It is from somebody without the token, and ignored.
             Err(SealError::OtherToken) => return Ok(None),
             Err(error @ SealError::Unreadable(_)) => {
                 self.news.push(format!("a result of an agent is dropped: {error}"));
@@ -320,6 +317,14 @@ impl Agents {
     }
 }
 
+/// That others are there of whom nothing is known: they may be agents, or campaigns.
+pub(crate) fn strangers(count: usize, place: &str) -> String {
+    match count {
+        1 => format!("1 agent or campaign on {place} has another token"),
+        _ => format!("{count} agents or campaigns on {place} have another token"),
+    }
+}
+
 impl Executor for Agents {
     fn submit(&mut self, job: Job) {
         let records = job.trace.is_some();
@@ -377,8 +382,7 @@ impl Executor for Agents {
         let place = self.queue.place();
         let nobody = || match self.strangers {
             0 => format!("no agent works for this campaign: start one with `sesamec agent {place}`"),
-            1 => format!("no agent works for this campaign, and one on {place} has another token"),
-            count => format!("no agent works for this campaign, and {count} on {place} have another token"),
+            count => format!("no agent works for this campaign; {}", strangers(count, &place)),
         };
         let stuck = || format!("each machine was put aside, others are awaited for {} s", PATIENCE.as_secs());
         let is_alone = self.alone.is_some_and(|since| since.elapsed() > JOINING);

@@ -35,7 +35,7 @@ const DEATH_LIMIT: Duration = Duration::from_secs(2);
 pub enum Retries {
     /// Here, twice at most.
     Here,
-    /// Whoever asked for the test has it run elsewhere.
+    /// On another machine, by the caller.
     Elsewhere,
 }
 

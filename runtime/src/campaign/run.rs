@@ -55,10 +55,7 @@ pub enum Place {
 
 /// Runs the task of a recorder, with the plan of that task, in worker processes and records it; what the recorder
 /// already holds is not simulated again. Each worker gets a folder of its own in `directory`.
-#[cfg_attr(
-    not(feature = "agents"),
-    expect(clippy::needless_pass_by_value, reason = "what agents are told is given away")
-)]
+#[cfg_attr(not(feature = "agents"), expect(clippy::needless_pass_by_value, reason = "agents take what is in it"))]
 pub fn run_campaign(
     plan: &CampaignPlan,
     recorder: Recorder,

@@ -175,8 +175,8 @@ pub(super) fn agent(args: &AgentArgs) -> Result<ExitCode, Failure> {
         folders.insert(name.clone(), found);
     }
     let parent = args.folder.clone().or_else(default_folder);
-    let parent =
-        parent.ok_or_else(|| Failure("there is no folder of caches: name one with `--folder DIR`".to_owned()))?;
+    let parent = parent
+        .ok_or_else(|| Failure("the user's folder of caches is unknown: name one with `--folder DIR`".to_owned()))?;
     let (folder, _lock) = own_folder(&parent)?;
     let stop = interruptible()?;
     let Some(queue) = awaited(args, &stop)? else { return Ok(ExitCode::SUCCESS) };
@@ -303,9 +303,9 @@ pub(super) fn agents(args: &AgentsArgs) -> Result<ExitCode, Failure> {
         Some(Task::Slurm(wanted)) => return slurm::submit(wanted),
         None => {}
     }
-    let place = args.queue.as_ref().expect("it is required");
-    let queue = args.access.open(place)?;
-    // One that was made only now would be no other's.
+    let queue = args.access.open(args.queue.as_ref().expect("it is required"))?;
+    let place = queue.place();
+    // A token that was made only now opens nothing, so all that is there is of others.
     let token = args.access.known_token()?.map_or_else(Token::random, Ok).map_err(Failure)?;
     let failed = |error: sesame_queue::queue::QueueError| Failure(error.to_string());
     if let Some(campaign) = &args.remove {
@@ -321,11 +321,8 @@ pub(super) fn agents(args: &AgentsArgs) -> Result<ExitCode, Failure> {
     let announced = queue.announcements().map_err(failed)?;
     let mut supervised = BTreeSet::new();
     for sealed in queue.presences().map_err(failed)? {
-        let supervises = |(campaign, _): &&(String, Vec<u8>)| {
-            token.open::<Supervision>(Kind::Supervision, campaign, &sealed).is_ok_and(|said| said.campaign == *campaign)
-        };
-        if let Some((campaign, _)) = announced.iter().find(supervises) {
-            supervised.insert(campaign.clone());
+        if let Some(said) = Supervision::read(&token, &sealed) {
+            supervised.insert(said.campaign);
         } else if let Ok(presence) = token.open::<Presence>(Kind::Presence, "", &sealed) {
             contents.agents.push(presence.into());
         } else {
@@ -344,11 +341,11 @@ pub(super) fn agents(args: &AgentsArgs) -> Result<ExitCode, Failure> {
     }
     match args.format {
         Format::Json => print_json(&contents),
-        Format::Text => print(&text(&contents)),
+        Format::Text => print(&text(&contents, &place)),
     }
 }
 
-fn text(contents: &QueueContents) -> String {
+fn text(contents: &QueueContents, place: &str) -> String {
     let mut lines = Vec::new();
     for ListedAgent { machine, workers, busy, finished, campaign, refused, .. } in &contents.agents {
         let title = |id: &String| {
@@ -370,9 +367,7 @@ fn text(contents: &QueueContents) -> String {
         lines.extend(put_aside.iter().map(|each| format!("    `{}` was put aside: {}", each.machine, each.reason)));
     }
     if contents.others > 0 {
-        let (count, use_) = (contents.others, if contents.others == 1 { "uses" } else { "use" });
-        let what = if count == 1 { "agent or campaign" } else { "agents or campaigns" };
-        lines.push(format!("{count} {what} more {use_} another token"));
+        lines.push(campaign::strangers(contents.others, place));
     }
     if lines.is_empty() {
         lines.push("no agents and no campaigns".to_owned());

@@ -153,7 +153,7 @@ impl ExecutionArgs {
 }
 
 /// Names hooks that are not filled in; an objective among them ends the run before it starts. The hooks of a runner
-/// that is a program of its own were looked at by whoever compiled it.
+/// that is a program of its own were checked when it was compiled.
 pub(super) fn refuse_unfilled(session: &Session, plan: &CampaignPlan, allowed: bool) -> Result<(), Failure> {
     #[cfg(feature = "agents")]
     if session.program.of_another_process().is_some() {

@@ -1,6 +1,6 @@
 //! Where a campaign's tests run, if not on this machine: the queue, its token, and what agents have to know.
 
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ use sesame_queue::announcement::{Announcement, Compiled, Files, Program};
 use sesame_queue::bundle;
 use sesame_queue::folder::Folder;
 use sesame_queue::message::digest_of;
-use sesame_queue::queue::{Queue, QueueError};
+use sesame_queue::queue::{Queue, QueueError, without_secrets};
 use sesame_queue::token::Token;
 
 use crate::campaign::Fleet;
@@ -56,17 +56,11 @@ pub struct FleetArgs {
 }
 
 impl QueueArgs {
-    /// These arguments for another program, with paths as `place` gives them.
-    pub(super) fn arguments(&self, place: &dyn Fn(&Path) -> Result<PathBuf, Failure>) -> Result<Vec<String>, Failure> {
-        let given =
-            [("--token", &self.token), ("--credentials", &self.credentials), ("--certificates", &self.certificates)];
-        let mut words = Vec::new();
-        for (name, path) in given {
-            if let Some(path) = path {
-                words.extend([name.to_owned(), place(path)?.display().to_string()]);
-            }
-        }
-        Ok(words)
+    /// The files that are named, each with the option that names it.
+    pub(super) fn files(&self) -> impl Iterator<Item = (&'static str, &Path)> {
+        let QueueArgs { token, credentials, certificates } = self;
+        let named = [("--token", token), ("--credentials", credentials), ("--certificates", certificates)];
+        named.into_iter().filter_map(|(option, file)| Some((option, file.as_deref()?)))
     }
 
     /// The queue at a URL or in a folder.
@@ -77,7 +71,7 @@ impl QueueArgs {
     /// The same, where it matters whether the queue may be there later.
     #[cfg_attr(not(feature = "nats"), expect(clippy::unused_self, reason = "a folder needs no credentials"))]
     pub(super) fn connect(&self, place: &str) -> Result<Arc<dyn Queue>, QueueError> {
-        let refused = |reason: String| Err(QueueError::Refused { place: place.to_owned(), reason });
+        let refused = |reason: String| Err(QueueError::Refused { place: without_secrets(place), reason });
         match place.split_once("://") {
             None => Ok(Arc::new(Folder::open(Path::new(place))?)),
             #[cfg(feature = "nats")]
@@ -160,7 +154,8 @@ fn default_token_file() -> Result<PathBuf, Failure> {
     let settings = std::env::var_os("XDG_CONFIG_HOME").map(PathBuf::from).filter(|folder| folder.is_absolute());
     let home = || std::env::home_dir().map(|home| home.join(".config"));
     let settings = settings.or_else(home).map(|settings| settings.join("sesame").join("token"));
-    settings.ok_or_else(|| Failure("there is no folder of settings: name a file with `--token FILE`".to_owned()))
+    settings
+        .ok_or_else(|| Failure("the user's folder of settings is unknown: name a file with `--token FILE`".to_owned()))
 }
 
 /// The architecture and system that programs of this machine are for.
@@ -196,20 +191,17 @@ pub(super) struct Reached {
 impl FleetArgs {
     /// These arguments for the runner of a campaign.
     pub fn arguments(&self) -> Vec<OsString> {
-        let QueueArgs { token, credentials, certificates } = &self.queue;
-        let given: [(&str, Option<OsString>); 5] = [
-            ("--on", self.on.clone().map(OsString::from)),
-            ("--prepared", self.prepared.clone().map(OsString::from)),
-            ("--token", token.clone().map(OsString::from)),
-            ("--credentials", credentials.clone().map(OsString::from)),
-            ("--certificates", certificates.clone().map(OsString::from)),
-        ];
-        given.into_iter().filter_map(|(name, value)| Some([OsString::from(name), value?])).flatten().collect()
+        let named = [("--on", &self.on), ("--prepared", &self.prepared)];
+        let named = named.into_iter().filter_map(|(option, value)| Some((option, OsStr::new(value.as_ref()?))));
+        let all = named.chain(self.queue.files().map(|(option, file)| (option, file.as_os_str())));
+        all.flat_map(|(option, value)| [OsString::from(option), value.to_owned()]).collect()
     }
 
-    /// The same for a command that goes on with the run. Paths are as they were given.
+    /// The same for a command that goes on with the run, as people may read it: without a password.
     pub(super) fn shown(&self) -> Vec<String> {
-        self.arguments().iter().map(|word| word.to_string_lossy().into_owned()).collect()
+        let on = self.on.as_deref().map(without_secrets);
+        let shown = FleetArgs { on, ..self.clone() };
+        shown.arguments().iter().map(|word| word.to_string_lossy().into_owned()).collect()
     }
 
     /// The queue; `None` if the campaign runs here.
@@ -291,5 +283,28 @@ impl Reached {
         let lock_stepped = plan.simulator.step_ns().is_some();
         let Reached { queue, token, .. } = self;
         Ok(Fleet { queue, token, announcement, files: bundle, lock_stepped })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Parsed {
+        #[command(flatten)]
+        fleet: FleetArgs,
+    }
+
+    #[test]
+    fn a_runner_gets_all_options_and_people_see_no_password() {
+        let words = ["run", "--on", "nats://robot:secret@broker:4222", "--prepared", "cell", "--token", "a token"];
+        let fleet = Parsed::parse_from(words).fleet;
+        assert_eq!(fleet.arguments(), words[1..]);
+        assert_eq!(fleet.shown(), ["--on", "nats://broker:4222", "--prepared", "cell", "--token", "a token"]);
+        let local = Parsed::parse_from(["run"]).fleet;
+        assert!(local.arguments().is_empty() && local.shown().is_empty());
     }
 }

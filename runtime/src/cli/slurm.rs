@@ -13,6 +13,7 @@ use std::time::Duration;
 use clap::Args;
 
 use sesame_base::shell::quoted;
+use sesame_queue::queue::without_secrets;
 
 use crate::cli::execution::seconds;
 use crate::cli::failure::Failure;
@@ -95,7 +96,7 @@ fn script(args: &SlurmArgs, program: &Path, queue: &str, access: &[String]) -> S
     ];
     let mut script = "#!/bin/sh\n".to_owned();
     let options = options.into_iter().map(|option| format!("--{option}"));
-    for option in options.chain(args.options.iter().cloned()) {
+    for option in options.chain(args.options.iter().map(|option| quoted(option))) {
         writeln!(script, "#SBATCH {option}").expect("a text can be written");
     }
     let mut words = vec![program.display().to_string(), "agent".to_owned(), queue.to_owned()];
@@ -119,10 +120,14 @@ pub(super) fn submit(args: &SlurmArgs) -> Result<ExitCode, Failure> {
     };
     // The nodes find the token where this machine has it, or each would make one of its own.
     args.access.token()?;
-    let access = args.access.arguments(&|path| absolute(path))?;
+    let mut access = Vec::new();
+    for (option, file) in args.access.files() {
+        access.extend([option.to_owned(), absolute(file)?.display().to_string()]);
+    }
     let script = script(args, &std::env::current_exe()?, &queue, &access);
-    if args.queue.contains("://") && is_of_each_machine(&args.queue) {
-        say(format_args!("warning: `{}` is another address on each node: name the machine of the broker", args.queue));
+    let shown = without_secrets(&args.queue);
+    if shown.contains("://") && is_of_each_machine(&shown) {
+        say(format_args!("warning: `{shown}` is another machine on each node: name the one of the broker"));
     }
     if args.print {
         return print(&script);
@@ -199,9 +204,12 @@ mod tests {
              '/home/it'\\''s/token'\n"
         );
         let words = ["slurm", "nats://broker", "--nodes", "2", "--time", "30min", "--workers", "4"];
+        let words = words.iter().chain(&["--", "--partition=long", "--comment=two words"]);
         let args = Parsed::parse_from(words).slurm;
         let written = script(&args, Path::new("sesamec"), "nats://broker", &[]);
         assert!(written.contains("#SBATCH --cpus-per-task=4\n") && written.contains(" --workers 4\n"), "{written}");
         assert!(!written.contains("exclusive"), "{written}");
+        let last = "#SBATCH --open-mode=append\n#SBATCH --partition=long\n#SBATCH '--comment=two words'\nexec ";
+        assert!(written.contains(last), "{written}");
     }
 }

@@ -116,7 +116,7 @@ impl Dispatch {
             }
             _ if !is_current => Answer::Nothing,
             EndedAs::Ran { result, fault: Some(_), recorded } if waiting.broken_off == RETRIES => {
-                // It ends so wherever it is run: that is no fault of a machine.
+                // It ends like this on every machine, so the machines are not to blame.
                 for machine in self.machines.values_mut() {
                     machine.faults.retain(|(test, _)| *test != number);
                 }

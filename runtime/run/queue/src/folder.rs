@@ -54,7 +54,7 @@ impl Folder {
     pub fn open(root: &Path) -> Result<Self, QueueError> {
         let mut own = [0; 8];
         getrandom::fill(&mut own).map_err(|error| {
-            let (place, reason) = (root.display().to_string(), format!("there are no random numbers: {error}"));
+            let (place, reason) = (root.display().to_string(), format!("cannot get random numbers: {error}"));
             QueueError::Refused { place, reason }
         })?;
         let folder =
@@ -139,10 +139,7 @@ impl Folder {
     }
 
     fn remove_if_there(&self, path: &Path) -> Result<(), QueueError> {
-        match fs::remove_file(path) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(self.unreachable(&error)),
-            _ => Ok(()),
-        }
+        unless_gone(fs::remove_file(path)).map_err(|error| self.unreachable(&error))
     }
 
     /// What the time is by the clock of the file system: machines need not agree on it.
@@ -241,10 +238,7 @@ impl Queue for Folder {
         let folder = self.campaign(campaign);
         // First what makes it known, so that nobody begins with it.
         self.remove_if_there(&folder.join("announcement"))?;
-        match fs::remove_dir_all(&folder) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(self.unreachable(&error)),
-            _ => Ok(()),
-        }
+        unless_gone(fs::remove_dir_all(&folder)).map_err(|error| self.unreachable(&error))
     }
 
     fn put_test(&self, campaign: &str, test: &[u8]) -> Result<(), QueueError> {
@@ -315,13 +309,21 @@ impl Queue for Folder {
         let (mut present, now) = (Vec::new(), self.now());
         for file in self.files(&self.root.join("agents"))? {
             match age(&file, now) {
-                // Whoever left it was lost.
+                // The agent that left it was lost.
                 Some(age) if age > FORGOTTEN => self.remove_if_there(&file)?,
                 Some(age) if age >= PRESENT * PRESENCE_SEEN_LATE => {}
                 _ => present.extend(self.read(&file)?),
             }
         }
         Ok(present)
+    }
+}
+
+/// What came of removing something: if it was gone already, that is as good.
+fn unless_gone(removed: io::Result<()>) -> io::Result<()> {
+    match removed {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        removed => removed,
     }
 }
 
@@ -380,10 +382,6 @@ impl FileHeld {
             thread.join().ok();
         }
     }
-
-    fn failed(&self, error: &io::Error) -> QueueError {
-        QueueError::Unreachable { place: self.place.clone(), reason: error.to_string() }
-    }
 }
 
 impl Drop for FileHeld {
@@ -403,10 +401,8 @@ impl Held for FileHeld {
 
     fn finish(mut self: Box<Self>) -> Result<(), QueueError> {
         self.let_go();
-        match fs::remove_file(&self.path) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(self.failed(&error)),
-            _ => Ok(()),
-        }
+        let removed = unless_gone(fs::remove_file(&self.path));
+        removed.map_err(|error| QueueError::Unreachable { place: self.place.clone(), reason: error.to_string() })
     }
 }
 

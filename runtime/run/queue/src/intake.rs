@@ -8,8 +8,8 @@ use crate::message::{AgentName, Limit, Work};
 /// A test that was delivered more often is not tried again: each time, its agent was lost with it.
 pub const MOST_DELIVERIES: u64 = 10;
 
-/// How often machines leave a test to others that they had a fault with. After that there are no others, so one tries
-/// again.
+/// How often machines that had a fault with a test leave it to others. If it comes back after that, no others are
+/// there, and one of them tries again.
 const POLITE: u32 = 3;
 
 /// How long a machine keeps a test that it leaves to others before it puts it back, so that others come first.

@@ -8,7 +8,7 @@
 //! by [`dispatch`], without a clock and without a connection, and what an agent does with a test by [`intake`]: so the
 //! same code can be tried against thousands of imagined machines. [`folder`] and [`nats`] are adapters.
 //!
-//! Whoever has the [token] may have agents run programs. All that passes is signed with it, and nothing else is read.
+//! Anyone with the [token] can run programs on agents. All messages are signed with it, and no others are read.
 
 pub mod announcement;
 pub mod bundle;

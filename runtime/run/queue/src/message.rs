@@ -108,6 +108,14 @@ impl Supervision {
     pub fn name(campaign: &str) -> String {
         format!("campaign-{campaign}")
     }
+
+    /// Reads what a supervisor with this token says, of whichever campaign.
+    pub fn read(token: &Token, sealed: &[u8]) -> Option<Supervision> {
+        let body = sealed.splitn(2, |&byte| byte == b'\n').nth(1)?;
+        // Not trusted: it only says which campaign the signature has to be for.
+        let said: Supervision = serde_json::from_slice(body).ok()?;
+        token.open(Kind::Supervision, &said.campaign, sealed).ok().filter(|read: &Supervision| *read == said)
+    }
 }
 
 /// An agent that is there.
@@ -127,16 +135,6 @@ pub struct Presence {
     pub campaign: Option<String>,
     /// Why it does not work for a campaign that is announced, each with its reason.
     pub refused: Vec<(String, String)>,
-}
-
-impl Supervision {
-    /// Reads what a supervisor with this token says, of whichever campaign.
-    pub fn read(token: &Token, sealed: &[u8]) -> Option<Supervision> {
-        let body = sealed.splitn(2, |&byte| byte == b'\n').nth(1)?;
-        // Not trusted: it only says which campaign the signature has to be for.
-        let said: Supervision = serde_json::from_slice(body).ok()?;
-        token.open(Kind::Supervision, &said.campaign, sealed).ok().filter(|read: &Supervision| *read == said)
-    }
 }
 
 /// The hash of bytes: SHA-256 in hexadecimal digits.

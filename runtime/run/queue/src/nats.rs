@@ -5,10 +5,11 @@
 
 #![expect(clippy::disallowed_methods, reason = "an adapter: it knows since when agents were not heard")]
 
+mod connection;
+
 use std::collections::{BTreeMap, VecDeque};
 use std::fmt::Display;
 use std::future::Future;
-use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -19,18 +20,18 @@ use async_nats::jetstream::message::{AckKind, Acker, PublishMessage};
 use async_nats::jetstream::object_store::{self, GetErrorKind, InfoErrorKind, ObjectInfo, ObjectStore};
 use async_nats::jetstream::stream::{self, RetentionPolicy, StorageType};
 use async_nats::jetstream::{self, Context, ErrorCode, kv};
-use async_nats::{Client, ConnectErrorKind, ConnectOptions, ServerAddr, Subject};
+use async_nats::{Client, Subject};
 use futures_util::StreamExt as _;
 use tokio::io::AsyncReadExt as _;
-use tokio::runtime::{Builder, Runtime};
+use tokio::runtime::Runtime;
 use tokio::task::JoinHandle;
 
+use self::connection::Connection;
 use crate::announcement::is_campaign_id;
 use crate::message::digest_of;
 use crate::queue::{Held, LARGEST_FILE, PRESENT, Queue, QueueError};
 
-/// The oldest version of the broker whose answers this client reads.
-const OLDEST: [u32; 2] = [2, 10];
+pub use self::connection::Access;
 
 /// A test whose agent was not heard for so long is delivered to somebody else.
 const LOST: Duration = Duration::from_secs(2);
@@ -43,9 +44,6 @@ const CONFIRMED: Duration = Duration::from_secs(30);
 
 /// How long an answer of the broker is awaited.
 const PATIENCE: Duration = Duration::from_secs(5);
-
-/// How long a broken connection rests before the next try.
-const RECONNECT: Duration = Duration::from_millis(200);
 
 /// How many bytes in a second the slowest network carries that is waited for.
 const SLOWEST: u64 = 100_000;
@@ -64,15 +62,6 @@ const AGENTS: &str = "sesame.agent";
 
 /// The mark of a message whose content is a file, followed by its hash. Sealed messages begin with a hexadecimal digit.
 const IN_FILE: u8 = b'@';
-
-/// How a broker is reached, in addition to its URL.
-#[derive(Debug, Clone, Default)]
-pub struct Access {
-    /// A file of credentials, as NATS writes them.
-    pub credentials: Option<PathBuf>,
-    /// A file of certificates in PEM of those who vouch for the broker, in place of those that the system trusts.
-    pub certificates: Option<PathBuf>,
-}
 
 /// Agents by their names, when they were last heard, and what they said.
 type Heard = Arc<Mutex<BTreeMap<String, (Instant, Vec<u8>)>>>;
@@ -126,54 +115,9 @@ impl Nats {
     /// Connects to a broker, for example at `nats://127.0.0.1:4222`. It must be there now; a connection that breaks
     /// later is made again.
     pub fn connect(url: &str, access: &Access) -> Result<Self, QueueError> {
-        let place = without_secrets(url);
-        let refused = |reason: String| QueueError::Refused { place: place.clone(), reason };
-        let runtime = Builder::new_multi_thread()
-            .worker_threads(1)
-            .thread_name("nats")
-            .enable_all()
-            .build()
-            .map_err(|error| refused(error.to_string()))?;
-        let mut options = ConnectOptions::new()
-            .name("sesame")
-            .max_reconnects(None)
-            .connection_timeout(PATIENCE)
-            .request_timeout(Some(PATIENCE))
-            .ping_interval(LOST)
-            .reconnect_delay_callback(|_| RECONNECT);
-        let address: ServerAddr = url.parse().map_err(|error| refused(format!("it is no URL of a broker: {error}")))?;
-        if let (Some(user), Some(password)) = (address.username(), address.password()) {
-            options = options.user_and_password(user.to_owned(), password.to_owned());
-        }
-        if let Some(file) = &access.certificates {
-            options = options.add_root_certificates(file.clone()).require_tls(true);
-        }
-        if let Some(file) = &access.credentials {
-            let text =
-                std::fs::read_to_string(file).map_err(|error| refused(format!("{}: {error}", file.display())))?;
-            options = options.credentials(&text).map_err(|error| refused(format!("{}: {error}", file.display())))?;
-        }
+        let Connection { place, runtime, client, context } = connection::connect(url, access)?;
         let heard = Heard::default();
-        let client = runtime.block_on(options.connect(address)).map_err(|error| match error.kind() {
-            ConnectErrorKind::Io | ConnectErrorKind::TimedOut | ConnectErrorKind::Dns => {
-                QueueError::Unreachable { place: place.clone(), reason: error.to_string() }
-            }
-            _ => refused(error.to_string()),
-        })?;
-        let connected = runtime.block_on(async {
-            let mut context = jetstream::new(client.clone());
-            context.set_timeout(PATIENCE);
-            let version = client.server_info().version;
-            if !is_recent(&version) {
-                let [major, minor] = OLDEST;
-                return Err(format!("it is version {version} of NATS: at least {major}.{minor} is needed"));
-            }
-            // Whether it keeps streams at all: then it says that it has none of this name.
-            if let Err(error) = context.get_stream("sesame-none").await
-                && !is_missing(&error.kind())
-            {
-                return Err(format!("it keeps no streams: start it with `nats-server --jetstream` ({error})"));
-            }
+        let subscribed = runtime.block_on(async {
             let mut subscriber = client.subscribe(format!("{AGENTS}.*")).await.map_err(|error| error.to_string())?;
             let heard = Arc::clone(&heard);
             tokio::spawn(async move {
@@ -181,11 +125,10 @@ impl Nats {
                     hear(&heard, &message.subject, message.payload.to_vec());
                 }
             });
-            // Whoever is asked for agents must have heard them.
-            client.flush().await.map_err(|error| error.to_string())?;
-            Ok(context)
+            // From now on, what agents say is heard.
+            client.flush().await.map_err(|error| error.to_string())
         });
-        let context = connected.map_err(refused)?;
+        subscribed.map_err(|reason| QueueError::Refused { place: place.clone(), reason })?;
         let (consumers, fetched) = (Mutex::default(), Mutex::default());
         Ok(Nats { url: place, client, context, heard, consumers, fetched, runtime })
     }
@@ -259,6 +202,14 @@ impl Nats {
         self.context.get_object_store(name).await.map(Some).map_err(|error| error.to_string())
     }
 
+    /// The announcements of campaigns; `None` if there was never one.
+    async fn campaigns(&self) -> Result<Option<kv::Store>, String> {
+        if !self.has_stream(&format!("KV_{CAMPAIGNS}")).await? {
+            return Ok(None);
+        }
+        self.context.get_key_value(CAMPAIGNS).await.map(Some).map_err(|error| error.to_string())
+    }
+
     /// The content of a message, or what stands for it where it is too large.
     fn carried(&self, campaign: &str, content: &[u8]) -> Result<Vec<u8>, QueueError> {
         if content.len() + OVERHEAD <= self.client.server_info().max_payload {
@@ -312,19 +263,6 @@ fn is_missing(kind: &GetStreamErrorKind) -> bool {
     matches!(kind, GetStreamErrorKind::JetStream(answer) if answer.error_code() == ErrorCode::STREAM_NOT_FOUND)
 }
 
-/// A URL as people may read it: who logs in, and with which password, is left out.
-fn without_secrets(url: &str) -> String {
-    let (scheme, rest) = url.split_once("://").map_or(("", url), |(scheme, rest)| (scheme, rest));
-    let host = rest.rsplit_once('@').map_or(rest, |(_, host)| host);
-    if scheme.is_empty() { host.to_owned() } else { format!("{scheme}://{host}") }
-}
-
-/// Whether a version such as `2.15.1` is not older than [`OLDEST`].
-fn is_recent(version: &str) -> bool {
-    let mut numbers = version.split('.').map(|number| number.parse::<u32>().unwrap_or(0));
-    [numbers.next().unwrap_or(0), numbers.next().unwrap_or(0)] >= OLDEST
-}
-
 fn hear(heard: &Heard, subject: &Subject, said: Vec<u8>) {
     let Some(agent) = subject.strip_prefix(AGENTS).and_then(|rest| rest.strip_prefix('.')) else { return };
     let mut heard = lock(heard);
@@ -351,7 +289,7 @@ fn time_for(bytes: u64) -> Duration {
 }
 
 fn no_room(campaign: &str) -> String {
-    format!("there is no campaign {campaign} any more")
+    format!("the campaign {campaign} has been removed")
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -393,8 +331,8 @@ impl Queue for Nats {
         let campaign = checked(campaign);
         let carried = self.carried(campaign, announcement)?;
         self.block(async {
-            let campaigns = if self.has_stream(&format!("KV_{CAMPAIGNS}")).await? {
-                self.context.get_key_value(CAMPAIGNS).await.map_err(|error| error.to_string())?
+            let campaigns = if let Some(campaigns) = self.campaigns().await? {
+                campaigns
             } else {
                 let config = kv::Config { bucket: CAMPAIGNS.to_owned(), history: 1, ..kv::Config::default() };
                 self.context.create_key_value(config).await.map_err(|error| error.to_string())?
@@ -406,10 +344,7 @@ impl Queue for Nats {
 
     fn announcements(&self) -> Result<Vec<(String, Vec<u8>)>, QueueError> {
         let carried = self.block(async {
-            if !self.has_stream(&format!("KV_{CAMPAIGNS}")).await? {
-                return Ok(Vec::new());
-            }
-            let campaigns = self.context.get_key_value(CAMPAIGNS).await.map_err(|error| error.to_string())?;
+            let Some(campaigns) = self.campaigns().await? else { return Ok(Vec::new()) };
             let mut keys = campaigns.keys().await.map_err(|error| error.to_string())?;
             let mut found = Vec::new();
             while let Some(key) = keys.next().await {
@@ -445,8 +380,7 @@ impl Queue for Nats {
         let campaign = checked(campaign);
         self.forget(campaign);
         self.block(async {
-            if self.has_stream(&format!("KV_{CAMPAIGNS}")).await? {
-                let campaigns = self.context.get_key_value(CAMPAIGNS).await.map_err(|error| error.to_string())?;
+            if let Some(campaigns) = self.campaigns().await? {
                 campaigns.purge(campaign).await.map_err(|error| error.to_string())?;
             }
             let mut streams = Part::ALL.map(|part| part.stream(campaign)).to_vec();
@@ -587,7 +521,7 @@ impl Queue for Nats {
 
     fn presences(&self) -> Result<Vec<Vec<u8>>, QueueError> {
         if self.client.connection_state() != State::Connected {
-            return Err(self.unreachable(&"there is no connection"));
+            return Err(self.unreachable(&"the connection is lost"));
         }
         let heard = lock(&self.heard);
         Ok(heard.values().filter(|(last, _)| last.elapsed() < PRESENT).map(|(_, said)| said.clone()).collect())
@@ -628,28 +562,5 @@ impl Held for OverNats {
             Err(_) => "no answer".to_owned(),
         };
         Err(QueueError::Unreachable { place: self.url.clone(), reason })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_url_is_shown_without_its_password() {
-        for (url, shown) in [
-            ("nats://127.0.0.1:4222", "nats://127.0.0.1:4222"),
-            ("tls://robot:se@cret@broker:4222", "tls://broker:4222"),
-            ("robot:secret@broker", "broker"),
-        ] {
-            assert_eq!(without_secrets(url), shown);
-        }
-    }
-
-    #[test]
-    fn versions_are_compared_number_by_number() {
-        for (version, recent) in [("2.15.1", true), ("2.10.0", true), ("2.9.10", false), ("3.0.0", true), ("", false)] {
-            assert_eq!(is_recent(version), recent, "{version}");
-        }
     }
 }

@@ -11,6 +11,9 @@ pub const PRESENT: Duration = Duration::from_secs(3);
 /// How often an agent says that it is there.
 pub const HERE: Duration = Duration::from_secs(1);
 
+/// How long to wait before an unreachable queue is tried again.
+pub const PAUSE: Duration = Duration::from_millis(200);
+
 /// The largest file that passes through a queue.
 pub const LARGEST_FILE: u64 = 1 << 30;
 
@@ -102,9 +105,32 @@ pub trait Held: Send {
     /// The test as it was put in.
     fn test(&self) -> &[u8];
 
-    /// How often it was delivered, this time included: each time before, whoever had it was lost or cut off.
+    /// How often it was delivered, this time included: each time before, the agent that had it was lost or cut off.
     fn deliveries(&self) -> u64;
 
     /// Its result is in the queue, or it was put back, so this message leaves the queue.
     fn finish(self: Box<Self>) -> Result<(), QueueError>;
+}
+
+/// The URL of a queue as people may read it: who logs in, and with which password, is left out.
+pub fn without_secrets(url: &str) -> String {
+    let (scheme, rest) = url.split_once("://").map_or(("", url), |(scheme, rest)| (scheme, rest));
+    let host = rest.rsplit_once('@').map_or(rest, |(_, host)| host);
+    if scheme.is_empty() { host.to_owned() } else { format!("{scheme}://{host}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_url_is_shown_without_its_password() {
+        for (url, shown) in [
+            ("nats://127.0.0.1:4222", "nats://127.0.0.1:4222"),
+            ("tls://robot:se@cret@broker:4222", "tls://broker:4222"),
+            ("robot:secret@broker", "broker"),
+        ] {
+            assert_eq!(without_secrets(url), shown);
+        }
+    }
 }

@@ -75,7 +75,7 @@ fn a_test_that_the_environment_breaks_off_is_run_elsewhere_and_in_the_end_that_i
     // The same news a second time, of a machine that was cut off meanwhile, is not a second fault of the test.
     assert!(matches!(dispatch.ended(ended(&first, "a", broken_off(1))), Answer::Nothing));
     let third = again(dispatch.ended(ended(&second, "b", broken_off(1))));
-    // With faults in a row of other tests, a machine would be put aside; this one is no fault of the machine.
+    // With faults in a row of other tests, a machine would be put aside; the machine is not to blame for this one.
     for number in [2, 3] {
         let work = dispatch.submit(number, job(number), LIMIT, false);
         again(dispatch.ended(ended(&work, "a", not_run())));

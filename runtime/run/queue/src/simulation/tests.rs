@@ -72,7 +72,7 @@ fn ten_thousand_agents_are_no_trouble() {
 }
 
 proptest! {
-    /// A naive judge: with perfect machines, tests go one after the other to whoever is free first.
+    /// A naive judge: with perfect machines, tests go one after the other to the machine that is free first.
     #[test]
     fn perfect_machines_take_as_long_as_a_list_scheduler(
         agents in 1u32..8,
