@@ -384,12 +384,18 @@ fn runs(repository: &Repository) -> Result<usize, Failure> {
     Ok(repository.numbers()?.len() + repetitions)
 }
 
+/// One press of Ctrl-C may arrive more than once within this time: from the terminal, and from a program that started
+/// this one and passes it on.
+const ONE_PRESS: Duration = Duration::from_millis(500);
+
 /// A flag that Ctrl-C sets: the first one stops in good order, a second one exits at once.
 pub(super) fn interruptible() -> Result<Arc<AtomicBool>, Failure> {
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
+    let mut first = None;
     ctrlc::set_handler(move || {
-        if flag.swap(true, Ordering::Relaxed) {
+        flag.store(true, Ordering::Relaxed);
+        if first.get_or_insert_with(Instant::now).elapsed() > ONE_PRESS {
             std::process::exit(i32::from(STOPPED));
         }
     })?;
