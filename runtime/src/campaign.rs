@@ -16,6 +16,8 @@ mod error;
 mod evaluator;
 mod events;
 mod executor;
+#[cfg(target_os = "linux")]
+mod fork_server;
 mod link;
 mod numbering;
 mod observer;
@@ -52,3 +54,11 @@ pub use settings::{Settings, default_timeout};
 pub use single::{SingleSettings, run_single};
 pub use worker::serve;
 pub use worker_program::WorkerProgram;
+
+/// Whether another process forks the workers of this one.
+pub(crate) fn forks_workers() -> bool {
+    #[cfg(target_os = "linux")]
+    return fork_server::ForkServer::of_this_process().is_some();
+    #[cfg(not(target_os = "linux"))]
+    false
+}

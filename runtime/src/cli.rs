@@ -61,6 +61,12 @@ use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use sesame_base::visible::visible_lines;
 use sesame_record as record;
 use sesame_record::Repository;
+#[cfg(feature = "process")]
+use sesame_relay::fuzz::OperationEntry;
+#[cfg(feature = "process")]
+use sesame_relay::metric::HookEntry;
+#[cfg(feature = "process")]
+use sesame_relay::transport::Connect;
 
 use crate::campaign::WorkerProgram;
 use crate::cli::failure::Failure;
@@ -105,6 +111,14 @@ enum Command {
     Showing(Showing),
     #[command(flatten)]
     Internal(Internal),
+}
+
+/// The command line of a process that was started as a worker.
+#[cfg(feature = "process")]
+#[derive(Debug, Parser)]
+struct Served {
+    #[command(subcommand)]
+    command: Internal,
 }
 
 /// The runner's command line. A generated `main` is nothing but this call.
@@ -152,6 +166,27 @@ pub fn recorded_source(results: &Path) -> Option<String> {
 /// Carries out a command on the runs in a folder of results.
 pub fn show(command: &Showing, results: &Path) -> ExitCode {
     concluded(command.carry_out(results))
+}
+
+/// Whether another process forks the workers of this one, with the user's code in them.
+pub fn forks_workers() -> bool {
+    crate::campaign::forks_workers()
+}
+
+/// Serves a supervisor with code that is not part of the plan: hooks, and what connects to the simulator, if that is
+/// not the plan's. `arguments` are those that the supervisor gave to this process. Returns the exit code.
+#[cfg(feature = "process")]
+pub fn worker(
+    hooks: &'static [HookEntry],
+    operations: &'static [OperationEntry],
+    connect: Option<Connect>,
+    arguments: &[OsString],
+) -> u8 {
+    let code = Interpreted::code(hooks, operations, connect);
+    let program = std::iter::once(OsString::from("worker"));
+    let called = Served::try_parse_from(program.chain(arguments.iter().cloned()));
+    let served = called.map_err(|error| Failure(error.to_string())).and_then(|it| it.command.serve_with(Some(&code)));
+    u8::from(concluded(served) != ExitCode::SUCCESS)
 }
 
 /// Carries out what a program that interprets runners started of itself.

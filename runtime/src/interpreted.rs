@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use sesame_base::time::SimTime;
 use sesame_plan::CampaignPlan;
+use sesame_relay::fuzz::OperationEntry;
+use sesame_relay::metric::HookEntry;
 use sesame_relay::relay::Exchange;
 use sesame_relay::simulator::Progress;
 use sesame_relay::transport::{Capabilities, Connect, Transport, TransportError};
@@ -65,20 +67,23 @@ impl Transport for Unavailable {
 
 impl Interpreted {
     /// Reads what a supervisor wrote for its worker.
-    pub(crate) fn read(file: &Path) -> std::io::Result<Self> {
+    pub fn read(file: &Path) -> std::io::Result<Self> {
         Ok(serde_json::from_slice(&std::fs::read(file)?)?)
+    }
+
+    /// Code for any plan: hooks, and what connects to the simulator, if not as the plan says.
+    pub(crate) fn code(
+        hooks: &'static [HookEntry],
+        operations: &'static [OperationEntry],
+        to_simulator: Option<Connect>,
+    ) -> Runner {
+        let connect = to_simulator.unwrap_or_else(|| Connect::new(connect, PathBuf::new()));
+        Runner { plan: "".into(), directory: PathBuf::new(), space: PathBuf::new(), hooks, operations, connect }
     }
 
     /// The runner that the runtime takes.
     pub(crate) fn runner(&self) -> Runner {
-        self.with_code_of(&Runner {
-            plan: "".into(),
-            directory: PathBuf::new(),
-            space: PathBuf::new(),
-            hooks: &[],
-            operations: &[],
-            connect: Connect::new(connect, PathBuf::new()),
-        })
+        self.with_code_of(&Interpreted::code(&[], &[], None))
     }
 
     /// A compiled runner with this plan and these folders in place of its own.

@@ -67,7 +67,7 @@ pub use sesame_search::{coverage, sspr};
 pub use sesame_simlog::server as simlog_server;
 
 /// The version of the interface between generated code and this crate.
-pub const GENERATOR_ABI: u32 = 3;
+pub const GENERATOR_ABI: u32 = 4;
 
 /// Fails to compile when generated code was written for another version of the interface.
 #[macro_export]

@@ -64,7 +64,7 @@ mod runner {
                 plan: Cow::Owned(fs::read_to_string(folder.join("plan.json")).unwrap()),
                 directory: folder.clone(),
                 space: folder.clone(),
-                hooks: &[HookEntry { metric: "slow", build: || Box::new(Slow) }],
+                hooks: &[HookEntry { metric: "slow", build: |_| Box::new(Slow) }],
                 operations: &[],
                 connect: transport::process(folder),
             });

@@ -117,11 +117,18 @@ impl RunnerPlan {
     /// Whether a runner of this campaign contains Rust that a command with these features of the runtime does not: the
     /// user's simulator or hooks, or a transport that the command was built without. Without, the plan says everything.
     pub fn needs_rust(&self, is_built_in: fn(feature: &str) -> bool) -> bool {
+        self.needs_a_runner(is_built_in) || self.has_hooks()
+    }
+
+    /// Whether it does so for its simulator, whatever hooks it has.
+    pub fn needs_a_runner(&self, is_built_in: fn(feature: &str) -> bool) -> bool {
         let simulator = &self.plan.simulator;
-        simulator.properties().in_runner
-            || runtime_feature(simulator).is_some_and(|feature| !is_built_in(feature))
-            || self.hooks.iter().any(|hook| self.uses(hook))
-            || self.operations.iter().any(|operation| self.applies(operation))
+        simulator.properties().in_runner || runtime_feature(simulator).is_some_and(|feature| !is_built_in(feature))
+    }
+
+    /// Whether this campaign calls hooks of the user's.
+    pub fn has_hooks(&self) -> bool {
+        self.hooks.iter().any(|hook| self.uses(hook)) || self.operations.iter().any(|operation| self.applies(operation))
     }
 
     /// Whether a test of this campaign may hold a custom operation, and so needs its hook to be compiled.

@@ -9,7 +9,9 @@ use std::process::Command;
 use std::time::Duration;
 
 pub use self::system::Address;
-pub(super) use self::system::{Stream, connect, offer};
+#[cfg(target_os = "linux")]
+pub(super) use self::system::pair;
+pub(super) use self::system::{Offer, Stream, connect, offer};
 
 #[cfg(unix)]
 mod system {
@@ -37,10 +39,16 @@ mod system {
     /// Gives one end of a fresh connection to the worker that this command starts. The command must be dropped once the
     /// worker has started: until then this process holds the worker's end too, and would not notice that it is closed.
     pub(in crate::campaign) fn offer(command: &mut Command) -> io::Result<Offer> {
+        let (offer, theirs) = pair()?;
+        command.stdin(Stdio::from(theirs));
+        Ok(offer)
+    }
+
+    /// A fresh connection, and the end of it that the worker is to have as its standard input.
+    pub(in crate::campaign) fn pair() -> io::Result<(Offer, OwnedFd)> {
         // Both ends are closed in every other program that this process starts.
         let (ours, theirs) = UnixStream::pair()?;
-        command.stdin(Stdio::from(OwnedFd::from(theirs)));
-        Ok(Offer { ours })
+        Ok((Offer { ours }, theirs.into()))
     }
 
     impl Offer {

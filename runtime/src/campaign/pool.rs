@@ -178,6 +178,23 @@ impl WorkerSlot {
         .map_err(|NotStarted { reason, .. }| ExecutorError::Worker { worker: self.number, reason })
     }
 
+    /// Starts the process of a worker in a folder of its own.
+    fn begin(&self, directory: &Path, output: File) -> io::Result<(link::Offer, WorkerProcess)> {
+        let program = &self.settings.program;
+        let mut command = program.command(directory)?;
+        #[cfg(target_os = "linux")]
+        if let Some(server) = program.forks() {
+            let (offer, input) = link::pair()?;
+            let forked = server.fork(&command, directory, self.number, &input, &output)?;
+            return Ok((offer, WorkerProcess::forked(forked)));
+        }
+        let offer = link::offer(&mut command)?;
+        command.env(WORKER, self.number.to_string()).current_dir(directory).stdout(output.try_clone()?).stderr(output);
+        let process = WorkerProcess::start(command)
+            .map_err(|error| io::Error::other(format!("{}: {error}", program.executable().display())))?;
+        Ok((offer, process))
+    }
+
     /// Runs a test. If the environment breaks it off, the test is run again, as often as [`Retries`] says; what
     /// happened then is its outcome.
     fn run(&mut self, job: &Job) -> Result<JobResult, ExecutorError> {
@@ -304,11 +321,7 @@ impl Worker {
         let directory = slot.directory();
         fs::create_dir_all(&directory)?;
         let output = File::options().create(true).append(true).open(output_file(&directory))?;
-        let mut command = slot.settings.program.command(&directory)?;
-        let offer = link::offer(&mut command)?;
-        command.env(WORKER, slot.number.to_string()).current_dir(&directory).stdout(output.try_clone()?).stderr(output);
-        let mut process = WorkerProcess::start(command)
-            .map_err(|error| io::Error::other(format!("{}: {error}", slot.settings.program.executable().display())))?;
+        let (offer, mut process) = slot.begin(&directory, output)?;
         let taken = offer.taken(START_LIMIT, &mut || {
             if slot.stop.load(Ordering::Relaxed) {
                 return Err(io::Error::new(io::ErrorKind::TimedOut, "the run was stopped"));

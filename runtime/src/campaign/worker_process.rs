@@ -15,6 +15,9 @@ use std::{io, thread};
 
 use sesame_lifecycle::{descendants, process_group};
 
+#[cfg(target_os = "linux")]
+use crate::campaign::fork_server::Forked;
+
 /// The environment variable with a worker's number, which everything inherits that the worker starts.
 pub(super) const WORKER: &str = "SESAME_WORKER";
 
@@ -54,13 +57,28 @@ impl Children {
 
 /// A worker's process. Dropping it ends the process and everything that it started.
 pub(super) struct WorkerProcess {
-    child: Child,
+    process: Process,
     status: Option<ExitStatus>,
     /// How long it may take to end once its connection is closed.
     end_limit: Duration,
 }
 
+/// Who can wait for it.
+enum Process {
+    /// This process: it is its child.
+    Child(Child),
+    /// The process that forked it.
+    #[cfg(target_os = "linux")]
+    Forked(Forked),
+}
+
 impl WorkerProcess {
+    /// Takes a worker that was forked in a group of its own.
+    #[cfg(target_os = "linux")]
+    pub(super) fn forked(forked: Forked) -> WorkerProcess {
+        WorkerProcess { process: Process::Forked(forked), status: None, end_limit: END_LIMIT }
+    }
+
     /// Starts it, in a group of its own where the system has groups.
     pub(super) fn start(mut command: Command) -> io::Result<WorkerProcess> {
         process_group::own(&mut command);
@@ -73,7 +91,7 @@ impl WorkerProcess {
         }
         let child = command.spawn()?;
         children.workers.insert(child.id());
-        Ok(WorkerProcess { child, status: None, end_limit: END_LIMIT })
+        Ok(WorkerProcess { process: Process::Child(child), status: None, end_limit: END_LIMIT })
     }
 
     /// Gives it this much more time to end once its connection is closed.
@@ -83,8 +101,15 @@ impl WorkerProcess {
 
     /// Its status once it has ended; then everything that it started is ended too.
     pub(super) fn ended(&mut self) -> Option<ExitStatus> {
-        if self.status.is_none() && process_group::has_ended(&mut self.child) {
-            self.end();
+        if self.status.is_none() {
+            let has_ended = match &mut self.process {
+                Process::Child(child) => process_group::has_ended(child),
+                #[cfg(target_os = "linux")]
+                Process::Forked(forked) => forked.has_ended(),
+            };
+            if has_ended {
+                self.end();
+            }
         }
         self.status
     }
@@ -105,12 +130,18 @@ impl WorkerProcess {
 
     /// Ends its group and it, and what either left behind.
     fn end(&mut self) {
-        // It is reaped afterwards: until then its id is given to no other process, and no other group.
-        process_group::kill(&mut self.child);
-        self.status = self.child.wait().ok();
-        Children::lock().workers.remove(&self.child.id());
-        // What the system does not let go is left to it.
-        descendants::end_adopted(Children::are_without, END_LIMIT);
+        match &mut self.process {
+            Process::Child(child) => {
+                // It is reaped afterwards: until then its id is given to no other process, and no other group.
+                process_group::kill(child);
+                self.status = child.wait().ok();
+                Children::lock().workers.remove(&child.id());
+                // What the system does not let go is left to it.
+                descendants::end_adopted(Children::are_without, END_LIMIT);
+            }
+            #[cfg(target_os = "linux")]
+            Process::Forked(forked) => self.status = Some(forked.end()),
+        }
     }
 }
 

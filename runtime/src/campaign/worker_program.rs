@@ -5,6 +5,11 @@ use std::io::{self, Write as _};
 use std::os::unix::process::CommandExt as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+#[cfg(target_os = "linux")]
+use std::sync::Arc;
+
+#[cfg(target_os = "linux")]
+use crate::campaign::fork_server::ForkServer;
 
 /// A program as it becomes a worker.
 #[derive(Debug, Clone)]
@@ -20,6 +25,9 @@ pub struct WorkerProgram {
     records: bool,
     /// How many of the topics that operations can act on pass through the relay; `None` for all.
     relayed: Option<u32>,
+    /// What forks it, in place of starting the program.
+    #[cfg(target_os = "linux")]
+    forks: Option<Arc<ForkServer>>,
 }
 
 impl WorkerProgram {
@@ -32,6 +40,8 @@ impl WorkerProgram {
             lab: None,
             records: false,
             relayed: None,
+            #[cfg(target_os = "linux")]
+            forks: ForkServer::of_this_process(),
         })
     }
 
@@ -118,6 +128,12 @@ impl WorkerProgram {
     #[cfg(not(target_os = "linux"))]
     fn this_program(&self) -> Command {
         Command::new(&self.executable)
+    }
+
+    /// What forks workers, if they are not started as programs.
+    #[cfg(target_os = "linux")]
+    pub(super) fn forks(&self) -> Option<&Arc<ForkServer>> {
+        self.forks.as_ref()
     }
 
     /// The program, as messages name it.

@@ -191,13 +191,7 @@ impl Internal {
     pub(super) fn carry_out(&self, compiled: Option<&Session>) -> Result<ExitCode, Failure> {
         match self {
             #[cfg(feature = "process")]
-            Internal::Worker { runner: Some(file), lab, record, relay, supervisor } => {
-                let sent = crate::interpreted::Interpreted::read(file)
-                    .map_err(|error| Failure(format!("cannot read {}: {error}", file.display())))?;
-                let runner = compiled.map_or_else(|| sent.runner(), |session| sent.with_code_of(&session.runner));
-                let plan = serde_json::from_str(&runner.plan)?;
-                serve(runner, recorded(plan, *record), lab.as_deref(), *relay, supervisor)
-            }
+            Internal::Worker { runner: Some(_), .. } => self.serve_with(compiled.map(|session| &session.runner)),
             #[cfg(feature = "process")]
             Internal::Worker { lab: Some(lab), record, relay, supervisor, .. } => {
                 let session = of_its_own(compiled)?;
@@ -220,6 +214,19 @@ impl Internal {
                 Ok(sesame_relay::transport::become_simulator(*keeper, program, arguments, *background))
             }
         }
+    }
+
+    /// Serves a supervisor that sent a plan, with this code for it, if there is any.
+    #[cfg(feature = "process")]
+    pub(super) fn serve_with(&self, code: Option<&Runner>) -> Result<ExitCode, Failure> {
+        let Internal::Worker { runner: Some(file), lab, record, relay, supervisor } = self else {
+            return Err(Failure("a worker needs the file with its plan".to_owned()));
+        };
+        let sent = crate::interpreted::Interpreted::read(file)
+            .map_err(|error| Failure(format!("cannot read {}: {error}", file.display())))?;
+        let runner = code.map_or_else(|| sent.runner(), |code| sent.with_code_of(code));
+        let plan = serde_json::from_str(&runner.plan)?;
+        serve(runner, recorded(plan, *record), lab.as_deref(), *relay, supervisor)
     }
 }
 

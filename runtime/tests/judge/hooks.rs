@@ -64,10 +64,10 @@ pub(crate) fn entries() -> Vec<HookEntry> {
     let mut entries = Vec::new();
     for kind in HookKind::ALL {
         for metric in kind.names() {
-            let build: fn() -> Box<dyn Hook> = match kind {
-                HookKind::Counting => || Box::new(Counting),
-                HookKind::Least => || Box::new(Least),
-                HookKind::Latest => || Box::new(Latest),
+            let build: fn(&str) -> Box<dyn Hook> = match kind {
+                HookKind::Counting => |_| Box::new(Counting),
+                HookKind::Least => |_| Box::new(Least),
+                HookKind::Latest => |_| Box::new(Latest),
             };
             entries.push(HookEntry { metric, build });
         }

@@ -149,7 +149,7 @@ fn adapter(runner: &RunnerPlan, types: &Messages<'_>, hook: &HookPlan) -> TokenS
     quote! {
         struct #adapter<H>(H);
 
-        fn #build<H: #hook_trait + 'static>() -> ::std::boxed::Box<dyn ::sesame_runtime::metric::Hook> {
+        fn #build<H: #hook_trait + 'static>(_: &str) -> ::std::boxed::Box<dyn ::sesame_runtime::metric::Hook> {
             ::std::boxed::Box::new(#adapter(<H as ::core::default::Default>::default()))
         }
 

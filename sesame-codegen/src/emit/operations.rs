@@ -249,6 +249,7 @@ fn adapter(runner: &RunnerPlan, types: &Messages<'_>, operation: &OperationPlan)
         }
 
         fn #build<H: #hook_trait + 'static>(
+            _: &str,
             choices: &[::sesame_runtime::plan::Choice],
         ) -> ::std::boxed::Box<dyn ::sesame_runtime::fuzz::OperationHook> {
             #unused

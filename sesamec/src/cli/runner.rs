@@ -98,7 +98,10 @@ impl<'a> Found<'a> {
 
     /// The runner as data, if the campaign needs no Rust beyond these features.
     fn interpreted(&self, is_there: fn(feature: &str) -> bool) -> anyhow::Result<Option<Interpreted>> {
-        if self.plan().needs_rust(is_there) || self.chooses_runtime()? {
+        // A process that forks workers has hooks of its own for them.
+        let has_code = sesame_runtime::cli::forks_workers();
+        let needs_rust = if has_code { RunnerPlan::needs_a_runner } else { RunnerPlan::needs_rust };
+        if needs_rust(self.plan(), is_there) || self.chooses_runtime()? {
             return Ok(None);
         }
         environment::check_program(&self.generation.file, self.plan())?;

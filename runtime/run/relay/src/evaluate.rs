@@ -266,7 +266,7 @@ mod tests {
     }
 
     /// A run with a blackhole from one to two seconds and a third metric with this hook, default 7.
-    fn observed(build: fn() -> Box<dyn Hook>, fails_at: Option<f64>) -> Observation {
+    fn observed(build: fn(&str) -> Box<dyn Hook>, fails_at: Option<f64>) -> Observation {
         let mut plan = plan(vec![operation(0, OperationKind::Blackhole)]);
         let mut counted = plan.metrics[1].clone();
         "counted".clone_into(&mut counted.name);
@@ -282,7 +282,7 @@ mod tests {
 
     #[test]
     fn a_run_to_its_end_is_complete() {
-        let run = observed(|| Box::new(Counter { panics: false }), None);
+        let run = observed(|_| Box::new(Counter { panics: false }), None);
         assert_eq!((run.outcome, run.end, run.messages), (Outcome::Completed, 10.0, 100));
         assert_eq!(run.metrics[2].value, Some(1100.0), "a hundred messages, and the end");
         assert_eq!(run.operations[0].counters.dropped, 10);
@@ -319,7 +319,7 @@ mod tests {
 
     #[test]
     fn what_was_seen_before_a_hook_panics_stands() {
-        let run = observed(|| Box::new(Counter { panics: true }), None);
+        let run = observed(|_| Box::new(Counter { panics: true }), None);
         assert!(matches!(&run.outcome, Outcome::Crash { .. }), "{:?}", run.outcome);
         assert_eq!(run.end, 5.0);
         assert_eq!(run.metrics[2].value, Some(49.0), "and nobody is told of an end");
@@ -329,7 +329,7 @@ mod tests {
 
     #[test]
     fn what_was_seen_before_a_simulator_fails_stands() {
-        let run = observed(|| Box::new(Counter { panics: false }), Some(3.0));
+        let run = observed(|_| Box::new(Counter { panics: false }), Some(3.0));
         assert_eq!(run.outcome, Outcome::Crash { message: "the simulator failed: out of breath".to_owned() });
         assert_eq!((run.end, run.metrics[2].value), (3.0, Some(29.0)));
     }
@@ -368,7 +368,7 @@ mod tests {
 
     #[test]
     fn a_hook_that_is_not_filled_in_has_no_value_not_even_its_default() {
-        let run = observed(|| Box::new(Stub), None);
+        let run = observed(|_| Box::new(Stub), None);
         assert_eq!((run.metrics[2].value, run.metrics[2].set), (None, false));
     }
 }

@@ -56,8 +56,8 @@ pub trait Hook {
 pub struct HookEntry {
     /// The metric's name in the space.
     pub metric: &'static str,
-    /// Creates a hook; every run has its own.
-    pub build: fn() -> Box<dyn Hook>,
+    /// Creates a hook for the metric of this name; every run has its own.
+    pub build: fn(&str) -> Box<dyn Hook>,
 }
 
 /// The context of a hook, in which it sets its value.

@@ -76,7 +76,7 @@ impl Setup {
 
 /// What is wrong with a parameter that a simulator does not have.
 #[cfg(feature = "in-process")]
-pub(crate) fn no_such_parameter(name: &str, known: &[String]) -> String {
+pub fn no_such_parameter(name: &str, known: &[String]) -> String {
     let known: Vec<String> = known.iter().map(|name| format!("`{name}`")).collect();
     let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
     format!("it has no parameter `{name}` that a compensation can set; it has {known}")

@@ -10,11 +10,13 @@ pub mod clock;
 #[cfg(feature = "in-process")]
 mod in_process;
 #[cfg(feature = "in-process")]
-mod node_orders;
+pub mod node_orders;
 #[cfg(feature = "process")]
 mod process;
 pub mod relay_latency;
 pub mod round;
+#[cfg(feature = "in-process")]
+pub mod topics;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

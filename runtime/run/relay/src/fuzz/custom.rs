@@ -31,8 +31,8 @@ pub trait OperationHook {
 pub struct OperationEntry {
     /// The operation's name in the space.
     pub operation: &'static str,
-    /// A fresh hook with the choices of a test, which fit the operation's parameters.
-    pub build: fn(&[Choice]) -> Box<dyn OperationHook>,
+    /// A fresh hook for the operation of this name, with the choices of a test, which fit the operation's parameters.
+    pub build: fn(&str, &[Choice]) -> Box<dyn OperationHook>,
 }
 
 /// A choice for a parameter, as generated code reads it.
@@ -156,6 +156,30 @@ impl<'a> MessageCall<'a> {
             unimplemented: false,
             mismatch: None,
         }
+    }
+
+    /// Calls a hook that reads and writes the message without its type. The error says that what it made is not of the
+    /// declared type; then the message is passed on as the hook left it, with a warning of the run.
+    pub fn dynamic(
+        &mut self,
+        value: &mut Value,
+        call: impl FnOnce(&mut Value, &mut OperationContext<'_, Value>) -> Result<(), Mismatch>,
+    ) {
+        let before = value.clone();
+        let mut ctx = OperationContext {
+            now: self.now,
+            topic: self.topic,
+            draws: self.draws,
+            next_draw: 0,
+            dropped: false,
+            injected: Vec::new(),
+            unimplemented: false,
+        };
+        self.mismatch = call(value, &mut ctx).err();
+        self.dropped = ctx.dropped;
+        self.unimplemented |= ctx.unimplemented;
+        self.injected.append(&mut ctx.injected);
+        self.changed = !value.is_same(&before);
     }
 
     /// Reads the message, calls the hook, and writes the message back. A message that is not of its declared type is
@@ -305,7 +329,7 @@ impl Custom {
         hooks: &[OperationEntry],
     ) -> Option<Self> {
         let entry = hooks.iter().find(|entry| entry.operation == operation.name)?;
-        Some(Custom { moment, hook: (entry.build)(choices), mismatch: None })
+        Some(Custom { moment, hook: (entry.build)(entry.operation, choices), mismatch: None })
     }
 
     /// Lets the hook at a message.

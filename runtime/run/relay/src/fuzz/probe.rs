@@ -25,7 +25,7 @@ pub fn unimplemented_operations(plan: &CampaignPlan, hooks: &[OperationEntry]) -
             let mut call = MessageCall::new(SimTime::ZERO, path, KeyedRng::new(0, 0, 0));
             let mut ctx = RunContext::probing();
             let called = panic::catch_unwind(AssertUnwindSafe(|| {
-                let mut hook = (entry.build)(&choices);
+                let mut hook = (entry.build)(entry.operation, &choices);
                 match (moment, topic) {
                     (Moment::OnMessage, Some(topic)) => hook.on_message(&mut sample(plan, &topic.ty), &mut call),
                     _ => hook.before_or_after_run(&mut ctx),

@@ -114,7 +114,7 @@ impl<'p> MetricTable<'p> {
             .zip(&self.plan.metrics)
             .map(|((at, hook), metric)| State {
                 compared: bounds_on(self.plan, MetricId(at)).map(Operand::Number).collect(),
-                hook: hook.map(|hook| (hook.build)()),
+                hook: hook.map(|hook| (hook.build)(hook.metric)),
                 formula: match &metric.source {
                     MetricSource::Formula { formula } => Some(FormulaState::new(formula, self.plan)),
                     _ => None,

@@ -20,7 +20,7 @@ pub fn unimplemented_hooks(plan: &CampaignPlan, hooks: &[HookEntry]) -> Vec<Metr
             let Some(entry) = hooks.iter().find(|hook| hook.metric == metric.name) else { return false };
             let mut ctx = Context::default();
             let called = panic::catch_unwind(AssertUnwindSafe(|| {
-                let mut hook = (entry.build)();
+                let mut hook = (entry.build)(entry.metric);
                 hook.on_start(&mut ctx);
                 for (input, topic) in topics.iter().enumerate() {
                     let topic = plan.topic(*topic);

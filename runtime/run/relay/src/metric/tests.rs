@@ -302,7 +302,7 @@ fn echoed(trend: Option<Trend>, accepts: bool, stream: &[Sent], end: Option<i64>
     plan.metrics[0].trend = trend;
     plan.metrics[0].accepts_not_finite = accepts;
     let wires = WireTable::new(&plan);
-    let hooks = [HookEntry { metric: "fuzzing_time", build: || Box::new(Echo) }];
+    let hooks = [HookEntry { metric: "fuzzing_time", build: |_| Box::new(Echo) }];
     let table = MetricTable::new(&plan, &wires, &hooks).unwrap();
     let mut metrics = table.start();
     for &(time, path, number) in stream {

@@ -366,7 +366,7 @@ fn custom(moment: Moment) -> Operation {
 /// The code of `custom` at each moment.
 fn raising() -> [OperationEntry; 3] {
     ["custom", "custom_before_start", "custom_after_end"]
-        .map(|operation| OperationEntry { operation, build: |_| Box::new(Raise) })
+        .map(|operation| OperationEntry { operation, build: |_, _| Box::new(Raise) })
 }
 
 #[test]

@@ -10,6 +10,7 @@ use crate::message;
 use crate::relay::{Delivery, Exchange};
 use crate::simulator::{Bus, Offered, Port, Progress, Setup, Simulator, SimulatorError, Wires};
 use crate::transport::node_orders::NodeOrders;
+use crate::transport::topics::STEP_LIMIT;
 use crate::transport::{Capabilities, Connect, Transport, TransportError, unknown_topic};
 use crate::value::Value;
 use crate::wire::Wire;
@@ -32,9 +33,6 @@ fn connect<S: Simulator + 'static>(plan: &CampaignPlan, _: &Path) -> Box<dyn Tra
         step: SimTime::from_nanos(i64::try_from(step_ns).unwrap_or(i64::MAX)),
     })
 }
-
-/// The most messages that a simulator may publish in one step; further ones are not kept, and the test is a crash.
-const STEP_LIMIT: u64 = 100_000;
 
 struct InProcess<S> {
     simulator: Option<S>,

@@ -11,7 +11,7 @@ use crate::transport::TransportError;
 /// What operations do to nodes at this moment of a run. A node that several act on has what the gravest of them wants,
 /// so the order of their ends does not matter.
 #[derive(Debug, Default)]
-pub(super) struct NodeOrders {
+pub struct NodeOrders {
     /// The position of each active operation in the test, and what it does to which node.
     active: Vec<(usize, NodeId, Condition)>,
 }
@@ -28,7 +28,7 @@ enum Condition {
 
 impl NodeOrders {
     /// Refuses a simulator that does not offer what an operation of the plan needs.
-    pub(super) fn are_offered(plan: &CampaignPlan, offers: &Offers) -> Result<(), TransportError> {
+    pub fn are_offered(plan: &CampaignPlan, offers: &Offers) -> Result<(), TransportError> {
         for operation in &plan.operations {
             let Some(fault) = fault(&operation.kind) else { continue };
             for node in operation.nodes() {
@@ -47,7 +47,7 @@ impl NodeOrders {
     }
 
     /// The orders for what operations have wanted since the last call. Tells the relay which of them a node feels.
-    pub(super) fn take(&mut self, plan: &CampaignPlan, now: SimTime, relay: &mut dyn Exchange) -> Vec<OrderToNode> {
+    pub fn take(&mut self, plan: &CampaignPlan, now: SimTime, relay: &mut dyn Exchange) -> Vec<OrderToNode> {
         let mut orders = Vec::new();
         for Order { operation, resource, begins } in relay.take_orders() {
             let Some((node, wanted)) = wanted(&resource) else { continue };

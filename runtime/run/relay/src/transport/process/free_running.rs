@@ -25,8 +25,9 @@ use crate::transport::node_orders::NodeOrders;
 use crate::transport::process::fault::{explain, note_restart};
 use crate::transport::process::launched::health;
 use crate::transport::process::protocol::{LINE_LIMIT, Line, Read, SimulatorMessage, read_line, request};
-use crate::transport::process::session::{Fault, Topics};
+use crate::transport::process::session::{Fault, Json, open, publish};
 use crate::transport::relay_latency::{Added, AddedOnWire, join, objections};
+use crate::transport::topics::Topics;
 use crate::transport::{Capabilities, Incidents, Transport, TransportError, wall_time_since};
 use crate::wire::WireTable;
 use sesame_lifecycle::launch::Launched;
@@ -60,7 +61,7 @@ struct Connection {
     line: Line,
     /// When the line came.
     arrived: Instant,
-    topics: Topics,
+    topics: Topics<Json>,
     orders: NodeOrders,
     /// How long messages were kept.
     added: Added,
@@ -226,8 +227,8 @@ impl Connection {
             ready.takes(relay.parameters())?;
             self.resets = ready.resets;
             self.clock = if ready.clock { Clock::Simulator } else { Clock::Wall(Instant::now()) };
-            self.topics.open(plan, &ready, relay)?;
-            self.topics.publish(plan, SimTime::ZERO, &ready.messages, relay, &self.line)?;
+            open(&mut self.topics, plan, &ready, relay)?;
+            publish(&mut self.topics, plan, SimTime::ZERO, &ready.messages, relay, &self.line)?;
             break;
         }
         self.deliver();
@@ -238,10 +239,10 @@ impl Connection {
 
     /// Sends what was delivered.
     fn deliver(&mut self) {
-        if !self.topics.outbox.is_empty() {
+        if !self.topics.format.outbox.is_empty() {
             let mut line = Vec::new();
-            request::deliver(&mut line, &self.topics.outbox);
-            self.topics.outbox.clear();
+            request::deliver(&mut line, &self.topics.format.outbox);
+            self.topics.format.outbox.clear();
             send(&mut self.input, &line);
         }
     }
@@ -292,11 +293,11 @@ impl Connection {
     ) -> Result<(SimTime, Progress), TransportError> {
         let (time, progress) = match self.line.parse()? {
             SimulatorMessage::Publish(messages) => {
-                self.topics.publish(plan, now, &messages, relay, &self.line)?;
+                publish(&mut self.topics, plan, now, &messages, relay, &self.line)?;
                 (now, Progress::Running)
             }
             SimulatorMessage::Done(done) => {
-                self.topics.publish(plan, now, &done.messages, relay, &self.line)?;
+                publish(&mut self.topics, plan, now, &done.messages, relay, &self.line)?;
                 if !done.ended {
                     let problem = "says `done`, but this simulator takes no steps".to_owned();
                     let remedy = "send messages with `publish`, and `\"ended\": true` at the end of the scenario";

@@ -1,26 +1,22 @@
 //! The runner's side of the protocol, over any pair of streams: the order of requests and answers, and the way of
 //! messages through the relay.
 
-use std::collections::BTreeMap;
 use std::io::{BufRead, Write};
-use std::mem;
 
 use serde_json::value::RawValue;
 
 use sesame_base::time::SimTime;
-use sesame_plan::CampaignPlan;
+use sesame_plan::{CampaignPlan, Type};
 
 use crate::json::{self, Shapes};
 use crate::message::Mismatch;
-use crate::relay::{Delivery, Exchange};
+use crate::relay::Exchange;
 use crate::simulator::Progress;
+use crate::transport::TransportError;
 use crate::transport::node_orders::NodeOrders;
 use crate::transport::process::protocol::{LINE_LIMIT, Line, Lines, Message, Ready, SimulatorMessage, request};
-use crate::transport::{TransportError, unknown_topic};
-use crate::wire::Wire;
-
-/// The most messages a simulator may publish in one step.
-const STEP_LIMIT: u64 = 100_000;
+use crate::transport::topics::{Format, Opened, Refused, STEP_LIMIT, Topics};
+use crate::value::Value;
 
 /// The remedy for a surplus answer.
 const TURNS: &str = "give one answer to each line; in this test there is one too many";
@@ -45,36 +41,71 @@ pub(super) struct Session<R, W> {
     lines: Lines<R>,
     output: W,
     line: Vec<u8>,
-    topics: Topics,
+    topics: Topics<Json>,
     orders: NodeOrders,
     resets: bool,
     ready: bool,
 }
 
-/// The topics of one run, and the messages that wait for delivery.
-#[derive(Default)]
-pub(super) struct Topics {
-    by_path: BTreeMap<String, Topic>,
-    /// Per wire of the relay: whether the simulator subscribes to it.
-    subscribed: Vec<bool>,
-    /// Whether the simulator is told when each message was delivered.
-    timed: bool,
+/// Payloads in JSON, and the messages for the next line to the simulator.
+#[derive(Debug, Default)]
+pub(super) struct Json {
     shapes: Shapes,
-    pub(super) deliveries: Vec<Delivery>,
-    /// Messages to be delivered, as JSON for the next line to the simulator.
     pub(super) outbox: Vec<u8>,
-    /// Messages since the last step began.
-    pub(super) published: u64,
-    /// The wires of messages that went to the outbox as soon as they came, each as often; `None` where that is not
-    /// measured.
-    pub(super) passed: Option<Vec<Wire>>,
 }
 
-/// One topic of the simulator.
-struct Topic {
-    wire: Option<Wire>,
-    publishes: bool,
-    subscribes: bool,
+impl Format for Json {
+    type Payload<'a> = &'a RawValue;
+
+    fn read(&mut self, plan: &CampaignPlan, ty: &Type, payload: &&RawValue) -> Result<Value, Mismatch> {
+        json::decode(plan, &mut self.shapes, ty, payload)
+    }
+
+    fn pass_on(&mut self, path: &str, at: Option<SimTime>, payload: &&RawValue) {
+        request::message(&mut self.outbox, path, at, |out| out.extend_from_slice(payload.get().as_bytes()));
+    }
+
+    fn deliver(&mut self, path: &str, at: Option<SimTime>, value: &Value) {
+        request::message(&mut self.outbox, path, at, |out| json::encode(value, out));
+    }
+
+    fn clear(&mut self) {
+        self.outbox.clear();
+    }
+}
+
+/// Opens the topics that a simulator names in `ready`.
+pub(super) fn open(
+    topics: &mut Topics<Json>,
+    plan: &CampaignPlan,
+    ready: &Ready<'_>,
+    relay: &mut dyn Exchange,
+) -> Result<(), TransportError> {
+    let Ready { publishes, subscribes, nodes, times, .. } = ready;
+    topics.open(plan, Opened { publishes, subscribes, nodes, times: *times }, relay)
+}
+
+/// Passes the messages of a line through the relay.
+pub(super) fn publish(
+    topics: &mut Topics<Json>,
+    plan: &CampaignPlan,
+    now: SimTime,
+    messages: &[Message<'_>],
+    relay: &mut dyn Exchange,
+    line: &Line,
+) -> Result<(), TransportError> {
+    let messages = messages.iter().map(|message| (message.topic.as_ref(), message.value));
+    topics.publish(plan, now, messages, relay).map_err(|refused| match refused {
+        Refused::TooMany => {
+            let problem = format!("has more than {STEP_LIMIT} messages in the step to {now}");
+            line.wrong(problem, "end a step with `done`")
+        }
+        Refused::NotPublished(path) => {
+            let problem = format!("has a message on `{path}`, which the simulator did not say it publishes");
+            line.wrong(problem, "list it in `publishes` of `ready`")
+        }
+        Refused::WrongType(error) => error,
+    })
 }
 
 impl<R: BufRead, W: Write> Session<R, W> {
@@ -159,8 +190,8 @@ impl<R: BufRead, W: Write> Session<R, W> {
         ready.takes(relay.parameters())?;
         self.resets = ready.resets;
         self.ready = true;
-        self.topics.open(plan, &ready, relay)?;
-        self.topics.publish(plan, SimTime::ZERO, &ready.messages, relay, self.lines.line())?;
+        open(&mut self.topics, plan, &ready, relay)?;
+        publish(&mut self.topics, plan, SimTime::ZERO, &ready.messages, relay, self.lines.line())?;
         Ok(())
     }
 
@@ -175,8 +206,8 @@ impl<R: BufRead, W: Write> Session<R, W> {
         relay.advance(now, &mut self.topics.deliveries);
         self.topics.deliver(relay, None);
         let orders = self.orders.take(plan, now, relay);
-        request::step(&mut self.line, now, &orders, &self.topics.outbox);
-        self.topics.outbox.clear();
+        request::step(&mut self.line, now, &orders, &self.topics.format.outbox);
+        self.topics.format.outbox.clear();
         self.send();
         let awaited = || format!("the end of its step to {now}");
         loop {
@@ -185,13 +216,13 @@ impl<R: BufRead, W: Write> Session<R, W> {
             }
             match self.lines.line().parse()? {
                 SimulatorMessage::Publish(messages) => {
-                    self.topics.publish(plan, now, &messages, relay, self.lines.line())?;
-                    request::deliver(&mut self.line, &self.topics.outbox);
-                    self.topics.outbox.clear();
+                    publish(&mut self.topics, plan, now, &messages, relay, self.lines.line())?;
+                    request::deliver(&mut self.line, &self.topics.format.outbox);
+                    self.topics.format.outbox.clear();
                     self.send();
                 }
                 SimulatorMessage::Done(done) => {
-                    self.topics.publish(plan, now, &done.messages, relay, self.lines.line())?;
+                    publish(&mut self.topics, plan, now, &done.messages, relay, self.lines.line())?;
                     return Ok(if done.ended { Progress::Ended } else { Progress::Running });
                 }
                 SimulatorMessage::Failed(reason) => return Err(TransportError::Simulator(reason).into()),
@@ -207,109 +238,6 @@ impl<R: BufRead, W: Write> Session<R, W> {
     fn send(&mut self) {
         self.output.write_all(&self.line).and_then(|()| self.output.flush()).ok();
         self.line.clear();
-    }
-}
-
-impl Topics {
-    /// Forgets the topics of the last run.
-    pub(super) fn clear(&mut self) {
-        let passed = self.passed.as_ref().map(|_| Vec::new());
-        *self = Topics { shapes: mem::take(&mut self.shapes), passed, ..Topics::default() };
-    }
-
-    /// Takes the simulator's topics; all topics of the space must be among them, but for states of monitors, and what
-    /// operations do to nodes among what it offers. Tells the relay which topics have subscribers.
-    pub(super) fn open(
-        &mut self,
-        plan: &CampaignPlan,
-        ready: &Ready<'_>,
-        relay: &mut dyn Exchange,
-    ) -> Result<(), TransportError> {
-        self.timed = ready.times;
-        let wires = relay.wires();
-        for path in ready.publishes.iter().chain(&ready.subscribes) {
-            let topic = Topic { wire: wires.find(path), publishes: false, subscribes: false };
-            self.by_path.entry(path.clone()).or_insert(topic);
-        }
-        self.subscribed = vec![false; wires.len()];
-        for path in &ready.publishes {
-            self.by_path.entry(path.clone()).and_modify(|topic| topic.publishes = true);
-        }
-        for path in &ready.subscribes {
-            self.by_path.entry(path.clone()).and_modify(|topic| topic.subscribes = true);
-            if let Some(wire) = wires.find(path) {
-                self.subscribed[wire.index()] = true;
-            }
-        }
-        let is_needed = |&wire: &Wire| !plan.is_state_of_monitor(wires.topic(wire));
-        let mut needed = wires.iter().filter(is_needed);
-        if let Some(missing) = needed.find(|&wire| !self.by_path.contains_key(wires.path(wire))) {
-            return Err(unknown_topic(wires.path(missing), self.by_path.keys()));
-        }
-        NodeOrders::are_offered(plan, &ready.nodes)?;
-        for wire in wires.iter().filter(|wire| self.subscribed[wire.index()]) {
-            relay.subscribed(wire);
-        }
-        Ok(())
-    }
-
-    /// Passes messages through the relay; deliveries to subscribers go to the outbox.
-    pub(super) fn publish(
-        &mut self,
-        plan: &CampaignPlan,
-        now: SimTime,
-        messages: &[Message<'_>],
-        relay: &mut dyn Exchange,
-        line: &Line,
-    ) -> Result<(), TransportError> {
-        self.published += messages.len() as u64;
-        if self.published > STEP_LIMIT {
-            let problem = format!("has more than {STEP_LIMIT} messages in the step to {now}");
-            return Err(line.wrong(problem, "end a step with `done`"));
-        }
-        for Message { topic: path, value } in messages {
-            let Some(topic) = self.by_path.get(path.as_ref()).filter(|topic| topic.publishes) else {
-                let problem = format!("has a message on `{path}`, which the simulator did not say it publishes");
-                return Err(line.wrong(problem, "list it in `publishes` of `ready`"));
-            };
-            let Some(wire) = topic.wire else {
-                if topic.subscribes {
-                    request::message(&mut self.outbox, path, self.timed.then_some(now), |out| {
-                        out.extend_from_slice(value.get().as_bytes());
-                    });
-                }
-                continue;
-            };
-            let declared = &plan.topic(relay.wires().topic(wire)).ty;
-            let decoded = json::decode(plan, &mut self.shapes, declared, value).map_err(|mismatch: Mismatch| {
-                TransportError::WrongType { path: path.as_ref().to_owned(), reason: mismatch.to_string() }
-            })?;
-            relay.message(now, wire, decoded, &mut self.deliveries);
-            self.deliver(relay, Some((wire, value)));
-        }
-        Ok(())
-    }
-
-    /// Puts the relay's deliveries to subscribers into the outbox. A message that no operation intercepts is passed on
-    /// byte for byte.
-    pub(super) fn deliver(&mut self, relay: &dyn Exchange, published: Option<(Wire, &RawValue)>) {
-        for Delivery { wire, at, by_monitor, value, .. } in self.deliveries.drain(..) {
-            if !self.subscribed.get(wire.index()).copied().unwrap_or(false) {
-                continue;
-            }
-            if let (Some(passed), Some((from, _))) = (&mut self.passed, published)
-                && from == wire
-                && !by_monitor
-            {
-                passed.push(wire);
-            }
-            let untouched = published.filter(|&(from, _)| from == wire && !by_monitor && !relay.intercepts(wire));
-            let time = self.timed.then_some(at);
-            request::message(&mut self.outbox, relay.wires().path(wire), time, |out| match untouched {
-                Some((_, raw)) => out.extend_from_slice(raw.get().as_bytes()),
-                None => json::encode(&value, out),
-            });
-        }
     }
 }
 

@@ -1,0 +1,214 @@
+"""Campaigns with a simulator in this process: `sesamec` supervises, and workers are forks of this process.
+
+The program asks over a pair of sockets for each worker that it needs, and for the end of each, so this process reaps
+only what it started, and a worker that hangs or crashes takes nothing with it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from typing import Any, Callable, Sequence
+
+from ._hooks import METRICS, OPERATIONS
+from ._world import Setup
+
+#: The longest request.
+REQUEST_LIMIT = 1 << 16
+
+
+class Failed(Exception):
+    """A campaign could not be run; `code` is the exit code of `sesamec`."""
+
+    def __init__(self, message: str, code: int) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+class Stopped(KeyboardInterrupt):
+    """The user stopped a campaign; `resume=True` continues it."""
+
+
+def program() -> str:
+    """The program `sesamec`: what `SESAMEC` names, else the one beside this Python, else the one on `PATH`."""
+    named = os.environ.get("SESAMEC")
+    if named:
+        return named
+    beside = Path(sys.executable).parent / "sesamec"
+    found = str(beside) if beside.is_file() else shutil.which("sesamec")
+    if found is None:
+        raise Failed("the program `sesamec` is neither beside this Python nor on PATH", 1)
+    return found
+
+
+def run(
+    space: str | os.PathLike[str],
+    campaign: str | None = None,
+    *,
+    simulator: Callable[[Setup], Any] | None = None,
+    seed: int | None = None,
+    evaluations: int | None = None,
+    workers: int | None = None,
+    results: str | os.PathLike[str] | None = None,
+    resume: bool | str | os.PathLike[str] = False,
+    debug: bool = False,
+    options: Sequence[str] = (),
+) -> dict[str, Any]:
+    """Runs a campaign of a space and returns its summary, as `--format json` prints it.
+
+    `simulator` is a class, or a function, that is called with a `Setup` for each test; without it, the space's own
+    simulator runs. Workers are forks of this process, so the class may be defined anywhere, also in a notebook.
+
+    `resume` continues a run that was stopped, as it was begun: the folder of that run, or `True` for the latest one
+    that is unfinished.
+
+    With `debug`, one worker stays in the terminal's foreground and no test has a time limit, so that `breakpoint()`
+    works in the simulator.
+    """
+    if resume and not (seed is evaluations is results is None):
+        raise TypeError("`resume` goes on with the seed, the tests and the results of its run")
+    command = [program(), "resume" if resume else "run", os.fspath(space)]
+    if resume and resume is not True:
+        command.append(os.fspath(resume))
+    if campaign is not None:
+        command += ["--campaign", campaign]
+    runner = ["--format", "json", *options]
+    if debug:
+        runner += ["--workers", "1", "--timeout", "86400", "--reference-timeout", "86400"]
+    for name, value in (("seed", seed), ("evaluations", evaluations), ("workers", workers), ("results", results)):
+        if value is not None:
+            runner += [f"--{name}", os.fspath(value) if isinstance(value, os.PathLike) else str(value)]
+    command += runner if resume else ["--", *runner]
+    if simulator is None:
+        done = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, check=False)
+        return _summary(done.returncode, done.stdout)
+    code, output = _Forks(simulator, debug).supervise(command)
+    return _summary(code, output)
+
+
+def _summary(code: int, output: bytes) -> dict[str, Any]:
+    if code == 130:
+        raise Stopped
+    if not output.strip():
+        raise Failed(f"sesamec ended with exit code {code}: see its message above", code)
+    summary: dict[str, Any] = json.loads(output)
+    return summary
+
+
+class _Forks:
+    """Forks workers for a supervisor until it has ended."""
+
+    def __init__(self, simulator: Callable[[Setup], Any], debug: bool) -> None:
+        self.simulator, self.debug = simulator, debug
+        self.workers: set[int] = set()
+
+    def supervise(self, command: list[str]) -> tuple[int, bytes]:
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        environment = {**os.environ, "SESAME_FORK_SERVER": "1"}
+        with ours:
+            with theirs:
+                supervisor = subprocess.Popen(command, stdin=theirs, stdout=subprocess.PIPE, env=environment)
+            # The supervisor stops the campaign in order. What a terminal sends reaches it anyway, and what is sent to
+            # this process alone is passed on.
+            before = signal.getsignal(signal.SIGINT)
+            stops = threading.current_thread() is threading.main_thread()
+            if stops:
+                signal.signal(signal.SIGINT, lambda *_: supervisor.send_signal(signal.SIGINT))
+            try:
+                self.answer(ours, supervisor)
+                assert supervisor.stdout is not None
+                output = supervisor.stdout.read()
+                return supervisor.wait(), output
+            finally:
+                if stops:
+                    signal.signal(signal.SIGINT, before)
+                for worker in list(self.workers):
+                    self.end(worker)
+                if supervisor.poll() is None:
+                    supervisor.kill()
+                    supervisor.wait()
+
+    def answer(self, connection: socket.socket, supervisor: subprocess.Popen[bytes]) -> None:
+        """Answers requests until the supervisor closes the connection."""
+        while True:
+            packet, descriptors, _, _ = socket.recv_fds(connection, REQUEST_LIMIT, 2)
+            if not packet:
+                return
+            request = json.loads(packet)
+            if "end" in request:
+                answer: dict[str, Any] = {"status": self.end(request["end"])}
+            else:
+                answer = self.fork(request["fork"], descriptors, connection)
+            for descriptor in descriptors:
+                os.close(descriptor)
+            connection.send(json.dumps(answer).encode())
+
+    def fork(self, worker: dict[str, Any], descriptors: list[int], connection: socket.socket) -> dict[str, Any]:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        try:
+            process = os.fork()
+        except OSError as error:
+            return {"failed": str(error)}
+        if process == 0:
+            code = 1
+            try:
+                connection.close()
+                code = _work(worker, descriptors, self.simulator, self.debug)
+            finally:
+                os._exit(code)
+        if not self.debug:
+            try:
+                os.setpgid(process, process)
+            except OSError:
+                pass  # It has done so itself.
+        self.workers.add(process)
+        return {"id": process}
+
+    def end(self, process: int) -> int:
+        """Kills a worker with its group, and reaps it."""
+        if process not in self.workers:
+            return 0
+        for kill in (os.kill,) if self.debug else (os.killpg, os.kill):
+            try:
+                kill(process, signal.SIGKILL)
+            except (ProcessLookupError, PermissionError):
+                pass  # It has ended.
+        self.workers.discard(process)
+        return os.waitpid(process, 0)[1]
+
+
+def _work(worker: dict[str, Any], descriptors: list[int], simulator: Callable[[Setup], Any], debug: bool) -> int:
+    """What a fork does: it becomes a worker."""
+    from . import _native
+
+    # In the foreground, Ctrl-C is for the supervisor, which ends its workers.
+    signal.signal(signal.SIGINT, signal.SIG_IGN if debug else signal.SIG_DFL)
+    terminal = os.dup(0)
+    os.dup2(descriptors[0], 0)
+    if not debug:
+        os.setpgid(0, 0)
+        os.dup2(descriptors[1], 1)
+        os.dup2(descriptors[1], 2)
+    for descriptor in descriptors:
+        os.close(descriptor)
+    os.chdir(worker["folder"])
+    os.environ["SESAME_WORKER"] = str(worker["worker"])
+    os.environ.pop("SESAME_FORK_SERVER", None)
+    if not debug:
+        os.close(terminal)
+        return _native.worker(worker["arguments"], simulator, METRICS, OPERATIONS)
+
+    def in_foreground(setup: Setup) -> Any:
+        # The worker has taken the connection from standard input by now, so a debugger may read there.
+        os.dup2(terminal, 0)
+        return simulator(setup)
+
+    return _native.worker(worker["arguments"], in_foreground, METRICS, OPERATIONS)

@@ -1,0 +1,7 @@
+//! Simulators, metrics and operations in Python, in the processes that run tests: the package is put together from its
+//! files and the module that cargo has built, and users' programs import it.
+
+mod both_ways;
+mod hooks;
+mod interruption;
+mod package;

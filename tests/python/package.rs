@@ -1,0 +1,115 @@
+//! The package as its users have it, and programs that use it.
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::Command;
+
+use sesame_base::observation::Outcome;
+use sesame_record::Repository;
+use sesame_tests::{Done, command, copy, done, fresh_folder, sesamec, workspace};
+
+/// A folder with the package, a space, and programs in Python.
+pub(crate) struct Place {
+    pub(crate) folder: PathBuf,
+}
+
+/// A cart between two walls, as a class.
+pub(crate) const CART: &str = r#"
+import sesamec
+
+POSITION, COMMAND, CLEARANCE = "cart/position", "cart/command", "cart/clearance"
+
+
+class World:
+    publishes = [POSITION, COMMAND, CLEARANCE]
+    subscribes = [POSITION, COMMAND]
+
+    def __init__(self, setup):
+        self.position, self.speed, self.heading, self.commanded = 5.0, 0.0, 1.0, 0.0
+
+    def step(self, bus):
+        bus.publish(POSITION, self.position)
+        bus.publish(CLEARANCE, 10.0 - self.position)
+        for topic, value, _ in bus.messages():
+            if topic == COMMAND:
+                self.commanded = value
+            elif topic == POSITION:
+                self.heading = 1.0 if value < 1.0 else -1.0 if value > 9.0 else self.heading
+                bus.publish(COMMAND, 2.0 * self.heading)
+        self.speed += (self.commanded - self.speed) * bus.step / 0.2
+        self.position = min(max(self.position + self.speed * bus.step, 0.0), 10.0)
+
+
+if __name__ == "__main__":
+    sesamec.serve(World)
+"#;
+
+impl Place {
+    /// The space of a new project, with this class as its simulator.
+    pub(crate) fn new(name: &str, simulator: &str) -> Option<Self> {
+        if !sesame_peers::has_python3() {
+            return None;
+        }
+        let folder = fresh_folder(name);
+        copy(&workspace().join("python/sesamec"), &folder.join("sesamec"));
+        let test = std::env::current_exe().expect("a test has a program");
+        let module = test.with_file_name("lib_native.so");
+        fs::copy(module, folder.join("sesamec/_native.abi3.so")).expect("cargo builds the module before its tests");
+        done(command(sesamec()).args(["new", "--python", "cart"]).current_dir(&folder)).expect(0);
+        let place = Place { folder };
+        place.write("cart/sim.py", simulator);
+        Some(place)
+    }
+
+    pub(crate) fn write(&self, file: &str, text: &str) {
+        fs::write(self.folder.join(file), text).expect("a file can be written");
+    }
+
+    /// Replaces a part of the space.
+    pub(crate) fn change_space(&self, part: &str, by: &str) {
+        let space = self.folder.join("cart/cart.sesame");
+        let text = fs::read_to_string(&space).expect("a project has a space");
+        assert!(text.contains(part), "{text}");
+        fs::write(&space, text.replace(part, by)).expect("a space can be written");
+    }
+
+    /// A program in Python that can import the package and the simulator.
+    pub(crate) fn python(&self, program: &str) -> Command {
+        self.write("program.py", program);
+        let mut python = command("python3");
+        python.arg("program.py").current_dir(&self.folder).env("SESAMEC", sesamec());
+        python.env(
+            "PYTHONPATH",
+            std::env::join_paths([self.folder.clone(), self.folder.join("cart")]).expect("no colon"),
+        );
+        python
+    }
+
+    /// Runs the campaign with the class in this process; arguments for `sesamec.run` follow.
+    pub(crate) fn run(&self, before: &str, arguments: &str) -> Done {
+        let program = format!(
+            "{before}\nimport sesamec\nfrom sim import World\n\
+             print('Digest', sesamec.run('cart/cart.sesame', simulator=World, {arguments})['digest'])\n"
+        );
+        done(&mut self.python(&program))
+    }
+
+    /// What broke off tests of the first run in this folder of results.
+    pub(crate) fn broken_off(&self, results: &str) -> Vec<Outcome> {
+        let results = Repository::open(&self.folder.join(results).join("1")).expect("a run has results");
+        let last = results.numbers().expect("they can be read").last().copied().expect("it has tests");
+        let records = results.records(0..=last, false).expect("they can be read");
+        records
+            .into_iter()
+            .map(|record| record.observation.outcome)
+            .filter(|it| matches!(it, Outcome::Crash { .. } | Outcome::Timeout { .. }))
+            .collect()
+    }
+
+    /// Runs it with the class as a program.
+    pub(crate) fn run_as_program(&self, arguments: &[&str]) -> Done {
+        let mut run = command(sesamec());
+        run.args(["run", "cart/cart.sesame", "--"]).args(arguments).current_dir(&self.folder);
+        done(run.env("PYTHONPATH", &self.folder))
+    }
+}
