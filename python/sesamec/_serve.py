@@ -2,14 +2,35 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import sys
-from typing import Any, Callable, TextIO
+from typing import Any, Callable, Iterable, TextIO
 
 from ._world import Message, Order, Setup, description, told
 
 NUMBERS = {float("inf"): "Infinity", float("-inf"): "-Infinity"}
+WORDS = {"NaN": float("nan"), "Infinity": float("inf"), "-Infinity": float("-inf")}
+
+
+#: Encodes a value; `json.dumps` with separators makes an encoder for each call.
+_encode = json.JSONEncoder(separators=(",", ":"), check_circular=False, allow_nan=False).encode
+
+#: What follows the value of a message, by whether it was delivered here.
+_DELIVERED = {False: "", True: ',"delivered":true'}
+
+
+@functools.cache
+def _beginning(topic: str) -> str:
+    """A message in JSON up to its value."""
+    return f'{{"topic":{_encode(topic)},"value":'
+
+
+def _line(topic: str, value: Any, delivered: bool) -> str:
+    """A message in JSON. Most carry a number, whose text is known."""
+    text = repr(value) if type(value) is float or type(value) is int else _encode(value)
+    return f"{_beginning(topic)}{text}{_DELIVERED[delivered]}}}"
 
 
 def _plain(value: Any) -> Any:
@@ -30,43 +51,82 @@ def _plain(value: Any) -> Any:
     return value
 
 
+def _number(value: Any) -> Any:
+    """A payload as it was published: NaN and infinities are numbers again. Lists and dictionaries are of its own."""
+    kind = type(value)
+    if kind is str:
+        return WORDS.get(value, value)
+    if kind is dict:
+        return {name: _number(part) for name, part in value.items()}
+    if kind is list:
+        return [_number(part) for part in value]
+    return value
+
+
 class _Ended(Exception):
     """The runner has closed the connection."""
 
 
 class _Bus:
-    """The way of a simulator's messages through the relay of the runner, while it takes a step."""
+    """The way of a simulator's messages through the relay of the runner, while it takes a step.
 
-    def __init__(self, send: Callable[[Any], None], receive: Callable[[], Any], step: float) -> None:
-        self.step, self.time = step, 0.0
+    What no operation of the test can change is delivered here, and the runner hears of it with the next line: a line
+    for each message would cost most of the time of a test.
+    """
+
+    def __init__(self, send: Callable[[str], None], receive: Callable[[], Any], reset: dict[str, Any]) -> None:
+        self.step, self.time = reset["step"], 0.0
         self.ended = False
-        self.published: list[dict[str, Any]] = []
+        #: What was published and not sent yet: its topic, what it carries, and whether it was delivered here.
+        self.published: list[tuple[str, Any, bool]] = []
+        self.subscribes: frozenset[str] = frozenset()
+        #: The topics that have to come back from the runner; all of them if it does not say which.
+        self._intercepted: frozenset[str] | None = None
+        if "intercepted" in reset:
+            self._intercepted = frozenset(reset["intercepted"])
+        #: Where what was published since the last call of `messages` begins.
+        self._fresh = 0
         self._inbox: list[Message] = []
         self._orders: list[Order] = []
         self._send, self._receive = send, receive
 
     def begin(self, step: dict[str, Any]) -> None:
         self.time = step["time"]
-        self._orders = [Order(order["node"], order["order"], order.get("share")) for order in step.get("orders", [])]
-        self._deliver(step.get("messages", []))
+        self._orders = [Order(order["node"], order["order"], order.get("share")) for order in step.get("orders", ())]
+        self._deliver(step.get("messages", ()))
 
-    def _deliver(self, messages: list[dict[str, Any]]) -> None:
-        self._inbox += [Message(message["topic"], message["value"], message["time"]) for message in messages]
+    def _deliver(self, messages: Iterable[dict[str, Any]]) -> None:
+        self._inbox += [Message(message["topic"], _number(message["value"]), message["time"]) for message in messages]
 
     def publish(self, topic: str, value: Any) -> None:
         """Sends a message through the relay. What reaches subscribers is in `messages()`."""
-        self.published.append({"topic": topic, "value": _plain(value)})
+        self.published.append((topic, _plain(value), False))
 
     def flush(self) -> None:
         """Sends what was published, so that the relay has it before anything else happens."""
         if self.published and self.time > 0.0:
-            self._send({"publish": self.published})
-            self.published = []
+            self._send(f'{{"publish":{self.sent()}}}')
             self._deliver(self._receive()["deliver"])
+
+    def sent(self) -> str:
+        """What was published, as a list in JSON that is sent now."""
+        published, self.published, self._fresh = self.published, [], 0
+        return f"[{','.join([_line(*message) for message in published])}]"
 
     def messages(self) -> list[Message]:
         """The messages that have reached subscribers since the last call."""
-        self.flush()
+        if self._fresh < len(self.published) and self.time > 0.0:
+            fresh = range(self._fresh, len(self.published))
+            heard = [at for at in fresh if self.published[at][0] in self.subscribes]
+            intercepted = self._intercepted
+            if intercepted is None or any(self.published[at][0] in intercepted for at in heard):
+                self.flush()
+            else:
+                for at in heard:
+                    topic, value, _ = self.published[at]
+                    self.published[at] = (topic, value, True)
+                    self._inbox.append(Message(topic, _number(value), self.time))
+                self._fresh = len(self.published)
         messages, self._inbox = self._inbox, []
         return messages
 
@@ -94,15 +154,17 @@ def serve(simulator: Callable[[Setup], Any]) -> None:
 
 
 def _serve(simulator: Callable[[Setup], Any], requests: TextIO, output: TextIO) -> None:
-    def send(answer: Any) -> None:
-        output.write(json.dumps(answer, separators=(",", ":")) + "\n")
+    decode = json.JSONDecoder().raw_decode
+
+    def send(line: str) -> None:
+        output.write(line + "\n")
         output.flush()
 
     def receive() -> Any:
         line = requests.readline()
         if not line:
             raise _Ended
-        return json.loads(line)
+        return decode(line)[0]
 
     world = bus = None
     while True:
@@ -112,28 +174,27 @@ def _serve(simulator: Callable[[Setup], Any], requests: TextIO, output: TextIO) 
                 _close(world)
                 reset = request["reset"]
                 setup = Setup(reset["seed"], reset["step"], reset.get("parameters", {}))
-                world, bus = None, _Bus(send, receive, reset["step"])
+                world, bus = None, _Bus(send, receive, reset)
                 world = simulator(setup)
                 publishes, subscribes, nodes = description(world)
+                bus.subscribes = frozenset(subscribes)
                 if hasattr(world, "start"):
                     world.start(bus)
-                answer = {
-                    "ready": {
-                        "publishes": publishes,
-                        "subscribes": subscribes,
-                        "nodes": nodes,
-                        "parameters": setup.asked,
-                        "resets": True,
-                        "times": True,
-                        "messages": bus.published,
-                    }
+                ready = {
+                    "publishes": publishes,
+                    "subscribes": subscribes,
+                    "nodes": nodes,
+                    "parameters": setup.asked,
+                    "resets": True,
+                    "times": True,
                 }
+                answer = f'{{"ready":{{"messages":{bus.sent()},{_encode(ready)[1:]}}}'
             else:
                 assert world is not None and bus is not None
                 bus.begin(request["step"])
                 world.step(bus)
-                answer = {"done": {"messages": bus.published, "ended": bus.ended}}
-            bus.published = []
+                ended = ',"ended":true' if bus.ended else ""
+                answer = f'{{"done":{{"messages":{bus.sent()}{ended}}}}}'
         except _Ended:
             raise
         except BaseException as error:
@@ -141,7 +202,7 @@ def _serve(simulator: Callable[[Setup], Any], requests: TextIO, output: TextIO) 
             print(trace, file=sys.stderr, flush=True)
             if bus is not None:
                 bus.flush()
-            answer = {"failed": message}
+            answer = _encode({"failed": message})
         send(answer)
 
 

@@ -19,7 +19,7 @@ use sesame_relay::message::Mismatch;
 use sesame_relay::relay::Exchange;
 use sesame_relay::simulator::{NodeFault, NodeOrder, Offers, OrderToNode, Progress, no_such_parameter};
 use sesame_relay::transport::node_orders::NodeOrders;
-use sesame_relay::transport::topics::{Format, Opened, Refused, STEP_LIMIT, Topics};
+use sesame_relay::transport::topics::{Format, Opened, Published, Refused, STEP_LIMIT, Topics};
 use sesame_relay::transport::{Capabilities, Connect, Incidents, Transport, TransportError};
 use sesame_relay::value::Value;
 
@@ -141,7 +141,7 @@ struct Taken<'t> {
 
 impl Turn for Taken<'_> {
     fn publish(&mut self, topic: &str, payload: &Bound<'_, PyAny>) -> bool {
-        let messages = std::iter::once((topic, payload));
+        let messages = std::iter::once(Published { path: topic, payload, delivered: false });
         let refused = match self.topics.publish(self.plan, self.now, messages, self.relay) {
             Ok(()) => return true,
             Err(Refused::TooMany) => TransportError::Simulator(format!(
@@ -151,6 +151,7 @@ impl Turn for Taken<'_> {
             Err(Refused::NotPublished(path)) => TransportError::Simulator(format!(
                 "it published a message on `{path}`, which is not in its `publishes`"
             )),
+            Err(Refused::Intercepted(_)) => unreachable!("nothing is delivered before it was published"),
             Err(Refused::WrongType(error)) => error,
         };
         self.failure.get_or_insert(refused);

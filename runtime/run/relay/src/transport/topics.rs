@@ -49,6 +49,17 @@ pub struct Opened<'a> {
     pub times: bool,
 }
 
+/// A message of the simulator.
+#[derive(Debug)]
+pub struct Published<'a, P> {
+    /// The topic's name on the wire.
+    pub path: &'a str,
+    /// What it carries.
+    pub payload: P,
+    /// Whether the simulator has given it to its own subscribers, since nothing can change it.
+    pub delivered: bool,
+}
+
 /// Why messages are not passed on.
 #[derive(Debug)]
 pub enum Refused {
@@ -56,6 +67,8 @@ pub enum Refused {
     TooMany,
     /// The simulator did not say that it publishes on this topic.
     NotPublished(String),
+    /// The simulator has delivered a message itself that an operation may change.
+    Intercepted(String),
     /// A payload is not of its declared type.
     WrongType(TransportError),
 }
@@ -68,6 +81,8 @@ pub struct Topics<F> {
     subscribed: Vec<bool>,
     /// Whether the simulator is told when each message was delivered.
     timed: bool,
+    /// Whether the simulator may deliver messages itself that no operation intercepts.
+    pub delivers: bool,
     /// Where deliveries are collected.
     pub format: F,
     /// What the relay has delivered and [`deliver`](Topics::deliver) has not collected yet.
@@ -93,6 +108,7 @@ impl<F: Format> Topics<F> {
         self.by_path.clear();
         self.subscribed.clear();
         self.timed = false;
+        self.delivers = false;
         self.format.clear();
         self.deliveries.clear();
         self.published = 0;
@@ -140,28 +156,34 @@ impl<F: Format> Topics<F> {
         &mut self,
         plan: &CampaignPlan,
         now: SimTime,
-        messages: impl ExactSizeIterator<Item = (&'a str, F::Payload<'a>)>,
+        messages: impl ExactSizeIterator<Item = Published<'a, F::Payload<'a>>>,
         relay: &mut dyn Exchange,
     ) -> Result<(), Refused> {
         self.published += messages.len() as u64;
         if self.published > STEP_LIMIT {
             return Err(Refused::TooMany);
         }
-        for (path, payload) in messages {
+        for Published { path, payload, delivered } in messages {
             let Some(topic) = self.by_path.get(path).filter(|topic| topic.publishes) else {
                 return Err(Refused::NotPublished(path.to_owned()));
             };
             let Some(wire) = topic.wire else {
-                if topic.subscribes {
+                if topic.subscribes && !delivered {
                     self.format.pass_on(path, self.timed.then_some(now), &payload);
                 }
                 continue;
             };
+            if delivered && (!self.delivers || relay.intercepts(wire)) {
+                return Err(Refused::Intercepted(path.to_owned()));
+            }
             let declared = &plan.topic(relay.wires().topic(wire)).ty;
             let value = self.format.read(plan, declared, &payload).map_err(|mismatch| {
                 Refused::WrongType(TransportError::WrongType { path: path.to_owned(), reason: mismatch.to_string() })
             })?;
             relay.message(now, wire, value, &mut self.deliveries);
+            if delivered {
+                self.deliveries.retain(|delivery| delivery.wire != wire);
+            }
             self.deliver(relay, Some((wire, &payload)));
         }
         Ok(())

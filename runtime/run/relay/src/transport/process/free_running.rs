@@ -213,7 +213,8 @@ impl Connection {
         self.topics.clear();
         self.orders = NodeOrders::default();
         let (mut line, wires) = (Vec::new(), relay.wires());
-        request::reset(&mut line, seed, None, relay.parameters(), wires.iter().map(|wire| wires.path(wire)));
+        let paths = wires.iter().map(|wire| wires.path(wire));
+        request::reset(&mut line, seed, None, relay.parameters(), None::<std::iter::Empty<&str>>, paths);
         send(&mut self.input, &line);
         self.line.number = 0;
         loop {

@@ -111,6 +111,9 @@ pub(super) struct Message<'a> {
     /// The payload.
     #[serde(borrow)]
     pub(super) value: &'a RawValue,
+    /// Whether the simulator has given it to its own subscribers.
+    #[serde(default)]
+    pub(super) delivered: bool,
 }
 
 /// The simulator's lines, counted from its last reset.
@@ -260,13 +263,15 @@ pub(super) mod request {
     use super::{SimTime, number, quoted};
     use crate::simulator::OrderToNode;
 
-    /// `{"reset":{"seed":1,"step":0.02,"parameters":{"gain":0.9},"topics":["a"]}}`, without `step` for a free-running
-    /// simulator, and without `parameters` if there are none.
+    /// `{"reset":{"seed":1,"step":0.02,"parameters":{"gain":0.9},"intercepted":["a"],"topics":["a","b"]}}`, without
+    /// `step` for a free-running simulator, without `parameters` if there are none, and without `intercepted` where all
+    /// messages have to come back from the runner.
     pub(in super::super) fn reset<'a>(
         line: &mut Vec<u8>,
         seed: u64,
         step: Option<SimTime>,
         parameters: &[(String, f64)],
+        intercepted: Option<impl Iterator<Item = &'a str>>,
         topics: impl Iterator<Item = &'a str>,
     ) {
         line.extend_from_slice(format!("{{\"reset\":{{\"seed\":{seed},").as_bytes());
@@ -287,14 +292,25 @@ pub(super) mod request {
             }
             line.extend_from_slice(b"},");
         }
-        line.extend_from_slice(b"\"topics\":[");
-        for (at, topic) in topics.enumerate() {
+        if let Some(intercepted) = intercepted {
+            line.extend_from_slice(b"\"intercepted\":");
+            list_of_names(line, intercepted);
+            line.push(b',');
+        }
+        line.extend_from_slice(b"\"topics\":");
+        list_of_names(line, topics);
+        line.extend_from_slice(b"}}\n");
+    }
+
+    fn list_of_names<'a>(line: &mut Vec<u8>, names: impl Iterator<Item = &'a str>) {
+        line.push(b'[');
+        for (at, name) in names.enumerate() {
             if at > 0 {
                 line.push(b',');
             }
-            quoted(topic, line);
+            quoted(name, line);
         }
-        line.extend_from_slice(b"]}}\n");
+        line.push(b']');
     }
 
     /// `{"step":{"time":0.02,"orders":[{"node":"arm","order":"pause"}],"messages":[…]}}`, with messages as [`message`]

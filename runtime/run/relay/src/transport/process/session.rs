@@ -15,7 +15,7 @@ use crate::simulator::Progress;
 use crate::transport::TransportError;
 use crate::transport::node_orders::NodeOrders;
 use crate::transport::process::protocol::{LINE_LIMIT, Line, Lines, Message, Ready, SimulatorMessage, request};
-use crate::transport::topics::{Format, Opened, Refused, STEP_LIMIT, Topics};
+use crate::transport::topics::{Format, Opened, Published, Refused, STEP_LIMIT, Topics};
 use crate::value::Value;
 
 /// The remedy for a surplus answer.
@@ -94,7 +94,11 @@ pub(super) fn publish(
     relay: &mut dyn Exchange,
     line: &Line,
 ) -> Result<(), TransportError> {
-    let messages = messages.iter().map(|message| (message.topic.as_ref(), message.value));
+    let messages = messages.iter().map(|message| Published {
+        path: message.topic.as_ref(),
+        payload: message.value,
+        delivered: message.delivered,
+    });
     topics.publish(plan, now, messages, relay).map_err(|refused| match refused {
         Refused::TooMany => {
             let problem = format!("has more than {STEP_LIMIT} messages in the step to {now}");
@@ -103,6 +107,10 @@ pub(super) fn publish(
         Refused::NotPublished(path) => {
             let problem = format!("has a message on `{path}`, which the simulator did not say it publishes");
             line.wrong(problem, "list it in `publishes` of `ready`")
+        }
+        Refused::Intercepted(path) => {
+            let problem = format!("says that a message on `{path}` was delivered, which an operation may change");
+            line.wrong(problem, "deliver only messages on topics that are not in `intercepted` of `reset`")
         }
         Refused::WrongType(error) => error,
     })
@@ -166,7 +174,12 @@ impl<R: BufRead, W: Write> Session<R, W> {
         self.topics.clear();
         self.orders = NodeOrders::default();
         let wires = relay.wires();
-        request::reset(&mut self.line, seed, Some(step), relay.parameters(), wires.iter().map(|wire| wires.path(wire)));
+        let paths = wires.iter().map(|wire| wires.path(wire));
+        let intercepted = wires.iter().filter(|&wire| relay.intercepts(wire)).map(|wire| wires.path(wire));
+        // A monitor may publish as soon as it hears a message.
+        let intercepted = plan.monitors.is_empty().then_some(intercepted);
+        self.topics.delivers = intercepted.is_some();
+        request::reset(&mut self.line, seed, Some(step), relay.parameters(), intercepted, paths);
         self.send();
         let awaited = || "its answer to `reset`".to_owned();
         if !self.lines.read()? {

@@ -63,7 +63,7 @@ impl<'p, 't> Hearing<'p, 't> {
         self.subscribed = ready.subscribes.iter().cloned().collect();
         self.times = ready.times;
         let mut messages = Vec::new();
-        for Message { topic, value } in &ready.messages {
+        for Message { topic, value, .. } in &ready.messages {
             request::message(&mut messages, topic, None, |out| out.extend_from_slice(value.get().as_bytes()));
         }
         while let Some((path, value)) = self.publication() {

@@ -88,7 +88,7 @@ impl Run<'_, '_, '_, '_> {
     /// it. What is delivered of all is added to what the simulator is sent.
     fn pass_on(&mut self, messages: &[Message<'_>], delivered: &mut Vec<u8>) -> Result<(), BesideError> {
         let mut together = Vec::new();
-        for (at, Message { topic, value }) in messages.iter().enumerate() {
+        for (at, Message { topic, value, .. }) in messages.iter().enumerate() {
             let value: &RawValue = value;
             request::message(&mut together, topic, None, |out| out.extend_from_slice(value.get().as_bytes()));
             if self.hearing.hears(topic) || at + 1 == messages.len() {

@@ -68,7 +68,7 @@ fn a_reset_tells_seed_step_and_topics_and_a_step_its_time() {
     assert_eq!(
         talk.orders,
         [
-            r#"{"reset":{"seed":7,"step":0.1,"topics":["arm/command","zones/Z1","zones/Z2"]}}"#,
+            r#"{"reset":{"seed":7,"step":0.1,"intercepted":[],"topics":["arm/command","zones/Z1","zones/Z2"]}}"#,
             r#"{"step":{"time":0.1,"messages":[]}}"#,
             r#"{"step":{"time":0.2,"messages":[]}}"#,
         ]
@@ -91,6 +91,26 @@ fn what_is_published_is_delivered_in_the_same_step_and_what_comes_with_done_in_t
     assert_eq!(talk.finished.messages, 3, "the relay sees what has no subscriber too");
     assert_eq!(talk.finished.metrics[1].value, Some(2.5));
     assert_eq!(talk.finished.metrics[1].series, [(0.1, 2.5)], "the last of a moment");
+}
+
+#[test]
+fn what_the_simulator_delivers_itself_is_measured_and_does_not_come_back() {
+    let delivered = r#"{"topic":"arm/command","value":1.5,"delivered":true}"#;
+    let later = r#"{"topic":"arm/command","value":2.5}"#;
+    let talk = talk(2, &[&format!(r#"{{"done":{{"messages":[{delivered},{later}]}}}}"#), r#"{"done":{}}"#]);
+    assert_eq!(talk.orders[2], r#"{"step":{"time":0.2,"messages":[{"topic":"arm/command","value":2.5}]}}"#);
+    assert_eq!((talk.finished.messages, talk.finished.metrics[1].value), (2, Some(2.5)));
+}
+
+#[test]
+fn what_an_operation_may_change_the_simulator_must_not_deliver_itself() {
+    let operations = vec![operation(0, OperationKind::Blackhole)];
+    let uses = vec![use_of(0, 5.0, 6.0, vec![], 1)];
+    let delivered = r#"{"publish":[{"topic":"arm/command","value":1.5,"delivered":true}]}"#;
+    let talk = talk_about(operations, &test_of(uses), 1, &format!("{READY}\n{delivered}\n"));
+    assert!(talk.orders[0].contains(r#""intercepted":["arm/command"]"#), "{:?}", talk.orders);
+    let error = talk.error();
+    assert!(error.contains("says that a message on `arm/command` was delivered"), "{error}");
 }
 
 #[test]
