@@ -1,7 +1,7 @@
 //! The package as its users have it, and programs that use it.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use sesame_base::observation::Outcome;
@@ -76,8 +76,15 @@ impl Place {
     /// A program in Python that can import the package and the simulator.
     pub(crate) fn python(&self, program: &str) -> Command {
         self.write("program.py", program);
-        let mut python = command("python3");
-        python.arg("program.py").current_dir(&self.folder).env("SESAMEC", sesamec());
+        let mut python = self.with_package("python3");
+        python.arg("program.py");
+        python
+    }
+
+    /// A Python, such as that of the peers, that can import the package and the simulator.
+    pub(crate) fn with_package(&self, python: impl AsRef<Path>) -> Command {
+        let mut python = command(python);
+        python.current_dir(&self.folder).env("SESAMEC", sesamec());
         python.env(
             "PYTHONPATH",
             std::env::join_paths([self.folder.clone(), self.folder.join("cart")]).expect("no colon"),
