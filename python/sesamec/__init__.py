@@ -1,12 +1,31 @@
 """Sesame: under which disturbances does a multi-robot system become dangerous?
 
-`run` runs a campaign of a `.sesame` file, with a class of this process as its simulator; `serve` makes a program of the
-same class, for `sesamec run` without Python around it.
+`run` runs a campaign of a `.sesame` file, with a class of this process as its simulator, and returns its results;
+`open_run` opens results that are there. `serve` makes a program of the same class, for `sesamec run` without Python
+around it.
 """
 
 from ._hooks import metric, operation
+from ._results import Metric, NotResults, Operation, Run, Test
+from ._run import open_run, run
 from ._serve import serve
-from ._supervise import Failed, Stopped, run
+from ._supervise import Failed, Stopped
 from ._world import Message, Order, Setup
 
-__all__ = ["Failed", "Message", "Order", "Setup", "Stopped", "metric", "operation", "run", "serve"]
+__all__ = [
+    "Failed",
+    "Message",
+    "Metric",
+    "NotResults",
+    "Operation",
+    "Order",
+    "Run",
+    "Setup",
+    "Stopped",
+    "Test",
+    "metric",
+    "open_run",
+    "operation",
+    "run",
+    "serve",
+]

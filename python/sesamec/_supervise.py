@@ -1,4 +1,4 @@
-"""Campaigns with a simulator in this process: `sesamec` supervises, and workers are forks of this process.
+"""Commands with a simulator in this process: `sesamec` supervises, and workers are forks of this process.
 
 The program asks over a pair of sockets for each worker that it needs, and for the end of each, so this process reaps
 only what it started, and a worker that hangs or crashes takes nothing with it.
@@ -13,9 +13,10 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import threading
 from pathlib import Path
-from typing import Any, Callable, Sequence
+from typing import IO, Any, Callable
 
 from ._hooks import METRICS, OPERATIONS
 from ._world import Setup
@@ -25,7 +26,7 @@ REQUEST_LIMIT = 1 << 16
 
 
 class Failed(Exception):
-    """A campaign could not be run; `code` is the exit code of `sesamec`."""
+    """A command of `sesamec` failed, with its message; `code` is its exit code."""
 
     def __init__(self, message: str, code: int) -> None:
         super().__init__(message)
@@ -48,58 +49,40 @@ def program() -> str:
     return found
 
 
-def run(
-    space: str | os.PathLike[str],
-    campaign: str | None = None,
-    *,
-    simulator: Callable[[Setup], Any] | None = None,
-    seed: int | None = None,
-    evaluations: int | None = None,
-    workers: int | None = None,
-    results: str | os.PathLike[str] | None = None,
-    resume: bool | str | os.PathLike[str] = False,
-    debug: bool = False,
-    options: Sequence[str] = (),
-) -> dict[str, Any]:
-    """Runs a campaign of a space and returns its summary, as `--format json` prints it.
+def answer(command: list[str], simulator: Callable[[Setup], Any] | None = None, *, debug: bool = False) -> Any:
+    """What `sesamec` prints as JSON. With a simulator, workers are forks of this process.
 
-    `simulator` is a class, or a function, that is called with a `Setup` for each test; without it, the space's own
-    simulator runs. Workers are forks of this process, so the class may be defined anywhere, also in a notebook.
-
-    `resume` continues a run that was stopped, as it was begun: the folder of that run, or `True` for the latest one
-    that is unfinished.
-
-    With `debug`, one worker stays in the terminal's foreground and no test has a time limit, so that `breakpoint()`
-    works in the simulator.
+    What it says to people goes to standard error, also in a notebook, and is the message of the exception if it fails.
     """
-    if resume and not (seed is evaluations is results is None):
-        raise TypeError("`resume` goes on with the seed, the tests and the results of its run")
-    command = [program(), "resume" if resume else "run", os.fspath(space)]
-    if resume and resume is not True:
-        command.append(os.fspath(resume))
-    if campaign is not None:
-        command += ["--campaign", campaign]
-    runner = ["--format", "json", *options]
-    if debug:
-        runner += ["--workers", "1", "--timeout", "86400", "--reference-timeout", "86400"]
-    for name, value in (("seed", seed), ("evaluations", evaluations), ("workers", workers), ("results", results)):
-        if value is not None:
-            runner += [f"--{name}", os.fspath(value) if isinstance(value, os.PathLike) else str(value)]
-    command += runner if resume else ["--", *runner]
-    if simulator is None:
-        done = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, check=False)
-        return _summary(done.returncode, done.stdout)
-    code, output = _Forks(simulator, debug).supervise(command)
-    return _summary(code, output)
+    code, output = call(command, simulator, debug=debug)
+    return json.loads(output)
 
 
-def _summary(code: int, output: bytes) -> dict[str, Any]:
+def call(
+    command: list[str], simulator: Callable[[Setup], Any] | None = None, *, debug: bool = False
+) -> tuple[int, bytes]:
+    """The exit code of a command of `sesamec`, and what it prints; a command that prints nothing has failed."""
+    # A terminal shows progress. Elsewhere, such as in a notebook, descriptor 2 is not what `sys.stderr` writes to.
+    in_terminal = os.isatty(2)
+    with tempfile.TemporaryFile() as kept:
+        messages = None if in_terminal else kept
+        if simulator is None:
+            done = subprocess.run(
+                command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=messages, check=False
+            )
+            code, output = done.returncode, done.stdout
+        else:
+            code, output = _Forks(simulator, debug).supervise(command, messages)
+        kept.seek(0)
+        said = kept.read().decode(errors="replace")
     if code == 130:
+        sys.stderr.write(said)
         raise Stopped
     if not output.strip():
-        raise Failed(f"sesamec ended with exit code {code}: see its message above", code)
-    summary: dict[str, Any] = json.loads(output)
-    return summary
+        told = said.strip() or f"{' '.join(command)} ended with exit code {code}: see its message above"
+        raise Failed(told, code)
+    sys.stderr.write(said)
+    return code, output
 
 
 class _Forks:
@@ -109,12 +92,14 @@ class _Forks:
         self.simulator, self.debug = simulator, debug
         self.workers: set[int] = set()
 
-    def supervise(self, command: list[str]) -> tuple[int, bytes]:
+    def supervise(self, command: list[str], messages: IO[bytes] | None = None) -> tuple[int, bytes]:
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         environment = {**os.environ, "SESAME_FORK_SERVER": "1"}
         with ours:
             with theirs:
-                supervisor = subprocess.Popen(command, stdin=theirs, stdout=subprocess.PIPE, env=environment)
+                supervisor = subprocess.Popen(
+                    command, stdin=theirs.fileno(), stdout=subprocess.PIPE, stderr=messages, env=environment
+                )
             # The supervisor stops the campaign in order. What a terminal sends reaches it anyway, and what is sent to
             # this process alone is passed on.
             before = signal.getsignal(signal.SIGINT)

@@ -18,7 +18,7 @@ mod select;
 mod shell;
 mod study;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
@@ -156,17 +156,19 @@ enum Command {
     Scan(scan::Scan),
     /// Explain the code of a diagnostic, for example E0203; or something that a space declares, with all its uses.
     ///
+    /// A `.sesame` file alone is a list of everything that it declares.
+    ///
     /// A campaign is shown with every default written out, and with the space of its tests; a monitor with its
     /// certificate as a tree. Without a code or a name, all codes are listed. `explain wiring FILE` shows how the nodes
     /// of a ROS 2 system are remapped.
     Explain {
-        /// The code, or the name; qualify a field or parameter, as in `SafetyZone.level`.
-        #[arg(value_name = "CODE or NAME")]
+        /// The code, or the name; qualify a field or parameter, as in `SafetyZone.level`. Or a `.sesame` file.
+        #[arg(value_name = "CODE, NAME or FILE")]
         what: Option<String>,
         /// The `.sesame` file that declares the name.
         file: Option<PathBuf>,
-        /// How a definition and its uses are shown: as text, or as one JSON object.
-        #[arg(long, value_enum, default_value_t, requires = "file")]
+        /// How a definition and its uses, or all definitions, are shown: as text, or as one line of JSON.
+        #[arg(long, value_enum, default_value_t, requires = "what")]
         format: ExplainFormat,
     },
     /// Print a script that completes sesamec's command line in a shell.
@@ -244,6 +246,9 @@ pub fn run(
         Command::Scan(asked) => scan::scan(shell, language, &asked),
         Command::Explain { what: Some(what), file: Some(file), format } => {
             commands::explain_name(shell, language, &what, &file, format)
+        }
+        Command::Explain { what: Some(file), format, .. } if file.ends_with(".sesame") => {
+            commands::explain_file(shell, language, Path::new(&file), format)
         }
         Command::Explain { what: Some(what), .. } => commands::explain_code(language, &what),
         Command::Explain { what: None, .. } => commands::explainable(language),

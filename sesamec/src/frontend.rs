@@ -31,6 +31,8 @@ pub struct Language {
     pub codes: fn() -> Vec<(&'static str, &'static str)>,
     /// What a space declares by a name, and what mentions it, even if the space has errors; or why that cannot be told.
     pub find: fn(file: &str, text: &str, name: &str) -> Result<Found, String>,
+    /// Lists everything that a space declares.
+    pub declarations: fn(file: &str, text: &str) -> Declarations,
 }
 
 /// How diagnostics look.
@@ -73,6 +75,17 @@ pub struct Found {
     pub errors: usize,
 }
 
+/// Everything that a space declares.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Declarations {
+    /// As text, a line each.
+    pub text: String,
+    /// As one line of JSON.
+    pub json: String,
+    /// How many errors the space has. What could not be read is not listed.
+    pub errors: usize,
+}
+
 /// What came of checking a space.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Checked {
@@ -96,7 +109,7 @@ pub struct Checked {
 }
 
 /// The language of this version.
-pub const SESAME: Language = Language { check, format, explain: page, codes, find };
+pub const SESAME: Language = Language { check, format, explain: page, codes, find, declarations };
 
 fn codes() -> Vec<(&'static str, &'static str)> {
     MEANINGS.iter().map(|(code, meaning)| (code.text(), *meaning)).collect()
@@ -182,8 +195,24 @@ fn find(file: &str, text: &str, name: &str) -> Result<Found, String> {
         text: uses::text(&sources, &index, id, certificate.as_ref()),
         uses: uses::uses(&sources, &index, id),
         json: uses::json(&sources, &index, id, certificate.as_ref()),
-        errors: diagnostics.iter().filter(|found| found.severity() == Severity::Error).count(),
+        errors: errors(&diagnostics),
     })
+}
+
+fn declarations(file: &str, text: &str) -> Declarations {
+    let mut sources = SourceMap::new();
+    let root = sources.add(file, text);
+    sesame_dsl::load_imports(&mut sources, root, read);
+    let Analysis { index, diagnostics, .. } = sesame_dsl::analyse_with(&sources, root, &Files::default());
+    Declarations {
+        text: uses::list(&sources, &index),
+        json: uses::list_json(&sources, &index),
+        errors: errors(&diagnostics),
+    }
+}
+
+fn errors(diagnostics: &[Diagnostic]) -> usize {
+    diagnostics.iter().filter(|found| found.severity() == Severity::Error).count()
 }
 
 fn diagnosed(diagnostics: &[Diagnostic], sources: &SourceMap, look: Look) -> Diagnosed {
@@ -193,8 +222,7 @@ fn diagnosed(diagnostics: &[Diagnostic], sources: &SourceMap, look: Look) -> Dia
         Look::Json => render::json(diagnostics, sources),
         Look::Github => render::github(diagnostics, sources),
     };
-    let errors = diagnostics.iter().filter(|found| found.severity() == Severity::Error).count();
-    Diagnosed { diagnostics: text, errors }
+    Diagnosed { diagnostics: text, errors: errors(diagnostics) }
 }
 
 /// What a space holds, for example `4 campaigns, 9 operations, 6 metrics, 2 requirements`.

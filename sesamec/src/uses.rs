@@ -155,6 +155,48 @@ struct Explained<'a> {
     uses: Vec<Use<'a>>,
 }
 
+/// Something that a space declares.
+#[derive(Serialize)]
+struct Declared<'a> {
+    /// What is declared, for example `topic`.
+    kind: &'static str,
+    /// Its name; that of a field or a parameter with what it belongs to.
+    name: String,
+    /// Where it is declared.
+    at: Location<'a>,
+    /// Its doc comment.
+    doc: &'a str,
+    /// The declaration as written.
+    text: &'a str,
+}
+
+/// Everything that a space declares, in the order of declarations: as lines of text.
+pub(crate) fn list(sources: &SourceMap, index: &Index) -> String {
+    let mut out = String::new();
+    for (id, definition) in ids(index) {
+        let (kind, name, at) = (definition.kind.word(), index.full_name(id), place(sources, definition.span));
+        let doc = definition.doc.lines().next().map_or_else(String::new, |line| format!("  {line}"));
+        writeln!(out, "{kind} `{name}`, {at}{doc}").expect(STRING);
+    }
+    out
+}
+
+/// The same as a list in JSON, in ASCII and on one line.
+pub(crate) fn list_json(sources: &SourceMap, index: &Index) -> String {
+    let declared = ids(index).map(|(id, definition)| Declared {
+        kind: definition.kind.word(),
+        name: index.full_name(id),
+        at: Location::with_utf16(sources, definition.span),
+        doc: &definition.doc,
+        text: sources.snippet(definition.full_span),
+    });
+    ascii(&declared.collect::<Vec<_>>())
+}
+
+fn ids(index: &Index) -> impl Iterator<Item = (DefinitionId, &Definition)> {
+    index.definitions.iter().enumerate().map(|(id, definition)| (DefinitionId(id), definition))
+}
+
 /// A place that mentions a definition.
 #[derive(Serialize)]
 struct Use<'a> {
@@ -200,9 +242,14 @@ pub(crate) fn json(
             })
             .collect(),
     };
+    ascii(&explained)
+}
+
+/// A line of JSON.
+fn ascii(shown: &impl Serialize) -> String {
     let mut out = String::new();
     // What is not ASCII may be obeyed by a terminal.
-    for c in serde_json::to_string(&explained).expect("strings and numbers serialise").chars() {
+    for c in serde_json::to_string(shown).expect("strings and numbers serialise").chars() {
         if c.is_ascii() && !c.is_control() {
             out.push(c);
         } else {

@@ -46,6 +46,7 @@ const PRINTED: [(&str, &str, &str, &str); 19] = [
         "sesame-dsl/src/diagnostic/render/json.rs",
     ),
     ("`sesamec explain NAME FILE`", "One object.", "Explained", "sesamec/src/uses.rs"),
+    ("`sesamec explain FILE`", "A list with an object for each declaration.", "Declared", "sesamec/src/uses.rs"),
     ("`sesamec scan`", "One object.", "Facts", "runtime/middleware/scan/src/facts.rs"),
     ("`sesamec agents`", "One object.", "QueueContents", "runtime/src/cli/agent.rs"),
     (

@@ -204,7 +204,8 @@ pub(super) fn explainable(language: &Language) -> anyhow::Result<ExitCode> {
     let codes: Vec<String> =
         (language.codes)().iter().map(|(code, meaning)| format!("  {code}  {meaning}\n")).collect();
     shell::asked_for(&format!(
-        "`{sesamec} explain NAME FILE` explains what a space declares: a topic, metric, operation, campaign, …\n\
+        "`{sesamec} explain FILE` lists what a space declares\n\
+         `{sesamec} explain NAME FILE` explains what a space declares: a topic, metric, operation, campaign, …\n\
          `{sesamec} explain wiring FILE` shows how the nodes of a ROS 2 system are remapped\n\
          `{sesamec} explain CODE` explains a diagnostic:\n{}",
         codes.concat()
@@ -239,19 +240,41 @@ pub(super) fn explain_name(
         shell::asked_for(&visible_lines(&text))?;
         return Ok(ExitCode::SUCCESS);
     }
-    if found.errors > 0 {
-        let has = if found.errors == 1 { "an error".to_owned() } else { format!("{} errors", found.errors) };
-        shell.warning(format!(
-            "{} has {has}: uses that could not be read are missing; see `{}`",
-            file.display(),
-            shell::command_for("check", file)
-        ));
-    }
+    unread(shell, file, found.errors, "uses");
     match format {
         ExplainFormat::Human => shell::asked_for(&visible_lines(&found.text))?,
         ExplainFormat::Json => shell::asked_for(&found.json)?,
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// `sesamec explain FILE`
+pub(super) fn explain_file(
+    shell: Shell,
+    language: &Language,
+    file: &Path,
+    format: ExplainFormat,
+) -> anyhow::Result<ExitCode> {
+    let text = input::text(file).with_context(|| format!("cannot read {}", file.display()))?;
+    let found = (language.declarations)(&file.display().to_string(), &text);
+    unread(shell, file, found.errors, "declarations");
+    match format {
+        ExplainFormat::Human => shell::asked_for(&visible_lines(&found.text))?,
+        ExplainFormat::Json => shell::asked_for(&found.json)?,
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Says that a space has errors, so that something is missing.
+fn unread(shell: Shell, file: &Path, errors: usize, what: &str) {
+    if errors > 0 {
+        let has = if errors == 1 { "an error".to_owned() } else { format!("{errors} errors") };
+        shell.warning(format!(
+            "{} has {has}: {what} that could not be read are missing; see `{}`",
+            file.display(),
+            shell::command_for("check", file)
+        ));
+    }
 }
 
 /// `sesamec explain wiring FILE`

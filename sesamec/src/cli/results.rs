@@ -12,7 +12,7 @@ use sesame_analysis::{GivenFront, Run, Scaling, Selection, Table, causes, pairs,
 use sesame_codegen::input;
 use sesame_plan::{CampaignPlan, Dimension};
 use sesame_record::{DATABASE, Repository};
-use sesame_report::TextOptions;
+use sesame_report::{TextOptions, figures};
 use sesame_search::coverage::Grid;
 use sesame_search::sspr::Convention;
 
@@ -139,6 +139,16 @@ pub(super) enum Results {
         unscaled: bool,
         #[command(flatten)]
         output: Output,
+    },
+    /// The page's figures of a run or a test, as a piece of HTML for a page of your own, such as a notebook.
+    ///
+    /// Of a run: its findings, causes, requirements and front; of a test: its timeline, and everything on it as tables.
+    /// The piece has its style with it, and no script.
+    Figures {
+        /// A results file, or the folder of a run.
+        file: PathBuf,
+        /// The test, for example `T158`; if omitted, the run.
+        test: Option<String>,
     },
     /// Compare runs, or groups of runs that differ in their seeds.
     ///
@@ -358,6 +368,12 @@ pub(super) fn results(shell: Shell, asked: Results) -> anyhow::Result<ExitCode> 
             let analysis = analysis::indicators(&repository, given)?;
             measured_from(shell, &analysis.reference);
             print(&analysis.dataset(), &output)
+        }
+        Results::Figures { file, test } => {
+            let repository = Repository::open(&file)?;
+            let number = test.map(|name| repository.find(&name)).transpose()?;
+            shell::asked_for(&figures(&repository, number)?)?;
+            Ok(ExitCode::SUCCESS)
         }
         Results::Compare { files, by_campaign, reference, grid, runs, pairs, output } => {
             let compared = to_compare(&files, by_campaign)?;

@@ -5,6 +5,7 @@ mod before_after;
 mod cells;
 pub(super) mod certificate;
 mod command;
+mod figures;
 mod front;
 mod generations;
 mod header;
@@ -21,5 +22,6 @@ mod test;
 mod timeline;
 mod tree;
 
+pub use figures::figures;
 pub use page::{page, write_page, write_page_against, write_page_with};
 pub(crate) use policy::policy;

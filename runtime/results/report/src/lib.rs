@@ -54,7 +54,7 @@ pub use facts::summary::{
 };
 pub use facts::twin::{MitigationVerdict, SentMitigation, Twin, TwinRequirement, twin};
 pub use file::write_aside;
-pub use html::{page, write_page, write_page_against, write_page_with};
+pub use html::{figures, page, write_page, write_page_against, write_page_with};
 pub use junit::{junit, write_junit};
 pub use monitors::monitors_text;
 pub use sentences::headline;

@@ -204,7 +204,7 @@ fn chosen(summary: &Summary, rows: &[TestRow]) -> Vec<Group> {
 }
 
 /// The causes of violations: what each requirement asks for, its causes, and what is known of others.
-fn causes(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
+pub(super) fn causes(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
     let Some(found) = summary.causes.as_ref().filter(|found| !found.causes.is_empty()) else { return };
     body.open("section", &[]);
     body.heading("Causes");
@@ -265,7 +265,7 @@ fn contents(body: &mut Markup, main: &Markup) {
 const FAILURES: usize = 50;
 
 /// The requirements, with a sentence on violations that were seen once only.
-fn requirements(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
+pub(super) fn requirements(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
     let table = tables::requirements(summary);
     if table.is_empty() {
         return;
