@@ -16,7 +16,7 @@ import sys
 import tempfile
 import threading
 from pathlib import Path
-from typing import IO, Any, Callable
+from typing import IO, Any, Callable, NamedTuple
 
 from ._hooks import METRICS, OPERATIONS
 from ._world import Setup
@@ -54,14 +54,19 @@ def answer(command: list[str], simulator: Callable[[Setup], Any] | None = None, 
 
     What it says to people goes to standard error, also in a notebook, and is the message of the exception if it fails.
     """
-    code, output = call(command, simulator, debug=debug)
-    return json.loads(output)
+    return json.loads(call(command, simulator, debug=debug).output)
 
 
-def call(
-    command: list[str], simulator: Callable[[Setup], Any] | None = None, *, debug: bool = False
-) -> tuple[int, bytes]:
-    """The exit code of a command of `sesamec`, and what it prints; a command that prints nothing has failed."""
+class Done(NamedTuple):
+    """What a command of `sesamec` came to: its exit code, what it printed, and what it told people, if that was kept."""
+
+    code: int
+    output: bytes
+    messages: str
+
+
+def call(command: list[str], simulator: Callable[[Setup], Any] | None = None, *, debug: bool = False) -> Done:
+    """Runs a command of `sesamec`. One that prints nothing has failed."""
     # A terminal shows progress. Elsewhere, such as in a notebook, descriptor 2 is not what `sys.stderr` writes to.
     in_terminal = os.isatty(2)
     with tempfile.TemporaryFile() as kept:
@@ -82,7 +87,7 @@ def call(
         told = said.strip() or f"{' '.join(command)} ended with exit code {code}: see its message above"
         raise Failed(told, code)
     sys.stderr.write(said)
-    return code, output
+    return Done(code, output, said)
 
 
 class _Forks:

@@ -3,6 +3,7 @@
 pub(super) mod causes;
 pub(super) mod certificate;
 pub(super) mod coverage;
+pub(super) mod disturbances;
 pub(super) mod monitors;
 pub(super) mod pairs;
 pub(super) mod readable;
@@ -14,4 +15,5 @@ pub(super) mod shrinking;
 pub(super) mod stacked;
 pub(super) mod summary;
 pub(super) mod twin;
+pub(super) mod violated;
 pub(super) mod wording;

@@ -8,9 +8,10 @@ use sesame_present::number;
 use sesame_record::{RecordError, Repository, Verdict};
 
 use crate::facts::causes::CauseSummary;
+use crate::facts::disturbances::disturbances_text;
 use crate::facts::summary::{ExpectationSummary, Failure, NotFinite, RequirementSummary, Summary, summary};
 use crate::file::write_aside;
-use crate::sentences::{disturbances_text, headline};
+use crate::sentences::headline;
 
 /// Writes the JUnit file of a campaign's results.
 pub fn write_junit(repository: &Repository, path: &Path) -> Result<(), RecordError> {

@@ -6,7 +6,7 @@ use sesame_analysis::confirmed::ConfirmedTest;
 use sesame_analysis::trigger::Agreement;
 use sesame_base::observation::Counters;
 use sesame_base::test_number::TestNumber;
-use sesame_plan::{Confirmation, Span, Statistic};
+use sesame_plan::{Confirmation, Statistic};
 use sesame_present::number::{self, fixed, join_words, plural};
 use sesame_record::{Standing, Verdict};
 
@@ -14,12 +14,12 @@ use crate::facts::causes::CausesSummary;
 use crate::facts::certificate::before_after::Mend;
 use crate::facts::certificate::campaign::MonitorsSummary;
 use crate::facts::coverage::CoverageSummary;
-use crate::facts::readable::short_numbers;
+use crate::facts::disturbances::spans_text;
 use crate::facts::repetition::ViolationRate;
 use crate::facts::show::{OperationReport, TestReport, VerdictReport};
 use crate::facts::shrinking::{ShrinkTrigger, Shrinking, ShrunkMessages};
-use crate::facts::summary::{RequirementSummary, Summary};
-use crate::facts::wording::{counted, outcome_words};
+use crate::facts::summary::Summary;
+use crate::facts::wording::outcome_words;
 use sesame_base::visible::visible;
 
 /// The whole in one sentence, dangers first: `2 requirements violated (R1 by 31 tests, R4 by 3), 5 causes, front of 6
@@ -85,44 +85,6 @@ fn missed_words(monitors: &MonitorsSummary) -> Option<String> {
     let mut tests: Vec<TestNumber> = monitors.missed.iter().map(|missed| missed.test).collect();
     tests.dedup();
     (!tests.is_empty()).then(|| format!("hazards missed in {}", plural(tests.len(), "test", "tests")))
-}
-
-/// What a requirement with causes asks for, and how far tests are from that: sentences, in which a test is named.
-pub(crate) struct Violated {
-    /// `R1: No load falls over people (drops ≤ 0). 11 of 84 tests violate it; the run without disturbance does not. 2
-    /// causes: lag, loss. The worst value is 1, in `
-    pub before: String,
-    /// The test with that value.
-    pub worst: Option<TestNumber>,
-    /// What is done in it: `: lag (latency 310 ms, at 4.00–9.00 s).`
-    pub after: String,
-}
-
-/// How many causes of a requirement its sentence names.
-const NAMED: usize = 4;
-
-/// What is to be said of a requirement with causes of these names.
-pub(crate) fn violated_requirement(of: &RequirementSummary, causes: &[String]) -> Violated {
-    let RequirementSummary { requirement, text, metric, bound, violated, satisfied, inconclusive, .. } = of;
-    let [one, several] = if *inconclusive == 0 { ["test", "tests"] } else { ["conclusive test", "conclusive tests"] };
-    let tests = plural(violated + satisfied, one, several);
-    let violate = if *violated == 1 { "violates" } else { "violate" };
-    let holds_undisturbed = of.reference == Some(Verdict::Satisfied);
-    let undisturbed = if holds_undisturbed { "; the run without disturbance does not" } else { "" };
-    let mut names = causes[..causes.len().min(NAMED)].join(", ");
-    if causes.len() > NAMED {
-        let _ = write!(names, " and {} more", causes.len() - NAMED);
-    }
-    let causes = plural(causes.len(), "cause", "causes");
-    let before = format!(
-        "{requirement}: {text} ({metric} {bound}). {violated} of {tests} {violate} it{undisturbed}. {causes}: {names}."
-    );
-    let Some(worst) = &of.worst else { return Violated { before, worst: None, after: String::new() } };
-    let after = match worst.acting.as_slice() {
-        [] => ".".to_owned(),
-        acting => format!(": {}.", worst_text(acting)),
-    };
-    Violated { before: format!("{before} The worst value is {}, in ", worst.text), worst: Some(worst.test), after }
 }
 
 /// How many causes are known, and what is known of others, in sentences.
@@ -331,27 +293,6 @@ pub(crate) fn outcome_sentence(test: &TestReport) -> String {
     sentence
 }
 
-/// When an operation was to be active: its window, or the conditions that switched it; a dash for an offline one. The
-/// only messages that it alters follow, if they are listed.
-pub(crate) fn planned_text(operation: &OperationReport) -> String {
-    let when = match (&operation.conditions, operation.planned) {
-        (Some(conditions), _) => short_numbers(conditions),
-        (None, planned) => spans_text(planned.as_slice()),
-    };
-    let listed = operation.messages.as_ref().map_or(String::new(), |messages| format!(", only messages {messages}"));
-    format!("{when}{listed}")
-}
-
-/// Spans in seconds, as in `8.00–57.00 s`; a dash for none.
-pub(crate) fn spans_text(spans: &[Span]) -> String {
-    if spans.is_empty() {
-        return "–".to_owned();
-    }
-    let words: Vec<String> = spans.iter().take(4).map(|span| format!("{:.2}–{:.2}", span.start, span.end)).collect();
-    let more = if spans.len() > 4 { format!(" and {} more", spans.len() - 4) } else { String::new() };
-    format!("{} s{more}", words.join(", "))
-}
-
 /// When a requirement that a run violates was violated in it; a dash if the run does not violate it.
 pub(crate) fn beyond_text(requirement: &VerdictReport) -> String {
     match requirement.first {
@@ -376,35 +317,6 @@ pub(crate) fn verdict_value_text(requirement: &VerdictReport) -> String {
         Some(at) => format!("{} at {at:.2} s", requirement.value),
         None => requirement.value.clone(),
     }
-}
-
-/// How many operations a sentence describes.
-const DESCRIBED: usize = 2;
-
-/// What the operations of a worst test do. If there are many, they are only named, since a page begins with such a
-/// sentence for each requirement: `jitter_link0 ×4 + jitter_link1`.
-fn worst_text(acting: &[OperationReport]) -> String {
-    if acting.len() <= DESCRIBED {
-        return disturbances_text(acting);
-    }
-    counted(acting.iter().map(|used| used.operation.as_str())).join(" + ")
-}
-
-/// What operations do in a test, and when: `lag_link1 (latency 310 ms, at 4.00–9.00 s)`.
-pub(crate) fn disturbances_text(operations: &[OperationReport]) -> String {
-    let words = |used: &OperationReport| {
-        let at = if used.planned.is_some() { "at " } else { "" };
-        let words = [choices_text(used), format!("{at}{}", planned_text(used))];
-        let words: Vec<&str> = words.iter().map(String::as_str).filter(|words| *words != "–").collect();
-        if words.is_empty() { used.operation.clone() } else { format!("{} ({})", used.operation, words.join(", ")) }
-    };
-    operations.iter().map(words).collect::<Vec<_>>().join(" + ")
-}
-
-/// What an operation's parameters are, in words.
-pub(crate) fn choices_text(operation: &OperationReport) -> String {
-    let words: Vec<&str> = operation.choices.iter().map(|choice| choice.text.as_str()).collect();
-    if words.is_empty() { "–".to_owned() } else { words.join(", ") }
 }
 
 /// What an operation did, in words, as in `2450 seen, 2450 changed from 8.00 to 56.98 s`.
@@ -495,35 +407,4 @@ fn shrunk_messages_sentence(shrinking: &Shrinking) -> Option<String> {
         (true, _) if shrinking.minimal => format!("What it needs are {text}: without any single one it does not fail"),
         (true, _) => format!("What it needs are at most {text}"),
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn lost(operation: &str, start: f64) -> OperationReport {
-        OperationReport {
-            operation: operation.to_owned(),
-            kind: "blackhole".to_owned(),
-            topic: Some("order".to_owned()),
-            further_topics: Vec::new(),
-            resource: None,
-            planned: Some(Span { start, end: start + 1.0 }),
-            conditions: None,
-            messages: None,
-            observed: None,
-            choices: Vec::new(),
-            operation_seed: 1,
-            counters: None,
-            first_touch: None,
-            last_touch: None,
-        }
-    }
-
-    #[test]
-    fn a_worst_test_of_many_operations_is_described_by_their_names() {
-        let acting = [("a", 1.0), ("b", 2.0), ("a", 4.0), ("a", 5.0)].map(|(name, start)| lost(name, start));
-        assert_eq!(worst_text(&acting), "a ×3 + b");
-        assert_eq!(worst_text(&acting[..2]), "a (at 1.00–2.00 s) + b (at 2.00–3.00 s)");
-    }
 }

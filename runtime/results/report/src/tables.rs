@@ -11,6 +11,7 @@ use sesame_present::table::{Cell, Column, Datum, Table};
 use sesame_record::{Difference, MetricValue, Verdict};
 
 use crate::facts::causes::CausesSummary;
+use crate::facts::disturbances::{choices_text, disturbances_text, planned_text, spans_text};
 use crate::facts::pairs::PairsSummary;
 use crate::facts::readable::short_numbers;
 use crate::facts::recording::{FedMetric, Sameness};
@@ -23,10 +24,7 @@ use crate::facts::summary::{
 };
 use crate::facts::wording::outcome_words;
 use crate::facts::wording::value_text;
-use crate::sentences::{
-    as_expected, beyond_text, choices_text, disturbances_text, effect_text, planned_text, rate_text, spans_text,
-    verdict_value_text,
-};
+use crate::sentences::{as_expected, beyond_text, effect_text, rate_text, verdict_value_text};
 
 /// The time of a failure, in seconds.
 fn at(time: f64) -> Datum {

@@ -38,7 +38,7 @@ fn the_sentence_of_a_requirement_says_no_more_than_its_tests() {
     let mut requirement = summary(&repository).unwrap().requirements.remove(0);
     let causes = ["a", "b", "c", "d", "e", "f"].map(str::to_owned);
     let begins = |requirement: &facts::summary::RequirementSummary, causes: &[String]| {
-        let sentence = sentences::violated_requirement(requirement, causes).before;
+        let sentence = facts::violated::violated_requirement(requirement, causes).before;
         sentence.split_once("). ").unwrap().1.split_once(" The worst").unwrap().0.to_owned()
     };
     let undisturbed = "; the run without disturbance does not";

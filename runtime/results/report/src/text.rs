@@ -12,15 +12,17 @@ use crate::facts::causes::CausesSummary;
 use crate::facts::certificate::campaign::MonitorsSummary;
 use crate::facts::certificate::moment::MomentReport;
 use crate::facts::certificate::test::MonitorReport;
+use crate::facts::disturbances::disturbances_text;
 use crate::facts::recording::RecordingReplay;
 use crate::facts::replay::Replay;
 use crate::facts::show::{TestList, TestReport};
 use crate::facts::shrinking::Shrinking;
 use crate::facts::summary::Summary;
+use crate::facts::violated::violated_requirement;
 use crate::sentences::{
-    QUARANTINED, Violated, beyond_sentence, causes_sentence, confirmation_sentence, counts_sentence, coverage_sentence,
-    disturbances_text, headline, mend_sentence, monitors_run_again, monitors_sentence, needs_sentences, once_sentence,
-    outcome_sentence, shrinking_sentence, values_sentence, violated_requirement, without_effect_sentence,
+    QUARANTINED, beyond_sentence, causes_sentence, confirmation_sentence, counts_sentence, coverage_sentence, headline,
+    mend_sentence, monitors_run_again, monitors_sentence, needs_sentences, once_sentence, outcome_sentence,
+    shrinking_sentence, values_sentence, without_effect_sentence,
 };
 use crate::tables;
 
@@ -32,11 +34,9 @@ pub fn summary_text(summary: &Summary, options: TextOptions) -> String {
     let mut text = String::new();
     paragraph(&mut text, &headline(summary), options);
     if let Some(found) = &summary.causes {
-        for (requirement, causes) in summary.violated_by_causes(found) {
-            let Violated { before, worst, after } = violated_requirement(requirement, &causes);
-            let worst = worst.map_or(String::new(), |test| test.to_string());
+        for (requirement, causes) in summary.violated_by_causes() {
             text.push('\n');
-            paragraph(&mut text, &format!("{before}{worst}{after}"), options);
+            paragraph(&mut text, &violated_requirement(requirement, &causes).to_string(), options);
         }
         causes(&mut text, found, options);
     }

@@ -27,6 +27,7 @@ use crate::facts::repetition::{Repetition, repetition};
 use crate::facts::show::{OperationReport, acting};
 use crate::facts::shrinking::{Shrinking, shrinkings};
 use crate::facts::stacked::{Stacked, stacked_in};
+use crate::facts::violated::violated_requirement;
 use crate::facts::wording::{bound_of, operations, tests_not_imported, value_of, violated};
 
 /// How the warning begins that the reference run after a campaign is not like the one before it.
@@ -114,15 +115,15 @@ pub struct Summary {
 
 impl Summary {
     /// The requirements that have causes, and the names of these.
-    pub(crate) fn violated_by_causes<'a>(
-        &'a self,
-        found: &'a CausesSummary,
-    ) -> impl Iterator<Item = (&'a RequirementSummary, Vec<String>)> {
-        let with_causes = self.requirements.iter().map(move |requirement| {
-            let of_it = found.causes.iter().filter(|cause| cause.requirement == requirement.requirement);
-            (requirement, of_it.map(CauseSummary::name).collect::<Vec<_>>())
-        });
+    pub(crate) fn violated_by_causes(&self) -> impl Iterator<Item = (&RequirementSummary, Vec<String>)> {
+        let with_causes = self.requirements.iter().map(|requirement| (requirement, self.causes_of(requirement)));
         with_causes.filter(|(_, causes)| !causes.is_empty())
+    }
+
+    /// The names of the causes of a requirement.
+    fn causes_of(&self, requirement: &RequirementSummary) -> Vec<String> {
+        let causes = self.causes.iter().flat_map(|found| &found.causes);
+        causes.filter(|cause| cause.requirement == requirement.requirement).map(CauseSummary::name).collect()
     }
 
     /// How tests were shrunk, one or several.
@@ -215,6 +216,9 @@ pub struct RequirementSummary {
     pub reference: Option<Verdict>,
     /// The test farthest outside the bound; among equals, the one with the smallest number.
     pub worst: Option<Worst>,
+    /// What the page says of it, if tests violate it: how many, its causes, and the worst of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sentence: Option<String>,
 }
 
 /// The worst violation of a requirement.
@@ -362,7 +366,7 @@ pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: &[u3
     let confirmed = confirmed_tests(plan, &judge, rows, members);
     let mut shrinkings = shrinkings(repository, rows)?;
     let shrinking = if matches!(repository.task(), Task::Shrink(_)) { shrinkings.pop() } else { None };
-    Ok(Summary {
+    let mut summary = Summary {
         space: plan.space.clone(),
         campaign: plan.campaign.name.clone(),
         seed: facts.seed,
@@ -399,7 +403,14 @@ pub(crate) fn summarise(repository: &Repository, rows: &[TestRow], members: &[u3
         confirmation: plan.campaign.confirm,
         confirmed,
         objectives,
-    })
+    };
+    for at in 0..summary.requirements.len() {
+        let requirement = &summary.requirements[at];
+        let sentence = (requirement.violated > 0)
+            .then(|| violated_requirement(requirement, &summary.causes_of(requirement)).to_string());
+        summary.requirements[at].sentence = sentence;
+    }
+    Ok(summary)
 }
 
 fn without_effect(repository: &Repository) -> Result<Vec<WithoutEffect>, RecordError> {
@@ -514,6 +525,7 @@ fn summarise_requirement(
         inconclusive: 0,
         reference: rows.iter().find(|row| row.origin == Origin::Reference).map(|row| row.verdict(requirement)),
         worst: None,
+        sentence: None,
     };
     let mut worst: Option<(f64, &TestRow, MetricValue)> = None;
     for row in rows.iter().filter(|row| counts_as_test(row)) {

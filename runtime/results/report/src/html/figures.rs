@@ -8,7 +8,7 @@ use sesame_record::{RecordError, Repository};
 use crate::facts::summary::summarise;
 use crate::html::front::front;
 use crate::html::header::header;
-use crate::html::page::{causes, requirements};
+use crate::html::page::{causes, requirements, worst_of_causes};
 use crate::html::test::test;
 
 /// The class of the element around the figures. Its style applies to nothing else.
@@ -29,6 +29,9 @@ pub fn figures(repository: &Repository, of_test: Option<u32>) -> Result<String, 
     } else {
         header(&mut body, repository, &summary);
         causes(&mut body, &summary, &[]);
+        if let Some(number) = worst_of_causes(&summary) {
+            test(&mut body, repository, &summary, number, Path::new(""))?;
+        }
         requirements(&mut body, &summary, &[]);
         front(&mut body, repository, &summary, &rows, &[]);
     }

@@ -11,6 +11,7 @@ use sesame_record::{Origin, RecordError, Repository, TestRow};
 use crate::facts::causes::{CauseSummary, CausesSummary};
 use crate::facts::shrinking::Shrinking;
 use crate::facts::summary::{Summary, summarise};
+use crate::facts::violated::{Violated, violated_requirement};
 use crate::file::write_aside;
 use crate::html::all_tests::all_tests;
 use crate::html::front::front;
@@ -19,7 +20,7 @@ use crate::html::header::{about, header};
 use crate::html::policy::policy;
 use crate::html::test::test;
 use crate::html::{before_after, cells, monitors, pairs, regions, shrinking, tree};
-use crate::sentences::{QUARANTINED, Violated, causes_sentence, once_sentence, violated_requirement};
+use crate::sentences::{QUARANTINED, causes_sentence, once_sentence};
 use crate::tables;
 
 /// Causes whose smallest tests are drawn at most.
@@ -208,7 +209,7 @@ pub(super) fn causes(body: &mut Markup, summary: &Summary, drawn: &[u32]) {
     let Some(found) = summary.causes.as_ref().filter(|found| !found.causes.is_empty()) else { return };
     body.open("section", &[]);
     body.heading("Causes");
-    for (requirement, causes) in summary.violated_by_causes(found) {
+    for (requirement, causes) in summary.violated_by_causes() {
         let Violated { before, worst, after } = violated_requirement(requirement, &causes);
         body.open("p", &[]);
         body.text(&before);
@@ -248,7 +249,7 @@ const WITH_FEWER: &str =
     "With fewer: what came of a violating test of just these operations when each of them was left out.";
 
 /// The test that shows the worst cause; it is drawn next to the table.
-fn worst_of_causes(summary: &Summary) -> Option<u32> {
+pub(super) fn worst_of_causes(summary: &Summary) -> Option<u32> {
     summary.causes.as_ref().and_then(CausesSummary::worst).map(|cause| cause.test.0)
 }
 

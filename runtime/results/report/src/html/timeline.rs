@@ -12,10 +12,11 @@ use sesame_present::markup::{Markup, coordinate, percent};
 use sesame_present::number;
 use sesame_record::{MetricValue, TestRecord};
 
+use crate::facts::disturbances::{choices_text, planned_text, spans_text};
 use crate::facts::show::{OperationReport, TestReport, decided_at, violated_when};
 use crate::facts::wording::value_of;
 use crate::html::certificate;
-use crate::sentences::{choices_text, effect_text, planned_text, spans_text};
+use crate::sentences::effect_text;
 
 /// Height of a lane of an operation, in pixels.
 const LANE: f64 = 30.0;
