@@ -4,4 +4,7 @@
 mod both_ways;
 mod hooks;
 mod interruption;
+mod notebook;
 mod package;
+mod pytest;
+mod results;

@@ -75,8 +75,13 @@ impl Place {
 
     /// A program in Python that can import the package and the simulator.
     pub(crate) fn python(&self, program: &str) -> Command {
+        self.script("python3", program)
+    }
+
+    /// A program for this Python.
+    pub(crate) fn script(&self, python: impl AsRef<Path>, program: &str) -> Command {
         self.write("program.py", program);
-        let mut python = self.with_package("python3");
+        let mut python = self.with_package(python);
         python.arg("program.py");
         python
     }
@@ -96,7 +101,7 @@ impl Place {
     pub(crate) fn run(&self, before: &str, arguments: &str) -> Done {
         let program = format!(
             "{before}\nimport sesamec\nfrom sim import World\n\
-             print('Digest', sesamec.run('cart/cart.sesame', simulator=World, {arguments})['digest'])\n"
+             print('Digest', sesamec.run('cart/cart.sesame', simulator=World, {arguments}).digest)\n"
         );
         done(&mut self.python(&program))
     }
