@@ -309,6 +309,22 @@ operation cat on zoness = blackhole
     }
 
     #[test]
+    fn everything_that_is_declared_is_listed_with_its_place() {
+        let mut sources = SourceMap::new();
+        let root = sources.add("a.sesame", SPACE);
+        let index = analyse(&sources, root).index;
+        let text = list(&sources, &index);
+        assert!(text.starts_with("space `cell`, a.sesame:1:7\nmessage `Zone`, a.sesame:3:11\n"), "{text}");
+        assert!(text.contains("\nfield `Zone.level`, a.sesame:3:18\n"), "{text}");
+        assert!(text.contains("\ntopic `zones`, a.sesame:8:9  What the zones report.\n"), "{text}");
+        let json: Vec<serde_json::Value> = serde_json::from_str(&list_json(&sources, &index)).unwrap();
+        assert_eq!(json.len(), text.lines().count());
+        let depth = json.iter().find(|declared| declared["name"] == "depth").unwrap();
+        assert_eq!(depth["kind"], "metric");
+        assert_eq!(depth["text"], "metric depth minimise = max(zones.level)");
+    }
+
+    #[test]
     fn a_declaration_of_several_lines_keeps_its_shape() {
         let text =
             explained("c", &SPACE.replace("\ncampaign c", "\n  campaign c").replace("\n}\nop", "\n  }\nop")).unwrap().0;

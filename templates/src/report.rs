@@ -60,3 +60,19 @@ const SCRIPT: [&str; 8] = [
     include_str!("../report/script/map.js"),
     include_str!("../report/script/timeline.js"),
 ];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_style_of_figures_applies_below_their_class_only() {
+        let style = style_below("figures");
+        assert!(style.starts_with(".figures {\n& {\n") && style.ends_with("\n}\n"));
+        assert_eq!(style.matches('{').count(), style.matches('}').count());
+        // Nothing is lost, and nothing is meant for the whole document any more.
+        assert_eq!(style.matches('{').count(), STYLE.matches('{').count() + 1);
+        let whole = |line: &str| ["html", "body", ":root"].iter().any(|it| line.trim_start().starts_with(it));
+        assert!(STYLE.lines().any(whole) && !style.lines().any(whole));
+    }
+}

@@ -4,9 +4,10 @@ use std::fs;
 use std::path::PathBuf;
 
 use sesame_peers::named;
-use sesame_tests::{Done, command, done, sesamec};
+use sesame_tests::{Done, command, done, sesamec, workspace};
 
 use crate::package::{CART, Place};
+use crate::results::examples;
 
 /// A place with pytest in a folder of its own beside the space, where `conftest.py` names the class.
 struct Tested {
@@ -206,4 +207,23 @@ def test_keeps_away_from_the_wall(simulator, violated, seed, tmp_path):
     tested.place.write("cart/test_cart.py", test);
     let run = tested.pytest(&[]).expect(0);
     assert!(run.out.contains("4 passed"), "{}", run.out);
+}
+
+#[test]
+fn the_examples_of_the_page_on_pytest_run() {
+    let Some(tested) = Tested::new("pytest_examples") else { return };
+    let [conftest, test] = <[String; 2]>::try_from(examples("pytest.md", "python")).unwrap();
+    let settings = examples("pytest.md", "toml").concat();
+    tested.place.write("cart/conftest.py", &conftest);
+    tested.place.write("cart/test_cart.py", &test);
+    tested.place.write("cart/pyproject.toml", &settings);
+    let run = tested.pytest(&["-p", "no:cacheprovider"]).expect(1);
+    assert!(run.out.contains("2 passed") && run.out.contains("1 failed"), "{}", run.out);
+    let all = tested.pytest(&["cart.sesame"]).expect(1);
+    let page = fs::read_to_string(workspace().join("docs/pytest.md")).unwrap();
+    let (_, shown) = page.split_once("```text\n").unwrap();
+    for line in shown.split("```").next().unwrap().lines() {
+        let line = line.split(" …").next().unwrap();
+        assert!(all.out.contains(line), "the page shows {line}\n{}", all.out);
+    }
 }

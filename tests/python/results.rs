@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use rusqlite::Connection;
 use sesame_patience::until;
 use sesame_peers::{Ended, named};
-use sesame_tests::{done, workspace};
+use sesame_tests::{command, done, sesamec, workspace};
 
 use crate::package::{CART, Place};
 
@@ -354,4 +354,27 @@ fn the_page_on_the_format_has_the_tables_and_columns_of_real_results() {
         let listed = public.iter().any(|(public, _)| *public == name) || rest.contains(&format!("`{name}`"));
         assert!(listed, "docs/format.md says nothing of {name}");
     }
+}
+
+/// The examples in this language on a page of the documentation, in their order.
+pub(crate) fn examples(page: &str, language: &str) -> Vec<String> {
+    let page = fs::read_to_string(workspace().join("docs").join(page)).unwrap();
+    let begin = format!("\n```{language}\n");
+    page.split(begin.as_str()).skip(1).map(|rest| rest.split("\n```").next().unwrap().to_owned() + "\n").collect()
+}
+
+#[test]
+fn the_examples_of_the_page_on_results_run() {
+    let Some(python) = named("SESAME_PYTHON_PEERS") else { return };
+    let Some(place) = Place::new("python_examples", CART) else { return };
+    let before = "import os\nos.chdir('cart')\nimport sesamec\nfrom sim import World\n\
+                  sesamec.run('cart.sesame', simulator=World)\n";
+    let program = before.to_owned() + &examples("python-results.md", "python").concat();
+    let shown = done(&mut place.script(python, &program)).expect(0).out;
+    for part in ["<Run first of cart, seed 1: 80 tests", "'too_close': 's'", "violates R1", "shape: ("] {
+        assert!(shown.contains(part), "{part}: {shown}");
+    }
+    let space = fs::read_to_string(place.folder.join("cart/cart.sesame")).unwrap();
+    assert!(space.contains("\ntest hits_the_wall {\n"), "{space}");
+    done(command(sesamec()).args(["check", "cart.sesame"]).current_dir(place.folder.join("cart"))).expect(0);
 }

@@ -14,7 +14,7 @@ const PAGE: &str = "docs/json.md";
 const MARK: &str = "<!-- From here on a test writes this page; CONTRIBUTING.md says how. -->\n";
 
 /// What is printed: the heading, how the values come, and the type with its file.
-const PRINTED: [(&str, &str, &str, &str); 19] = [
+const PRINTED: [(&str, &str, &str, &str); 20] = [
     (
         "`run`, `resume`, `known`, `repeat`, `shrink`, `report`",
         "One object.",
