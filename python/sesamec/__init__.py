@@ -2,12 +2,13 @@
 
 `run` runs a campaign of a `.sesame` file, with a class of this process as its simulator, and returns its results;
 `open_run` opens results that are there. `serve` makes a program of the same class, for `sesamec run` without Python
-around it.
+around it. `Search` asks for the tests of a campaign one by one, for those who run tests themselves.
 """
 
 from ._hooks import metric, operation
 from ._results import Metric, NotResults, Operation, Run, Test
 from ._run import open_run, run
+from ._search import PlannedOperation, PlannedTest, Search
 from ._serve import serve
 from ._supervise import Failed, Stopped
 from ._world import Message, Order, Setup
@@ -19,7 +20,10 @@ __all__ = [
     "NotResults",
     "Operation",
     "Order",
+    "PlannedOperation",
+    "PlannedTest",
     "Run",
+    "Search",
     "Setup",
     "Stopped",
     "Test",

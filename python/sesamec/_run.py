@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any, Callable, Sequence
+from typing import Any, Callable, Mapping, Sequence
 
 from ._results import Run, latest
 from ._supervise import answer, program
@@ -35,7 +35,22 @@ def run(
     With `debug`, one worker stays in the terminal's foreground and no test has a time limit, so that `breakpoint()`
     works in the simulator.
     """
-    if resume and not (seed is None and evaluations is None and results is None):
+    runner = ["--workers", "1", "--timeout", "86400", "--reference-timeout", "86400"] if debug else []
+    values = {"seed": seed, "evaluations": evaluations, "workers": workers, "results": results}
+    command = command_of(space, campaign, values, resume, [*options, *runner])
+    summary = answer(command, simulator, debug=debug)
+    return Run(Path(summary["results"]), space=Path(space), simulator=simulator, summary=summary)
+
+
+def command_of(
+    space: str | os.PathLike[str],
+    campaign: str | None,
+    values: Mapping[str, int | str | os.PathLike[str] | None],
+    resume: bool | str | os.PathLike[str],
+    options: Sequence[str],
+) -> list[str]:
+    """The command that runs a campaign, or goes on with it; options without a value are left out."""
+    if resume and any(values.get(name) is not None for name in ("seed", "evaluations", "results")):
         raise TypeError("`resume` goes on with the seed, the tests and the results of its run")
     command = [program(), "resume" if resume else "run", os.fspath(space)]
     if resume and resume is not True:
@@ -43,14 +58,10 @@ def run(
     if campaign is not None:
         command += ["--campaign", campaign]
     runner = ["--format", "json", *options]
-    if debug:
-        runner += ["--workers", "1", "--timeout", "86400", "--reference-timeout", "86400"]
-    for name, value in (("seed", seed), ("evaluations", evaluations), ("workers", workers), ("results", results)):
+    for name, value in values.items():
         if value is not None:
             runner += [f"--{name}", os.fspath(value) if isinstance(value, os.PathLike) else str(value)]
-    command += runner if resume else ["--", *runner]
-    summary = answer(command, simulator, debug=debug)
-    return Run(Path(summary["results"]), space=Path(space), simulator=simulator, summary=summary)
+    return command + (runner if resume else ["--", *runner])
 
 
 def open_run(

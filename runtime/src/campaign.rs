@@ -11,6 +11,8 @@
 mod agent;
 #[cfg(feature = "agents")]
 mod agents;
+#[cfg(unix)]
+mod asked;
 mod confirmation;
 mod error;
 mod evaluator;
@@ -55,8 +57,12 @@ pub use single::{SingleSettings, run_single};
 pub use worker::serve;
 pub use worker_program::WorkerProgram;
 
-/// Whether another process forks the workers of this one.
-pub(crate) fn forks_workers() -> bool {
+/// Whether the process that started this one has the code of its tests: it forks workers, or carries tests out itself.
+pub(crate) fn is_called_by_code() -> bool {
+    #[cfg(unix)]
+    if asked::carries_out_tests() {
+        return true;
+    }
     #[cfg(target_os = "linux")]
     return fork_server::ForkServer::of_this_process().is_some();
     #[cfg(not(target_os = "linux"))]

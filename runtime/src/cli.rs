@@ -168,9 +168,10 @@ pub fn show(command: &Showing, results: &Path) -> ExitCode {
     concluded(command.carry_out(results))
 }
 
-/// Whether another process forks the workers of this one, with the user's code in them.
-pub fn forks_workers() -> bool {
-    crate::campaign::forks_workers()
+/// Whether the process that started this one has the code of its tests: it forks workers with the user's code in them,
+/// or carries tests out itself.
+pub fn is_called_by_code() -> bool {
+    crate::campaign::is_called_by_code()
 }
 
 /// Serves a supervisor with code that is not part of the plan: hooks, and what connects to the simulator, if that is

@@ -8,3 +8,4 @@ mod notebook;
 mod package;
 mod pytest;
 mod results;
+mod search;

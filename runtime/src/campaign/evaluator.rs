@@ -12,7 +12,7 @@ use sesame_record as record;
 use sesame_record::{Event, EventKind, Origin, RecordError, Recorder, Repetition, TestRecord};
 
 use crate::campaign::error::{CampaignError, Halt};
-use crate::campaign::executor::{Executor, Job, JobResult, Machines, TraceRequest};
+use crate::campaign::executor::{Executor, ExecutorError, Job, JobResult, Machines, TraceRequest};
 use crate::campaign::numbering::PlannedTest;
 use crate::campaign::silence;
 
@@ -252,7 +252,10 @@ impl<'a> Evaluator<'a> {
             if self.interrupted.load(Ordering::Relaxed) {
                 return Err(Halt::Stopped);
             }
-            let next = self.executor.next(WAIT)?;
+            let next = match self.executor.next(WAIT) {
+                Err(ExecutorError::Closed) => return Err(Halt::Stopped),
+                next => next?,
+            };
             for text in self.executor.news() {
                 meanwhile(Happened::Told(&text));
                 self.recorder.put_event(&Event { kind: EventKind::Session, test: None, text })?;

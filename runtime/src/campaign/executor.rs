@@ -124,10 +124,25 @@ pub enum ExecutorError {
         /// Why.
         reason: String,
     },
+    /// The program that carries out the tests fails to.
+    #[error("the program that carries out the tests does not go on: {reason}")]
+    Program {
+        /// Why.
+        reason: String,
+    },
+    /// The program that carries out the tests wants no more of them: the user stopped it, or it has ended.
+    #[error("the program that carries out the tests has ended")]
+    Closed,
     /// Agents cannot be reached, or none can run tests.
     #[error("agents cannot run the tests: {reason}")]
     Agents {
         /// Why.
         reason: String,
     },
+}
+
+impl From<std::io::Error> for ExecutorError {
+    fn from(error: std::io::Error) -> Self {
+        ExecutorError::Program { reason: error.to_string() }
+    }
 }

@@ -17,6 +17,8 @@ use sesame_search::{Evaluated, Neighbours, Strategy};
 
 #[cfg(feature = "agents")]
 use crate::campaign::agents::{Agents, Fleet};
+#[cfg(unix)]
+use crate::campaign::asked::{Asked, carries_out_tests};
 use crate::campaign::confirmation::ConfirmedSearch;
 use crate::campaign::error::{CampaignError, Halt};
 use crate::campaign::evaluator::{Evaluator, Happened};
@@ -45,7 +47,7 @@ pub enum CampaignEnd {
 /// Where the tests of a campaign run.
 #[derive(Default)]
 pub enum Place {
-    /// In worker processes of this machine.
+    /// In worker processes of this machine, or by the program that started this one, if that carries out tests.
     #[default]
     Here,
     /// On machines with agents.
@@ -70,6 +72,8 @@ pub fn run_campaign(
     let strategy = search::strategy_of_task(plan, &task, settings.seed)?;
     let timeout = settings.first_timeout();
     let mut executor: Box<dyn Executor> = match place {
+        #[cfg(unix)]
+        Place::Here if carries_out_tests() => Box::new(Asked::connect(plan)?),
         Place::Here => Box::new(Pool::start(&settings.pool(task.evaluations(plan), directory, timeout))?),
         #[cfg(feature = "agents")]
         Place::Fleet(fleet) => Box::new(Agents::start(*fleet, timeout)?),

@@ -98,8 +98,7 @@ impl<'a> Found<'a> {
 
     /// The runner as data, if the campaign needs no Rust beyond these features.
     fn interpreted(&self, is_there: fn(feature: &str) -> bool) -> anyhow::Result<Option<Interpreted>> {
-        // A process that forks workers has hooks of its own for them.
-        let has_code = sesame_runtime::cli::forks_workers();
+        let has_code = sesame_runtime::cli::is_called_by_code();
         let needs_rust = if has_code { RunnerPlan::needs_a_runner } else { RunnerPlan::needs_rust };
         if needs_rust(self.plan(), is_there) || self.chooses_runtime()? {
             return Ok(None);

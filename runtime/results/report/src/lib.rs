@@ -42,7 +42,7 @@ pub use facts::repetition::{Repetition, ViolationRate};
 pub use facts::replay::Replay;
 pub use facts::show::{
     ChoiceReport, FreshVerdicts, ListedTest, MetricReport, OperationReport, TestList, TestReport, VerdictReport, list,
-    show,
+    operations_of, show,
 };
 pub use facts::shrinking::{
     LeftMessage, ShrinkStep, ShrinkThreshold, ShrinkTrigger, Shrinking, ShrunkMessages, TestSize,

@@ -6,13 +6,13 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use sesame_analysis::confirmed::{ConfirmedTest, confirmed_test};
-use sesame_base::observation::{Counters, MetricObservation};
+use sesame_base::observation::{Counters, MetricObservation, OperationEffect};
 use sesame_base::robustness;
 use sesame_base::test_number::TestNumber;
 use sesame_gap::proportion::wilson;
 use sesame_notation as notation;
 use sesame_plan::stl::Formula;
-use sesame_plan::{Activation, Bound, CampaignPlan, Choice, Metric, MetricId, MetricSource, Span, Task};
+use sesame_plan::{Activation, Bound, CampaignPlan, Choice, Metric, MetricId, MetricSource, Span, Task, Test};
 use sesame_present::number;
 use sesame_record::{
     EventKind, Judge, MetricValue, Origin, RecordError, Repetition, Repository, Tally, TestRecord, TestRow, Verdict,
@@ -391,9 +391,18 @@ pub(crate) fn acting(plan: &CampaignPlan, record: &TestRecord) -> Vec<OperationR
 
 /// The operations of a test, and what they did.
 pub(crate) fn operations(plan: &CampaignPlan, record: &TestRecord) -> Vec<OperationReport> {
-    let reports = record.test.operations.iter().enumerate().map(|(position, used)| {
+    reports(plan, &record.test, &record.observation.operations)
+}
+
+/// The operations of a test that has not been run.
+pub fn operations_of(plan: &CampaignPlan, test: &Test) -> Vec<OperationReport> {
+    reports(plan, test, &[])
+}
+
+fn reports(plan: &CampaignPlan, test: &Test, effects: &[OperationEffect]) -> Vec<OperationReport> {
+    let reports = test.operations.iter().enumerate().map(|(position, used)| {
         let operation = plan.operation(used.operation);
-        let effect = record.observation.operations.get(position);
+        let effect = effects.get(position);
         let mut topics = operation.topics().map(|topic| plan.topic(topic).name.clone());
         let (planned, conditions) = match used.activation {
             Activation::Time { start, end } => (Some(Span { start, end }), None),
