@@ -87,7 +87,7 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
     if file_path.suffix != ".sesame":
         return None
-    patterns = [*parent.config.getoption("--sesame"), *parent.config.getini("sesame_files")]
+    patterns: list[str] = parent.config.getoption("--sesame") + parent.config.getini("sesame_files")
     named = any(fnmatch(file_path.name, Path(pattern).name) and _at(file_path, pattern) for pattern in patterns)
     if named or parent.session.isinitpath(file_path):
         space: pytest.Collector = SpaceFile.from_parent(parent, path=file_path)
@@ -236,10 +236,10 @@ class SpaceItem(pytest.Item):
     def reportinfo(self) -> tuple[os.PathLike[str] | str, int | None, str]:
         return self.declared.file, self.declared.line - 1, self.nodeid.partition("::")[2]
 
-    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], *arguments: Any) -> Any:
+    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
         if isinstance(excinfo.value, Unmet):
             return str(excinfo.value)
-        return super().repr_failure(excinfo, *arguments)
+        return super().repr_failure(excinfo, style)
 
     def shows(self, run: Run, test: str) -> str:
         """The command that shows a test in a terminal."""
@@ -309,18 +309,16 @@ class KnownItem(SpaceItem):
             for item in self.session.items
             if isinstance(item, KnownItem) and item.parent is self.parent and item.seed == self.seed
         ]
+        refused = Unmet(f"no campaign of {self.space.path.name} can run `{self.declared.name}`")
         for campaign in campaigns:
             try:
                 run, _ = self.space.run("known", campaign, self.seed, *(selected if len(campaigns) == 1 else ()))
             except Unmet as failed:
-                if len(campaigns) == 1:
-                    raise
                 refused = failed
             else:
                 if self.declared.name in run:
                     return run
-                refused = Unmet(f"no campaign of {self.space.path.name} can run `{self.declared.name}`")
-        raise refused if campaigns else Unmet(f"{self.space.path.name} has no campaign that could run its tests")
+        raise refused
 
     def sentence(self, run: Run, expectation: dict[str, Any]) -> str:
         metric, value, bound = expectation["metric"], expectation["value"], expectation["bound"]

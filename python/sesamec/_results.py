@@ -43,8 +43,8 @@ def latest(space: Path, campaign: str | None) -> Path:
     runners = space.parent / "runners"
     found = []
     for database in [*runners.glob(f"*/results/*/{DATABASE}"), *runners.glob(f"*/*/results/*/{DATABASE}")]:
-        name = database.parent.parent.parent.name.removesuffix("_campaign")
-        if campaign in (None, name) and _source(database) == space.name:
+        source, name = _campaign(database)
+        if source == space.name and campaign in (None, name):
             log = database.with_name(f"{DATABASE}-wal")
             written = max(file.stat().st_mtime_ns for file in (database, log) if file.exists())
             found.append((RUN.fullmatch(database.parent.name) is not None, written, database))
@@ -54,13 +54,14 @@ def latest(space: Path, campaign: str | None) -> Path:
     return max(found)[2]
 
 
-def _source(database: Path) -> str | None:
+def _campaign(database: Path) -> tuple[str | None, str | None]:
+    """The file of the space, and the campaign, of results that can be read."""
     try:
         with closing(_connect(database)) as connection:
-            row = connection.execute("SELECT source FROM campaign").fetchone()
+            row = connection.execute("SELECT source, name FROM campaign").fetchone()
     except NotResults:
-        return None
-    return None if row is None else str(row[0])
+        return None, None
+    return (None, None) if row is None else (str(row[0]), str(row[1]))
 
 
 def _connect(database: Path) -> sqlite3.Connection:
@@ -553,8 +554,11 @@ class Test:
 
 
 def _beside(database: Path, source: str) -> Path | None:
-    """The space of a run that is where `sesamec` puts it: in `runners/CAMPAIGN/results/SEED` beside the space."""
-    return next((folder / source for folder in list(database.parents)[1:6] if (folder / source).is_file()), None)
+    """The space of a run that is where `sesamec` puts it: in `runners/CAMPAIGN/results/SEED` beside the space, or, if
+    spaces have campaigns of one name, in `runners/SPACE/CAMPAIGN/results/SEED`.
+    """
+    places = (folder.parent / source for folder in list(database.parents)[3:5] if folder.name == "runners")
+    return next((space for space in places if space.is_file()), None)
 
 
 def _gathered(rows: Iterable[tuple[int, str]]) -> dict[int, list[str]]:

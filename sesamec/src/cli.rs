@@ -250,6 +250,9 @@ pub fn run(
         Command::Explain { what: Some(file), format, .. } if file.ends_with(".sesame") => {
             commands::explain_file(shell, language, Path::new(&file), format)
         }
+        Command::Explain { what: Some(what), format: ExplainFormat::Json, .. } => {
+            Err(anyhow::anyhow!("`--format json` is for what a space declares: add the file of the space to `{what}`"))
+        }
         Command::Explain { what: Some(what), .. } => commands::explain_code(language, &what),
         Command::Explain { what: None, .. } => commands::explainable(language),
         Command::Completions { shell } => {

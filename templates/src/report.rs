@@ -13,21 +13,16 @@ pub fn study(figures: &str) -> String {
 
 /// The style of the page for its elements below an element of this class, in a page of others: as nested rules.
 pub fn style_below(class: &str) -> String {
-    // What the page says of the whole document goes for that element.
-    let nested: Vec<String> = STYLE
-        .lines()
-        .map(|line| {
-            let blanks = line.len() - line.trim_start().len();
-            let whole = [":root", "html", "body"].iter().find(|&whole| {
-                line.trim_start() == format!("{whole} {{") || line.trim_start().starts_with(&format!("{whole} {{ "))
-            });
-            match whole {
-                Some(whole) => format!("{}&{}", &line[..blanks], &line[blanks + whole.len()..]),
-                None => line.to_owned(),
-            }
-        })
-        .collect();
-    format!(".{class} {{\n{}\n}}\n", nested.join("\n"))
+    let nested = STYLE.lines().map(|line| {
+        let rule = line.trim_start();
+        let blanks = &line[..line.len() - rule.len()];
+        // What the page says of the whole document goes for that element.
+        match [":root {", "html {", "body {"].iter().find_map(|whole| rule.strip_prefix(whole)) {
+            Some(rest) => format!("{blanks}& {{{rest}\n"),
+            None => format!("{line}\n"),
+        }
+    });
+    format!(".{class} {{\n{}}}\n", nested.collect::<String>())
 }
 
 fn shell(style: &str, script: &[&str]) -> String {

@@ -145,6 +145,19 @@ fn expectations_hold_with_the_class_are_updated_on_demand_and_those_of_requireme
 }
 
 #[test]
+fn a_regression_test_runs_in_the_first_campaign_that_can_run_it() {
+    let Some(tested) = Tested::new("pytest_campaigns") else { return };
+    let shorter = "campaign shorter {\n  operations lose_commands 1 per test\n  activate by time\n  \
+                   search random { evaluations 4 }\n  end after 10s\n}\n/// Searches for";
+    tested.place.change_space("/// Searches for", shorter);
+    tested.keep(KEPT);
+    let run = tested.pytest(&["cart.sesame", "-k", "known"]).expect(0);
+    assert!(run.out.contains("PASSED cart.sesame::known::hits_wall"), "{}", run.out);
+    let requirements = tested.pytest(&["cart.sesame", "--collect-only", "-q", "-m", "sesame_campaign"]).expect(0).out;
+    assert!(requirements.starts_with("cart.sesame::shorter::R1\ncart.sesame::first::R1\n"), "{requirements}");
+}
+
+#[test]
 fn each_seed_is_an_item_of_its_own_and_runs_the_campaign_with_it() {
     let Some(tested) = Tested::new("pytest_seeds") else { return };
     tested.keep(KEPT);

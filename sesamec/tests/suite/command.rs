@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use sesame_codegen::project::Simulator;
 use sesamec::cli::{Shell, run};
-use sesamec::frontend::{Checked, Diagnosed, Found, Language, Look};
+use sesamec::frontend::{Checked, Declarations, Diagnosed, Found, Language, Look};
 
 use crate::plans::small;
 
@@ -43,6 +43,10 @@ const LANGUAGE: Language = Language {
     explain: |code| (code == "E0203").then_some("# E0203"),
     codes: || vec![("E0203", "There is no such name.")],
     find,
+    declarations: |_, text| {
+        let errors = usize::from(text.contains("mistake"));
+        Declarations { text: String::new(), json: String::new(), errors }
+    },
 };
 
 pub(crate) fn sesamec(arguments: &[&str]) -> bool {
@@ -177,6 +181,9 @@ fn what_a_space_with_errors_declares_is_explained_all_the_same() {
     assert!(sesamec(&["explain", "speed", &file]));
     assert!(sesamec(&["explain", "speed", &file, "--format", "json"]));
     assert!(!sesamec(&["explain", "sped", &file]));
+    assert!(sesamec(&["explain", &file]));
+    assert!(sesamec(&["explain", &file, "--format", "json"]));
+    assert!(!sesamec(&["explain", "E0203", "--format", "json"]), "a code has a page of text");
     assert!(!sesamec(&["explain", "day", &file]), "what a campaign does cannot be told from a space with errors");
     assert!(sesamec(&["explain", "day", &file, "--format", "json"]), "where it is declared can");
 }
