@@ -77,7 +77,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    if config.getoption("--sesame-update") and config.getoption("--sesame-seeds"):
+    seeds = config.getoption("--sesame-seeds")
+    if seeds is not None and not re.fullmatch(r"\d+(,\d+)*", seeds):
+        raise pytest.UsageError(f"--sesame-seeds takes whole numbers, as in 1,2,3, and not {seeds}")
+    if seeds is not None and config.getoption("--sesame-update"):
         raise pytest.UsageError("--sesame-update measures tests with their own seeds, so --sesame-seeds cannot be given")
     config.stash[UPDATED] = []
     config.addinivalue_line("markers", "sesame_campaign(name): a requirement of a campaign, which runs for it")

@@ -142,13 +142,15 @@ fn expectations_hold_with_the_class_are_updated_on_demand_and_those_of_requireme
     assert_eq!(tested.space(), demands);
     let both = tested.pytest(&["cart.sesame", "--sesame-update", "--sesame-seeds", "1"]).expect(4);
     assert!(both.err.contains("--sesame-seeds cannot be given"), "{both:?}");
+    let words = tested.pytest(&["cart.sesame", "--sesame-seeds", "1,x"]).expect(4);
+    assert!(words.err.contains("--sesame-seeds takes whole numbers"), "{words:?}");
 }
 
 #[test]
 fn a_regression_test_runs_in_the_first_campaign_that_can_run_it() {
     let Some(tested) = Tested::new("pytest_campaigns") else { return };
-    let shorter = "campaign shorter {\n  operations lose_commands 1 per test\n  activate by time\n  \
-                   search random { evaluations 4 }\n  end after 10s\n}\n/// Searches for";
+    let shorter = "campaign shorter {\n  objectives closest\n  operations lose_commands 1 per test\n  activate by time\n  \
+                   search random { evaluations 4 }\n  end after 20s\n}\n/// Searches for";
     tested.place.change_space("/// Searches for", shorter);
     tested.keep(KEPT);
     let run = tested.pytest(&["cart.sesame", "-k", "known"]).expect(0);
