@@ -142,6 +142,35 @@ for wrong in (lambda: run.series("closet"), lambda: run.series("closest", ["T77"
 }
 
 #[test]
+fn results_of_the_version_before_have_the_values_that_the_program_prints() {
+    let Some((place, python)) = place("python_earlier_results") else { return };
+    let earlier = workspace().join("runtime/results/record/src/fixtures/results_of_schema_7.sql");
+    fs::create_dir(place.folder.join("earlier")).unwrap();
+    let made = Connection::open(place.folder.join("earlier/results.sqlite")).unwrap();
+    made.execute_batch(&fs::read_to_string(earlier).unwrap()).unwrap();
+    drop(made);
+    let program = r#"
+import json, os, sqlite3, subprocess, sesamec
+run = sesamec.open_run("earlier")
+for analysis in ("front", "causes", "tests", "indicators"):
+    command = [os.environ["SESAMEC"], "results", analysis, "earlier", "--format", "json"]
+    expected = json.loads(subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout)
+    for row, printed in zip(getattr(run, analysis)("records"), expected, strict=True):
+        assert row | printed == row, (row, printed)
+database = sqlite3.connect("file:earlier/results.sqlite?mode=ro", uri=True)
+count = 0
+for test in ("T0", *run.tests().index):
+    for metric in run.metrics:
+        sql = "SELECT time_s, value FROM series WHERE test_name = ? AND metric = ? ORDER BY position"
+        points = database.execute(sql, (test, metric)).fetchall()
+        assert [tuple(row.values()) for row in run[test].series(metric, "records")] == points, (test, metric)
+        count += len(points)
+assert count > 100, count
+"#;
+    done(&mut place.script(python, program)).expect(0);
+}
+
+#[test]
 fn without_pandas_a_table_is_a_frame_of_polars_and_without_both_a_list() {
     let Some((place, python)) = place("python_frames_without") else { return };
     let program = RUN.to_owned()
