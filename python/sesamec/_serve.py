@@ -6,8 +6,10 @@ import functools
 import json
 import os
 import sys
+from dataclasses import fields
 from typing import Any, Callable, Iterable, TextIO
 
+from ._hooks import wire_name
 from ._world import Message, Order, Setup, description, told
 
 NUMBERS = {float("inf"): "Infinity", float("-inf"): "-Infinity"}
@@ -45,7 +47,7 @@ def _plain(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [_plain(part) for part in value]
     if hasattr(value, "__dataclass_fields__"):
-        return _plain(vars(value))
+        return _plain(_fields(value))
     if hasattr(value, "tolist"):
         return _plain(value.tolist())
     return value
@@ -61,6 +63,13 @@ def _number(value: Any) -> Any:
     if kind is list:
         return [_number(part) for part in value]
     return value
+
+
+def _fields(value: Any) -> dict[str, Any]:
+    """The fields of a dataclass, as messages name them."""
+    names = [field.name for field in fields(value)]
+    of_space = hasattr(value, "__sesame_message__")
+    return {wire_name(name) if of_space else name: getattr(value, name) for name in names}
 
 
 class _Ended(Exception):
@@ -167,6 +176,7 @@ def _serve(simulator: Callable[[Setup], Any], requests: TextIO, output: TextIO) 
         return decode(line)[0]
 
     world = bus = None
+    answer: str
     while True:
         request = receive()
         try:

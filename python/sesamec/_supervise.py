@@ -71,7 +71,7 @@ def call(command: list[str], simulator: Callable[[Setup], Any] | None = None, *,
     in_terminal = os.isatty(2)
     with tempfile.TemporaryFile() as kept:
         messages = None if in_terminal else kept
-        if simulator is None:
+        if simulator is None and not METRICS and not OPERATIONS:
             done = subprocess.run(
                 command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=messages, check=False
             )
@@ -93,7 +93,7 @@ def call(command: list[str], simulator: Callable[[Setup], Any] | None = None, *,
 class _Forks:
     """Forks workers for a supervisor until it has ended."""
 
-    def __init__(self, simulator: Callable[[Setup], Any], debug: bool) -> None:
+    def __init__(self, simulator: Callable[[Setup], Any] | None, debug: bool) -> None:
         self.simulator, self.debug = simulator, debug
         self.workers: set[int] = set()
 
@@ -175,10 +175,19 @@ class _Forks:
         return os.waitpid(process, 0)[1]
 
 
-def _work(worker: dict[str, Any], descriptors: list[int], simulator: Callable[[Setup], Any], debug: bool) -> int:
-    """What a fork does: it becomes a worker."""
-    from . import _native
+def _work(
+    worker: dict[str, Any], descriptors: list[int], simulator: Callable[[Setup], Any] | None, debug: bool
+) -> int:
+    """What a fork does: it becomes a worker, or says which hooks it has."""
+    from ._work import examine_on, work
 
+    os.environ.pop("SESAME_FORK_SERVER", None)
+    sys.dont_write_bytecode = True
+    if worker["arguments"][0] == "examine":
+        # What hooks print while they are imported is not the caller's output.
+        os.dup2(2, 1)
+        examine_on(descriptors[0])
+        return 0
     # In the foreground, Ctrl-C is for the supervisor, which ends its workers.
     signal.signal(signal.SIGINT, signal.SIG_IGN if debug else signal.SIG_DFL)
     terminal = os.dup(0)
@@ -191,14 +200,13 @@ def _work(worker: dict[str, Any], descriptors: list[int], simulator: Callable[[S
         os.close(descriptor)
     os.chdir(worker["folder"])
     os.environ["SESAME_WORKER"] = str(worker["worker"])
-    os.environ.pop("SESAME_FORK_SERVER", None)
-    if not debug:
+    if not debug or simulator is None:
         os.close(terminal)
-        return _native.worker(worker["arguments"], simulator, METRICS, OPERATIONS)
+        return work(worker["arguments"], simulator)
 
     def in_foreground(setup: Setup) -> Any:
         # The worker has taken the connection from standard input by now, so a debugger may read there.
         os.dup2(terminal, 0)
         return simulator(setup)
 
-    return _native.worker(worker["arguments"], in_foreground, METRICS, OPERATIONS)
+    return work(worker["arguments"], in_foreground)

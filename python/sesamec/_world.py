@@ -71,7 +71,8 @@ def description(simulator: Any) -> tuple[list[str], list[str], dict[str, list[st
 def told(error: BaseException, raised: TracebackType | None) -> tuple[str, str]:
     """An exception as the outcome of a test, which is the same wherever the files are, and its traceback."""
     own = os.path.dirname(os.path.abspath(__file__))
-    frames = [frame for frame in traceback.extract_tb(raised) if not frame.filename.startswith(own)]
+    others = (own, "<frozen")
+    frames = [frame for frame in traceback.extract_tb(raised) if not frame.filename.startswith(others)]
     words = "".join(traceback.format_exception_only(type(error), error)).strip()
     # The user's calls, the innermost one first.
     places = [f"{frame.name} ({os.path.basename(frame.filename)}, line {frame.lineno})" for frame in reversed(frames)]

@@ -9,17 +9,19 @@ use std::sync::OnceLock;
 
 use pyo3::exceptions::{PyRuntimeError, PyTypeError};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyFloat, PyList, PyString};
+use pyo3::types::{PyDict, PyFloat, PyInt, PyList, PyString, PyType};
 use scoped_tls_hkt::scoped_thread_local;
 
-use sesame_plan::{CampaignPlan, Choice, MetricSource, Moment, OperationKind, Type};
-use sesame_relay::fuzz::{MessageCall, OperationContext, OperationEntry, OperationHook, RunContext};
-use sesame_relay::message::Mismatch;
+use sesame_plan::{
+    CampaignPlan, Choice, Domain, MetricSource, Moment, Operation, OperationKind, Parameter, Type, python,
+};
+use sesame_relay::fuzz::{self, MessageCall, OperationEntry, OperationHook};
 use sesame_relay::metric::{Context, Hook, HookEntry};
 use sesame_relay::value::Value;
 
 use crate::raised;
-use crate::value::{self, Shapes};
+use crate::types::{Types, Unfit};
+use crate::value::Shapes;
 
 /// What this process runs tests with.
 static CODE: OnceLock<Code> = OnceLock::new();
@@ -31,6 +33,28 @@ struct Code {
     package: Py<PyModule>,
     metrics: Py<PyDict>,
     operations: Py<PyDict>,
+    types: Types,
+}
+
+/// The topics of a metric that is a hook.
+pub(crate) fn inputs<'a>(plan: &'a CampaignPlan, source: &MetricSource) -> Option<Vec<&'a str>> {
+    let MetricSource::Hook { topics } = source else { return None };
+    Some(topics.iter().map(|&topic| plan.topic(topic).name.as_str()).collect())
+}
+
+/// The method of a hook that gets messages of a topic, for each topic.
+pub(crate) fn methods(topics: &[&str]) -> Vec<String> {
+    topics.iter().map(|topic| python::method(topic)).collect()
+}
+
+/// The method of a custom operation's hook.
+pub(crate) fn method_of(plan: &CampaignPlan, operation: &Operation) -> Option<String> {
+    let OperationKind::Custom { moment } = operation.kind else { return None };
+    Some(match (moment, operation.topic) {
+        (Moment::OnMessage, Some(topic)) => python::method(&plan.topic(topic).name),
+        (Moment::AfterEnd, _) => "after_end".to_owned(),
+        _ => "before_start".to_owned(),
+    })
 }
 
 /// Takes the user's classes, and returns an entry for each that the plan uses. Entries live as long as the process, as
@@ -38,9 +62,10 @@ struct Code {
 pub(crate) fn register(
     py: Python<'_>,
     plan: CampaignPlan,
-    metrics: Bound<'_, PyDict>,
-    operations: Bound<'_, PyDict>,
 ) -> PyResult<(&'static [HookEntry], &'static [OperationEntry])> {
+    let package = py.import("sesamec._hooks")?;
+    let registry = |name: &str| PyResult::Ok(package.getattr(name)?.cast_into::<PyDict>()?);
+    let (metrics, operations) = (registry("METRICS")?, registry("OPERATIONS")?);
     let registered = |name: &str, classes: &Bound<'_, PyDict>| classes.contains(name);
     let (mut of_metrics, mut of_operations) = (Vec::new(), Vec::new());
     for metric in plan.metrics.iter().filter(|metric| matches!(metric.source, MetricSource::Hook { .. })) {
@@ -53,8 +78,10 @@ pub(crate) fn register(
             of_operations.push(OperationEntry { operation: operation.name.clone().leak(), build: operation_hook });
         }
     }
-    let package = py.import("sesamec._hooks")?.unbind();
-    let code = Code { plan, package, metrics: metrics.unbind(), operations: operations.unbind() };
+    let classes = package.getattr("of_space")?.call1((registry("MESSAGES")?, &plan.space))?.cast_into::<PyDict>()?;
+    let types = Types::new(py, &plan, &classes)?;
+    let package = package.unbind();
+    let code = Code { plan, package, metrics: metrics.unbind(), operations: operations.unbind(), types };
     if CODE.set(code).is_err() {
         return Err(PyRuntimeError::new_err("this process has hooks already"));
     }
@@ -83,12 +110,13 @@ fn metric_hook(name: &str) -> Box<dyn Hook> {
     let code = code();
     let metric = code.plan.metrics.iter().find(|metric| metric.name == name).expect("it is of this plan");
     let MetricSource::Hook { topics } = &metric.source else { unreachable!("only hooks have entries") };
-    let names: Vec<&str> = topics.iter().map(|&topic| code.plan.topic(topic).name.as_str()).collect();
+    let types = topics.iter().map(|&topic| &code.plan.topic(topic).ty).collect();
+    let names = methods(&inputs(&code.plan, &metric.source).unwrap_or_default());
     let made = Python::attach(|py| {
         let class = code.metrics.bind(py).get_item(name)?.expect("it was registered");
         let methods = code.package.bind(py).getattr("metric_methods")?.call1((name, class, names))?;
         let (start, on, end) = methods.extract()?;
-        PyResult::Ok(PythonMetric { start, on, end, context: Py::new(py, MetricContext)? })
+        PyResult::Ok(PythonMetric { start, on, end, types, context: Py::new(py, MetricContext)? })
     });
     Box::new(called(made))
 }
@@ -97,6 +125,8 @@ struct PythonMetric {
     start: Option<Py<PyAny>>,
     /// For each input.
     on: Vec<Py<PyAny>>,
+    /// Of its inputs.
+    types: Vec<&'static Type>,
     end: Option<Py<PyAny>>,
     context: Py<MetricContext>,
 }
@@ -111,10 +141,15 @@ impl Hook for PythonMetric {
     }
 
     fn on_message(&mut self, input: usize, value: &Value, ctx: &mut Context) {
-        let on = &self.on[input];
-        called(
-            METRIC.set(ctx, || Python::attach(|py| on.call1(py, (value::object(py, value)?, &self.context)).map(drop))),
-        );
+        let (on, ty, code) = (&self.on[input], self.types[input], code());
+        Python::attach(|py| {
+            let returned = match code.types.object(py, &code.plan, ty, value) {
+                Ok(message) => METRIC.set(ctx, || on.call1(py, (message, &self.context)).map(drop)),
+                Err(Unfit::Mismatch(mismatch)) => return ctx.mismatch(&mismatch),
+                Err(Unfit::Raised(error)) => Err(error),
+            };
+            called(returned);
+        });
     }
 
     fn on_end(&mut self, ctx: &mut Context) {
@@ -184,33 +219,31 @@ fn operation_hook(name: &str, choices: &[Choice]) -> Box<dyn OperationHook> {
     let code = code();
     let operation = code.plan.operations.iter().find(|operation| operation.name == name).expect("it is of this plan");
     let OperationKind::Custom { moment } = operation.kind else { unreachable!("only custom operations have entries") };
-    let topic = operation.topic.map(|topic| code.plan.topic(topic));
-    let names: Vec<&str> = operation.parameters.iter().map(|parameter| parameter.name.as_str()).collect();
-    let word = match moment {
-        Moment::OnMessage => "message",
-        Moment::BeforeStart => "before_start",
-        Moment::AfterEnd => "after_end",
-    };
+    let topic = operation.topic.filter(|_| matches!(moment, Moment::OnMessage)).map(|topic| code.plan.topic(topic));
+    let word = method_of(&code.plan, operation).expect("it is a custom operation");
     let made = Python::attach(|py| {
-        let values = PyList::empty(py);
-        for choice in choices {
-            values.append(chosen(py, choice)?)?;
+        let values = PyDict::new(py);
+        for (parameter, choice) in operation.parameters.iter().zip(choices) {
+            values.set_item(&*python::attribute(&parameter.name), chosen(py, parameter, choice)?)?;
         }
         let class = code.operations.bind(py).get_item(name)?.expect("it was registered");
         let package = code.package.bind(py);
-        let topic_name = topic.map(|topic| topic.name.as_str());
-        let (method, parameters): (Py<PyAny>, Py<PyAny>) =
-            package.getattr("operation_method")?.call1((name, class, word, topic_name, names, values))?.extract()?;
-        let context = Py::new(py, OperationCall)?;
-        let around = Py::new(py, RunCall)?;
+        let method = package.getattr("operation_method")?.call1((name, class, &word))?.unbind();
+        let parameters = package.getattr("parameters_of")?.call1((&code.plan.space, name, values))?.unbind();
+        let context = Py::new(py, OperationContext)?;
+        let around = Py::new(py, RunContext)?;
         let ty = topic.map(|topic| &topic.ty);
-        PyResult::Ok(PythonOperation { method, parameters, context, around, ty, shapes: Shapes::default() })
+        PyResult::Ok(PythonOperation { method, word, parameters, context, around, ty, shapes: Shapes::default() })
     });
     Box::new(called(made))
 }
 
-fn chosen<'py>(py: Python<'py>, choice: &Choice) -> PyResult<Bound<'py, PyAny>> {
+fn chosen<'py>(py: Python<'py>, parameter: &Parameter, choice: &Choice) -> PyResult<Bound<'py, PyAny>> {
     Ok(match choice {
+        #[expect(clippy::cast_possible_truncation, reason = "choices of whole numbers are at most 2^53")]
+        Choice::Value { value } if matches!(parameter.domain, Domain::Number { integer: true, .. }) => {
+            PyInt::new(py, *value as i64).into_any()
+        }
         Choice::Value { value } => PyFloat::new(py, *value).into_any(),
         Choice::Text { text } => PyString::new(py, text).into_any(),
         Choice::Point { point } => PyList::new(py, point)?.into_any(),
@@ -220,9 +253,11 @@ fn chosen<'py>(py: Python<'py>, choice: &Choice) -> PyResult<Bound<'py, PyAny>> 
 
 struct PythonOperation {
     method: Py<PyAny>,
+    /// What the method is called.
+    word: String,
     parameters: Py<PyAny>,
-    context: Py<OperationCall>,
-    around: Py<RunCall>,
+    context: Py<OperationContext>,
+    around: Py<RunContext>,
     /// The type of the messages that it is called with.
     ty: Option<&'static Type>,
     shapes: Shapes,
@@ -234,13 +269,14 @@ trait Turn {
     fn topic(&self) -> String;
     fn draw(&mut self) -> f64;
     fn drop_message(&mut self);
-    fn inject(&mut self, message: &Bound<'_, PyAny>) -> Result<(), Mismatch>;
+    fn inject(&mut self, message: &Bound<'_, PyAny>) -> Result<(), Unfit>;
     fn unimplemented(&mut self);
 }
 
 /// One call of an operation's hook.
 struct Called<'a, 'c> {
-    ctx: &'a mut OperationContext<'c, Value>,
+    ctx: &'a mut fuzz::OperationContext<'c, Value>,
+    dropped: bool,
     /// The message as it came.
     original: &'a Value,
     ty: &'a Type,
@@ -261,13 +297,15 @@ impl Turn for Called<'_, '_> {
     }
 
     fn drop_message(&mut self) {
+        self.dropped = true;
         self.ctx.drop_message();
     }
 
-    fn inject(&mut self, message: &Bound<'_, PyAny>) -> Result<(), Mismatch> {
-        let read = value::read(&code().plan, self.shapes, self.ty, message)?;
+    fn inject(&mut self, message: &Bound<'_, PyAny>) -> Result<(), Unfit> {
+        let code = code();
+        // Undeclared parts are those of the original message.
         let mut injected = self.original.clone();
-        value::overwrite(&mut injected, read);
+        code.types.write_back(&code.plan, self.shapes, self.ty, &mut injected, message)?;
         self.ctx.inject(injected);
         Ok(())
     }
@@ -290,55 +328,63 @@ trait Around {
     fn unimplemented(&mut self);
 }
 
-impl Around for RunContext<'_> {
+impl Around for fuzz::RunContext<'_> {
     fn folder(&mut self) -> PathBuf {
-        RunContext::folder(self)
+        fuzz::RunContext::folder(self)
     }
 
     fn replace_file(&mut self, path: &str, contents: &[u8]) {
-        RunContext::replace_file(self, path, contents);
+        fuzz::RunContext::replace_file(self, path, contents);
     }
 
     fn edit_file(&mut self, path: &str, edit: &mut dyn FnMut(&str) -> String) {
-        RunContext::edit_file(self, path, |text| edit(text));
+        fuzz::RunContext::edit_file(self, path, |text| edit(text));
     }
 
     fn count_side_effect(&mut self) {
-        RunContext::count_side_effect(self);
+        fuzz::RunContext::count_side_effect(self);
     }
 
     fn draw(&mut self) -> f64 {
-        RunContext::draw(self)
+        fuzz::RunContext::draw(self)
     }
 
     fn unimplemented(&mut self) {
-        RunContext::unimplemented(self);
+        fuzz::RunContext::unimplemented(self);
     }
 }
 
 impl OperationHook for PythonOperation {
     fn on_message(&mut self, message: &mut Value, call: &mut MessageCall<'_>) {
-        let PythonOperation { method, parameters, context, ty, shapes, .. } = self;
-        let ty = ty.expect("an operation on messages has a topic");
+        let PythonOperation { method, word, parameters, context, ty, shapes, .. } = self;
+        let (ty, code) = (ty.expect("an operation on messages has a topic"), code());
         call.dynamic(message, |message, ctx| {
-            let original = message.clone();
-            let mut turn = Called { ctx, original: &original, ty, shapes };
-            let returned = called(OPERATION.set(&mut turn, || {
-                Python::attach(|py| {
-                    let given = value::object(py, &original)?;
-                    method.call1(py, (given, &*parameters, &*context))
-                })
-            }));
-            let read = Python::attach(|py| value::read(&code().plan, shapes, ty, returned.bind(py)));
-            // It has to return the message, also if it does not change it.
-            let read =
-                read.map_err(|mismatch| PyTypeError::new_err(format!("what it returned is not a message: {mismatch}")));
-            value::overwrite(message, called(read));
-            Ok(())
+            Python::attach(|py| {
+                let given = match code.types.object(py, &code.plan, ty, message) {
+                    Ok(given) => given,
+                    // It is passed on unchanged, with a warning of the run.
+                    Err(Unfit::Mismatch(mismatch)) => return Err(mismatch),
+                    Err(Unfit::Raised(error)) => called(Err(error)),
+                };
+                let original = message.clone();
+                let mut turn = Called { ctx, dropped: false, original: &original, ty, shapes };
+                let returned = OPERATION.set(&mut turn, || method.call1(py, (given, &*parameters, &*context)));
+                let (returned, dropped) = (called(returned).into_bound(py), turn.dropped);
+                if !(dropped && returned.is_none()) {
+                    let read = code.types.write_back(&code.plan, shapes, ty, message, &returned);
+                    called(read.map_err(|unfit| match unfit {
+                        Unfit::Raised(error) => error,
+                        Unfit::Mismatch(mismatch) => PyTypeError::new_err(format!(
+                            "`{word}` has to return the message, also if it does not change it: {mismatch}"
+                        )),
+                    }));
+                }
+                Ok(())
+            })
         });
     }
 
-    fn before_or_after_run(&mut self, ctx: &mut RunContext<'_>) {
+    fn before_or_after_run(&mut self, ctx: &mut fuzz::RunContext<'_>) {
         let (method, parameters, around) = (&self.method, &self.parameters, &self.around);
         called(RUN.set(ctx, || Python::attach(|py| method.call1(py, (parameters, around)).map(drop))));
     }
@@ -346,14 +392,20 @@ impl OperationHook for PythonOperation {
 
 /// What an operation can do besides changing its message.
 #[pyclass(frozen, module = "sesamec")]
-pub(crate) struct OperationCall;
+pub(crate) struct OperationContext;
 
 fn operation<T>(call: impl FnOnce(&mut dyn Turn) -> T) -> PyResult<T> {
     if OPERATION.is_set() { Ok(OPERATION.with(call)) } else { outside() }
 }
 
 #[pymethods]
-impl OperationCall {
+impl OperationContext {
+    /// As in `OperationContext[Pose]`, which says what a message is.
+    #[classmethod]
+    fn __class_getitem__<'py>(class: &Bound<'py, PyType>, _message: &Bound<'py, PyAny>) -> Bound<'py, PyType> {
+        class.clone()
+    }
+
     /// Simulation time in seconds.
     #[getter]
     fn now(&self) -> PyResult<f64> {
@@ -379,8 +431,10 @@ impl OperationCall {
 
     /// Publishes a further message on the same topic, directly after this one.
     fn inject(&self, message: &Bound<'_, PyAny>) -> PyResult<()> {
-        let injected = operation(|turn| turn.inject(message))?;
-        injected.map_err(|mismatch| PyTypeError::new_err(mismatch.to_string()))
+        operation(|turn| turn.inject(message))?.map_err(|unfit| match unfit {
+            Unfit::Raised(error) => error,
+            Unfit::Mismatch(mismatch) => PyTypeError::new_err(format!("it cannot be injected: {mismatch}")),
+        })
     }
 
     /// Marks this hook as not implemented yet.
@@ -391,14 +445,14 @@ impl OperationCall {
 
 /// What a hook can do before the start or after the end of a run.
 #[pyclass(frozen, module = "sesamec")]
-pub(crate) struct RunCall;
+pub(crate) struct RunContext;
 
 fn run<T>(call: impl FnOnce(&mut dyn Around) -> T) -> PyResult<T> {
     if RUN.is_set() { Ok(RUN.with(call)) } else { outside() }
 }
 
 #[pymethods]
-impl RunCall {
+impl RunContext {
     /// The folder of the `.sesame` file.
     #[getter]
     fn folder(&self) -> PyResult<PathBuf> {

@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
 
-use sesame_plan::{CampaignPlan, MessageId, Type};
+use sesame_plan::{CampaignPlan, MessageId, Type, python};
 use sesame_relay::message::Mismatch;
 use sesame_relay::value::{Fields, Record, Text, Value};
 
@@ -127,7 +127,7 @@ fn int(payload: &Bound<'_, PyAny>) -> Result<i64, Mismatch> {
 }
 
 /// The items of a list, a tuple, or an array of another package.
-fn items<'py>(payload: &Bound<'py, PyAny>) -> Option<Vec<Bound<'py, PyAny>>> {
+pub(crate) fn items<'py>(payload: &Bound<'py, PyAny>) -> Option<Vec<Bound<'py, PyAny>>> {
     if let Ok(list) = payload.cast::<PyList>() {
         return Some(list.iter().collect());
     }
@@ -143,7 +143,28 @@ fn entries<'py>(payload: &Bound<'py, PyAny>) -> Option<Bound<'py, PyDict>> {
     if let Ok(entries) = payload.cast::<PyDict>() {
         return Some(entries.clone());
     }
+    if let Some(fields) = fields_of_class(payload) {
+        let entries = PyDict::new(payload.py());
+        for (name, value) in fields {
+            entries.set_item(name, value).ok()?;
+        }
+        return Some(entries);
+    }
     payload.getattr("__dict__").ok()?.cast_into::<PyDict>().ok()
+}
+
+/// The fields of an object of a class that stands for a message of a space, by their names on the wire. Those that are
+/// not set are left out.
+pub(crate) fn fields_of_class<'py>(payload: &Bound<'py, PyAny>) -> Option<Vec<(String, Bound<'py, PyAny>)>> {
+    payload.getattr_opt(pyo3::intern!(payload.py(), "__sesame_message__")).ok()??;
+    let names =
+        payload.getattr(pyo3::intern!(payload.py(), "__dataclass_fields__")).ok()?.cast_into::<PyDict>().ok()?;
+    let fields = names.keys().iter().filter_map(|name| {
+        let name = name.cast_into::<PyString>().ok()?;
+        let value = payload.getattr(&name).ok()?;
+        Some((python::named(name.to_str().ok()?).to_owned(), value))
+    });
+    Some(fields.collect())
 }
 
 /// A function of Python's module for JSON, looked up once.
@@ -155,9 +176,14 @@ static DUMPS: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
 static LOADS: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
 
 /// A part that the space does not declare, in JSON.
-fn undeclared(value: &Bound<'_, PyAny>) -> Result<Text, Mismatch> {
+pub(crate) fn undeclared(value: &Bound<'_, PyAny>) -> Result<Text, Mismatch> {
     let text = json(value.py(), "dumps", &DUMPS).and_then(|dumps| dumps.call1((value,))?.extract::<String>());
     text.map(Text::from).map_err(|_| mismatch("what JSON can hold", value))
+}
+
+/// The same as a value of Python.
+pub(crate) fn of_undeclared<'py>(py: Python<'py>, text: &Text) -> PyResult<Bound<'py, PyAny>> {
+    json(py, "loads", &LOADS)?.call1((text.as_str(),))
 }
 
 /// The payload as Python's.
@@ -182,49 +208,9 @@ pub(crate) fn write<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, 
             }
             entries.into_any()
         }
-        Value::Undeclared(text) => json(py, "loads", &LOADS)?.call1((text.as_str(),))?,
+        Value::Undeclared(text) => of_undeclared(py, text)?,
         Value::Opaque(bytes) => pyo3::types::PyBytes::new(py, bytes).into_any(),
     })
-}
-
-/// The payload as hooks get it: messages are objects with attributes.
-pub(crate) fn object<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>> {
-    static NAMESPACE: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
-    match value {
-        Value::Record(record) => {
-            let fields = PyDict::new(py);
-            for (name, value) in record.iter() {
-                fields.set_item(PyString::intern(py, name.as_str()), object(py, value)?)?;
-            }
-            let namespace = NAMESPACE
-                .get_or_try_init(py, || py.import("types")?.getattr("SimpleNamespace").map(Bound::unbind))?
-                .bind(py);
-            namespace.call((), Some(&fields))
-        }
-        Value::List(values) => {
-            let list = PyList::empty(py);
-            for value in values {
-                list.append(object(py, value)?)?;
-            }
-            Ok(list.into_any())
-        }
-        _ => write(py, value),
-    }
-}
-
-/// Writes what was read of a hook into a message. What the hook did not name stays as it was.
-pub(crate) fn overwrite(value: &mut Value, by: Value) {
-    match (value, by) {
-        (Value::Record(record), Value::Record(by)) => {
-            for (name, new) in by.iter() {
-                if let Some(old) = record.get_mut(name.as_str()) {
-                    overwrite(old, new.clone());
-                }
-            }
-        }
-        (Value::Undeclared(_), _) => {}
-        (value, by) => *value = by,
-    }
 }
 
 /// A payload of its own for whoever receives it: what one part of a simulator changes in it, no other part sees.
@@ -251,7 +237,7 @@ pub(crate) fn copied<'py>(payload: &Bound<'py, PyAny>) -> PyResult<Bound<'py, Py
     Ok(payload.clone())
 }
 
-fn mismatch(expected: &'static str, payload: &Bound<'_, PyAny>) -> Mismatch {
+pub(crate) fn mismatch(expected: &'static str, payload: &Bound<'_, PyAny>) -> Mismatch {
     let found = if payload.is_none() {
         "null"
     } else if payload.is_instance_of::<PyBool>() {

@@ -28,6 +28,8 @@ mod pool;
 #[cfg(any(not(unix), test))]
 mod port;
 mod protocol;
+#[cfg(feature = "process")]
+pub(crate) mod python;
 mod reference;
 mod run;
 mod settings;
@@ -57,12 +59,16 @@ pub use single::{SingleSettings, run_single};
 pub use worker::serve;
 pub use worker_program::WorkerProgram;
 
-/// Whether the process that started this one has the code of its tests: it forks workers, or carries tests out itself.
-pub(crate) fn is_called_by_code() -> bool {
+/// Whether the process that started this one carries out the tests of campaigns.
+pub(crate) fn carries_out_tests() -> bool {
     #[cfg(unix)]
-    if asked::carries_out_tests() {
-        return true;
-    }
+    return asked::carries_out_tests();
+    #[cfg(not(unix))]
+    false
+}
+
+/// Whether another process forks the workers of this one.
+pub(crate) fn forks_workers() -> bool {
     #[cfg(target_os = "linux")]
     return fork_server::ForkServer::of_this_process().is_some();
     #[cfg(not(target_os = "linux"))]

@@ -168,10 +168,21 @@ pub fn show(command: &Showing, results: &Path) -> ExitCode {
     concluded(command.carry_out(results))
 }
 
-/// Whether the process that started this one has the code of its tests: it forks workers with the user's code in them,
-/// or carries tests out itself.
-pub fn is_called_by_code() -> bool {
-    crate::campaign::is_called_by_code()
+/// Whether another process forks the workers of this one, with the user's code in them.
+pub fn forks_workers() -> bool {
+    crate::campaign::forks_workers()
+}
+
+/// Whether the process that started this one carries out tests itself, so that neither simulator nor hooks are used.
+pub fn carries_out_tests() -> bool {
+    crate::campaign::carries_out_tests()
+}
+
+/// The metrics and operations of an interpreted runner's campaign that have hooks in Python. The error says what is
+/// wrong with the file of the hooks, or that no Python has the package.
+#[cfg(feature = "process")]
+pub fn hooks_in_python(runner: &Interpreted) -> std::io::Result<Vec<String>> {
+    crate::campaign::python::registered(runner)
 }
 
 /// Serves a supervisor with code that is not part of the plan: hooks, and what connects to the simulator, if that is

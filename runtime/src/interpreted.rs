@@ -1,11 +1,13 @@
-//! Runners without a crate: of a campaign whose simulator is a program and that uses no hooks, the plan says
-//! everything. So one program, `sesamec`, can run any of them at once, with nothing to generate or to compile.
+//! Runners without a crate: of a campaign whose simulator is a program and that uses no hooks in Rust, the plan says
+//! everything but the code of hooks in Python, which its workers import. So one program, `sesamec`, can run any of
+//! them at once, with nothing to generate or to compile.
 
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use sesame_base::time::SimTime;
 use sesame_plan::CampaignPlan;
+use sesame_plan::python::PythonHooks;
 use sesame_relay::fuzz::OperationEntry;
 use sesame_relay::metric::HookEntry;
 use sesame_relay::relay::Exchange;
@@ -26,6 +28,9 @@ pub struct Interpreted {
     pub space: PathBuf,
     /// Folder that the simulator runs in, as seen from there.
     pub simulator: PathBuf,
+    /// The hooks in Python that it calls; `None` if it calls none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hooks: Option<PythonHooks>,
 }
 
 /// The transport to the simulator of a plan, which is not part of the runner.
@@ -88,7 +93,7 @@ impl Interpreted {
 
     /// A compiled runner with this plan and these folders in place of its own.
     pub(crate) fn with_code_of(&self, compiled: &Runner) -> Runner {
-        let Interpreted { plan, directory, space, simulator } = self;
+        let Interpreted { plan, directory, space, simulator, hooks: _ } = self;
         Runner {
             plan: plan.clone().into(),
             directory: directory.clone(),

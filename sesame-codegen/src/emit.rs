@@ -10,6 +10,7 @@ mod monitor;
 mod operations;
 mod package;
 mod problem;
+mod python;
 mod registry;
 mod rust;
 mod stub;
@@ -27,13 +28,14 @@ pub use self::monitor::monitor;
 use self::package::Kind;
 pub(crate) use self::package::is_dependency as is_package_name;
 pub use self::problem::Problem;
+pub use self::python::{Python, python, python_stubs};
 pub use self::text::Templates;
-use crate::files::{File, Hook, Owner, Tree};
+use crate::files::{File, Hook, MANIFEST, Owner, Tree};
 use crate::names;
 use crate::plan::{OperationPlan, RunnerPlan, runtime_feature};
 
 /// The version of the interface between generated code and the runtime that this generator writes for.
-const ABI: u32 = 3;
+const ABI: u32 = 4;
 
 /// What the crates of a space need of the world around them.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -172,6 +174,7 @@ fn doc_lines(doc: &str) -> Vec<String> {
 fn tree(folder: String, runner: &RunnerPlan, environment: &Environment, model: String) -> Tree {
     Tree {
         folder,
+        manifest: MANIFEST.to_owned(),
         files: BTreeMap::new(),
         generator: runner.plan.generator.clone(),
         source: runner.plan.source.clone(),

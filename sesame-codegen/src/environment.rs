@@ -335,6 +335,15 @@ pub(crate) fn runtime_for(folder: &Path, runtime: Option<&RuntimeChoice>) -> Res
     runtime_dependency(&settled(folder)?, Path::new("."), runtime, None).map(|(value, _)| value)
 }
 
+/// The templates for what is generated of a space: as the command line or `sesame.toml` says, else those of this
+/// project.
+pub fn chosen_templates(source: &Path, options: &EnvironmentOptions) -> Result<Templates, Vec<Error>> {
+    let home = home(source);
+    let settings = settings(&home.join(SETTINGS)).map_err(|error| vec![error])?;
+    let folder = options.templates.clone().or_else(|| settings.templates.map(|folder| home.join(folder)));
+    folder.as_deref().map_or_else(|| Ok(Templates::default()), templates)
+}
+
 /// The user's templates in a folder: every file in it and below takes the place of the template of its path.
 pub fn templates(folder: &Path) -> Result<Templates, Vec<Error>> {
     let read = |path: &String| {

@@ -34,11 +34,16 @@ impl File {
     }
 }
 
+/// Where the manifest of a folder is that holds nothing but what is generated, and hooks.
+pub(crate) const MANIFEST: &str = ".sesame/manifest.json";
+
 /// A folder with one manifest: the output folder itself (what all runners share), or one runner's crate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tree {
     /// Its name inside the output folder; empty for the output folder itself.
     pub folder: String,
+    /// Where its manifest is, relative to the folder.
+    pub manifest: String,
     /// Its files by path relative to the folder, `/` between the parts, no part `.` or `..`.
     pub files: BTreeMap<String, File>,
     /// The generator, for example `sesamec 0.1.0`.

@@ -5,6 +5,7 @@
 //! hide something the generated code or a stub speaks of.
 
 use std::collections::BTreeSet;
+use std::path::Path;
 
 use heck::{ToSnakeCase, ToUpperCamelCase};
 use proc_macro2::{Ident, Span};
@@ -109,6 +110,23 @@ pub(crate) fn hook_trait(metric: &str) -> String {
 /// The struct of a custom operation's parameters, for example `BendPathParameters`.
 pub(crate) fn parameters_type(operation: &str) -> String {
     hook_type(operation) + "Parameters"
+}
+
+/// The file beside a `.sesame` file with its hooks in Python.
+pub fn python_hooks(space: &Path) -> String {
+    format!("{}_hooks.py", python_stem(space))
+}
+
+/// The file beside a `.sesame` file with its types in Python.
+pub(crate) fn python_types(space: &Path) -> String {
+    format!("{}_types.py", python_stem(space))
+}
+
+/// What the modules of a space begin with: the name of its file, where Python can import it.
+fn python_stem(space: &Path) -> String {
+    let stem = space.file_stem().unwrap_or_default().to_string_lossy();
+    let stem: String = stem.chars().map(|it| if it.is_ascii_alphanumeric() { it } else { '_' }).collect();
+    if stem.starts_with(|first: char| first.is_ascii_digit()) { format!("_{stem}") } else { stem }
 }
 
 /// The folder of a monitor that is a program of its own, inside the output folder.

@@ -19,7 +19,7 @@ use similar::TextDiff;
 pub use self::fresh_folder::FreshFolder;
 use self::manifest::{Entry, Manifest};
 use self::place::{Found, OutputPath};
-use crate::files::{Owner, Tree};
+use crate::files::{MANIFEST, Owner, Tree};
 use crate::input::Unreadable;
 
 /// What to do about the difference between generated files and those on disk.
@@ -313,8 +313,8 @@ fn survey(
 ) -> Result<(), Error> {
     let root = if tree.folder.is_empty() { out.to_owned() } else { out.join(&tree.folder) };
     let shown = |path: &str| if tree.folder.is_empty() { path.to_owned() } else { format!("{}/{path}", tree.folder) };
-    let manifest_path = root.join(manifest::PATH);
-    let manifest_shown = shown(manifest::PATH);
+    let manifest_path = root.join(&tree.manifest);
+    let manifest_shown = shown(&tree.manifest);
     // What is not UTF-8 was not generated, and is not JSON either.
     let at_manifest = OutputPath { root: out, below: &manifest_shown };
     let old_text = at_manifest.read()?.map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
@@ -460,7 +460,7 @@ fn leftovers(
     }
     for folder in &old.runners {
         let gone = !new.runners.contains(folder);
-        let manifest = format!("{folder}/{}", manifest::PATH);
+        let manifest = format!("{folder}/{MANIFEST}");
         if gone && is_inside(folder) && matches!((OutputPath { root: out, below: &manifest }).look(), Ok(Found::File)) {
             report.orphans.push(Orphan::Runner { folder: folder.clone() });
             new.runners.push(folder.clone());

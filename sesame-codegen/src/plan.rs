@@ -114,13 +114,8 @@ impl RunnerPlan {
         Path::new(&self.system_file).parent().unwrap_or(Path::new(""))
     }
 
-    /// Whether a runner of this campaign contains Rust that a command with these features of the runtime does not: the
-    /// user's simulator or hooks, or a transport that the command was built without. Without, the plan says everything.
-    pub fn needs_rust(&self, is_built_in: fn(feature: &str) -> bool) -> bool {
-        self.needs_a_runner(is_built_in) || self.has_hooks()
-    }
-
-    /// Whether it does so for its simulator, whatever hooks it has.
+    /// Whether a runner of this campaign contains Rust that a command with these features of the runtime does not,
+    /// whatever hooks it has: the user's simulator, or a transport that the command was built without.
     pub fn needs_a_runner(&self, is_built_in: fn(feature: &str) -> bool) -> bool {
         let simulator = &self.plan.simulator;
         simulator.properties().in_runner || runtime_feature(simulator).is_some_and(|feature| !is_built_in(feature))
@@ -128,7 +123,14 @@ impl RunnerPlan {
 
     /// Whether this campaign calls hooks of the user's.
     pub fn has_hooks(&self) -> bool {
-        self.hooks.iter().any(|hook| self.uses(hook)) || self.operations.iter().any(|operation| self.applies(operation))
+        self.called_hooks().next().is_some()
+    }
+
+    /// The metrics and operations whose hooks this campaign calls.
+    pub fn called_hooks(&self) -> impl Iterator<Item = &str> {
+        let metrics = self.hooks.iter().filter(|hook| self.uses(hook)).map(|hook| hook.metric.as_str());
+        let operations = self.operations.iter().filter(|operation| self.applies(operation));
+        metrics.chain(operations.map(|operation| operation.operation.as_str()))
     }
 
     /// Whether a test of this campaign may hold a custom operation, and so needs its hook to be compiled.

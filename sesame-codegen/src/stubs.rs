@@ -20,6 +20,29 @@ pub fn unfilled_objectives(runner: &RunnerPlan, hooks: &Path) -> Vec<(String, Pa
         .collect()
 }
 
+/// The hooks that the campaign calls and that are filled in in this folder, with their files. One that cannot be read
+/// is not listed.
+pub fn filled_in(runner: &RunnerPlan, hooks: &Path) -> Vec<(String, PathBuf)> {
+    let files = runner.called_hooks().map(|name| (name.to_owned(), hooks.join(format!("{}.rs", names::snake(name)))));
+    files.filter(|(_, file)| input::text(file).is_ok_and(|text| !is_stub(&text))).collect()
+}
+
+/// The hooks that the text of a module in Python does not seem to have. It is not run, so names are looked for where
+/// they are written: in a decorator, or as the name of a function or class.
+pub fn missing_in_python(module: &str, needed: &[String]) -> Vec<String> {
+    let code: Vec<&str> = module.lines().map(|line| line.split('#').next().unwrap_or_default().trim()).collect();
+    let defines = |line: &str, name: &str| {
+        let defined = line.strip_prefix("def ").or_else(|| line.strip_prefix("class "));
+        let defined = defined.and_then(|rest| rest.split(['(', ':', '[', ' ']).next()).unwrap_or_default();
+        defined == name || heck::ToSnakeCase::to_snake_case(defined) == *name
+    };
+    let names = |line: &str, name: &str| {
+        line.starts_with('@') && [format!("\"{name}\""), format!("'{name}'")].iter().any(|name| line.contains(name))
+    };
+    let is_there = |name: &str| code.iter().any(|line| defines(line, name) || names(line, name));
+    needed.iter().filter(|name| !is_there(name)).cloned().collect()
+}
+
 /// Whether a hook is still a stub: whether its code calls a method `unimplemented`; comments and texts do not count.
 pub fn is_stub(code: &str) -> bool {
     code.parse::<TokenStream>().is_ok_and(calls)

@@ -10,6 +10,7 @@ mod lab;
 mod monitor;
 mod owner;
 mod progress;
+mod python;
 mod results;
 mod runner;
 mod scan;
@@ -87,6 +88,10 @@ enum Command {
         /// Write a monitor of the space as a program, instead of runners.
         #[arg(long, value_name = "NAME", conflicts_with = "campaign")]
         eddi: Option<String>,
+        /// Write types and stubs of hooks in Python beside the file, or into the folder that `-o` names, instead of
+        /// runners.
+        #[arg(long, conflicts_with_all = ["campaign", "eddi", "runtime", "self_contained", "vendor"])]
+        python: bool,
         /// Write nothing; exit with code 1 if anything would be written.
         #[arg(long, conflicts_with = "force")]
         check: bool,
@@ -216,7 +221,7 @@ pub fn run(
             commands::check_only(shell, language, &file, deny, diagnostics.format)
         }
         Command::Fmt { files, check, diagnostics } => fmt::fmt(shell, language, &files, check, diagnostics.format),
-        Command::Generate { generation, eddi, check, dry_run, self_contained, vendor } => {
+        Command::Generate { generation, eddi, python, check, dry_run, self_contained, vendor } => {
             let purpose = match (check, dry_run) {
                 (true, _) => Purpose::Check,
                 (false, true) => Purpose::DryRun,
@@ -224,6 +229,7 @@ pub fn run(
             };
             let options = EnvironmentOptions { self_contained, vendor, ..generation.options() };
             match eddi {
+                _ if python => python::generate(shell, language, &generation, &options, purpose),
                 Some(eddi) => monitor::generate(shell, language, &eddi, &generation, &options, purpose),
                 None => commands::generate(shell, language, &generation, &options, purpose),
             }

@@ -263,7 +263,7 @@ mod tests {
         assert_eq!(checked.summary, "1 campaign, 2 operations, 2 metrics, 1 requirement");
         assert_eq!(checked.plans[0].plan.source, "demo.sesame");
         assert_eq!(checked.plans[0].hooks[0].metric, "close_calls");
-        assert!(checked.plans[0].needs_rust(is_built_in));
+        assert!(checked.plans[0].needs_a_runner(is_built_in) && checked.plans[0].has_hooks());
     }
 
     #[test]
@@ -271,7 +271,7 @@ mod tests {
         let checked = new_project(Simulator::Python);
         assert_eq!((checked.errors, checked.diagnostics.as_str()), (0, ""));
         assert_eq!(checked.summary, "1 campaign, 2 operations, 3 metrics, 1 requirement");
-        assert!(!checked.plans[0].needs_rust(is_built_in));
+        assert!(!checked.plans[0].needs_a_runner(is_built_in) && !checked.plans[0].has_hooks());
     }
 
     #[test]

@@ -17,6 +17,7 @@ pub const ALL: &[(&str, &str)] = &[
     ("project/simulator/lib.rs.tera", project::SIMULATOR),
     ("project/space.sesame.tera", project::SPACE),
     ("runner/hook.rs.tera", runner::HOOK),
+    ("runner/hooks.py.tera", runner::PYTHON_HOOKS),
     ("runner/monitor_readme.md.tera", runner::MONITOR_README),
     ("runner/operation_hook.rs.tera", runner::OPERATION_HOOK),
     ("runner/runner_readme.md.tera", runner::RUNNER_README),

@@ -2,6 +2,8 @@
 
 /// The user's first version of a metric hook.
 pub const HOOK: &str = include_str!("../runner/hook.rs.tera");
+/// The user's first version of all hooks of a space, in Python.
+pub const PYTHON_HOOKS: &str = include_str!("../runner/hooks.py.tera");
 /// The user's first version of an operation hook.
 pub const OPERATION_HOOK: &str = include_str!("../runner/operation_hook.rs.tera");
 /// The README of the folder that holds the runners of a space.

@@ -9,3 +9,4 @@ mod package;
 mod pytest;
 mod results;
 mod search;
+mod stubs;

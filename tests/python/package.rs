@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use sesame_base::observation::Outcome;
-use sesame_record::Repository;
+use sesame_record::{Repository, TestRecord};
 use sesame_tests::{Done, command, copy, done, fresh_folder, sesamec, workspace};
 
 /// A folder with the package, a space, and programs in Python.
@@ -124,4 +124,34 @@ impl Place {
         run.args(["run", "cart/cart.sesame", "--"]).args(arguments).current_dir(&self.folder);
         done(run.env("PYTHONPATH", &self.folder))
     }
+
+    /// `sesamec` in the folder of the space, where Python can import the package.
+    pub(crate) fn sesamec(&self, arguments: &[&str]) -> Command {
+        let mut run = command(sesamec());
+        run.args(arguments).current_dir(self.folder.join("cart")).env("PYTHONPATH", &self.folder);
+        run
+    }
+
+    /// Runs the campaign of a space without a program of Python around it.
+    pub(crate) fn command_on(&self, space: &str, arguments: &[&str]) -> Done {
+        let mut run = self.sesamec(&["run", space, "--"]);
+        done(run.args(arguments))
+    }
+}
+
+/// What a run recorded.
+pub(crate) struct Results {
+    /// The causes of crashes and timeouts.
+    pub(crate) crashes: Vec<String>,
+    pub(crate) repository: Repository,
+    pub(crate) records: Vec<TestRecord>,
+}
+
+/// What the run in this folder recorded.
+pub(crate) fn results(place: &Place, folder: &str) -> Results {
+    let repository = Repository::open(&place.folder.join(folder)).expect("there are results");
+    let last = repository.numbers().expect("it can be read").last().copied().expect("there is a test");
+    let records = repository.records(0..=last, false).expect("they can be read");
+    let message = |record: &TestRecord| record.observation.outcome.message().map(str::to_owned);
+    Results { crashes: records.iter().filter_map(message).collect(), repository, records }
 }

@@ -270,7 +270,7 @@ impl Agent<'_> {
 
     /// What the workers of a campaign are started with. Its files are unpacked first.
     fn program(&self, announcement: &Announcement) -> Result<WorkerProgram, Preparation> {
-        let Program { plan, space, simulator, compiled, one_at_a_time: _ } = &announcement.program;
+        let Program { plan, space, simulator, hooks, compiled, one_at_a_time: _ } = &announcement.program;
         let own = self.settings.folder.join(&announcement.campaign);
         // What an earlier edition of the campaign left here may have other files.
         match fs::remove_dir_all(&own) {
@@ -301,7 +301,9 @@ impl Agent<'_> {
         } else {
             space.join(bundle::inside(simulator).map_err(|error| Preparation::Failed(error.to_string()))?)
         };
-        let runner = Interpreted { plan: plan.clone(), directory, space, simulator };
+        let hooks = hooks.as_deref().map(serde_json::from_str).transpose();
+        let hooks = hooks.map_err(|error| Preparation::Failed(format!("its hooks cannot be read: {error}")))?;
+        let runner = Interpreted { plan: plan.clone(), directory, space, simulator, hooks };
         match compiled {
             None => WorkerProgram::interpreted(&runner).map_err(failed),
             Some(Compiled { program, .. }) => {

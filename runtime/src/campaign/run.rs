@@ -18,7 +18,7 @@ use sesame_search::{Evaluated, Neighbours, Strategy};
 #[cfg(feature = "agents")]
 use crate::campaign::agents::{Agents, Fleet};
 #[cfg(unix)]
-use crate::campaign::asked::{Asked, carries_out_tests};
+use crate::campaign::asked::{self, Asked};
 use crate::campaign::confirmation::ConfirmedSearch;
 use crate::campaign::error::{CampaignError, Halt};
 use crate::campaign::evaluator::{Evaluator, Happened};
@@ -73,7 +73,7 @@ pub fn run_campaign(
     let timeout = settings.first_timeout();
     let mut executor: Box<dyn Executor> = match place {
         #[cfg(unix)]
-        Place::Here if carries_out_tests() => Box::new(Asked::connect(plan)?),
+        Place::Here if asked::carries_out_tests() => Box::new(Asked::connect(plan)?),
         Place::Here => Box::new(Pool::start(&settings.pool(task.evaluations(plan), directory, timeout))?),
         #[cfg(feature = "agents")]
         Place::Fleet(fleet) => Box::new(Agents::start(*fleet, timeout)?),

@@ -1,4 +1,5 @@
-//! The program that a supervisor starts as its worker: its own, which is called again, or a compiled runner.
+//! The program that a supervisor starts as its worker: its own, which is called again, a compiled runner, or a Python
+//! that imports the hooks.
 
 use std::io::{self, Write as _};
 #[cfg(target_os = "linux")]
@@ -10,13 +11,14 @@ use std::sync::Arc;
 
 #[cfg(target_os = "linux")]
 use crate::campaign::fork_server::ForkServer;
+#[cfg(feature = "process")]
+use crate::campaign::python::Examined;
 
 /// A program as it becomes a worker.
 #[derive(Debug, Clone)]
 pub struct WorkerProgram {
     executable: PathBuf,
-    /// Whether it is the program of this process.
-    own: bool,
+    kind: Kind,
     /// What a worker has to know of the runner, as JSON; `None` if it contains that.
     runner: Option<String>,
     /// The lab in which it runs tests, instead of the simulator.
@@ -30,12 +32,25 @@ pub struct WorkerProgram {
     forks: Option<Arc<ForkServer>>,
 }
 
+/// What a program is.
+#[derive(Debug, Clone)]
+enum Kind {
+    /// That of this process.
+    Own,
+    /// A compiled runner.
+    #[cfg(feature = "agents")]
+    Compiled,
+    /// One that imports hooks in Python.
+    #[cfg(feature = "process")]
+    Python(Box<Examined>),
+}
+
 impl WorkerProgram {
     /// A compiled runner contains all that its workers have to know.
     pub fn compiled() -> io::Result<Self> {
         Ok(WorkerProgram {
             executable: std::env::current_exe()?,
-            own: true,
+            kind: Kind::Own,
             runner: None,
             lab: None,
             records: false,
@@ -45,11 +60,34 @@ impl WorkerProgram {
         })
     }
 
-    /// A program that interprets a runner reads it from a file.
+    /// A program that interprets a runner reads it from a file. If the runner has hooks in Python, they are imported
+    /// once now, and the error says what is wrong with them.
     #[cfg(feature = "process")]
     pub fn interpreted(runner: &crate::interpreted::Interpreted) -> io::Result<Self> {
+        let program = WorkerProgram::sending(runner)?;
+        if runner.hooks.is_none() {
+            return Ok(program);
+        }
+        let examined = crate::campaign::python::examine(runner)?;
+        let executable =
+            if examined.python.as_os_str().is_empty() { program.executable } else { examined.python.clone() };
+        Ok(WorkerProgram { executable, kind: Kind::Python(Box::new(examined)), ..program })
+    }
+
+    /// The program of this process, as a worker that is sent this runner.
+    #[cfg(feature = "process")]
+    fn sending(runner: &crate::interpreted::Interpreted) -> io::Result<Self> {
         let text = serde_json::to_string(runner)?;
         Ok(WorkerProgram { runner: Some(text), ..WorkerProgram::compiled()? })
+    }
+
+    /// The hooks in Python that its workers import.
+    #[cfg(feature = "process")]
+    pub(crate) fn python(&self) -> Option<&Examined> {
+        match &self.kind {
+            Kind::Python(examined) => Some(examined),
+            _ => None,
+        }
     }
 
     /// A compiled runner, as a program of its own, with this plan and these folders in place of those that it was
@@ -57,13 +95,13 @@ impl WorkerProgram {
     #[cfg(feature = "agents")]
     pub(crate) fn compiled_at(executable: &Path, runner: &crate::interpreted::Interpreted) -> io::Result<Self> {
         let executable = executable.canonicalize()?;
-        Ok(WorkerProgram { executable, own: false, ..WorkerProgram::interpreted(runner)? })
+        Ok(WorkerProgram { executable, kind: Kind::Compiled, ..WorkerProgram::sending(runner)? })
     }
 
     /// The compiled runner that it is, if that is not the program of this process.
     #[cfg(feature = "agents")]
     pub(crate) fn of_another_process(&self) -> Option<&Path> {
-        (!self.own).then_some(self.executable.as_path())
+        matches!(self.kind, Kind::Compiled).then_some(self.executable.as_path())
     }
 
     /// The runner as other machines can run it; `None` if only its program knows it, and for one in a lab or with a
@@ -94,8 +132,22 @@ impl WorkerProgram {
 
     /// The command that starts a worker with this folder of its own.
     pub(super) fn command(&self, directory: &Path) -> io::Result<Command> {
-        let mut command = if self.own { self.this_program() } else { Command::new(&self.executable) };
+        let mut command = match &self.kind {
+            Kind::Own => self.this_program(),
+            #[cfg(feature = "agents")]
+            Kind::Compiled => Command::new(&self.executable),
+            #[cfg(feature = "process")]
+            // Only the arguments of a fork count.
+            Kind::Python(_) if self.is_forked() => Command::new(&self.executable),
+            #[cfg(feature = "process")]
+            Kind::Python(_) => crate::campaign::python::command(&self.executable),
+        };
         command.arg("worker");
+        // A worker of Python is not a keeper of its simulator's program.
+        #[cfg(all(feature = "process", target_os = "linux"))]
+        if self.is_forked() || matches!(self.kind, Kind::Python(_)) {
+            command.arg("--keeper").arg(format!("/proc/{}/exe", std::process::id()));
+        }
         if let Some(text) = &self.runner {
             let file = directory.join("runner.json");
             // A file of an earlier worker goes, and nothing is written through a link.
@@ -128,6 +180,14 @@ impl WorkerProgram {
     #[cfg(not(target_os = "linux"))]
     fn this_program(&self) -> Command {
         Command::new(&self.executable)
+    }
+
+    #[cfg(feature = "process")]
+    fn is_forked(&self) -> bool {
+        #[cfg(target_os = "linux")]
+        return self.forks.is_some();
+        #[cfg(not(target_os = "linux"))]
+        false
     }
 
     /// What forks workers, if they are not started as programs.

@@ -96,6 +96,10 @@ pub enum Internal {
         #[cfg(feature = "process")]
         #[arg(long, value_name = "FILE")]
         runner: Option<std::path::PathBuf>,
+        /// The program that keeps the programs that it starts; by default its own
+        #[cfg(feature = "process")]
+        #[arg(long, value_name = "FILE")]
+        keeper: Option<std::path::PathBuf>,
         /// The lab in which it runs tests, instead of the simulator
         #[cfg(feature = "process")]
         #[arg(long, value_name = "NAME")]
@@ -219,9 +223,15 @@ impl Internal {
     /// Serves a supervisor that sent a plan, with this code for it, if there is any.
     #[cfg(feature = "process")]
     pub(super) fn serve_with(&self, code: Option<&Runner>) -> Result<ExitCode, Failure> {
-        let Internal::Worker { runner: Some(file), lab, record, relay, supervisor } = self else {
+        let Internal::Worker { runner: Some(file), keeper, lab, record, relay, supervisor } = self else {
             return Err(Failure("a worker needs the file with its plan".to_owned()));
         };
+        #[cfg(target_os = "linux")]
+        if let Some(keeper) = keeper {
+            sesame_lifecycle::use_keeper(keeper.clone());
+        }
+        #[cfg(not(target_os = "linux"))]
+        let _ = keeper;
         let sent = crate::interpreted::Interpreted::read(file)
             .map_err(|error| Failure(format!("cannot read {}: {error}", file.display())))?;
         let runner = code.map_or_else(|| sent.runner(), |code| sent.with_code_of(code));

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use serde::Serialize;
 
-use sesame_plan::{CampaignPlan, Domain, Task};
+use sesame_plan::{CampaignPlan, Domain, MetricId, Task};
 use sesame_record as record;
 use sesame_record::{Recorder, Repository};
 use sesame_relay::files::SpaceFiles as _;
@@ -159,27 +159,22 @@ pub(super) fn refuse_unfilled(session: &Session, plan: &CampaignPlan, allowed: b
     if session.program.of_another_process().is_some() {
         return Ok(());
     }
-    let runner = &session.runner;
-    let unfilled = unimplemented_hooks(plan, runner.hooks);
+    let Unfilled { metrics, operations, hooks } = unfilled(session, plan);
     let mut objectives = Vec::new();
-    for id in unfilled {
-        let name = &plan.metric(id).name;
-        if plan.campaign.objectives.contains(&id) && !allowed {
+    for name in metrics {
+        let is_objective = |&id: &MetricId| plan.metric(id).name == name;
+        if plan.campaign.objectives.iter().any(is_objective) && !allowed {
             objectives.push(format!("`{name}`"));
         } else {
             say(format_args!("warning: the hook of metric `{name}` is not filled in yet"));
         }
     }
-    for id in unimplemented_operations(plan, runner.operations) {
-        say(format_args!(
-            "warning: the hook of operation `{}` is not filled in yet: it disturbs nothing",
-            plan.operation(id).name
-        ));
+    for name in operations {
+        say(format_args!("warning: the hook of operation `{name}` is not filled in yet: it disturbs nothing"));
     }
     if objectives.is_empty() {
         return Ok(());
     }
-    let hooks = runner.directory.join("../hooks");
     let hooks = hooks.canonicalize().unwrap_or(hooks);
     Err(Failure(format!(
         "the hook of {} is not filled in yet, and the campaign is to optimise it\n  \
@@ -187,6 +182,33 @@ pub(super) fn refuse_unfilled(session: &Session, plan: &CampaignPlan, allowed: b
         objectives.join(" and "),
         shown(&hooks)
     )))
+}
+
+/// Hooks that are not filled in yet.
+struct Unfilled<'a> {
+    metrics: Vec<&'a str>,
+    operations: Vec<&'a str>,
+    /// Where hooks are.
+    hooks: PathBuf,
+}
+
+fn unfilled<'a>(session: &'a Session, plan: &'a CampaignPlan) -> Unfilled<'a> {
+    let runner = &session.runner;
+    #[cfg(feature = "process")]
+    if let Some(python) = session.program.python() {
+        return Unfilled {
+            metrics: python.unfilled_metrics.iter().map(String::as_str).collect(),
+            operations: python.unfilled_operations.iter().map(String::as_str).collect(),
+            hooks: runner.directory.join(&runner.space).join(python.file.as_deref().unwrap_or_default()),
+        };
+    }
+    let metrics = unimplemented_hooks(plan, runner.hooks).into_iter();
+    let operations = unimplemented_operations(plan, runner.operations).into_iter();
+    Unfilled {
+        metrics: metrics.map(|id| plan.metric(id).name.as_str()).collect(),
+        operations: operations.map(|id| plan.operation(id).name.as_str()).collect(),
+        hooks: runner.directory.join("../hooks"),
+    }
 }
 
 /// Puts back files of the space that an earlier run left changed, and keeps other runners of the space out if tests may

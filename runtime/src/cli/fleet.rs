@@ -265,6 +265,7 @@ impl Reached {
         let changes_files = plan.operations.iter().any(|operation| operation.kind.calls_code_outside_the_run());
         let program = Program {
             plan: runner.plan,
+            hooks: runner.hooks.as_ref().map(serde_json::to_string).transpose()?,
             space: files,
             simulator: simulator.replace('\\', "/"),
             compiled,

@@ -50,6 +50,14 @@ pub(super) fn replay_recording(session: &Session, args: &ReplayRecordingArgs) ->
     use super::terminal::{print, print_json, say, text_options};
 
     let Session { runner, plan, .. } = session;
+    #[cfg(feature = "process")]
+    if let Some(python) = session.program.python() {
+        return Err(Failure(format!(
+            "`replay-recording` feeds metrics in this process, and {} is Python, which runs in workers: run a campaign that \
+             measures them, or use formulas",
+            python.file.as_deref().unwrap_or("their code")
+        )));
+    }
     refuse_unfilled(session, plan, true)?;
     let wires = WireTable::new(plan);
     let table = MetricTable::new(plan, &wires, runner.hooks)?;

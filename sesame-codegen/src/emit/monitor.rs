@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::package::Kind;
 use super::{ABI, Environment, Problem, add_options, by, doc_lines, package, problem, rust, sha256};
-use crate::files::{Owner, Tree};
+use crate::files::{MANIFEST, Owner, Tree};
 use crate::names;
 use crate::plan::{MonitorPlan, runtime_feature};
 
@@ -49,6 +49,7 @@ pub fn monitor(monitor: &MonitorPlan, environment: &Environment) -> Result<Tree,
     json.push('\n');
     let mut tree = Tree {
         folder: names::monitor_folder(name),
+        manifest: MANIFEST.to_owned(),
         files: BTreeMap::new(),
         generator: plan.generator.clone(),
         source: plan.source.clone(),

@@ -16,7 +16,7 @@ use crate::names::{self, Scope};
 use crate::plan::{Called, Offline, OperationPlan, RunnerPlan};
 
 /// Where an operation is declared, for example ``operation `bend_path` (kuka_cell.sesame:41)``.
-fn declared(operation: &OperationPlan) -> String {
+pub(super) fn declared(operation: &OperationPlan) -> String {
     format!("operation `{}` ({}:{})", operation.operation, operation.source, operation.line)
 }
 
@@ -71,7 +71,7 @@ fn fields(operation: &OperationPlan) -> Vec<(&Parameter, &str, String)> {
 }
 
 /// What a parameter may be, in a sentence.
-fn permitted(parameter: &Parameter) -> String {
+pub(super) fn permitted(parameter: &Parameter) -> String {
     let unit = parameter.unit.as_ref().map(|unit| format!(" In {unit}.")).unwrap_or_default();
     match &parameter.domain {
         Domain::Number { low, high, .. } => format!("From {low} to {high}.{unit}"),

@@ -1,4 +1,4 @@
-//! `.sesame/manifest.json`: what was generated, so that the next generation can tell its own files from edited ones.
+//! Manifests: what was generated, so that the next generation can tell its own files from edited ones.
 
 use std::collections::BTreeMap;
 
@@ -8,9 +8,6 @@ use crate::files::{Hook, Owner, Tree};
 
 /// The version of the manifest's format.
 const SCHEMA: u32 = 1;
-
-/// Where the manifest is, relative to its tree.
-pub(super) const PATH: &str = ".sesame/manifest.json";
 
 /// A manifest.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

@@ -64,8 +64,8 @@ fn a_runner_of_a_ros_system_has_its_transport_and_says_how_nodes_are_remapped() 
     let wiring = (0..runner.plan.topics.len()).map(|topic| cut(topic == 0)).collect();
     runner.plan.simulator = ros2(0, wiring);
     let without_hooks = RunnerPlan { hooks: Vec::new(), operations: Vec::new(), ..runner.clone() };
-    assert!(without_hooks.needs_rust(|_| false));
-    assert!(!without_hooks.needs_rust(|feature| feature == "ros2"));
+    assert!(without_hooks.needs_a_runner(|_| false) && !without_hooks.has_hooks());
+    assert!(!without_hooks.needs_a_runner(|feature| feature == "ros2"));
     let trees = emit(&[runner], &environment()).unwrap();
     let file = |path: &str| trees[1].files[path].text().into_owned();
     assert!(file("src/generated/campaign.rs").contains("::sesame_runtime::transport::ros2("));

@@ -124,7 +124,7 @@ pub(super) fn generate(
     };
     let mode = mode(purpose, generation);
     let (out, report) = write(shell, generation, options, &checked, &chosen, mode)?;
-    conclude(shell, &out, &report, purpose, &generation.file)
+    conclude(shell, &out, &report, purpose, &shell::command_for("generate", &generation.file))
 }
 
 /// How trees are applied.
@@ -143,7 +143,7 @@ pub(super) fn conclude(
     out: &Path,
     report: &Report,
     purpose: Purpose,
-    file: &Path,
+    remedy: &str,
 ) -> anyhow::Result<ExitCode> {
     if purpose == Purpose::DryRun {
         shell::asked_for(&visible_lines(&preview(out, report)))?;
@@ -158,7 +158,7 @@ pub(super) fn conclude(
             };
             shell.text(&visible_lines(&format!("{} {what}", out.join(&file.path).display())));
         }
-        bail!("out of date: run `{}`", shell::command_for("generate", file));
+        bail!("out of date: run `{remedy}`");
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -392,6 +392,18 @@ pub(super) fn tell_tree(shell: Shell, out: &Path, tree: &Tree, report: &Report, 
     shell.did(verb, format!("{}: {} files{changed}{more}", out.join(&tree.folder).display(), files.len()));
 }
 
+/// Hooks of the user's that may need a change.
+pub(super) fn tell_changed_hooks(shell: Shell, out: &Path, report: &Report) {
+    for hook in &report.changed_hooks {
+        let mut lines = format!("the inputs of {} have changed; adapt {}:", hook.of, out.join(&hook.path).display());
+        let changes = hook.gone.iter().map(|line| ('-', line)).chain(hook.new.iter().map(|line| ('+', line)));
+        for (sign, line) in changes {
+            lines = format!("{lines}\n           {sign} {line}");
+        }
+        shell.warning(lines);
+    }
+}
+
 /// What was generated.
 fn tell(shell: Shell, out: &Path, trees: &[Tree], report: &Report, mode: Mode, space: &RunnerPlan) {
     let created: Vec<_> =
@@ -412,14 +424,7 @@ fn tell(shell: Shell, out: &Path, trees: &[Tree], report: &Report, mode: Mode, s
             shell.did(verb, what);
         }
     }
-    for hook in &report.changed_hooks {
-        let mut lines = format!("the inputs of {} have changed; adapt {}:", hook.of, out.join(&hook.path).display());
-        let changes = hook.gone.iter().map(|line| ('-', line)).chain(hook.new.iter().map(|line| ('+', line)));
-        for (sign, line) in changes {
-            lines = format!("{lines}\n           {sign} {line}");
-        }
-        shell.warning(lines);
-    }
+    tell_changed_hooks(shell, out, report);
     for orphan in &report.orphans {
         shell.warning(match orphan {
             Orphan::Hook { path, of } if declares(space, of) => {

@@ -10,7 +10,7 @@ use sesame_codegen::{emit, names, output};
 
 use super::arguments::{Generation, Purpose};
 use super::commands::{all, check, conclude, mode, tell_tree};
-use super::shell::Shell;
+use super::shell::{self, Shell};
 use crate::frontend::{Checked, Language};
 
 pub(super) fn generate(
@@ -36,7 +36,7 @@ pub(super) fn generate(
     let trees = [tree];
     let report = output::apply(&out, &trees, mode)?;
     tell_tree(shell, &out, &trees[0], &report, mode, "");
-    conclude(shell, &out, &report, purpose, &generation.file)
+    conclude(shell, &out, &report, purpose, &shell::command_for("generate", &generation.file))
 }
 
 /// The monitor of a name.

@@ -1,7 +1,8 @@
 //! The runners of a project's campaigns, from the project: `run`, and the commands that every runner has.
 //!
-//! A campaign whose simulator is a program and that uses no hooks is interpreted: the runtime is linked into `sesamec`,
-//! and its plan says everything. The runner of any other campaign is a crate, which is generated and built first.
+//! A campaign whose simulator is a program and that uses no hooks in Rust is interpreted: the runtime is linked into
+//! `sesamec`, its plan says everything, and its workers import hooks in Python. The runner of any other campaign is a
+//! crate, which is generated and built first.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -11,8 +12,9 @@ use anyhow::{Context as _, bail};
 use clap::{Arg, ArgAction, ArgMatches};
 use sesame_codegen::output::Mode;
 use sesame_codegen::plan::RunnerPlan;
-use sesame_codegen::stubs::unfilled_objectives;
+use sesame_codegen::stubs::{filled_in, unfilled_objectives};
 use sesame_codegen::{emit, environment, names};
+use sesame_plan::python::PythonHooks;
 use sesame_runtime::Interpreted;
 use sesame_runtime::cli::{CALLER, Caller, EXIT_CODES, RUNNER, Running, Showing};
 use sesame_runtime::transport::is_built_in;
@@ -98,13 +100,47 @@ impl<'a> Found<'a> {
 
     /// The runner as data, if the campaign needs no Rust beyond these features.
     fn interpreted(&self, is_there: fn(feature: &str) -> bool) -> anyhow::Result<Option<Interpreted>> {
-        let has_code = sesame_runtime::cli::is_called_by_code();
-        let needs_rust = if has_code { RunnerPlan::needs_a_runner } else { RunnerPlan::needs_rust };
-        if needs_rust(self.plan(), is_there) || self.chooses_runtime()? {
+        if sesame_runtime::cli::carries_out_tests() {
+            return self.as_data().map(Some);
+        }
+        if self.plan().needs_a_runner(is_there) || self.chooses_runtime()? {
+            return Ok(None);
+        }
+        let hooks = self.plan().has_hooks().then(|| self.hooks_in_python()).transpose()?;
+        // A process that forks workers may have hooks of its own for them.
+        let in_python = sesame_runtime::cli::forks_workers() || hooks.as_ref().is_some_and(|it| it.file.is_some());
+        if hooks.is_some() && !in_python {
             return Ok(None);
         }
         environment::check_program(&self.generation.file, self.plan())?;
-        self.as_data().map(Some)
+        let runner = Interpreted { hooks, ..self.as_data()? };
+        Ok(Some(runner).filter(|runner| !self.has_all_hooks_in_rust(runner)))
+    }
+
+    /// Where the campaign's hooks are, if they are in Python.
+    fn hooks_in_python(&self) -> anyhow::Result<PythonHooks> {
+        let plan = self.plan();
+        let campaign = &plan.plan.campaign.name;
+        let folder = self.generation.runners(&[campaign]).join("hooks");
+        let file = names::python_hooks(&self.generation.file);
+        let is_there = self.generation.file.with_file_name(&file).is_file();
+        Ok(PythonHooks {
+            file: is_there.then_some(file),
+            metrics: plan.hooks.iter().map(|hook| hook.metric.clone()).collect(),
+            operations: plan.operations.iter().map(|operation| operation.operation.clone()).collect(),
+            in_rust: filled_in(plan, &folder)
+                .into_iter()
+                .map(|(name, file)| (name, file.display().to_string()))
+                .collect(),
+        })
+    }
+
+    /// Whether no hook that the campaign calls is in Python, and each is filled in in Rust. What is wrong with the
+    /// hooks in Python is said when they are to be used.
+    fn has_all_hooks_in_rust(&self, runner: &Interpreted) -> bool {
+        let Some(hooks) = &runner.hooks else { return false };
+        let all = self.plan().called_hooks().all(|name| hooks.in_rust.iter().any(|(filled, _)| filled == name));
+        all && sesame_runtime::cli::hooks_in_python(runner).is_ok_and(|registered| registered.is_empty())
     }
 
     /// Whether its runner links another runtime than this program.
@@ -124,7 +160,7 @@ impl<'a> Found<'a> {
         }
         owner::check(file, &folder)?;
         let directory = std::path::absolute(&folder).with_context(|| format!("cannot find {}", folder.display()))?;
-        Ok(Interpreted { plan: emit::plan_json(self.plan()), directory, space, simulator })
+        Ok(Interpreted { plan: emit::plan_json(self.plan()), directory, space, simulator, hooks: None })
     }
 }
 
@@ -220,6 +256,13 @@ pub(super) fn passed_on(runners: &clap::Command, name: &str, matches: &ArgMatche
 /// Generates and builds a runner, and becomes it.
 fn compiled(shell: Shell, found: &Found<'_>, arguments: &[OsString], allow_unfilled: bool) -> anyhow::Result<ExitCode> {
     let Found { generation, checked, chosen, caller } = found;
+    if sesame_runtime::cli::forks_workers() {
+        bail!(
+            "campaign `{}` runs with Rust code of yours or another runtime, so not in a process of Python: run it with \
+             `sesamec run`",
+            found.plan().plan.campaign.name
+        );
+    }
     let mode = if generation.force { Mode::Force } else { Mode::Write };
     let (out, _) = write(shell, generation, &generation.options(), checked, &[*chosen], mode)?;
     let runner = found.plan();

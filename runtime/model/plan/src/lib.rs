@@ -32,6 +32,7 @@ mod monitor_program;
 mod objective;
 mod operation;
 mod operation_kind;
+pub mod python;
 mod ros2;
 mod score;
 mod search;

@@ -13,9 +13,9 @@ use std::fs::File;
 use std::io::{self, PipeReader, PipeWriter, Read as _, Write as _};
 use std::os::fd::AsRawFd as _;
 use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, ExitStatus, Stdio};
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, OnceLock, PoisonError};
 use std::thread;
 use std::time::Duration;
 
@@ -67,11 +67,22 @@ impl Report {
     }
 }
 
+/// What keepers are, if not the program of this process.
+static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+
+/// From now on, keepers are this program: for a process whose own is another, such as Python. The first call decides.
+pub fn use_keeper(program: PathBuf) {
+    PROGRAM.get_or_init(|| program);
+}
+
 /// The command of a keeper, without the program and its arguments.
 pub(crate) fn command(report: &Report, background: bool) -> Command {
-    // This is the running executable even if its file was replaced.
-    let mut command = Command::new("/proc/self/exe");
-    if let Some(name) = std::env::args_os().next() {
+    let mut command = match PROGRAM.get() {
+        Some(program) => Command::new(program),
+        // This is the running executable even if its file was replaced.
+        None => Command::new("/proc/self/exe"),
+    };
+    if let Some(name) = std::env::args_os().next().filter(|_| PROGRAM.get().is_none()) {
         command.arg0(name);
     }
     command.arg("simulator").arg(std::process::id().to_string()).arg(report.name());

@@ -20,5 +20,5 @@ pub mod process_group;
 mod program;
 
 #[cfg(target_os = "linux")]
-pub use keeper::{Kept, become_program, keep};
+pub use keeper::{Kept, become_program, keep, use_keeper};
 pub use program::{Alarm, Input, PostMortem, Program, Running, StartError, end_programs};

@@ -37,6 +37,9 @@ pub struct Program {
     pub space: Files,
     /// The folder that the simulator runs in, as seen from that of the space.
     pub simulator: String,
+    /// The hooks in Python that its tests call, as JSON; `None` if they call none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hooks: Option<String>,
     /// The runner that was compiled for the campaign; `None` if the agent's own program interprets the plan.
     pub compiled: Option<Compiled>,
     /// Whether an agent can run only one test at a time: operations change files of the space, or all tests use the
