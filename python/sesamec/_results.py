@@ -573,7 +573,7 @@ def _points(
 ) -> Iterable[tuple[float, float]]:
     """The changes of a metric, from pieces of up to 64 points: the same values as those of the view `series`.
 
-    The view computes doubles from their digits, in any client of SQLite, and takes a hundred times as long.
+    The view computes doubles from their digits, in any client of SQLite, and takes ten times as long.
     """
     sql = (
         f"SELECT p.points, p.start_ns, p.tick_ns, p.times, p.numbers FROM {pieces} p JOIN metrics m ON m.id = p.metric "
