@@ -48,7 +48,7 @@ impl Tested {
     }
 
     fn space(&self) -> String {
-        fs::read_to_string(self.place.folder.join("cart/cart.sesame")).unwrap()
+        fs::read_to_string(self.place.folder.join("cart/cart.sesame")).expect("a project has a space")
     }
 
     /// Runs pytest in the project's folder.
