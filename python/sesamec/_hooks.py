@@ -6,6 +6,7 @@ import difflib
 import inspect
 import keyword
 import re
+from dataclasses import fields
 from types import SimpleNamespace
 from typing import Any, Callable, NamedTuple, TypeVar, overload
 
@@ -94,7 +95,9 @@ def message(space: str, name: str, /) -> Callable[[type[T]], type[T]]:
     """Registers a dataclass as the message of a space that hooks get; for modules that `sesamec generate` writes."""
 
     def register(kind: type[T]) -> type[T]:
-        setattr(kind, "__sesame_message__", name)
+        declared: type[Any] = kind
+        # Constants of the class are no fields.
+        declared.__sesame_fields__ = tuple(field.name for field in fields(declared))
         MESSAGES[space, name] = kind
         return kind
 

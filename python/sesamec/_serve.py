@@ -68,7 +68,7 @@ def _number(value: Any) -> Any:
 def _fields(value: Any) -> dict[str, Any]:
     """The fields of a dataclass, as messages name them."""
     names = [field.name for field in fields(value)]
-    of_space = hasattr(value, "__sesame_message__")
+    of_space = hasattr(value, "__sesame_fields__")
     return {wire_name(name) if of_space else name: getattr(value, name) for name in names}
 
 

@@ -373,7 +373,9 @@ impl OperationHook for PythonOperation {
                 if !(dropped && returned.is_none()) {
                     let read = code.types.write_back(&code.plan, shapes, ty, message, &returned);
                     called(read.map_err(|unfit| match unfit {
-                        Unfit::Raised(error) => error,
+                        Unfit::Raised(error) => {
+                            PyTypeError::new_err(format!("what `{word}` returned is no message: {}", error.value(py)))
+                        }
                         Unfit::Mismatch(mismatch) => PyTypeError::new_err(format!(
                             "`{word}` has to return the message, also if it does not change it: {mismatch}"
                         )),

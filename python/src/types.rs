@@ -216,13 +216,12 @@ impl Types {
             };
             let none = field.optional && part.is_none();
             match record.get_mut(&field.name) {
-                Some(Value::Undeclared(_)) if none => {}
+                Some(Value::Undeclared(_)) | None if none => {}
                 Some(old) if none => *old = Value::Undeclared(Text::from("null")),
                 Some(old @ Value::Undeclared(_)) => {
                     *old = self.read(plan, shapes, &field.ty, part).map_err(inside)?;
                 }
                 Some(old) => self.write_back(plan, shapes, &field.ty, old, part).map_err(inside)?,
-                None if none => {}
                 None => added.push((&field.name, self.read(plan, shapes, &field.ty, part).map_err(inside)?)),
             }
         }

@@ -156,10 +156,9 @@ fn entries<'py>(payload: &Bound<'py, PyAny>) -> Option<Bound<'py, PyDict>> {
 /// The fields of an object of a class that stands for a message of a space, by their names on the wire. Those that are
 /// not set are left out.
 pub(crate) fn fields_of_class<'py>(payload: &Bound<'py, PyAny>) -> Option<Vec<(String, Bound<'py, PyAny>)>> {
-    payload.getattr_opt(pyo3::intern!(payload.py(), "__sesame_message__")).ok()??;
     let names =
-        payload.getattr(pyo3::intern!(payload.py(), "__dataclass_fields__")).ok()?.cast_into::<PyDict>().ok()?;
-    let fields = names.keys().iter().filter_map(|name| {
+        payload.getattr_opt(pyo3::intern!(payload.py(), "__sesame_fields__")).ok()??.cast_into::<PyTuple>().ok()?;
+    let fields = names.iter().filter_map(|name| {
         let name = name.cast_into::<PyString>().ok()?;
         let value = payload.getattr(&name).ok()?;
         Some((python::named(name.to_str().ok()?).to_owned(), value))

@@ -249,6 +249,33 @@ fn a_hook_that_lacks_a_method_of_its_class_is_refused_before_anything_runs() {
 }
 
 #[test]
+fn a_message_with_a_field_that_the_space_does_not_declare_is_the_crash_of_its_test() {
+    let Some(place) = carrier("python_stubs_misspelt") else { return };
+    generate(&place, &[]).expect(0);
+    for (returned, said) in [
+        (
+            "state.loadad = True; return state",
+            "AttributeError: 'State' object has no attribute 'loadad' in on_state (carrier_hooks.py",
+        ),
+        (
+            "return {**{'class': 'x', 'from': state.from_, 'way': [], 'self': 1, 'loaded': True}, 'lode': 1}",
+            "message `State` has no field `lode`: it has class_, from_, way, self_, loaded, note",
+        ),
+        (
+            "return {'class': 'x'}",
+            "`on_state` has to return the message, also if it does not change it: field `from`: expected a value, found nothing",
+        ),
+    ] {
+        place
+            .write("cart/carrier_hooks.py", &HOOKS.replace("        return state\n", &format!("        {returned}\n")));
+        place.command_on("carrier.sesame", &["--results", "misspelt"]);
+        let crashes = results(&place, "cart/misspelt/1").crashes;
+        assert!(crashes.iter().any(|crash| crash.contains(said)), "{returned}: {crashes:?}");
+        fs::remove_dir_all(place.folder.join("cart/misspelt")).unwrap();
+    }
+}
+
+#[test]
 fn classes_of_another_version_of_the_space_are_refused() {
     let Some(place) = carrier("python_stubs_outdated") else { return };
     generate(&place, &[]).expect(0);

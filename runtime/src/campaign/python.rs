@@ -96,10 +96,8 @@ pub(crate) fn registered(runner: &Interpreted) -> io::Result<Vec<String>> {
 fn imported(runner: &Interpreted) -> io::Result<(Examined, Vec<(String, String)>)> {
     let text = serde_json::to_vec(runner)?;
     #[cfg(target_os = "linux")]
-    let forks = ForkServer::of_this_process();
-    #[cfg(target_os = "linux")]
-    if let Some(server) = forks {
-        let answer = asked_of_fork(&server, text)?;
+    if let Some(server) = ForkServer::of_this_process() {
+        let answer = asked_of_fork(&server, &text)?;
         return concluded(runner, PathBuf::new(), answer);
     }
     let mut refusals = Vec::new();
@@ -213,7 +211,7 @@ fn read(from: &mut impl Read) -> Vec<u8> {
 
 /// Asks a process that forks, by a fork of it.
 #[cfg(target_os = "linux")]
-fn asked_of_fork(server: &std::sync::Arc<ForkServer>, text: Vec<u8>) -> io::Result<Answer> {
+fn asked_of_fork(server: &std::sync::Arc<ForkServer>, text: &[u8]) -> io::Result<Answer> {
     use std::net::Shutdown;
     use std::os::unix::net::UnixStream;
 
@@ -224,10 +222,8 @@ fn asked_of_fork(server: &std::sync::Arc<ForkServer>, text: Vec<u8>) -> io::Resu
     let forked = server.fork(&command, Path::new("."), 0, &theirs.into(), &output)?;
     ours.set_read_timeout(Some(IMPORT_LIMIT))?;
     let mut answer = Vec::new();
-    let heard = ours
-        .write_all(&text)
-        .and_then(|()| ours.shutdown(Shutdown::Write))
-        .and_then(|()| ours.read_to_end(&mut answer));
+    let heard =
+        ours.write_all(text).and_then(|()| ours.shutdown(Shutdown::Write)).and_then(|()| ours.read_to_end(&mut answer));
     forked.end();
     match heard {
         Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {

@@ -1,5 +1,6 @@
 //! Python: a module with classes for messages, parameters and hooks, and the user's first version of the hooks.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -124,7 +125,7 @@ impl<'a> Space<'a> {
         let fields = plan.messages.iter().flat_map(|message| &message.fields).map(|field| field.name.as_str());
         let parameters = runner.operations.iter().flat_map(|operation| &operation.parameters);
         let taken = fields.chain(parameters.map(|(parameter, _)| parameter.name.as_str())).map(attribute);
-        let taken: Vec<String> = taken.map(|name| name.into_owned()).collect();
+        let taken: Vec<String> = taken.map(Cow::into_owned).collect();
         let mut scope = Scope::reserving(&["ABC", "ClassVar", "Literal"]);
         for name in taken {
             scope.take(name, "_");
@@ -206,7 +207,7 @@ impl<'a> Space<'a> {
             text.push_str(&dataclass(&decorator, self.class(id), &doc, fields));
             text.push_str(&constants(message));
         }
-        for operation in self.runner.operations.iter() {
+        for operation in &self.runner.operations {
             let decorator = format!(
                 "@sesamec.parameters(\"{}\", \"{}\")\n@dataclass(frozen=True, slots=True, kw_only=True)",
                 plan.space, operation.operation
@@ -267,7 +268,7 @@ impl<'a> Space<'a> {
 
     fn metric(&self, hook: &HookPlan) -> Stub {
         let mut doc = lines(&hook.doc);
-        paragraph(&mut doc, format!("The hook of {}.", metrics::declared(hook)));
+        paragraph(&mut doc, &format!("The hook of {}.", metrics::declared(hook)));
         let meaning = metrics::meaning(hook).map(|meaning| format!(" {meaning}")).unwrap_or_default();
         doc.push(one_line(&format!("An object is created for each run.{meaning}")));
         let methods = hook.inputs.iter().map(|&input| {
@@ -297,7 +298,7 @@ impl<'a> Space<'a> {
 
     fn operation(&self, operation: &OperationPlan) -> Stub {
         let mut doc = lines(&operation.doc);
-        paragraph(&mut doc, format!("The hook of {}.", operations::declared(operation)));
+        paragraph(&mut doc, &format!("The hook of {}.", operations::declared(operation)));
         doc.push("An object is created for each use in a test, and for each run.".to_owned());
         let parameters =
             Argument { name: "parameters".to_owned(), ty: format!("{}.{}", self.module, parameters_class(operation)) };
@@ -503,11 +504,11 @@ fn lines(doc: &str) -> Vec<String> {
 }
 
 /// Adds a paragraph.
-fn paragraph(doc: &mut Vec<String>, text: String) {
+fn paragraph(doc: &mut Vec<String>, text: &str) {
     if !doc.is_empty() {
         doc.push(String::new());
     }
-    doc.push(one_line(&text));
+    doc.push(one_line(text));
 }
 
 fn described(doc: &str, more: [Option<String>; 3]) -> Vec<String> {

@@ -106,7 +106,7 @@ impl<'a> Found<'a> {
         if self.plan().needs_a_runner(is_there) || self.chooses_runtime()? {
             return Ok(None);
         }
-        let hooks = self.plan().has_hooks().then(|| self.hooks_in_python()).transpose()?;
+        let hooks = self.plan().has_hooks().then(|| self.hooks_in_python());
         // A process that forks workers may have hooks of its own for them.
         let in_python = sesame_runtime::cli::forks_workers() || hooks.as_ref().is_some_and(|it| it.file.is_some());
         if hooks.is_some() && !in_python {
@@ -118,13 +118,13 @@ impl<'a> Found<'a> {
     }
 
     /// Where the campaign's hooks are, if they are in Python.
-    fn hooks_in_python(&self) -> anyhow::Result<PythonHooks> {
+    fn hooks_in_python(&self) -> PythonHooks {
         let plan = self.plan();
         let campaign = &plan.plan.campaign.name;
         let folder = self.generation.runners(&[campaign]).join("hooks");
         let file = names::python_hooks(&self.generation.file);
         let is_there = self.generation.file.with_file_name(&file).is_file();
-        Ok(PythonHooks {
+        PythonHooks {
             file: is_there.then_some(file),
             metrics: plan.hooks.iter().map(|hook| hook.metric.clone()).collect(),
             operations: plan.operations.iter().map(|operation| operation.operation.clone()).collect(),
@@ -132,7 +132,7 @@ impl<'a> Found<'a> {
                 .into_iter()
                 .map(|(name, file)| (name, file.display().to_string()))
                 .collect(),
-        })
+        }
     }
 
     /// Whether no hook that the campaign calls is in Python, and each is filled in in Rust. What is wrong with the
