@@ -60,7 +60,7 @@ class Table:
             missing = any(value is None for value in values)
             dtype = PANDAS_MISSING.get(kind, PANDAS[kind]) if missing else PANDAS[kind]
             series[name] = pandas.Series(values, dtype=dtype, name=name)
-        frame = pandas.DataFrame(series, columns=list(self.columns))
+        frame: pandas.DataFrame = pandas.DataFrame(series, columns=list(self.columns))
         if self.index is not None:
             frame = frame.set_index(self.index)
         frame.attrs["units"] = dict(self.units)

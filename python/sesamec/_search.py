@@ -89,7 +89,7 @@ class Search:
         with theirs:
             # Ctrl-C is for the loop: the end of this process, or of the search, stops the program.
             self._supervisor = subprocess.Popen(
-                command, stdin=theirs, stdout=subprocess.PIPE, env=environment, start_new_session=True
+                command, stdin=theirs.fileno(), stdout=subprocess.PIPE, env=environment, start_new_session=True
             )
         self._connection = ours
         self._lines = ours.makefile("r", encoding="utf-8")

@@ -25,7 +25,8 @@ pub enum Outcome {
     /// It ran to its end, but no operation had any effect.
     NoEffect,
     /// It ran to its end in another program, which did not count what operations did: whether they had any effect is
-    /// not known, and its counters are all zero. Only imported tests end so.
+    /// not known, and its counters are all zero. Imported tests end so, and those of a search whose tests the user's
+    /// own program carries out.
     Unknown,
     /// The simulator or a hook failed or panicked, or the worker process died.
     Crash {
