@@ -10,7 +10,7 @@ use sesame_tests::{command, done, fresh_folder, sesamec};
 
 use crate::package::{CART, Place, results};
 
-const HOOKS: &str = r#"
+const HOOKS: &str = r"
 import os, time, sesamec
 
 @sesamec.metric
@@ -24,7 +24,7 @@ class TooClose:
 class Bend:
     def on_command(self, command, parameters, ctx):
         return command + parameters.shift * ctx.draw(0.5, 1.0)
-"#;
+";
 
 /// The cart, with a metric and an operation that are hooks.
 fn place(name: &str, simulator: &str) -> Option<Place> {

@@ -144,7 +144,7 @@ fn generate(place: &Place, arguments: &[&str]) -> Done {
 }
 
 fn read(place: &Place, file: &str) -> String {
-    fs::read_to_string(place.folder.join("cart").join(file)).unwrap()
+    fs::read_to_string(place.folder.join("cart").join(file)).expect("a file that was generated")
 }
 
 #[test]
@@ -291,14 +291,14 @@ fn classes_of_another_version_of_the_space_are_refused() {
 fn checkers(place: &Place) -> Option<[Command; 2]> {
     let python = sesame_peers::named("SESAME_PYTHON_PEERS")?;
     let folder = sesame_peers::named("SESAME_PYRIGHT")?;
-    let paths = std::env::join_paths([place.folder.clone(), place.folder.join("cart")]).unwrap();
+    let paths = std::env::join_paths([place.folder.clone(), place.folder.join("cart")]).expect("no colon");
     let mut mypy = command(&python);
     mypy.args(["-m", "mypy", "--strict", "--python-version", "3.10", "--cache-dir", ".mypy_cache"])
         .env("MYPYPATH", paths);
     let mut pyright = command(folder.join("node_modules/.bin/pyright"));
     pyright.args(["--pythonversion", "3.10", "--pythonpath"]).arg(&python);
     let settings = r#"{"strict": ["*_types.py", "*_hooks.py"], "reportMissingModuleSource": false}"#;
-    fs::write(place.folder.join("cart/pyrightconfig.json"), settings).unwrap();
+    fs::write(place.folder.join("cart/pyrightconfig.json"), settings).expect("a file can be written");
     copy(&place.folder.join("sesamec"), &place.folder.join("cart/sesamec"));
     Some([mypy, pyright])
 }
@@ -379,8 +379,8 @@ fn what_people_write_in_a_space_cannot_break_out_of_a_docstring() {
 
 /// The blocks of Python on the page that register hooks.
 fn examples_of_hooks() -> Vec<String> {
-    let page = fs::read_to_string(workspace().join("docs/python.md")).unwrap();
-    let blocks = page.split("```python\n").skip(1).map(|block| block.split("```").next().unwrap().to_owned());
+    let page = fs::read_to_string(workspace().join("docs/python.md")).expect("a page of the documentation");
+    let blocks = page.split("```python\n").skip(1).map(|block| block.split("```").next().expect("its text").to_owned());
     blocks.filter(|block| block.contains("\n@sesamec.") || block.starts_with("@sesamec.")).collect()
 }
 
