@@ -263,6 +263,17 @@ fn compiled(shell: Shell, found: &Found<'_>, arguments: &[OsString], allow_unfil
             found.plan().plan.campaign.name
         );
     }
+    let hooks = found.hooks_in_python();
+    let in_rust = |name: &str| hooks.in_rust.iter().any(|(filled, _)| filled == name);
+    if let Some(file) = &hooks.file
+        && let Some(name) = found.plan().called_hooks().find(|name| !in_rust(name))
+    {
+        bail!(
+            "`{name}` has no hook in Rust, and {file} is Python, which a compiled runner does not call: campaign `{}` runs \
+             compiled because of its simulator or the options, so write the hook in Rust",
+            found.plan().plan.campaign.name
+        );
+    }
     let mode = if generation.force { Mode::Force } else { Mode::Write };
     let (out, _) = write(shell, generation, &generation.options(), checked, &[*chosen], mode)?;
     let runner = found.plan();
