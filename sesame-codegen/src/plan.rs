@@ -121,6 +121,17 @@ impl RunnerPlan {
         simulator.properties().in_runner || runtime_feature(simulator).is_some_and(|feature| !is_built_in(feature))
     }
 
+    /// What of this campaign is in Rust, for sentences: the user's simulator and hooks. Nothing, when its runner is
+    /// built for another reason.
+    pub fn parts_in_rust(&self) -> Vec<String> {
+        let simulator = self.plan.simulator.rust_type().map(|path| format!("the simulator `{path}`"));
+        let metrics = self.hooks.iter().filter(|hook| self.uses(hook));
+        let metrics = metrics.map(|hook| format!("the metric `{}`", hook.metric));
+        let operations = self.operations.iter().filter(|operation| self.applies(operation));
+        let operations = operations.map(|operation| format!("the operation `{}`", operation.operation));
+        simulator.into_iter().chain(metrics).chain(operations).collect()
+    }
+
     /// Whether this campaign calls hooks of the user's.
     pub fn has_hooks(&self) -> bool {
         self.called_hooks().next().is_some()

@@ -22,6 +22,7 @@ mod study;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use anyhow::Context as _;
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use sesame_codegen::environment::{EnvironmentOptions, RuntimeChoice};
 use sesame_codegen::project;
@@ -184,6 +185,12 @@ enum Command {
         /// The shell.
         shell: clap_complete::Shell,
     },
+    /// Write the manual pages of sesamec into a folder, one for each command.
+    #[command(after_help = "For example: sesamec man-pages ~/.local/share/man/man1")]
+    ManPages {
+        /// The folder; it is made if it is missing.
+        folder: PathBuf,
+    },
 }
 
 /// The commands of runners, as runners have them.
@@ -196,6 +203,13 @@ fn command_line() -> clap::Command {
     let runners = runners();
     let names = runners.get_subcommands().map(|command| command.get_name().to_owned());
     names.fold(Arguments::command(), |command, name| command.mut_subcommand(name, runner::of_a_campaign))
+}
+
+/// `sesamec man-pages`
+fn man_pages(folder: &Path) -> anyhow::Result<()> {
+    std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    clap_mangen::generate_to(command_line(), folder)
+        .with_context(|| format!("cannot write manual pages into {}", folder.display()))
 }
 
 /// The command line of this process.
@@ -266,6 +280,7 @@ pub fn run(
             clap_complete::generate(shell, &mut command_line(), "sesamec", &mut script);
             shell::asked_for(&String::from_utf8_lossy(&script)).map(|()| ExitCode::SUCCESS)
         }
+        Command::ManPages { folder } => man_pages(&folder).map(|()| ExitCode::SUCCESS),
     };
     result.unwrap_or_else(|failure| {
         shell.failure(&failure);

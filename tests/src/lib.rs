@@ -68,9 +68,7 @@ fn program(name: &str) -> PathBuf {
 /// The same, optimised, built if it is not up to date: for what is to be measured.
 pub fn optimised_sesamec() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
-    PROGRAM.get_or_init(|| {
-        built(&["--package", "sesamec", "--features", "mavlink,mqtt,ros1,ros2,rosbridge,simlog", "--release"])
-    })
+    PROGRAM.get_or_init(|| built(&["--package", "sesamec", "--release"]))
 }
 
 /// The program that cargo builds when it is asked for this.

@@ -1,12 +1,13 @@
 //! Building a runner by cargo.
 
-use std::io::{BufRead as _, BufReader, Read as _};
+use std::io::{BufRead as _, BufReader, ErrorKind, Read as _};
 use std::path::{Path, PathBuf};
 use std::process::{ChildStdout, Command, Stdio};
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, bail};
+use sesame_codegen::plan::RunnerPlan;
 use sesame_runtime::cli::RUNNER;
 
 use super::progress::{CargoMessage, Crates, Metadata};
@@ -21,6 +22,9 @@ const LINE_EVERY: Duration = Duration::from_secs(5);
 /// A build that takes longer is worth counting its crates.
 const SHORT: Duration = Duration::from_secs(1);
 
+/// What the first build of a runner takes, on two processors of 2026. Later ones compile only the runner's own crate.
+const COST: &str = "one to two minutes, and 500 MB on the disk";
+
 /// What becomes known while cargo builds.
 enum Event {
     /// Cargo says something.
@@ -33,16 +37,21 @@ enum Event {
 
 /// Builds the runner in a folder and returns its program. Shows progress; what rustc has to say of the user's hooks is
 /// passed on.
-pub(super) fn build(shell: Shell, folder: &Path, campaign: &str) -> anyhow::Result<PathBuf> {
+pub(super) fn build(shell: Shell, folder: &Path, runner: &RunnerPlan) -> anyhow::Result<PathBuf> {
+    let campaign = &runner.plan.campaign.name;
     let start = Instant::now();
-    let mut cargo = cargo(folder)
+    let cargo = cargo(folder)
         .env(RUNNER, folder.canonicalize().unwrap_or_else(|_| folder.to_owned()))
         .args(["build", "--quiet", "--message-format=json-render-diagnostics"])
         .args(["--color", if shell.colour() { "always" } else { "never" }])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
-        .spawn()
-        .context("cannot start `cargo` to build the runner; install Rust from https://rustup.rs")?;
+        .spawn();
+    let mut cargo = match cargo {
+        Ok(cargo) => cargo,
+        Err(error) if error.kind() == ErrorKind::NotFound => bail!("{}", without_cargo(runner, folder)),
+        Err(error) => return Err(error).context("cannot start `cargo` to build the runner"),
+    };
     let mut errors = cargo.stderr.take().expect("it is piped");
     let errors = std::thread::spawn(move || {
         let mut text = Vec::new();
@@ -94,6 +103,23 @@ pub(super) fn build(shell: Shell, folder: &Path, campaign: &str) -> anyhow::Resu
         }
         _ => bail!("cannot build the runner in {}; see the errors above", folder.display()),
     }
+}
+
+/// What to do about a campaign that needs Rust on a machine that has none.
+fn without_cargo(runner: &RunnerPlan, folder: &Path) -> String {
+    let parts = runner.parts_in_rust();
+    let why = if parts.is_empty() { String::new() } else { format!(": {} is in Rust", parts.join(", ")) };
+    let why = if parts.len() > 1 { why.replace(" is in Rust", " are in Rust") } else { why };
+    let mut text = format!(
+        "the runner of campaign `{}` has to be compiled{why}, and there is no `cargo` on PATH\n  install Rust from \
+         https://rustup.rs, and a C compiler: about 1 GB; the first build of {} then takes {COST}",
+        runner.plan.campaign.name,
+        folder.display(),
+    );
+    if !parts.is_empty() {
+        text += "\n  or write these parts in Python, for which nothing is compiled: see docs/python.md";
+    }
+    text
 }
 
 /// Cargo, in the folder of a runner: it reads the settings of the folder it runs in, and there the runners' common

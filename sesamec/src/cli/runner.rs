@@ -295,7 +295,7 @@ fn compiled(shell: Shell, found: &Found<'_>, arguments: &[OsString], allow_unfil
         }
     }
     let folder = out.join(names::campaign_folder(campaign));
-    let program = build::build(shell, &folder, campaign)?;
+    let program = build::build(shell, &folder, runner)?;
     if by_agents(arguments) {
         if found.chooses_runtime()? {
             bail!(

@@ -108,8 +108,7 @@ pub(super) fn scan(shell: Shell, language: &Language, scan: &Scan) -> anyhow::Re
 )))]
 fn without(what: &str, feature: &str) -> anyhow::Result<ExitCode> {
     anyhow::bail!(
-        "this sesamec was built without {what}; in a checkout of Sesame, `cargo install --path sesamec --features \
-         {feature}` installs one with it, and `cargo run --features {feature} -p sesamec -- scan {feature}` runs \
-         one"
+        "this sesamec was built without {what}; that of a release has it, and so has one that was installed without \
+         `--no-default-features`, or with `--features {feature}`"
     )
 }
