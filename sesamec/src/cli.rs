@@ -298,6 +298,28 @@ mod tests {
     }
 
     #[test]
+    fn every_command_has_a_manual_page_with_its_options() {
+        fn check(command: &clap::Command, page: &str, folder: &Path) {
+            let path = folder.join(page).with_extension("1");
+            let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+            assert!(text.contains(".SH SYNOPSIS") && text.contains(".SH DESCRIPTION"), "{page}");
+            for option in command.get_arguments().filter(|arg| !arg.is_hide_set()).filter_map(clap::Arg::get_long) {
+                assert!(text.contains(&format!("\\-\\-{}", option.replace('-', "\\-"))), "{page} --{option}");
+            }
+            for command in command.get_subcommands().filter(|command| !command.is_hide_set()) {
+                check(command, &format!("{page}-{}", command.get_name()), folder);
+            }
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let manual = folder.path().join("man/man1");
+        man_pages(&manual).unwrap();
+        check(&command_line(), "sesamec", &manual);
+        let hidden = command_line().get_subcommands().filter(|it| it.is_hide_set()).count();
+        let pages = std::fs::read_dir(&manual).unwrap().count();
+        assert!(hidden > 0 && pages > 60, "{hidden} hidden, {pages} pages");
+    }
+
+    #[test]
     fn the_page_on_the_commands_has_every_option() {
         let page = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/sesamec.md");
         let page = std::fs::read_to_string(page).unwrap();

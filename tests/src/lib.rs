@@ -404,7 +404,7 @@ pub fn shared(name: &str, key: &str, campaign: &str, project: impl FnOnce(&str) 
 
 /// What tells this run of the tests from all others: nextest says it, and cargo runs all tests of a program in one
 /// process.
-fn this_run() -> &'static str {
+pub fn this_run() -> &'static str {
     static RUN: OnceLock<String> = OnceLock::new();
     RUN.get_or_init(|| {
         std::env::var("NEXTEST_RUN_ID").unwrap_or_else(|_| {
