@@ -43,7 +43,8 @@ pub(crate) fn file(begins: &str, ends: &str) -> PathBuf {
         name.starts_with(begins) && name.ends_with(ends)
     };
     let entries = fs::read_dir(&folder).expect("a release is a folder");
-    let found: Vec<PathBuf> = entries.map(|entry| entry.expect("it can be listed").path()).filter(|it| fits(it)).collect();
+    let found: Vec<PathBuf> =
+        entries.map(|entry| entry.expect("it can be listed").path()).filter(|it| fits(it)).collect();
     let [file] = &found[..] else { panic!("{begins}…{ends} in {}: {found:?}", folder.display()) };
     file.clone()
 }

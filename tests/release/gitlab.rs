@@ -16,7 +16,7 @@ fn its_jobs_leave_junit_and_fail_as_their_comments_say() {
     assert!(night.err.contains("not as required: R1 is violated in"), "{}", night.err);
     assert!(read(&checkout.folder.join("sesame-results/campaign.xml")).contains("<failure"));
 
-    checkout.keep("sesame-results/1", "T2");
+    checkout.keep("sesame-results/1", &["T2", "--pin"]);
     checkout.bash(&gitlab_script(&file, "change"), &environment).expect(0);
     assert!(read(&checkout.folder.join("sesame-results/regression-tests.xml")).contains("first_T2"));
 }

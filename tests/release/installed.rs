@@ -155,7 +155,8 @@ fn a_campaign_in_rust_says_what_it_needs_and_runs_with_released_crates() {
     let Some(mut machine) = Machine::with_wheel("rust") else { return };
     // The crates around the project take the place of those in the registry.
     let crates = file("sesame-crates-", ".tar.gz");
-    done(command("tar").arg("xzf").arg(&crates).args(["--strip-components", "1"]).current_dir(&machine.folder)).expect(0);
+    done(command("tar").arg("xzf").arg(&crates).args(["--strip-components", "1"]).current_dir(&machine.folder))
+        .expect(0);
     machine.sesamec(&["new", "demo"]).expect(0);
     let refused = machine.sesamec(&["run", "demo/demo.sesame"]).expect(1).err;
     for said in ["the simulator `", "no `cargo` on PATH", "https://rustup.rs", "GB", "minutes", "Python"] {
@@ -184,11 +185,14 @@ fn a_campaign_in_rust_says_what_it_needs_and_runs_with_released_crates() {
 fn the_static_program_runs_anywhere_with_its_pages() {
     let mut machine = Machine::new("static");
     let archive = file("sesamec-", "-unknown-linux-musl.tar.gz");
-    done(command("tar").arg("xzf").arg(&archive).args(["--strip-components", "1"]).current_dir(&machine.folder)).expect(0);
+    done(command("tar").arg("xzf").arg(&archive).args(["--strip-components", "1"]).current_dir(&machine.folder))
+        .expect(0);
     portable(&machine.folder.join("sesamec"));
     let said = done(command("file").arg("-L").arg(machine.folder.join("sesamec")));
     eprintln!("{}", said.out.trim());
-    for part in ["README.md", "CHANGELOG.md", "LICENSE-APACHE", "LICENSE-MIT", "third-party-licences.txt", "Containerfile"] {
+    for part in
+        ["README.md", "CHANGELOG.md", "LICENSE-APACHE", "LICENSE-MIT", "third-party-licences.txt", "Containerfile"]
+    {
         assert!(machine.folder.join(part).is_file(), "{part}");
     }
     for page in ["sesamec.1", "sesamec-run.1", "sesamec-lab-brief.1"] {
@@ -262,7 +266,8 @@ fn the_image_that_the_recipe_makes_runs_a_campaign() {
     }
     let machine = Machine::new("container");
     let archive = file("sesamec-", "-unknown-linux-musl.tar.gz");
-    done(command("tar").arg("xzf").arg(&archive).args(["--strip-components", "1"]).current_dir(&machine.folder)).expect(0);
+    done(command("tar").arg("xzf").arg(&archive).args(["--strip-components", "1"]).current_dir(&machine.folder))
+        .expect(0);
     let store = ["--root", "images", "--runroot", "images-run", "--storage-driver", "vfs"];
     let buildah = |what: &str, arguments: &[&str]| {
         let mut buildah = command("buildah");

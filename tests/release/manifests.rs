@@ -99,7 +99,9 @@ fn the_command_has_every_transport_unless_it_is_built_without() {
     let features = table("sesamec/Cargo.toml")["features"].as_table().expect("it is a table").clone();
     let default = features["default"].as_array().expect("it is a list");
     let contains = |feature: &str| {
-        let of = |name: &str| features[name].as_array().is_some_and(|parts| parts.iter().any(|it| it.as_str() == Some(feature)));
+        let of = |name: &str| {
+            features[name].as_array().is_some_and(|parts| parts.iter().any(|it| it.as_str() == Some(feature)))
+        };
         default.iter().filter_map(toml::Value::as_str).any(|name| name == feature || of(name))
     };
     let missing: Vec<&String> = features.keys().filter(|name| *name != "default" && !contains(name)).collect();
@@ -118,5 +120,8 @@ fn the_script_explains_its_pieces_and_refuses_others() {
     }
     assert!(help.ends_with("how to publish it.\n"), "{help}");
     let refused = release(&["wheels"]).expect(2);
-    assert_eq!(refused.err, format!("error: `wheels` is not a piece of a release; there are {}\n", pieces.trim_end_matches(')')));
+    assert_eq!(
+        refused.err,
+        format!("error: `wheels` is not a piece of a release; there are {}\n", pieces.trim_end_matches(')'))
+    );
 }

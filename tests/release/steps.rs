@@ -159,13 +159,10 @@ impl Checkout {
             inputs.get(name).unwrap_or_else(|| panic!("the input `{name}` is required")).clone()
         };
         let mut job = Job { ran: Vec::new(), outputs: BTreeMap::new(), summary: String::new() };
-        let files: Vec<(&str, PathBuf)> = [
-            ("GITHUB_PATH", "path"),
-            ("GITHUB_OUTPUT", "output"),
-            ("GITHUB_STEP_SUMMARY", "summary"),
-        ]
-        .map(|(variable, file)| (variable, self.server.join(file)))
-        .into();
+        let files: Vec<(&str, PathBuf)> =
+            [("GITHUB_PATH", "path"), ("GITHUB_OUTPUT", "output"), ("GITHUB_STEP_SUMMARY", "summary")]
+                .map(|(variable, file)| (variable, self.server.join(file)))
+                .into();
         for step in action.steps.iter().skip_while(|step| step.name != from).filter(|step| !step.script.is_empty()) {
             if let Some((name, value)) = step.condition.split_once(" == ") {
                 let wanted = value.trim_end_matches(" }}").trim_matches('\'');
@@ -199,10 +196,10 @@ impl Checkout {
         self.folder.join(file).exists()
     }
 
-    /// Adds a recorded test of a run to the space, as a regression test.
-    pub(crate) fn keep(&self, results: &str, test: &str) {
+    /// Adds a recorded test of a run to the space, as a regression test: `test` is its number, and how it is exported.
+    pub(crate) fn keep(&self, results: &str, test: &[&str]) {
         let mut export = command(sesamec());
-        export.args(["export", SPACE, "--results", results, test]).current_dir(&self.folder);
+        export.args(["export", SPACE, "--results", results]).args(test).current_dir(&self.folder);
         let block = done(&mut export).expect(0).out;
         let space = self.folder.join(SPACE);
         fs::write(&space, format!("{}\n{block}", read(&space))).expect("a space can be written");
