@@ -20,7 +20,12 @@ fn accepted(program: &str, arguments: &[&str], file: &str, (right, wrong): (&str
 
 #[test]
 fn kubernetes_reads_the_manifest() {
-    accepted("kubernetes-validate", &["--strict"], "examples/agents/kubernetes.yaml", ("replicas: 10", "replicas: ten"));
+    accepted(
+        "kubernetes-validate",
+        &["--strict"],
+        "examples/agents/kubernetes.yaml",
+        ("replicas: 10", "replicas: ten"),
+    );
 }
 
 #[test]

@@ -158,13 +158,31 @@ fn a_campaign_in_rust_says_what_it_needs_and_runs_with_released_crates() {
     done(command("tar").arg("xzf").arg(&crates).args(["--strip-components", "1"]).current_dir(&machine.folder))
         .expect(0);
     machine.sesamec(&["new", "demo"]).expect(0);
+    let listed = |folder: &str| fs::read_dir(machine.folder.join(folder)).expect("it is there").count();
+    let before = listed("demo");
     let refused = machine.sesamec(&["run", "demo/demo.sesame"]).expect(1).err;
-    for said in ["the simulator `", "no `cargo` on PATH", "https://rustup.rs", "GB", "minutes", "Python"] {
+    assert_eq!(listed("demo"), before, "nothing is generated that cannot be built");
+    for said in [
+        "the simulator `",
+        "the metric `close_calls`",
+        "no `cargo` on PATH",
+        "https://rustup.rs",
+        "GB",
+        "minutes",
+        "Python",
+    ] {
         assert!(refused.contains(said), "{said}:\n{refused}");
     }
+    machine.sesamec(&["generate", "demo/demo.sesame"]).expect(0);
     let manifest = read(&machine.folder.join("demo/runners/first/Cargo.toml"));
     let released = format!("sesame-runtime = \"={}\"", env!("CARGO_PKG_VERSION"));
     assert!(manifest.contains(&released), "{manifest}");
+
+    let hook = machine.folder.join("demo/runners/hooks/close_calls.rs");
+    let stub = read(&hook);
+    let filled = stub.replace("ctx.unimplemented();", "if clearance < 0.5 && ctx.every_seconds(0.2) { ctx.add(1.0); }");
+    assert_ne!(stub, filled);
+    fs::write(&hook, filled).expect("a hook can be written");
 
     let cargo = Path::new(env!("CARGO")).parent().expect("it is in a folder").to_owned();
     machine.path.extend([cargo, "/usr/bin".into(), "/bin".into()]);
@@ -176,6 +194,7 @@ fn a_campaign_in_rust_says_what_it_needs_and_runs_with_released_crates() {
     run.env("CARGO_HOME", of_cargo).env("RUSTUP_HOME", rustup);
     let ran = machine.timed("sesamec run, with a runner to compile", run.args(["run", "demo/demo.sesame"])).expect(0);
     ran.digest();
+    assert!(!ran.err.contains("warning"), "{}", ran.err);
     let target = machine.folder.join("demo/runners/target");
     eprintln!("{}", done(command("du").arg("-sh").arg(target)).out.trim());
 }

@@ -1,6 +1,6 @@
 //! Building a runner by cargo.
 
-use std::io::{BufRead as _, BufReader, ErrorKind, Read as _};
+use std::io::{BufRead as _, BufReader, Read as _};
 use std::path::{Path, PathBuf};
 use std::process::{ChildStdout, Command, Stdio};
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
@@ -37,21 +37,16 @@ enum Event {
 
 /// Builds the runner in a folder and returns its program. Shows progress; what rustc has to say of the user's hooks is
 /// passed on.
-pub(super) fn build(shell: Shell, folder: &Path, runner: &RunnerPlan) -> anyhow::Result<PathBuf> {
-    let campaign = &runner.plan.campaign.name;
+pub(super) fn build(shell: Shell, folder: &Path, campaign: &str) -> anyhow::Result<PathBuf> {
     let start = Instant::now();
-    let cargo = cargo(folder)
+    let mut cargo = cargo(folder)
         .env(RUNNER, folder.canonicalize().unwrap_or_else(|_| folder.to_owned()))
         .args(["build", "--quiet", "--message-format=json-render-diagnostics"])
         .args(["--color", if shell.colour() { "always" } else { "never" }])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
-        .spawn();
-    let mut cargo = match cargo {
-        Ok(cargo) => cargo,
-        Err(error) if error.kind() == ErrorKind::NotFound => bail!("{}", without_cargo(runner, folder)),
-        Err(error) => return Err(error).context("cannot start `cargo` to build the runner"),
-    };
+        .spawn()
+        .context("cannot start `cargo` to build the runner")?;
     let mut errors = cargo.stderr.take().expect("it is piped");
     let errors = std::thread::spawn(move || {
         let mut text = Vec::new();
@@ -105,21 +100,27 @@ pub(super) fn build(shell: Shell, folder: &Path, runner: &RunnerPlan) -> anyhow:
     }
 }
 
-/// What to do about a campaign that needs Rust on a machine that has none.
-fn without_cargo(runner: &RunnerPlan, folder: &Path) -> String {
-    let parts = runner.parts_in_rust();
-    let why = if parts.is_empty() { String::new() } else { format!(": {} is in Rust", parts.join(", ")) };
-    let why = if parts.len() > 1 { why.replace(" is in Rust", " are in Rust") } else { why };
-    let mut text = format!(
-        "the runner of campaign `{}` has to be compiled{why}, and there is no `cargo` on PATH\n  install Rust from \
-         https://rustup.rs, and a C compiler: about 1 GB; the first build of {} then takes {COST}",
-        runner.plan.campaign.name,
-        folder.display(),
-    );
-    if !parts.is_empty() {
-        text += "\n  or write these parts in Python, for which nothing is compiled: see docs/python.md";
+/// Insists that there is a cargo to build the runner of a campaign, before anything is generated or filled in for it.
+pub(super) fn check_cargo(runner: &RunnerPlan) -> anyhow::Result<()> {
+    let name = Path::new("cargo").with_extension(std::env::consts::EXE_EXTENSION);
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    if std::env::split_paths(&path).any(|folder| folder.join(&name).is_file()) {
+        return Ok(());
     }
-    text
+    let parts = runner.parts_in_rust();
+    let (why, instead) = match &parts[..] {
+        [] => (String::new(), ""),
+        [one] => (format!(": {one} is in Rust"), "\n  or write it in Python, for which nothing is compiled"),
+        all => {
+            let why = format!(": {} are in Rust", all.join(", "));
+            (why, "\n  or write them in Python, for which nothing is compiled")
+        }
+    };
+    bail!(
+        "the runner of campaign `{}` has to be compiled{why}, and there is no `cargo` on PATH\n  install Rust from \
+         https://rustup.rs, and a C compiler: about 1 GB; the first build then takes {COST}{instead}",
+        runner.plan.campaign.name,
+    )
 }
 
 /// Cargo, in the folder of a runner: it reads the settings of the folder it runs in, and there the runners' common

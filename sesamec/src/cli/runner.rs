@@ -274,6 +274,7 @@ fn compiled(shell: Shell, found: &Found<'_>, arguments: &[OsString], allow_unfil
             found.plan().plan.campaign.name
         );
     }
+    build::check_cargo(found.plan())?;
     let mode = if generation.force { Mode::Force } else { Mode::Write };
     let (out, _) = write(shell, generation, &generation.options(), checked, &[*chosen], mode)?;
     let runner = found.plan();
@@ -295,7 +296,7 @@ fn compiled(shell: Shell, found: &Found<'_>, arguments: &[OsString], allow_unfil
         }
     }
     let folder = out.join(names::campaign_folder(campaign));
-    let program = build::build(shell, &folder, runner)?;
+    let program = build::build(shell, &folder, campaign)?;
     if by_agents(arguments) {
         if found.chooses_runtime()? {
             bail!(
