@@ -1,9 +1,9 @@
-"""What the program `sesamec` is made of, from what cargo says: a bill of materials, and the licences to pass on.
+"""What the program `sesamec` and its Python module are made of, from what cargo says: a bill of materials, and the licences to pass on.
 
     python3 packaging/bill_of_materials.py TARGET BOM LICENCES
 
 `BOM` is written as CycloneDX 1.5, and `LICENCES` holds the texts that each package has in its folder. Packages are
-those that cargo links into the program for the platform `TARGET`, and the C library that one of them brings along;
+those that cargo links into them for the platform `TARGET`, and the C library that one of them brings along;
 programs of the build, and macros, are not part of it. The same sources give the same files, byte for byte.
 
 Tools that write such bills write one for each crate of a workspace, beside its manifest, and take longer to compile
@@ -22,6 +22,7 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
 PROGRAM = "sesamec"
+MODULE = "sesame-python"
 TEXTS = re.compile(r"(licen[cs]e|copying|notice|unlicense|copyright)", re.IGNORECASE)
 
 Package = tuple[str, str]
@@ -34,9 +35,9 @@ def cargo(*arguments: str) -> str:
 
 
 def linked(target: str) -> set[Package]:
-    """Names and versions of the packages in the program, itself among them."""
+    """Names and versions of the packages in program and module, themselves among them."""
     edges = ["--edges", "normal,no-proc-macro", "--prefix", "none", "--format", "{p}"]
-    lines = cargo("tree", "--package", PROGRAM, "--target", target, *edges).splitlines()
+    lines = cargo("tree", "--package", PROGRAM, "--package", MODULE, "--target", target, *edges).splitlines()
     words = (line.split() for line in lines if line)
     return {(name, version.removeprefix("v")) for name, version, *_ in words}
 
