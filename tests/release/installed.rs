@@ -139,10 +139,10 @@ fn the_wheel_gives_a_front_without_rust() {
 
     // The program and the module of one wheel work together.
     let in_process = "import sys; sys.path.insert(0, 'demo')\nimport sesamec\n\
-        class World:\n    publishes = subscribes = ['cart/position', 'cart/command']\n    \
-        def __init__(self, setup): self.at = 5.0\n    \
-        def step(self, bus):\n        bus.messages(); bus.publish('cart/position', self.at)\n        \
-        bus.publish('cart/command', 1.0)\n\
+        class World:\n    subscribes = ['cart/position', 'cart/command']\n    \
+        publishes = ['cart/clearance', *subscribes]\n    def __init__(self, setup): pass\n    \
+        def step(self, bus):\n        bus.messages()\n        \
+        for topic in self.publishes: bus.publish(topic, 5.0)\n\
         print(sesamec.run('demo/demo.sesame', simulator=World, evaluations=4, results='here', \
         options=['--allow-unheard', '--fail-on', 'nothing'])['digest'])";
     let ran = machine.timed("sesamec.run, in process", machine.command("python").args(["-c", in_process])).expect(0);
