@@ -20,6 +20,15 @@ struct Machine {
     path: Vec<PathBuf>,
 }
 
+/// Runs a command to its end, and says what it took.
+#[track_caller]
+fn timed(what: &str, command: &mut Command) -> Done {
+    let begin = Instant::now();
+    let done = done(command);
+    say(what, begin.elapsed());
+    done
+}
+
 impl Machine {
     fn new(name: &str) -> Self {
         Machine { folder: fresh_folder(&format!("release-{name}")), path: Vec::new() }
@@ -38,18 +47,9 @@ impl Machine {
         places.into_iter().find(|place| place.is_file()).unwrap_or_else(|| program.to_owned())
     }
 
-    /// Runs a command to its end, and says what it took.
-    #[track_caller]
-    fn timed(&self, what: &str, command: &mut Command) -> Done {
-        let begin = Instant::now();
-        let done = done(command);
-        say(what, begin.elapsed());
-        done
-    }
-
     fn sesamec(&self, arguments: &[&str]) -> Done {
         let mut sesamec = self.command("sesamec");
-        self.timed(&format!("sesamec {}", arguments.join(" ")), sesamec.args(arguments))
+        timed(&format!("sesamec {}", arguments.join(" ")), sesamec.args(arguments))
     }
 
     /// The way from nothing to a page that every installation has to go, and the digest of its results.
@@ -78,7 +78,7 @@ impl Machine {
         let wheel = file("sesamec-", ".whl");
         let mut pip = machine.command("pip");
         pip.args(["install", "--quiet", "--disable-pip-version-check", "--no-index"]).arg(&wheel);
-        machine.timed("pip install", &mut pip).expect(0);
+        timed("pip install", &mut pip).expect(0);
         Some(machine)
     }
 }
@@ -134,7 +134,7 @@ fn the_wheel_gives_a_front_without_rust() {
     portable(&package.join("_native.abi3.so"));
     assert!(package.join("py.typed").is_file());
 
-    machine.timed("import sesamec", machine.command("python").args(["-c", "import sesamec"])).expect(0);
+    timed("import sesamec", machine.command("python").args(["-c", "import sesamec"])).expect(0);
     assert_eq!(machine.first_front(), expected("wheel"));
 
     // The program and the module of one wheel work together.
@@ -145,7 +145,7 @@ fn the_wheel_gives_a_front_without_rust() {
         for topic in self.publishes: bus.publish(topic, 5.0)\n\
         print(sesamec.run('demo/demo.sesame', simulator=World, evaluations=4, results='here', \
         options=['--allow-unheard', '--fail-on', 'nothing'])['digest'])";
-    let ran = machine.timed("sesamec.run, in process", machine.command("python").args(["-c", in_process])).expect(0);
+    let ran = timed("sesamec.run, in process", machine.command("python").args(["-c", in_process])).expect(0);
     assert_eq!(ran.out.trim().len(), 64, "{}", ran.out);
 }
 
@@ -192,7 +192,7 @@ fn a_campaign_in_rust_says_what_it_needs_and_runs_with_released_crates() {
     let of_cargo = std::env::var_os("CARGO_HOME").unwrap_or_else(|| Path::new(&home).join(".cargo").into());
     let rustup = std::env::var_os("RUSTUP_HOME").unwrap_or_else(|| Path::new(&home).join(".rustup").into());
     run.env("CARGO_HOME", of_cargo).env("RUSTUP_HOME", rustup);
-    let ran = machine.timed("sesamec run, with a runner to compile", run.args(["run", "demo/demo.sesame"])).expect(0);
+    let ran = timed("sesamec run, with a runner to compile", run.args(["run", "demo/demo.sesame"])).expect(0);
     ran.digest();
     assert!(!ran.err.contains("warning"), "{}", ran.err);
     let target = machine.folder.join("demo/runners/target");
@@ -253,7 +253,7 @@ fn the_debian_package_installs_the_program_its_pages_and_completions() {
     // A system without anything else: not even the C library, which is that of this machine.
     let mut install = command("dpkg");
     install.arg(format!("--root={}", root.display())).args(["--force-not-root", "--force-depends", "--install"]);
-    machine.timed("dpkg --install", install.arg(&package)).expect(0);
+    timed("dpkg --install", install.arg(&package)).expect(0);
     for part in [
         "usr/share/man/man1/sesamec-run.1.gz",
         "usr/share/bash-completion/completions/sesamec",
@@ -291,7 +291,7 @@ fn the_image_that_the_recipe_makes_runs_a_campaign() {
     let buildah = |what: &str, arguments: &[&str]| {
         let mut buildah = command("buildah");
         buildah.args(store).args(arguments).current_dir(&machine.folder);
-        machine.timed(what, &mut buildah)
+        timed(what, &mut buildah)
     };
     buildah("buildah bud", &["bud", "--quiet", "--isolation", "chroot", "--tag", "sesamec", "."]).expect(0);
     let container = buildah("buildah from", &["from", "sesamec"]).expect(0).out.trim().to_owned();
