@@ -106,6 +106,29 @@ class RunContext:
     def unimplemented(self) -> None:
         """Marks this hook as not filled in yet."""
 
+class Evolution:
+    """NSGA-II, or NSGA-III, on vectors in `0..=1` with the usual variation of real numbers. All is minimised."""
+
+    def __init__(self, variables: int, population: int, seed: int, reference_points: bool) -> None: ...
+    def ask(self) -> list[list[float]]:
+        """The next generation."""
+
+    def tell(self, objectives: Sequence[Sequence[float] | None]) -> None:
+        """Takes the objectives of that generation, in its order; `None` for what could not be evaluated."""
+
+    def survivors(self) -> list[int]:
+        """The vectors that survived, by how many were told before them."""
+
+class Falsification:
+    """A search for a violation, by a Gaussian process, on vectors in `0..=1`."""
+
+    def __init__(self, variables: int, requirements: int, seed: int) -> None: ...
+    def ask(self) -> list[list[float]]:
+        """The next vectors: several at first, then one."""
+
+    def tell(self, margins: Sequence[Sequence[float] | None]) -> None:
+        """Takes the margins of those vectors, in their order: negative where a requirement is violated."""
+
 class Needs(TypedDict):
     """What a plan needs of hooks, and says of their types."""
 

@@ -12,6 +12,7 @@
 )]
 
 mod hooks;
+mod optimise;
 mod raised;
 mod simulator;
 mod types;
@@ -36,6 +37,9 @@ mod _native {
 
     #[pymodule_export]
     use super::hooks::{MetricContext, OperationContext, RunContext};
+
+    #[pymodule_export]
+    use super::optimise::{Evolution, Falsification};
 
     /// The version of the package, which is that of the program.
     #[pymodule_export]

@@ -5,6 +5,7 @@ mod both_ways;
 mod hooks;
 mod interruption;
 mod notebook;
+mod optimisers;
 mod package;
 mod pytest;
 mod results;
