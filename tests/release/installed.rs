@@ -164,7 +164,7 @@ fn a_campaign_in_rust_says_what_it_needs_and_runs_with_released_crates() {
     assert_eq!(listed("demo"), before, "nothing is generated that cannot be built");
     for said in [
         "the simulator `",
-        "the metric `close_calls`",
+        "` and the metric `close_calls` are in Rust",
         "no `cargo` on PATH",
         "https://rustup.rs",
         "GB",

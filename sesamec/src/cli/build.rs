@@ -111,8 +111,8 @@ pub(super) fn check_cargo(runner: &RunnerPlan) -> anyhow::Result<()> {
     let (why, instead) = match &parts[..] {
         [] => (String::new(), ""),
         [one] => (format!(": {one} is in Rust"), "\n  or write it in Python, for which nothing is compiled"),
-        all => {
-            let why = format!(": {} are in Rust", all.join(", "));
+        [others @ .., last] => {
+            let why = format!(": {} and {last} are in Rust", others.join(", "));
             (why, "\n  or write them in Python, for which nothing is compiled")
         }
     };
