@@ -4,7 +4,7 @@ use std::fs;
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use sesame_tests::{Done, command, done, fresh_folder, sesamec, workspace};
 
@@ -83,8 +83,12 @@ impl Machine {
     }
 }
 
-fn say(what: &str, took: Duration) {
-    eprintln!("{what}: {:.2} s", took.as_secs_f64());
+/// Runs a command to its end, and prints what it took.
+fn timed(what: &str, command: &mut Command) -> Done {
+    let begin = Instant::now();
+    let done = done(command);
+    eprintln!("{what}: {:.2} s", begin.elapsed().as_secs_f64());
+    done
 }
 
 /// The digest that this workspace's own program comes to.
