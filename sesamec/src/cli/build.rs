@@ -22,8 +22,8 @@ const LINE_EVERY: Duration = Duration::from_secs(5);
 /// A build that takes longer is worth counting its crates.
 const SHORT: Duration = Duration::from_secs(1);
 
-/// What the first build of a runner takes, on two processors of 2026. Later ones compile only the runner's own crate.
-const COST: &str = "one to two minutes, and 500 MB on the disk";
+/// What the first build of a runner takes; later ones compile only the runner's own crate.
+const COST: &str = "about five minutes of processor, and 1 GB on the disk";
 
 /// What becomes known while cargo builds.
 enum Event {
