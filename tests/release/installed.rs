@@ -20,15 +20,6 @@ struct Machine {
     path: Vec<PathBuf>,
 }
 
-/// Runs a command to its end, and says what it took.
-#[track_caller]
-fn timed(what: &str, command: &mut Command) -> Done {
-    let begin = Instant::now();
-    let done = done(command);
-    say(what, begin.elapsed());
-    done
-}
-
 impl Machine {
     fn new(name: &str) -> Self {
         Machine { folder: fresh_folder(&format!("release-{name}")), path: Vec::new() }
