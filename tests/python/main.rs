@@ -2,6 +2,7 @@
 //! files and the module that cargo has built, and users' programs import it.
 
 mod both_ways;
+mod debugging;
 mod hooks;
 mod interruption;
 mod notebook;
