@@ -19,7 +19,7 @@ from typing import Any, Iterable, Iterator, Mapping, Sequence
 
 from ._results import Run
 from ._run import command_of
-from ._supervise import Failed, Stopped
+from ._supervise import concluded
 
 OUTCOMES = ("unknown", "completed", "no_effect", "crash", "timeout")
 
@@ -82,14 +82,14 @@ class Search:
         options: Sequence[str] = (),
     ) -> None:
         values = {"seed": seed, "evaluations": evaluations, "results": results}
-        command = command_of(space, campaign, values, resume, options)
+        self._command = command_of(space, campaign, values, resume, options)
         self._space = Path(space)
         ours, theirs = socket.socketpair()
         environment = {**os.environ, "SESAME_ASKED": "deterministic" if deterministic else "free"}
         with theirs:
             # Ctrl-C is for the loop: the end of this process, or of the search, stops the program.
             self._supervisor = subprocess.Popen(
-                command, stdin=theirs.fileno(), stdout=subprocess.PIPE, env=environment, start_new_session=True
+                self._command, stdin=theirs.fileno(), stdout=subprocess.PIPE, env=environment, start_new_session=True
             )
         self._connection = ours
         self._lines = ours.makefile("r", encoding="utf-8")
@@ -209,12 +209,7 @@ class Search:
 
     def _end(self) -> None:
         output, _ = self._supervisor.communicate()
-        code = self._supervisor.returncode
-        if code == 130:
-            raise Stopped
-        if not output.strip():
-            raise Failed(f"sesamec ended with exit code {code}: see its message above", code)
-        summary = json.loads(output)
+        summary = json.loads(concluded(self._command, self._supervisor.returncode, output).output)
         self._run = Run(Path(summary["results"]), space=self._space, summary=summary)
 
 

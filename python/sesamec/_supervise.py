@@ -80,6 +80,11 @@ def call(command: list[str], simulator: Callable[[Setup], Any] | None = None, *,
             code, output = _Forks(simulator, debug).supervise(command, messages)
         kept.seek(0)
         said = kept.read().decode(errors="replace")
+    return concluded(command, code, output, said)
+
+
+def concluded(command: list[str], code: int, output: bytes, said: str = "") -> Done:
+    """What a command that has ended came to. `said` are its messages, if they were kept."""
     if code == 130:
         sys.stderr.write(said)
         raise Stopped

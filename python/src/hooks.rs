@@ -373,9 +373,10 @@ impl OperationHook for PythonOperation {
                 if !(dropped && returned.is_none()) {
                     let read = code.types.write_back(&code.plan, shapes, ty, message, &returned);
                     called(read.map_err(|unfit| match unfit {
-                        Unfit::Raised(error) => {
-                            PyTypeError::new_err(format!("what `{word}` returned is no message: {}", error.value(py)))
-                        }
+                        Unfit::Raised(error) => PyTypeError::new_err(format!(
+                            "what `{word}` returned is not a message: {}",
+                            error.value(py)
+                        )),
                         Unfit::Mismatch(mismatch) => PyTypeError::new_err(format!(
                             "`{word}` has to return the message, also if it does not change it: {mismatch}"
                         )),

@@ -273,7 +273,7 @@ impl InThisProcess {
     }
 
     fn create(&mut self, seed: u64, relay: &mut dyn Exchange) -> Result<World, TransportError> {
-        let class = CLASS.get().ok_or_else(|| TransportError::Simulator("there is no class".to_owned()))?;
+        let class = CLASS.get().ok_or_else(|| TransportError::Simulator("this process has no simulator".to_owned()))?;
         let step = self.step.seconds();
         let parameters: Vec<(String, f64)> = relay.parameters().to_vec();
         let created = Python::attach(|py| {

@@ -1,4 +1,4 @@
-//! What users install of a release, where there is no Rust: an empty folder, and a PATH with nothing of this machine's.
+//! What users install of a release, on a machine without Rust: an empty folder, and a PATH with nothing of this one.
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt as _;

@@ -1,5 +1,5 @@
 //! What a release is made of, and what `./release` makes of it: the wheel, the archives, the Debian package and the
-//! image are installed where there is no Rust, and used.
+//! image are installed and used without Rust.
 #![cfg(test)]
 
 mod action;

@@ -1,4 +1,4 @@
-//! What the registries are told, in manifests that have to agree.
+//! What manifests say to registries, which has to agree.
 
 use std::collections::BTreeSet;
 

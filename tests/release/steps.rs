@@ -117,7 +117,7 @@ impl Job {
 pub(crate) const SPACE: &str = "a $(touch folder)/demo.sesame";
 
 impl Checkout {
-    /// `None` where there is no Python, which the demo's simulator needs.
+    /// `None` on a machine without Python, which the demo's simulator needs.
     pub(crate) fn new(name: &str) -> Option<Self> {
         if !sesame_peers::has_python3() {
             return None;

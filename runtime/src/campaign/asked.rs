@@ -230,21 +230,7 @@ fn observation(plan: &CampaignPlan, test: &Test, told: Told, run: f64) -> Result
     if let Some(unknown) = metrics.keys().next() {
         return Err(format!("the result of test {number} has a metric `{unknown}`, which the space does not declare"));
     }
-    Ok(Observation {
-        outcome,
-        end,
-        operations: Vec::new(),
-        unheard: Vec::new(),
-        unreached: Vec::new(),
-        traffic: Vec::new(),
-        course: None,
-        altered: None,
-        metrics: observed,
-        monitors: Vec::new(),
-        messages: 0,
-        warnings: Vec::new(),
-        wall: WallTime { run },
-    })
+    Ok(Observation { end, metrics: observed, wall: WallTime { run }, ..Observation::without_run(outcome) })
 }
 
 /// For how long the operations of a test are to be active, in seconds; `None` where conditions decide that.

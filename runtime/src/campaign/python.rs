@@ -204,7 +204,7 @@ fn late() -> io::Error {
 
 fn read(from: &mut impl Read) -> Vec<u8> {
     let mut text = Vec::new();
-    // What cannot be read is no answer.
+    // An answer that cannot be read to its end is not understood either.
     from.read_to_end(&mut text).ok();
     text
 }

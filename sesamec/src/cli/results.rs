@@ -142,8 +142,8 @@ pub(super) enum Results {
     },
     /// The page's figures of a run or a test, as a piece of HTML for a page of your own, such as a notebook.
     ///
-    /// Of a run: its findings, causes, requirements and front; of a test: its timeline, and everything on it as tables.
-    /// The piece has its style with it, and no script.
+    /// A run has its findings, causes, requirements and front; a test has its timeline and tables of everything on it.
+    /// The piece brings its style, and needs no script.
     Figures {
         /// A results file, or the folder of a run.
         file: PathBuf,

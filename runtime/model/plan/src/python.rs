@@ -27,8 +27,8 @@ const TAKEN: [&str; 42] = [
     "with", "yield",
 ];
 
-/// The name in Python of a field, a parameter or a message: its own, with `_` behind it if Python cannot have it. No
-/// two names come to the same.
+/// The name in Python of a field, a parameter or a message: its own, with `_` behind it if Python cannot have it. Two
+/// names never become one.
 pub fn attribute(name: &str) -> Cow<'_, str> {
     // Inside of a class, a name that begins with two underscores is another, unless it ends with two as well.
     if name.starts_with("__") {

@@ -14,8 +14,8 @@ use crate::html::test::test;
 /// The class of the element around the figures. Its style applies to nothing else.
 const CLASS: &str = "sesame-figures";
 
-/// The figures of a run: its findings, causes, requirements and front. Of a test: its timeline, and everything on it as
-/// tables. A run may still be going on.
+/// The figures of a run are its findings, causes, requirements and front; those of a test are its timeline and tables
+/// of everything on it. A run may still be going on.
 ///
 /// Links lead nowhere but to other tests of the same piece.
 pub fn figures(repository: &Repository, of_test: Option<u32>) -> Result<String, RecordError> {

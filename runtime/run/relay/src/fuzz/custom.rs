@@ -158,6 +158,19 @@ impl<'a> MessageCall<'a> {
         }
     }
 
+    /// The context of one call.
+    fn context<M>(&self) -> OperationContext<'a, M> {
+        OperationContext {
+            now: self.now,
+            topic: self.topic,
+            draws: self.draws,
+            next_draw: 0,
+            dropped: false,
+            injected: Vec::new(),
+            unimplemented: false,
+        }
+    }
+
     /// Calls a hook that reads and writes the message without its type. The error says that what it made is not of the
     /// declared type; then the message is passed on as the hook left it, with a warning of the run.
     pub fn dynamic(
@@ -166,15 +179,7 @@ impl<'a> MessageCall<'a> {
         call: impl FnOnce(&mut Value, &mut OperationContext<'_, Value>) -> Result<(), Mismatch>,
     ) {
         let before = value.clone();
-        let mut ctx = OperationContext {
-            now: self.now,
-            topic: self.topic,
-            draws: self.draws,
-            next_draw: 0,
-            dropped: false,
-            injected: Vec::new(),
-            unimplemented: false,
-        };
+        let mut ctx = self.context();
         self.mismatch = call(value, &mut ctx).err();
         self.dropped = ctx.dropped;
         self.unimplemented |= ctx.unimplemented;
@@ -196,15 +201,7 @@ impl<'a> MessageCall<'a> {
                 return;
             }
         };
-        let mut ctx = OperationContext {
-            now: self.now,
-            topic: self.topic,
-            draws: self.draws,
-            next_draw: 0,
-            dropped: false,
-            injected: Vec::new(),
-            unimplemented: false,
-        };
+        let mut ctx = self.context();
         call(&mut message, &mut ctx);
         self.dropped = ctx.dropped;
         self.unimplemented |= ctx.unimplemented;
